@@ -24,6 +24,7 @@ from klack.simulation.modal_step import (
     ROW_Q,
     ROW_V,
 )
+from klack.simulation.moving_bodies import MovingBodies
 from klack.simulation.network_arrays import (
     AT_ONCE,
     FINE,
@@ -95,6 +96,8 @@ class CompiledNetwork:
         Handle of every node of the loop.
     body_blocks : array, shape (bodies + 1,)
         First block of each body.
+    moving : MovingBodies or None
+        Bodies that meet point by point, instead of at interfaces.
     """
 
     rows: Rows
@@ -116,6 +119,7 @@ class CompiledNetwork:
     port_of: Mapping[int, int]
     node_order: tuple[int, ...]
     body_blocks: Index
+    moving: MovingBodies | None = None
 
     @property
     def arrays(self) -> NetworkArrays:

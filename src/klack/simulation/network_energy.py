@@ -28,6 +28,8 @@ def reset_accounts(network: CompiledNetwork) -> None:
     for account in network.accounts:
         account[:] = 0.0
     network.bodies.at[WORK : WORK + PORTS] = _unseen_work(network)
+    if network.moving is not None:
+        network.moving.forget_losses()
 
 
 def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
@@ -85,6 +87,8 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
                 float(touching.e[c]),
             )
         )
+    if network.moving is not None:
+        stores |= network.moving.stores()
     for i in range(nodes.volumes):
         excess = state.p[i] - nodes.ambient
         name = rows.nodes[network.node_order[i]].component
@@ -121,6 +125,13 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
     for k, line in enumerate(rows.lines):
         for j, what in enumerate(LINE_LOSSES):
             losses[f"{line.component} {what}"] = float(accounts.lines[k, j])
+    if network.moving is not None:
+        return EnergyBooks(
+            supplies=supplies,
+            losses=losses | network.moving.losses(),
+            stores_before=dict(before),
+            stores_after=after,
+        )
     works = network.bodies.at[WORK : WORK + PORTS] - _unseen_work(network)
     place = 0
     for row in rows.bodies:

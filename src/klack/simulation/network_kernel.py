@@ -123,7 +123,16 @@ from klack.simulation.step_status import (
     STATUS_REFUSED,
 )
 
-__all__ = ["CLOCK", "run_network"]
+__all__ = [
+    "CLOCK",
+    "FEW_REPEATS",
+    "MACRO_REPEATS",
+    "MOST_REPEATS",
+    "SETTLED",
+    "moved_by_round_off",
+    "push_by_rows",
+    "run_network",
+]
 
 Index = NDArray[np.int64]
 Vector = NDArray[np.float64]
@@ -133,14 +142,14 @@ CLOCK = 8
 """Time in fine steps, size of the last step, then
 :class:`klack.simulation.network_result.StepCounts`."""
 
-_SETTLED = 5e-5  # displacement by the missed force, over the longest way of a port; fine steps
-_SETTLED_MACRO = 2e-4  # the same of macro steps
-_ENERGY = 1e-12  # energy that catching up costs over the work of the step, fine steps
-_ENERGY_MACRO = 1e-6  # the same of macro steps
+SETTLED = (2e-4, 1e-6), (5e-5, 1e-12)
+"""Of a macro step, then of a fine one: displacement by the missed force, over the longest way of a
+port, and energy that catching up costs over the work of the step."""
+
 _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
-_FEW_REPEATS = 8  # are enough, unless what still changes is round-off
-_MOST_REPEATS = 200
-_MACRO_REPEATS = 6  # without success: fine steps
+FEW_REPEATS = 8  # are enough, unless what still changes is round-off
+MOST_REPEATS = 200
+MACRO_REPEATS = 6  # without success: fine steps
 
 
 class _Loop(NamedTuple):
@@ -348,9 +357,8 @@ def _settle(
     bodies, contacts = loop.bodies, loop.contacts
     G = shift(bodies.G, step.level * PORTS * PORTS)
     fine = step.level == FINE
-    share = _SETTLED if fine else _SETTLED_MACRO
-    energy = _ENERGY if fine else _ENERGY_MACRO
-    for attempt in range(_MOST_REPEATS if fine else _MACRO_REPEATS):
+    share, energy = SETTLED[1 if fine else 0]
+    for attempt in range(MOST_REPEATS if fine else MACRO_REPEATS):
         if attempt > 0:
             take_back_ports(bodies, sub.level, parts > 1)
             take_back_interfaces(
@@ -361,7 +369,7 @@ def _settle(
             clock[7] += 1
         status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop, report)
         if status == STATUS_DONE:
-            status = _push_by_rows(step, bodies, loop.elements, loop.fluid, contacts, report)
+            status = push_by_rows(step, bodies, loop.elements, loop.fluid, contacts, report)
         if status != STATUS_DONE:
             return status
         miss(bodies, G)
@@ -371,9 +379,9 @@ def _settle(
             return STATUS_DONE
         if not finite(bodies):
             break
-        if fine and attempt >= _FEW_REPEATS:
+        if fine and attempt >= FEW_REPEATS:
             moved = largest_missed(bodies)
-            if moved <= _moved_by_round_off(G, bodies.ports, loop.elements, loop.fluid, contacts):
+            if moved <= moved_by_round_off(G, bodies.ports, loop.elements, loop.fluid, contacts):
                 return STATUS_DONE
     if fine:
         report[0], report[2] = largest_missed(bodies), step.t
@@ -483,7 +491,7 @@ def _slider_sums(loop: Any) -> Any:
 
 
 @phase
-def _push_by_rows(
+def push_by_rows(
     step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, report: Any
 ) -> int:
     """Forces of elements, fluid and far films for the way that their ports went."""
@@ -500,7 +508,7 @@ def _push_by_rows(
 
 
 @phase
-def _moved_by_round_off(G: Any, ports: int, elements: Any, fluid: Any, contacts: Any) -> float:
+def moved_by_round_off(G: Any, ports: int, elements: Any, fluid: Any, contacts: Any) -> float:
     """Displacement that the round-off of the forces of a sweep makes [m], the largest of a port.
 
     Forces that hold each other in balance leave a sum of nothing, but not without the round-off of

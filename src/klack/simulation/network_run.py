@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Literal
 
@@ -50,6 +50,7 @@ from klack.simulation.network_result import (
 )
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.rubbing_step import slider_places
+from klack.simulation.spatial_motion import SpatialMotion
 from klack.simulation.static_start import start_at_rest
 from klack.simulation.step_sizes import StepSizes, largest_divisor, step_sizes
 from klack.simulation.step_status import (
@@ -61,7 +62,14 @@ from klack.simulation.step_status import (
 from klack.simulation.yielding_step import pressed_state
 from klack.units import format_si
 
-__all__ = ["Grid", "grid_of", "has_python_steps", "simulate_network"]
+__all__ = [
+    "Grid",
+    "everything",
+    "grid_of",
+    "has_python_steps",
+    "put_back",
+    "simulate_network",
+]
 
 Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
@@ -85,6 +93,7 @@ def simulate_network(
     record: float = 0.5e-6,
     start: Literal["rest", "free"] = "rest",
     state: State | None = None,
+    spatial: SpatialMotion | None = None,
     progress: Callable[[float], None] = lambda fraction: None,
 ) -> NetworkResult:
     """Compute a network over time.
@@ -114,6 +123,9 @@ def simulate_network(
     state : mapping of str to array, optional
         :attr:`NetworkResult.state` of a former run of the same network and steps, to continue from;
         ``start`` then has no meaning, time continues, and the energy balance starts there.
+    spatial : SpatialMotion, optional
+        Bodies that meet point by point, in place of the interfaces of the network, which only give
+        names to what is recorded.
     progress : callable
         Told the fraction done.
 
@@ -141,7 +153,7 @@ def simulate_network(
     network = compile_network(rows, sizes)
     grid = grid_of(duration, sizes, record)
     step = sizes.step
-    chunk = _PYTHON_CHUNK if has_python_steps(rows) else _CHUNK
+    chunk = _PYTHON_CHUNK if has_python_steps(rows) or spatial is not None else _CHUNK
     recorder = Recorder(
         network,
         records=grid.records,
@@ -152,10 +164,16 @@ def simulate_network(
     clock = np.zeros(CLOCK, dtype=np.int64)
     clock[1] = -1
     begun = None
+    if state is None and start == "rest":
+        begun = start_at_rest(network, step)
+    if spatial is not None:
+        network = replace(network, moving=spatial.of(network, sizes))
     if state is not None:
         _restore(network, clock, state)
-    elif start == "rest":
-        begun = start_at_rest(network, step)
+    if network.moving is not None and state is None:
+        network.moving.start(rest=start == "rest")
+    elif network.moving is not None:
+        network.moving.resume()
     first_step, done_before = int(clock[0]), clock[2:].copy()
     finder = ImpactFinder(rows, step * first_step)
     fresh = state is None or _IMPACTS not in state  # of an earlier version
@@ -188,9 +206,13 @@ def simulate_network(
     books = balance_since(network, before)
     events = finder.events()
     finder.told()
+    channels = recorder.channels(records)
+    if network.moving is not None:
+        for row, added in zip(rows.interfaces, network.moving.gap(), strict=True):
+            channels[f"{row.component} gap"].values[:] += added
     result = NetworkResult(
         time=time.astype(float),
-        channels=recorder.channels(records),
+        channels=channels,
         interfaces=recorder.interfaces(),
         events=events,
         books=books,
@@ -285,7 +307,7 @@ def _run(
         # a chunk ends with a record if it can, wherever the run began
         to_record = grid.looks - recorder.looked % grid.looks
         count = min(chunk, looks - recorder.looked if chunk >= grid.looks else to_record)
-        kept = _everything(network, clock)
+        kept = everything(network, clock)
         good, failure = _try_chunk(network, recorder, limits, clock, grid, count)
         if failure is not None:
             good, failure = _up_to(network, recorder, limits, clock, grid, kept, good, failure)
@@ -324,7 +346,7 @@ def _up_to(
     count = good
     try:
         while high - low > 1:
-            _put_back(kept)
+            put_back(kept)
             most, again = _try_chunk(network, recorder, limits, clock, grid, count)
             if again is None:
                 low, done = count, count
@@ -332,12 +354,12 @@ def _up_to(
                 high, done, failure = min(count, most + 1), 0, again
             count = (low + high) // 2
         if low and done != low:
-            _put_back(kept)
+            put_back(kept)
             low, _ = _try_chunk(network, recorder, limits, clock, grid, low)
     except InputError:
         low = 0
     if not low:
-        _put_back(kept)
+        put_back(kept)
     return low, failure
 
 
@@ -396,6 +418,19 @@ def _advance(
     *,
     report: Vector,
 ) -> None:
+    if network.moving is not None:
+        status = network.moving.advance(
+            recording,
+            scratch_of(network, recording),
+            clock,
+            grid.block,
+            grid.look,
+            macros // grid.look,
+            report,
+        )
+        if status != STATUS_DONE:
+            raise _failure(network, status, report)
+        return
     status = run_network(
         macros,
         grid.look,
@@ -408,14 +443,15 @@ def _advance(
         grid.sizes.coarse > 1,
         network.arrays,
         recording,
-        _scratch(network, recording),
+        scratch_of(network, recording),
         report,
     )
     if status != STATUS_DONE:
         raise _failure(network, status, report)
 
 
-def _scratch(network: CompiledNetwork, recording: Recording) -> Scratch:
+def scratch_of(network: CompiledNetwork, recording: Recording) -> Scratch:
+    """Memory of the time loop of a network."""
     return scratch_memory(
         interfaces=network.interfaces.interfaces,
         sliders=network.sliders.sliders,
@@ -582,6 +618,8 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
     arrays = {
         f"{owner}.{name}": array for owner, group in groups.items() for name, array in group.items()
     }
+    if network.moving is not None:
+        arrays |= {f"moving.{name}": array for name, array in network.moving.changing().items()}
     return {"clock": clock} | arrays
 
 
@@ -599,13 +637,14 @@ def _pressed_faces(network: CompiledNetwork) -> dict[str, PressedFaces]:
     return found
 
 
-def _everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:
+def everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:
     """All arrays that a step changes, and what they hold now."""
     arrays = [*_changing(network, clock).values(), *network.accounts]
     return [(array, array.copy()) for array in arrays]
 
 
-def _put_back(kept: Kept) -> None:
+def put_back(kept: Kept) -> None:
+    """Go back to what :func:`everything` kept."""
     for array, values in kept:
         array[...] = values
 

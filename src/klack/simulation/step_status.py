@@ -8,6 +8,7 @@ __all__ = [
     "STATUS_MET",
     "STATUS_PRESSURES",
     "STATUS_REFUSED",
+    "STATUS_REPEAT",
 ]
 
 STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
@@ -17,3 +18,6 @@ STATUS_REFUSED = -1
 
 STATUS_MET = -2
 """Of a step that met a touch or a release: bodies need finer ones."""
+
+STATUS_REPEAT = -3
+"""Of a step whose guess of the forces of elements and fluid missed too much."""

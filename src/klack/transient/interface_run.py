@@ -58,7 +58,7 @@ from klack.transient.interface_result import (
     RigidMotion,
 )
 
-__all__ = ["Gaps", "contact_points", "simulate_interface"]
+__all__ = ["Gaps", "bore_arrays", "contact_points", "modes_of_step", "simulate_interface"]
 
 Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Exact gaps, shape (nc,) [m], at a rigid placement of the moving body, shape (6,) [m], [rad]."""
@@ -197,7 +197,7 @@ def contact_points(
     )
 
 
-def _modes(model: InterfaceModel, step: float) -> Modes:
+def modes_of_step(model: InterfaceModel, step: float) -> Modes:
     """Everything that depends on the length of the step."""
     P = modal_propagator(model.omega, model.damping, step)
     loss = np.zeros((0, model.mode_count))
@@ -253,7 +253,7 @@ class _Run:
         self.clearance = max(
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
-        self.bore = _bore(guide, M)
+        self.bore = bore_arrays(guide, M)
         self.state = State.still(M, n, len(self.bore.clearance), model.ways)
         self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
         self.in_flight = self.state._replace(
@@ -273,7 +273,7 @@ class _Run:
 
     def stepper(self, doublings: int) -> Modes:
         if doublings not in self.steppers:
-            self.steppers[doublings] = _modes(self.model, self.step * 2.0**doublings)
+            self.steppers[doublings] = modes_of_step(self.model, self.step * 2.0**doublings)
         return self.steppers[doublings]
 
     # ------------------------------------------------------------------ placement
@@ -673,7 +673,8 @@ _SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
 """A millimetre of translation weighs like a radian over a metre: lengths of valves."""
 
 
-def _bore(guide: Guide | None, modes: int) -> Bore:
+def bore_arrays(guide: Guide | None, modes: int) -> Bore:
+    """Guide as the compiled step takes it."""
     if guide is None:
         return Bore.none(modes)
     return Bore(

@@ -1,0 +1,55 @@
+"""Bodies of a running network that meet point by point, whoever moves them."""
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.simulation.network_arrays import Recording, Scratch
+
+__all__ = ["MovingBodies"]
+
+Vector = NDArray[np.float64]
+Changing = NDArray[np.generic]
+
+
+class MovingBodies(Protocol):
+    """Bodies of one run; the network holds their modes whenever a record ends."""
+
+    def start(self, *, rest: bool) -> None:
+        """Place them, and bring them to rest under the forces of the network if asked to."""
+
+    def resume(self) -> None:
+        """Go on from a stored state."""
+
+    def advance(
+        self,
+        recording: Recording,
+        scratch: Scratch,
+        clock: NDArray[np.int64],
+        block: int,
+        look: int,
+        looks: int,
+        report: Vector,
+    ) -> int:
+        """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
+        ...
+
+    def changing(self) -> dict[str, Changing]:
+        """All arrays that a step changes and the next one begins with."""
+        ...
+
+    def stores(self) -> dict[str, float]:
+        """Energies [J] that they hold beside that of their modes."""
+        ...
+
+    def losses(self) -> dict[str, float]:
+        """Energies [J] lost since the start of the run."""
+        ...
+
+    def forget_losses(self) -> None:
+        """Begin a new energy balance."""
+
+    def gap(self) -> Vector:
+        """Add this to a recorded gap to have the true one, of each interface [m]."""
+        ...

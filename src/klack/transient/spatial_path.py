@@ -1,0 +1,47 @@
+"""Way of a needle in space over a run."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["SpatialPath"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class SpatialPath:
+    """Rigid motion of the needle and the forces of its guide, filled while it moves."""
+
+    _rows: list[tuple[float, Vector, Vector, Vector]] = field(default_factory=list)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._rows.clear()
+
+    def add(self, time: float, place: Vector, speed: Vector, guide: Vector) -> None:
+        """Add a moment; what was later is forgotten, since it has been computed again."""
+        while self._rows and self._rows[-1][0] >= time:
+            self._rows.pop()
+        self._rows.append((time, place, speed, np.linalg.norm(guide, axis=1)))
+
+    @property
+    def time(self) -> Vector:
+        """Moments, shape (n,) [s]."""
+        return np.array([row[0] for row in self._rows])
+
+    @property
+    def position(self) -> Vector:
+        """Translation of the centre of mass and rotation vector, shape (n, 6) [m], [rad]."""
+        return np.array([row[1] for row in self._rows]).reshape(-1, 6)
+
+    @property
+    def velocity(self) -> Vector:
+        """Rates of both, shape (n, 6) [m/s], [rad/s]."""
+        return np.array([row[2] for row in self._rows]).reshape(-1, 6)
+
+    @property
+    def guide_force(self) -> Vector:
+        """Side force at each height of the guide, shape (n, k) [N]."""
+        return np.array([row[3] for row in self._rows])

@@ -1,0 +1,777 @@
+r"""Bodies that meet point by point, driven by the axial network of a valve.
+
+Modes of all bodies move under the forces of the network, constant over a macro step; contact points
+and guide act in the fine steps of :mod:`klack.transient.interface_kernel` where they may touch.
+What the guess of the forces missed is repaired by superposition: see :class:`_Moving`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.step_constants import NO_LAW
+from klack.errors import ConvergenceError, InputError
+from klack.simulation.modal_step import ROW, ROW_Q, ROW_V
+from klack.simulation.network_arrays import (
+    AHEAD,
+    ANSWER,
+    BEGIN,
+    COARSE,
+    FINE,
+    GUESS,
+    LAST,
+    MISSED,
+    NEAR,
+    PORTS,
+    WORK,
+    Y0,
+    Y1,
+    Recording,
+    Scratch,
+)
+from klack.simulation.network_compile import CompiledNetwork
+from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_network
+from klack.simulation.network_run import everything, put_back
+from klack.simulation.propagator import modal_propagator
+from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
+from klack.simulation.step_sizes import StepSizes
+from klack.simulation.step_status import (
+    STATUS_DONE,
+    STATUS_FORCES,
+    STATUS_REFUSED,
+    STATUS_REPEAT,
+)
+from klack.transient.guide import Guide
+from klack.transient.interface_arrays import (
+    DAMPING,
+    DEBT,
+    FRICTION,
+    GUIDE,
+    GUIDE_STRAIN,
+    ActiveSet,
+    ContactPoints,
+    Modes,
+    Outside,
+    Record,
+    Rubbing,
+    State,
+)
+from klack.transient.interface_kernel import FAILED, march, safe_flight
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
+from klack.transient.spatial_path import SpatialPath
+from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
+
+__all__ = ["SpatialValve"]
+
+Vector = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_AWAY = 1.0  # [m] added to the gaps of the axial interfaces, which then never act
+_FRESH = 0.04e-6  # gaps as good as new [m]
+_STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wrong by
+_SURE = 0.5  # share of the time in which no gap can close, since forces may change meanwhile
+_LONGEST = 16  # records of a flight at once
+_STEADY = 0.04  # change of the force of a contact at rest in a step
+_NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SpatialValve:
+    """Bodies of a valve that meet point by point: :class:`klack.simulation.spatial_motion`.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+        Of all bodies of the network, the needle first, at the placement of the meshes (q = 0 is
+        where the network has its displacements 0).  Without friction between the faces.
+    components : tuple of str
+        Component of each of ``model.bodies`` in the network.
+    stops : tuple of str
+        Component of the network at each of ``model.contacts``; one below and one above at most.
+    guide : Guide, optional
+    gaps : callable, optional
+        Exact gaps at a rigid placement of the needle; without it they stay linear.
+    placement : array, shape (6,) [m], [rad]
+        Of the needle at the start: translation of its centre of mass and rotation vector, beside
+        the displacement along the axis that the network has.
+    velocity : array, shape (6,) [m/s], [rad/s]
+        At the start, beside what the network has.
+    path : SpatialPath
+        Filled while it runs.
+    """
+
+    model: InterfaceModel
+    components: tuple[str, ...]
+    stops: tuple[str, ...]
+    guide: Guide | None = None
+    gaps: Gaps | None = None
+    placement: Vector = field(default_factory=lambda: np.zeros(6))
+    velocity: Vector = field(default_factory=lambda: np.zeros(6))
+    path: SpatialPath = field(default_factory=SpatialPath)
+
+    def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
+        """Return them in a network.
+
+        Raises
+        ------
+        InputError
+            For a network with other bodies, interfaces, or friction along the axis.
+        """
+        _check(self, network)
+        return _Moving(self, network, sizes)
+
+
+class _Kept(NamedTuple):
+    """What a repeated step begins with."""
+
+    vectors: tuple[Vector, ...]
+    active: NDArray[np.bool_]
+    points: Index
+    counts: Index
+    inverse: NDArray[np.float64]
+
+
+class _Moving:
+    r"""Bodies of a valve in one run.
+
+    The network has the modes while nothing can touch; else ``state`` has them, in the order of the
+    model, and the network gets them at the end of each record.
+
+    A repair :math:`\delta q, \delta \dot q` of the modes adds the energy
+
+    .. math:: \delta E = \sum \omega^2 q\,\delta q + \dot q\,\delta\dot q
+        + \tfrac12 (\omega^2 \delta q^2 + \delta\dot q^2) ,
+
+    of which :math:`\lambda^T \Phi\,\delta q` is of the contact (half of it in its potential, half a
+    debt of its next step) and :math:`N^T T\,\delta q` of the guide.
+    """
+
+    def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
+        self.valve, self.network, self.sizes = valve, network, sizes
+        model = valve.model
+        self.model, self.ports = model, len(network.ports)
+        self.place_q, self.place_v, self.P = _places(valve, network)
+        self.at = network.bodies.at
+        h = sizes.step
+        steps = {FINE: 1, COARSE: sizes.coarse, NEAR: sizes.near}
+        self.steps = steps
+        self.kicks = {
+            level: modal_propagator(model.omega, model.damping, count * h)
+            for level, count in steps.items()
+        }
+        self.fine, self.whole = modes_of_step(model, h), modes_of_step(model, sizes.coarse * h)
+        self.points = contact_points(model, self.fine.B1, h)
+        self.resting = contact_points(model, self.whole.B1, sizes.coarse * h)
+        self.nothing = ContactPoints.none(model.mode_count)
+        self.bore = bore_arrays(valve.guide, model.mode_count)
+        self.state = State.still(model.mode_count, model.count, len(self.bore.clearance))
+        self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
+        self.apart = self.state._replace(
+            lam=np.zeros(0), contact=ActiveSet.none(0), rubbing=Rubbing.none(0, 0)
+        )
+        self.gap0 = np.array(model.gap)
+        self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
+        self.taken_at = np.zeros(6)
+        self.arms = np.array([model.points[a:b].mean(axis=0) for _, a, b in model.contacts])
+        self.arms -= model.centre
+        # closed since [fine steps], nan while open; axial force of the last step
+        self.closed = np.full(len(model.contacts), np.nan)
+        self.force = np.zeros(len(model.contacts))
+        self.steady = False
+        self.flags = np.zeros(2)  # 1 at rest: inverse of long steps; energy that flights lost [J]
+        self.order = [
+            [row.component for row in network.rows.interfaces].index(stop) for stop in valve.stops
+        ]
+        self.rest = network.interfaces.rest[self.order] / h
+        self.side = np.array([np.sign(np.sum(model.axial[a:b])) for _, a, b in model.contacts])
+        self.fresh = True
+
+    # ------------------------------------------------------------------ start
+
+    def start(self, *, rest: bool) -> None:
+        """Place the needle, and let it settle under the forces of the network if asked to."""
+        self.read()
+        placed, moving = self.coordinates(self.valve.placement), self.valve.velocity
+        self.q[: self.rigid_count] += placed
+        self.v[: self.rigid_count] += self.coordinates(moving)
+        self.take_gaps()
+        self._silence_interfaces()
+        if rest:
+            settle_at_rest(
+                self.model,
+                self.state,
+                self.gap0,
+                self.bore,
+                self.P @ self.at[LAST : LAST + self.ports],
+                self.sizes.near * self.sizes.step,
+            )
+            self._begin_closed()
+        else:
+            shaft_pressed(self.bore, self.state)
+        self.write()
+        self.at[Y0 : Y0 + self.ports] = self.P.T @ self.q
+        if not rest:
+            self.at[Y1 : Y1 + self.ports] = self.at[Y0 : Y0 + self.ports]
+            self.at[2 * PORTS : 2 * PORTS + self.ports] = self.at[Y0 : Y0 + self.ports]  # SEEN
+        self.valve.path.clear()
+        self._tell_path(0)
+
+    def resume(self) -> None:
+        """Go on from a stored state."""
+        self._silence_interfaces()
+        self.read()
+        carrying = np.flatnonzero(self.state.lam > 0.0)
+        self.state.contact.active[:] = self.state.lam > 0.0
+        self.state.contact.points[: len(carrying)] = carrying
+        self.state.contact.counts[:] = len(carrying), 0
+        self._renew(self.resting.A if self.flags[0] else self.points.A)
+        self.valve.path.clear()
+
+    def _silence_interfaces(self) -> None:
+        """Let the points act in place of the interfaces of the network."""
+        rows, state = self.network.interfaces, self.network.interface_state
+        rows.kind[:] = NO_LAW
+        rows.dry[:] = 1
+        if not np.any(rows.gap0 > 0.5 * _AWAY):
+            rows.gap0[:] += _AWAY
+            state.gap[:] += _AWAY
+        for values in (state.e, state.force, state.chi, state.deepest, state.force_before):
+            values[:] = 0.0
+        state.since[:] = np.inf
+
+    def _begin_closed(self) -> None:
+        for c, (_, a, b) in enumerate(self.model.contacts):
+            self.force[c] = float(self.model.axial[a:b] @ self.state.lam[a:b])
+            self.closed[c] = -np.inf if np.any(self.state.lam[a:b] > 0.0) else np.nan
+        self._rest_on(rest=not bool(np.all(np.isnan(self.closed))))
+
+    # ------------------------------------------------------------------ what others ask
+
+    def gap(self) -> Vector:
+        """Add this to a recorded gap to have the true one, of each interface [m]."""
+        return np.full(len(self.order), -_AWAY)
+
+    def changing(self) -> dict[str, NDArray[np.generic]]:
+        """All arrays that a step changes and the next one begins with."""
+        return {
+            "forces": self.state.lam,
+            "guide": self.state.guide_force,
+            "carried": self.state.carried,
+            "books": self.books,
+            "gaps": self.gap0,
+            "placement": self.taken_at,
+            "closed": self.closed,
+            "force": self.force,
+            "flags": self.flags,
+        }
+
+    def stores(self) -> dict[str, float]:
+        """Energies [J] that contacts and guide hold."""
+        self.read()
+        held = {}
+        for stop, (_, a, b) in zip(self.valve.stops, self.model.contacts, strict=True):
+            depth = self.gap0[a:b] + self.model.traces[a:b] @ self.q
+            held[f"{stop} contact"] = float(-0.5 * self.state.lam[a:b] @ depth)
+        if len(self.bore.clearance):
+            held["guide strain"] = float(self.books[GUIDE_STRAIN])
+        return held
+
+    def losses(self) -> dict[str, float]:
+        """Energies [J] lost since the start of the run."""
+        lost = {}
+        if np.any(self.model.damping > 0.0):
+            lost["bodies damping"] = float(self.books[DAMPING] + self.flags[1])
+        if len(self.bore.clearance):
+            lost["guide friction"] = float(self.books[GUIDE])
+        return lost
+
+    def forget_losses(self) -> None:
+        """Begin a new energy balance."""
+        self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
+        self.flags[1] = 0.0
+
+    # ------------------------------------------------------------------ motion
+
+    def advance(
+        self,
+        recording: Recording,
+        scratch: Scratch,
+        clock: Index,
+        block: int,
+        look: int,
+        looks: int,
+        report: Vector,
+    ) -> int:
+        """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
+        done = 0
+        if not looks:
+            return self._loop(recording, scratch, clock, block, look, 0, 0, report)
+        self.read()
+        self.fresh = True
+        span = look * block * self.sizes.step
+        while done < looks:
+            fly, points = self._outlook(span, looks - done)
+            if fly:
+                kept, filled = everything(self.network, clock), recording.filled.copy()
+                status = self._fly(recording, scratch, clock, block, look, done, fly, report)
+                if status != STATUS_DONE:
+                    return status
+                if self._clear():
+                    done += fly
+                    self._tell_path(int(clock[0]))
+                    continue
+                put_back(kept)
+                recording.filled[:] = filled
+                self.read()
+                points = True
+            status = self._watch(recording, scratch, clock, block, look, done, points, report)
+            if status != STATUS_DONE:
+                return status
+            done += 1
+            self._tell_path(int(clock[0]))
+        return STATUS_DONE
+
+    def _outlook(self, span: float, most: int) -> tuple[int, bool]:
+        """How many records can be flown, and else whether contact points have to be looked at."""
+        if self.state.contact.counts[0]:
+            return 0, True
+        horizon = min(most, _LONGEST) * span / _SURE
+        stale = self._stale()
+        safe = self._safe(horizon, stale)
+        if safe * _SURE < 2.0 * span and stale > _FRESH:
+            self.take_gaps(careful=True)
+            safe = self._safe(horizon, self._stale())
+        fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
+        while fly and not self._unguided(fly * span):
+            fly //= 2
+        return fly, safe * _SURE < span
+
+    def _fly(
+        self,
+        recording: Recording,
+        scratch: Scratch,
+        clock: Index,
+        block: int,
+        look: int,
+        done: int,
+        looks: int,
+        report: Vector,
+    ) -> int:
+        """Free flight, in the loop of the axial network."""
+        here = slice(0, self.ports)
+        before, work = self._modal_energy(), float(np.sum(self.at[WORK:][here]))
+        status = self._loop(recording, scratch, clock, block, look, done, looks, report)
+        self.read()
+        if np.any(self.model.damping > 0.0):
+            given = float(np.sum(self.at[WORK:][here])) - work
+            self.flags[1] += given - (self._modal_energy() - before)
+        self.fresh = True
+        return status
+
+    def _loop(
+        self,
+        recording: Recording,
+        scratch: Scratch,
+        clock: Index,
+        block: int,
+        look: int,
+        done: int,
+        looks: int,
+        report: Vector,
+    ) -> int:
+        part = recording._replace(
+            means=recording.means[done:],
+            peaks=recording.peaks[done:],
+            points=recording.points[done:],
+        )
+        sizes = self.sizes
+        return int(
+            run_network(
+                looks * look,
+                look,
+                clock,
+                block,
+                sizes.near,
+                sizes.middle,
+                0.0,
+                sizes.step,
+                sizes.coarse > 1,
+                self.network.arrays,
+                part,
+                scratch,
+                report,
+            )
+        )
+
+    def _watch(
+        self,
+        recording: Recording,
+        scratch: Scratch,
+        clock: Index,
+        block: int,
+        look: int,
+        row: int,
+        points: bool,
+        report: Vector,
+    ) -> int:
+        """One record in which contact points or the guide are looked at."""
+        left = look * block
+        time = left * self.sizes.step
+        before = self.force.copy()
+        while left:
+            level = NEAR if self.sizes.coarse > 1 else FINE
+            if points and self._rests(clock) and left >= self.steps[COARSE]:
+                level = COARSE
+            taken = self.steps[level]
+            status = self._step(
+                level, recording, scratch, clock, points, row if left == taken else -1, time, report
+            )
+            if status == STATUS_REFUSED:
+                if level == COARSE:
+                    self._rest_on(rest=False)
+                    self.closed[~np.isnan(self.closed)] = float(clock[0])
+                    continue
+                for _ in range(taken):
+                    left -= 1
+                    status = self._step(
+                        FINE, recording, scratch, clock, points, -1 if left else row, time, report
+                    )
+                    if status != STATUS_DONE:
+                        return STATUS_FORCES if status == STATUS_REFUSED else status
+                continue
+            if status != STATUS_DONE:
+                return status
+            left -= taken
+        self._steady(before)
+        self.write()
+        record_moment(row, self.network.arrays, recording)
+        return STATUS_DONE
+
+    def _step(
+        self,
+        level: int,
+        recording: Recording,
+        scratch: Scratch,
+        clock: Index,
+        points: bool,
+        record: int,
+        record_time: float,
+        report: Vector,
+    ) -> int:
+        """One macro step, with bodies in fine steps; at rest in one."""
+        h, steps, arrays = self.sizes.step, self.steps[level], self.network.arrays
+        t, H = float(clock[0]) * h, steps * h
+        last = self._length(int(clock[1]), steps)
+        begin_step(steps, steps / last, t, H, self.fresh, arrays, scratch)
+        self.fresh = False
+        rest = level == COARSE
+        count, modes = (1, self.whole) if rest else (steps, self.fine)
+        kept = self._keep()
+        at, here = self.at, self.ports
+        self.network.interface_state.far[:] = 0.0
+        for attempt in range(MOST_REPEATS if level == FINE else MACRO_REPEATS):
+            if attempt:
+                self._put_back(kept)
+                at[GUESS : GUESS + PORTS] = at[ANSWER : ANSWER + PORTS]
+                at[GUESS + here] = 0.0
+                clock[7] += 1
+            push = self.P @ at[GUESS : GUESS + here]
+            record_ = self._march(modes._replace(push=push), count, points, rest, t, report)
+            if rest and not self._still(record_):
+                self._put_back(kept)
+                clock[1] = level
+                return STATUS_REFUSED
+            at[Y1 : Y1 + here] = self.P.T @ self.q
+            status = answer_step(level, steps, attempt, t, H, arrays, scratch, report)
+            if status != STATUS_REPEAT:
+                break
+        if status in (STATUS_REPEAT, STATUS_REFUSED):
+            self._put_back(kept)
+            clock[1] = level  # forces are spaced like this now
+            if level == FINE:
+                report[2] = t
+            return STATUS_REFUSED
+        if status != STATUS_DONE:
+            return int(status)
+        excess = self._repair(level)
+        self._tell(record_, t, H / count, recording, scratch, points)
+        clock[0] += steps
+        clock[1] = level
+        clock[2 if level == FINE else 3 if rest else 4] += 1
+        if level == NEAR:
+            clock[5] += steps
+            clock[6] += steps
+        end_step(steps, H, excess, record, record_time, arrays, recording, scratch)
+        return STATUS_DONE
+
+    def _length(self, level: int, default: int) -> int:
+        return self.steps.get(level, default) if level >= 0 else default
+
+    def _march(
+        self, modes: Modes, count: int, points: bool, rest: bool, t: float, report: Vector
+    ) -> Record:
+        """Fine steps under a constant modal force, that of ``modes.push``."""
+        n = self.model.count if points else 0
+        record = Record.empty(count, len(self.model.bodies), n, keep_points=False)
+        touching = self.nothing
+        if points:
+            touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
+        state = self.state if points else self.apart
+        _, status = march(count, 0, modes, _NONE, touching, self.bore, state, record)
+        if status == FAILED or not np.all(np.isfinite(self.q)):
+            report[2] = t
+            raise ConvergenceError(
+                f"needle: no contact forces found at {1e6 * t:.4g} us.\n"
+                "Try: a shorter step, or fewer kept modes."
+            )
+        return record
+
+    def _repair(self, level: int) -> float:
+        """Let what was missed act; the energy that bodies got beyond what was given to them [J]."""
+        at, here, omega2 = self.at, self.ports, self.model.omega**2
+        missed, d = at[MISSED : MISSED + here], at[AHEAD : AHEAD + here]
+        guess = at[GUESS : GUESS + here]
+        way = at[Y1 : Y1 + here] - at[BEGIN : BEGIN + here]
+        kick = self.P @ missed
+        dq, dv = self.kicks[level].B1 * kick, self.kicks[level].B2 * kick
+        energy = float(np.sum(omega2 * self.q * dq + self.v * dv + 0.5 * (omega2 * dq**2 + dv**2)))
+        contact, guided = 0.0, 0.0
+        if self.state.contact.counts[0]:
+            contact = float(self.state.lam @ (self.model.traces @ dq))
+        if np.any(self.state.guide_force):
+            guided = float(np.sum(self.state.guide_force * (self.bore.traces @ dq)))
+        self.q += dq
+        self.v += dv
+        self.books[DEBT] += 0.5 * contact
+        self.books[GUIDE] -= guided
+        return energy - contact - guided - float(missed @ (way + d) + guess @ d)
+
+    # ------------------------------------------------------------------ rest
+
+    def _rests(self, clock: Index) -> bool:
+        """Whether the needle lies on a stop long enough, and steadily."""
+        if self.flags[0]:
+            return True
+        long = float(clock[0]) - self.closed >= self.rest
+        if self.sizes.coarse > 1 and np.any(long) and self.steady:
+            self._rest_on(rest=True)
+            return True
+        return False
+
+    def _steady(self, before: Vector) -> None:
+        """Note whether forces changed little in this record."""
+        scale = np.maximum(np.abs(before), np.abs(self.force))
+        self.steady = bool(np.all(np.abs(self.force - before) <= _STEADY * scale))
+
+    def _still(self, record: Record) -> bool:
+        """Whether a long step met nothing that it cannot see."""
+        total = float(record.force[0])
+        before = float(np.sum(self.force))
+        steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
+        return steady and bool(self.state.contact.counts[0] > 0)
+
+    def _rest_on(self, *, rest: bool) -> None:
+        """Change between fine steps and those at rest: their contact matrices differ."""
+        self.flags[0] = float(rest)
+        self._renew(self.resting.A if rest else self.points.A)
+
+    def _renew(self, A: NDArray[np.float64]) -> None:
+        """Inverse over the points that carry, of another matrix."""
+        carrying = self.state.contact
+        m = int(carrying.counts[0])
+        index = carrying.points[:m]
+        inverse = np.linalg.inv(A[np.ix_(index, index)])
+        carrying.inverse[:m, :m] = 0.5 * (inverse + inverse.T)
+        carrying.counts[1] = 0
+
+    # ------------------------------------------------------------------ records
+
+    def _tell(
+        self,
+        record: Record,
+        t: float,
+        h: float,
+        recording: Recording,
+        scratch: Scratch,
+        points: bool,
+    ) -> None:
+        """Forces and gaps of the stops, in the words of the network."""
+        network, state = self.network, self.network.interface_state
+        first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
+        now = round(t / self.sizes.step)
+        for c, row in enumerate(self.order):
+            a, b = self.model.contacts[c][1:]
+            smallest = float(np.min(self.gap0[a:b] + self.model.traces[a:b] @ self.q))
+            lam = self.state.lam[a:b]
+            state.gap[row] = _AWAY + max(smallest, 0.0)
+            if not points:
+                continue
+            force = np.where(self.side[c] * record.force > 0.0, np.abs(record.force), 0.0)
+            acted = np.flatnonzero(force)
+            self.force[c] = force[-1]
+            if not np.any(lam > 0.0):
+                self.closed[c] = np.nan
+            elif np.isnan(self.closed[c]):
+                self.closed[c] = float(now)
+            if not len(acted):
+                continue
+            place = int(recording.filled[row])
+            end = min(place + len(acted), recording.fine.shape[1])
+            rows = recording.fine[row, place:end]
+            some = acted[: end - place]
+            rows[:, 0], rows[:, 1] = t + some * h, h
+            rows[:, 2], rows[:, 3], rows[:, 4] = force[some], 0.0, record.gap[some]
+            recording.filled[row] = place + len(acted)
+            scratch.sums[first + 2 * row] += h * float(np.sum(force))
+            scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))
+
+    def _tell_path(self, steps: int) -> None:
+        rigid = self.model.rigid
+        self.valve.path.add(
+            steps * self.sizes.step, rigid @ self.q, rigid @ self.v, self.state.guide_force
+        )
+
+    # ------------------------------------------------------------------ state
+
+    def read(self) -> None:
+        """Take the modes from the network."""
+        self.q[:] = self.network.bodies.laid_out[self.place_q]
+        self.v[:] = self.network.bodies.laid_out[self.place_v]
+
+    def write(self) -> None:
+        """Give the modes to the network."""
+        self.network.bodies.laid_out[self.place_q] = self.q
+        self.network.bodies.laid_out[self.place_v] = self.v
+
+    def coordinates(self, rigid: Vector) -> Vector:
+        """Rigid modal coordinates of a translation and rotation vector of the needle."""
+        R = self.model.rigid[:, : self.rigid_count]
+        scale = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
+        q, *_ = np.linalg.lstsq(R / scale[:, None], rigid / scale, rcond=1e-12)
+        return np.asarray(q)
+
+    def take_gaps(self, *, careful: bool = False) -> None:
+        """Take the gaps from the geometry at the present placement.
+
+        ``careful``: only where no point is closed by it.
+        """
+        if self.valve.gaps is None:
+            return
+        at = self.model.rigid @ self.q
+        r = self.rigid_count
+        fresh = self.valve.gaps(at) - self.model.traces[:, :r] @ self.q[:r]
+        if careful and np.min(fresh + self.model.traces @ self.q) <= 0.0:
+            return
+        self.gap0[:], self.taken_at[:] = fresh, at
+
+    def _stale(self) -> float:
+        """Largest possible difference of the gaps from those of the geometry [m]."""
+        if self.valve.gaps is None:
+            return 0.0
+        moved = self.model.rigid @ self.q - self.taken_at
+        ways = moved[:3] + np.cross(moved[3:], self.arms)
+        # along the axis gaps of faces of revolution stay linear but for their curvature
+        return _STALE_SHARE * float(np.max(np.linalg.norm(ways, axis=1))) + 0.5 * _FRESH
+
+    def _safe(self, horizon: float, stale: float) -> float:
+        model = self.model
+        force = self.P @ self.at[LAST : LAST + self.ports]
+        args = (model.traces, model.omega, self.q, self.v, force, horizon)
+        return float(safe_flight(self.gap0 - stale, *args))
+
+    def _clear(self) -> bool:
+        """Whether no point and no height of the guide has closed."""
+        open_by = self.gap0 + self.model.traces @ self.q
+        return bool(np.min(open_by) > 0.0) and self._unguided(0.0)
+
+    def _unguided(self, time: float) -> bool:
+        """Whether the shaft surely stays clear of its guide for this time."""
+        guide, model = self.valve.guide, self.model
+        if guide is None:
+            return True
+        if np.any(self.state.guide_force):
+            return False
+        elastic = model.omega > 0
+        swing, drift = np.zeros(model.mode_count), np.where(elastic, 0.0, self.v)
+        if time > 0.0:
+            swing[elastic] = np.hypot(
+                self.q[elastic], self.v[elastic] / model.omega[elastic]
+            ) + np.abs(self.q[elastic])
+        position = self.bore.offset + self.bore.traces @ self.q
+        reach = np.linalg.norm(self.bore.traces @ drift, axis=1) * time
+        reach = reach + np.linalg.norm(np.abs(self.bore.traces) @ swing, axis=1)
+        return bool(np.all(np.linalg.norm(position, axis=1) + reach < guide.clearance))
+
+    def _modal_energy(self) -> float:
+        return float(0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2))
+
+    def _keep(self) -> _Kept:
+        contact = self.state.contact
+        m = int(contact.counts[0])
+        vectors = (self.q, self.v, self.state.lam, self.state.guide_force, self.books)
+        return _Kept(
+            tuple(values.copy() for values in vectors),
+            contact.active.copy(),
+            contact.points.copy(),
+            contact.counts.copy(),
+            contact.inverse[:m, :m].copy(),
+        )
+
+    def _put_back(self, kept: _Kept) -> None:
+        contact = self.state.contact
+        vectors = (self.q, self.v, self.state.lam, self.state.guide_force, self.books)
+        for values, old in zip(vectors, kept.vectors, strict=True):
+            values[...] = old
+        m = int(kept.counts[0])
+        contact.active[:], contact.points[:], contact.counts[:] = kept[1:4]
+        contact.inverse[:m, :m] = kept.inverse
+
+
+def _places(valve: SpatialValve, network: CompiledNetwork) -> tuple[Index, Index, Vector]:
+    """Where the network keeps each coordinate of the model, and the shapes of its ports."""
+    model, rows = valve.model, network.rows
+    names = [row.component for row in rows.bodies]
+    starts = np.cumsum([0, *(len(row.ports) for row in rows.bodies)])
+    place_q, place_v = [], []
+    P = np.zeros((model.mode_count, len(network.ports)))
+    for number, component in enumerate(valve.components):
+        b = names.index(component)
+        own = np.flatnonzero(model.owner == number)
+        P[own, starts[b] : starts[b + 1]] = rows.bodies[b].body.port_shapes
+        local = np.arange(len(own))
+        first = network.bodies.start[network.body_blocks[b] + local // ROW]
+        place_q.append(first + ROW * ROW_Q + local % ROW)
+        place_v.append(first + ROW * ROW_V + local % ROW)
+    return np.concatenate(place_q), np.concatenate(place_v), P
+
+
+def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
+    rows, model = network.rows, valve.model
+    modes: Mapping[str, int] = {row.component: row.body.mode_count for row in rows.bodies}
+    wanted = {
+        component: int(np.sum(model.owner == number))
+        for number, component in enumerate(valve.components)
+    }
+    stops = sorted(row.component for row in rows.interfaces)
+    problem = ""
+    if modes != wanted:
+        problem = f"bodies {modes} in the network and {wanted} in space"
+    elif sorted(valve.stops) != stops:
+        problem = f"the stops {stops} in the network and {sorted(valve.stops)} in space"
+    elif rows.sliders:
+        problem = f"friction along the axis ('{rows.sliders[0].component}')"
+    elif any(row.film is not None for row in rows.interfaces):
+        problem = "a film between faces"
+    elif model.ways:
+        problem = "friction between faces"
+    if problem:
+        raise InputError(
+            "motion in three dimensions",
+            got=problem,
+            expected="the same bodies and end stops, a guide in place of friction, dry smooth faces",
+            hint="leave it out, or let the needle move along its axis.",
+        )
