@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from klack.analyses.shots.draw import centric_draw, draw_shot, extreme_placements, polar
-from klack.analyses.shots.one_shot import rigid_placement
+from klack.mesh.rigid import rigid_placement
 from klack.case import load_case
 from klack.case.distribution import Distribution
 from klack.case.schema import Case

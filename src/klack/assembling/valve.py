@@ -11,12 +11,13 @@ from klack.assembling.bodies import assemble_body, find_touch, mesh_body
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes
 from klack.assembling.modes import mode_pool, selection_of
+from klack.assembling.spatial import build_spatial
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
 from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
-from klack.case.valve_roles import FLEXIBLE_BODY
+from klack.case.valve_roles import FLEXIBLE_BODY, find_roles
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -32,6 +33,7 @@ from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.structure import Structure
 from klack.stages import warnings_of
+from klack.transient.spatial_run import SpatialValve
 
 __all__ = ["Valve", "build_valve", "build_valve_bodies", "filled_network"]
 
@@ -57,6 +59,8 @@ class Valve:
         With the bodies and laws filled in: the variant ``wet``.
     structures : tuple of Structure
         Held bodies as sources of sound.
+    spatial : SpatialValve or None
+        Bodies that meet point by point, of a motion in three dimensions.
     """
 
     case: ValveCase
@@ -66,6 +70,7 @@ class Valve:
     laws: Mapping[str, StopFaces]
     network: Network
     structures: tuple[Structure, ...] = ()
+    spatial: SpatialValve | None = None
 
 
 def build_valve(
@@ -120,6 +125,12 @@ def _built(
         )
     progress("radiating surfaces", 0.0)
     structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
+    spatial = None
+    if case.motion == "three-dimensional":
+        progress("contact points", 0.0)
+        spatial = build_spatial(
+            case, find_roles(case), bodies, flexibilities, pools, ports, contacts
+        )
     for flexibility in flexibilities.values():
         flexibility.close()
     laws = {}
@@ -137,6 +148,7 @@ def _built(
         laws=laws,
         network=network,
         structures=structures,
+        spatial=spatial,
     )
 
 

@@ -11,8 +11,10 @@ from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
 from klack.case.calibration import CaseCalibration
+from klack.case.guide import CaseGuide
 from klack.case.impact_sections import CaseWorn, Lumped
 from klack.case.measurement import CaseMeasurement
+from klack.case.motion_of_valve import ValveMotion, ValvePlacement
 from klack.case.noise import CaseNoise
 from klack.case.study import CaseStudy
 from klack.case.variants import Variant
@@ -161,6 +163,18 @@ class ValveSections(CaseFile):
         default=Reduction(), description="Kept modes and their correction."
     )
     network: NetworkSection = Field(description="Components of the valve and their connections.")
+    motion: ValveMotion = Field(
+        default="axial",
+        description="axial: all bodies move along the axis, stops have a law; three-dimensional: "
+        "all bodies keep their rigid freedoms and modes, and touch point by point.",
+    )
+    guide: CaseGuide | None = Field(
+        default=None, description="Guide of the needle in three dimensions; default none."
+    )
+    placement: ValvePlacement | None = Field(
+        default=None,
+        description="Position of the needle at the start in three dimensions; default centred.",
+    )
     run: StrokeRun = Field(description="Duration, steps and variants.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")
     measurement: CaseMeasurement | None = Field(

@@ -28,7 +28,7 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
-__all__ = ["RigidGaps"]
+__all__ = ["PlacedGaps", "RigidGaps"]
 
 _LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of faces holds
 
@@ -165,3 +165,30 @@ class RigidGaps:
         facing = covered > COVERED * full
         mean = self.weight @ np.where(met, gap + self.form, 0.0) / np.where(facing, covered, 1.0)
         return np.where(facing, mean, self.away)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlacedGaps:
+    """Gaps of all contacts of a moving body, one contact after the other.
+
+    Parameters
+    ----------
+    contacts : tuple of RigidGaps
+        Each with the centre of mass of the moving body as its ``centre``.
+    is_upper : tuple of bool
+        Whether the moving body is body a there; else a is moved the opposite way.
+    """
+
+    contacts: tuple[RigidGaps, ...]
+    is_upper: tuple[bool, ...]
+
+    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Gaps, shape (nc,) [m], at a placement of the moving body, shape (6,) [m], [rad]."""
+        shift, rotation = placement[:3], placement[3:]
+        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
+        return np.concatenate(
+            [
+                gaps(placement if upper else back)
+                for gaps, upper in zip(self.contacts, self.is_upper, strict=True)
+            ]
+        )

@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Pose", "rotation_matrix"]
+__all__ = ["Pose", "rigid_placement", "rotation_matrix"]
 
 Vector = NDArray[np.float64]
 
@@ -71,3 +71,22 @@ def rotation_matrix(rotation: Vector) -> NDArray[np.float64]:
     first = float(np.sinc(angle / np.pi))
     second = 0.5 * float(np.sinc(angle / (2.0 * np.pi))) ** 2
     return np.eye(3) + first * W + second * (W @ W)
+
+
+def rigid_placement(
+    aside: Vector,
+    lean: Vector,
+    about: Vector,
+    centre: Vector,
+) -> Vector:
+    """Translation of ``centre`` [m] and rotation vector [rad] of a body off its axis, shape (6,).
+
+    Parameters
+    ----------
+    aside, lean : array, shape (2,) [m], [rad]
+        Position of its axis at the height of ``about``, and slope of the axis.
+    about, centre : array, shape (3,) [m]
+    """
+    rotation = np.array([-lean[1], lean[0], 0.0])  # z x d
+    pose = Pose(rotation=rotation, about=about, shift=np.append(aside, 0.0))
+    return np.concatenate([pose.of(centre) - centre, rotation])

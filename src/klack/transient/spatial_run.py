@@ -92,6 +92,8 @@ class SpatialValve:
         Component of each of ``model.bodies`` in the network.
     stops : tuple of str
         Component of the network at each of ``model.contacts``; one below and one above at most.
+    arms : array, shape (contacts, 3), optional [m]
+        Middle of each contact from the centre of mass of the needle; with ``gaps``.
     guide : Guide, optional
     gaps : callable, optional
         Exact gaps at a rigid placement of the needle; without it they stay linear.
@@ -107,6 +109,7 @@ class SpatialValve:
     model: InterfaceModel
     components: tuple[str, ...]
     stops: tuple[str, ...]
+    arms: Vector = field(default_factory=lambda: np.zeros((1, 3)))
     guide: Guide | None = None
     gaps: Gaps | None = None
     placement: Vector = field(default_factory=lambda: np.zeros(6))
@@ -176,8 +179,6 @@ class _Moving:
         self.gap0 = np.array(model.gap)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.taken_at = np.zeros(6)
-        self.arms = np.array([model.points[a:b].mean(axis=0) for _, a, b in model.contacts])
-        self.arms -= model.centre
         # closed since [fine steps], nan while open; axial force of the last step
         self.closed = np.full(len(model.contacts), np.nan)
         self.force = np.zeros(len(model.contacts))
@@ -611,21 +612,25 @@ class _Moving:
             if not points:
                 continue
             force = np.where(self.side[c] * record.force > 0.0, np.abs(record.force), 0.0)
-            acted = np.flatnonzero(force)
-            self.force[c] = force[-1]
+            force, gap = np.append(force, 0.0), np.append(record.gap, smallest)
+            acted = force > 0.0
+            told = acted.copy()
+            told[1:] |= acted[:-1]  # a step without force ends a contact
+            told[-1] &= not np.any(lam > 0.0)
+            self.force[c] = force[-2]
             if not np.any(lam > 0.0):
                 self.closed[c] = np.nan
             elif np.isnan(self.closed[c]):
                 self.closed[c] = float(now)
-            if not len(acted):
+            rows = np.flatnonzero(told)
+            if not len(rows):
                 continue
             place = int(recording.filled[row])
-            end = min(place + len(acted), recording.fine.shape[1])
-            rows = recording.fine[row, place:end]
-            some = acted[: end - place]
-            rows[:, 0], rows[:, 1] = t + some * h, h
-            rows[:, 2], rows[:, 3], rows[:, 4] = force[some], 0.0, record.gap[some]
-            recording.filled[row] = place + len(acted)
+            end = min(place + len(rows), recording.fine.shape[1])
+            some, into = rows[: end - place], recording.fine[row, place:end]
+            into[:, 0], into[:, 1] = t + some * h, h
+            into[:, 2], into[:, 3], into[:, 4] = force[some], 0.0, gap[some]
+            recording.filled[row] = place + len(rows)
             scratch.sums[first + 2 * row] += h * float(np.sum(force))
             scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))
 
@@ -673,7 +678,7 @@ class _Moving:
         if self.valve.gaps is None:
             return 0.0
         moved = self.model.rigid @ self.q - self.taken_at
-        ways = moved[:3] + np.cross(moved[3:], self.arms)
+        ways = moved[:3] + np.cross(moved[3:], self.valve.arms)
         # along the axis gaps of faces of revolution stay linear but for their curvature
         return _STALE_SHARE * float(np.max(np.linalg.norm(ways, axis=1))) + 0.5 * _FRESH
 
@@ -772,6 +777,6 @@ def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
         raise InputError(
             "motion in three dimensions",
             got=problem,
-            expected="the same bodies and end stops, a guide in place of friction, dry smooth faces",
+            expected="the same bodies and end stops, a guide instead of friction, dry smooth faces",
             hint="leave it out, or let the needle move along its axis.",
         )

@@ -1,7 +1,7 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
@@ -19,7 +19,7 @@ from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
-from klack.contact.gap_update import RigidGaps
+from klack.contact.gap_update import PlacedGaps, RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.contact.statics import ReachError, extended_compliance
@@ -28,7 +28,6 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.rigid import rotation_matrix
 from klack.reduction.ports import Port
 from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.transient.guide import Guide, guide_of_shaft
@@ -45,7 +44,6 @@ from klack.units import format_si
 __all__ = [
     "CONTACT",
     "OPPOSITE",
-    "ExactGaps",
     "build_guide",
     "build_interface",
     "certificate_modes",
@@ -222,7 +220,7 @@ def _sides(problem: ContactProblem) -> list[tuple[ElasticBody, Flexibility]]:
     return sides
 
 
-def exact_gaps(problem: ContactProblem) -> "ExactGaps":
+def exact_gaps(problem: ContactProblem) -> PlacedGaps:
     """Gaps of all contact points on the curved faces, at any rigid placement of the moving body.
 
     Raises
@@ -236,35 +234,10 @@ def exact_gaps(problem: ContactProblem) -> "ExactGaps":
     below = (pair.lower.mesh, pair.lower_surface)
     seat = RigidGaps.of(problem.space, *here, *below, centre=centre, form=pair.form)
     if above is None:
-        return ExactGaps(seat=seat)
+        return PlacedGaps((seat,), (True,))
     there = (above.body.mesh, above.surface)
     stop = RigidGaps.of(above.space, *there, pair.upper.mesh, above.moving_surface, centre=centre)
-    return ExactGaps(seat=seat, stop=stop)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class ExactGaps:
-    """Gaps at a rigid placement of the moving body; see :func:`exact_gaps`.
-
-    Parameters
-    ----------
-    seat : RigidGaps
-        The moving body is body a.
-    stop : RigidGaps or None
-        Upper stop: the moving body is body b, so body a is moved the opposite way.
-    """
-
-    seat: RigidGaps
-    stop: RigidGaps | None = None
-
-    def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Gaps, shape (nc,) [m], at a placement, shape (6,) [m], [rad]."""
-        gaps = self.seat(placement)
-        if self.stop is None:
-            return gaps
-        shift, rotation = placement[:3], placement[3:]
-        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
-        return np.concatenate([gaps, self.stop(back)])
+    return PlacedGaps((seat, stop), (True, False))
 
 
 def _kept(

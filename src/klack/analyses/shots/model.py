@@ -9,29 +9,26 @@ from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.impact.run import ImpactBodies, impact_bodies
 from klack.analyses.shots.draw import extreme_placements, face_friction, shots_of
-from klack.analyses.shots.one_shot import ShotSetup, rigid_placement
+from klack.analyses.shots.one_shot import ShotSetup
+from klack.assembling.off_axis import off_axis_space, touch_height
 from klack.assembling.problem import ContactProblem, contact_problem
 from klack.case.placement import Placement
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
-from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.mortar import ContactSpace
 from klack.contact.statics import extended_compliance
 from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.rigid import rigid_placement
 from klack.progress import Progress
 from klack.stages import collected_warnings
 from klack.transient.interface_model import InterfaceModel
 
 __all__ = ["ShotModel", "build_shots", "centred_case", "shot_bodies", "shot_model"]
 
-# An eccentric contact carries on a part of the ring only, and yields more.
-_SOFTER = 1.6
-_WIDER = 4.0
-_FIRST = 0.02  # share of the reach: points with so small a gap touch first
 _FLIGHT_STEPS = 20  # before first touch, without a gap
 _SPAN_OVER_CONTACT = 3.0
 
@@ -119,7 +116,7 @@ def _model(
 ) -> ShotModel:
     shots = shots_of(case)
     progress("interface", 0.0)
-    pair, height = problem.pair, _touch_height(problem.space)
+    pair, height = problem.pair, touch_height(problem.space)
     drawn_height = height - pair.shift
     space = _candidates(case, problem, height, drawn_height)
     progress("interface", 0.2)
@@ -160,14 +157,6 @@ def _model(
     return ShotModel(setup=setup, touch_height=drawn_height, modes=modes, notes=())
 
 
-def _touch_height(space: ContactSpace) -> float:
-    """Height z [m] at which the centred bodies touch first."""
-    facing = space.axial > 1e-6
-    lift = space.gap[facing] / space.axial[facing]
-    first = lift <= lift.min() + _FIRST * space.reach
-    return float(np.mean(space.points[facing][first, 2]))
-
-
 def _gaps(problem: ContactProblem, space: ContactSpace) -> RigidGaps:
     pair = problem.pair
     return RigidGaps.of(
@@ -184,36 +173,16 @@ def _candidates(
     case: Case, problem: ContactProblem, height: float, drawn_height: float
 ) -> ContactSpace:
     """Contact points that close in a centred impact or in one from the farthest placements."""
-    reach = problem.space.reach
     farthest = extreme_placements(case, drawn_height)
     off_axis = max(float(np.linalg.norm(aside)) for aside, _ in farthest)
-    wide = contact_space(
-        *_surfaces(problem),
-        reach=_WIDER * reach + off_axis,
-        slave=problem.space.slave,
-        form=problem.pair.form,
-    )
-    gaps = _gaps(problem, wide)
     about, centre = np.array([0.0, 0.0, height]), problem.pair.upper.centre_of_mass
-    keep = wide.gap <= wide.gap.min() + _SOFTER * reach
-    for aside, lean in farthest:
-        open_by = _gaps_in_touch(gaps, wide, rigid_placement(aside, lean, about, centre))
-        keep |= open_by <= _SOFTER * reach
-    # and one row more: on coarse elements a contact is not much wider than a point
-    G = abs(wide.G_a if wide.slave == "a" else wide.G_b)
-    return wide.restricted(G @ (G.T @ keep.astype(float)) > 0)
-
-
-def _gaps_in_touch(
-    gaps: RigidGaps, space: ContactSpace, placement: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Gaps [m] after the moving body has been moved along z to its first touch."""
-    facing = space.axial > 1e-6
-    for _ in range(3):  # points slide along the other surface
-        gap = gaps(placement)
-        lift = float(np.min(gap[facing] / space.axial[facing]))
-        placement = placement - np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
-    return np.asarray(gap - lift * space.axial)
+    return off_axis_space(
+        problem.pair,
+        problem.space,
+        [rigid_placement(aside, lean, about, centre) for aside, lean in farthest],
+        off_axis,
+        centre=centre,
+    )
 
 
 def _force_span(problem: ContactProblem, model: InterfaceModel) -> float:

@@ -10,7 +10,7 @@ from klack.analyses.shots.draw import ShotDraw, polar
 from klack.analyses.shots.record import ShotColumns, ShotTraces
 from klack.contact.gap_update import RigidGaps
 from klack.contact.restitution import ImpactMeasures, measure_impact
-from klack.mesh.rigid import Pose
+from klack.mesh.rigid import rigid_placement
 from klack.stages import collected_warnings
 from klack.transient.guide import Guide
 from klack.transient.interface_model import InterfaceModel
@@ -21,7 +21,6 @@ __all__ = [
     "ShotOutcome",
     "ShotSetup",
     "columns_of",
-    "rigid_placement",
     "run_shot",
     "simulate_shot",
     "traces_of",
@@ -109,25 +108,6 @@ class ShotSetup:
     def placement(self, draw: ShotDraw) -> NDArray[np.float64]:
         """Rigid placement of the moving body at the start, but for its height, shape (6,)."""
         return rigid_placement(draw.aside, draw.lean, self.about, self.model.centre)
-
-
-def rigid_placement(
-    aside: NDArray[np.float64],
-    lean: NDArray[np.float64],
-    about: NDArray[np.float64],
-    centre: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Translation of ``centre`` [m] and rotation vector [rad] of a body off its axis, shape (6,).
-
-    Parameters
-    ----------
-    aside, lean : array, shape (2,) [m], [rad]
-        Position of its axis at the height of ``about``, and slope of the axis.
-    about, centre : array, shape (3,) [m]
-    """
-    rotation = np.array([-lean[1], lean[0], 0.0])  # z x d
-    pose = Pose(rotation=rotation, about=about, shift=np.append(aside, 0.0))
-    return np.concatenate([pose.of(centre) - centre, rotation])
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -39,6 +39,7 @@ from klack.network.travel import Travel
 from klack.progress import Progress, silent
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
+from klack.simulation.spatial_motion import SpatialMotion
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
@@ -204,8 +205,12 @@ def run_variant(
     progress: Callable[[float], None] = lambda fraction: None,
     *,
     state: State | None = None,
+    spatial: SpatialMotion | None = None,
 ) -> NetworkResult:
-    """Run rows for the duration and steps of the case, from rest or a state."""
+    """Run rows for the duration and steps of the case, from rest or a state.
+
+    ``spatial`` are the bodies of a motion in three dimensions.
+    """
     return simulate_network(
         rows,
         duration=case.run.duration,
@@ -214,6 +219,7 @@ def run_variant(
         coarse=case.run.coarse,
         record=case.run.record,
         state=state,
+        spatial=spatial,
         progress=progress,
     )
 
@@ -276,7 +282,11 @@ def one_variant(
     failure: ConvergenceError | None = None
     try:
         result = run_variant(
-            valve.case, rows, lambda fraction: progress(stage, fraction), state=state
+            valve.case,
+            rows,
+            lambda fraction: progress(stage, fraction),
+            state=state,
+            spatial=valve.spatial,
         )
     except IncompleteRunError as error:
         result, failure = error.result, error

@@ -1,0 +1,268 @@
+"""From a case of a whole valve to bodies that meet point by point, with a guide."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import cos, hypot, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.bodies import BodyPair
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import selection_of
+from klack.assembling.off_axis import off_axis_space, touch_height
+from klack.assembling.stops import StopContact
+from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import ValveRoles
+from klack.contact.gap_update import PlacedGaps, RigidGaps
+from klack.contact.mortar import ContactSpace
+from klack.contact.statics import extended_compliance
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.statics import Flexibility
+from klack.errors import InputError
+from klack.mesh.rigid import rigid_placement
+from klack.reduction.ports import Port
+from klack.reduction.reduce import kept_modes
+from klack.transient.guide import guide_of_shaft
+from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
+from klack.transient.spatial_run import SpatialValve
+from klack.units import format_si
+
+__all__ = ["build_spatial"]
+
+Vector = NDArray[np.float64]
+
+_DIRECTIONS = 8
+_IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Meeting:
+    """One stop, its bodies as far apart as they start."""
+
+    name: str
+    pair: BodyPair
+    space: ContactSpace
+    compliance: NDArray[np.float64]
+    upper_moves: bool
+    centre: Vector
+
+
+def build_spatial(
+    case: ValveCase,
+    roles: ValveRoles,
+    bodies: Mapping[str, ElasticBody],
+    flexibilities: Mapping[str, Flexibility],
+    pools: Mapping[str, Modes],
+    ports: Mapping[str, Sequence[Port]],
+    contacts: Mapping[str, StopContact],
+) -> SpatialValve:
+    """Bodies of a valve with all their freedoms, contact points of its stops, and its guide.
+
+    Modes are those that the network has.  Contact points are all that can close in any position
+    which the guide allows; without a guide, in that of the start.
+
+    Raises
+    ------
+    InputError
+        For a guide that the needle does not fit in, or a placement outside of it.
+    """
+    parts = case.network.components
+    component = {str(getattr(part, "body", "")): name for name, part in parts.items()}
+    needle = str(getattr(parts[roles.needle], "body", ""))
+    kept = {
+        name: kept_modes(
+            selection_of(case.reduction.choice(name)),
+            pools[name],
+            np.column_stack([port.pattern for port in ports[name]]),
+        )
+        for name in bodies
+    }
+    height = _seat_height(contacts, needle)
+    placement = _placement(case, height)
+    off_axis = _farthest(case, height, placement)
+    about = _about(height, bodies[needle])
+    meetings = [
+        _meeting(
+            contact,
+            needle,
+            bodies[needle],
+            flexibilities,
+            [
+                rigid_placement(aside, lean, *_about(height, bodies[needle]))
+                for aside, lean in off_axis
+            ],
+            max(hypot(*aside) for aside, _ in off_axis),
+            float(getattr(parts[name], "gap", 0.0)),
+        )
+        for name, contact in contacts.items()
+    ]
+    model = interface_model(
+        [
+            InterfaceBody(
+                body=bodies[name],
+                flexibility=flexibilities[name],
+                modes=kept[name],
+                damping=damping_of(case.bodies[name].damping).ratios(kept[name].omega),
+            )
+            for name in [needle, *(name for name in bodies if name != needle)]
+        ],
+        [
+            InterfaceContact(
+                name=meeting.name,
+                upper=meeting.pair.upper.name,
+                lower=meeting.pair.lower.name,
+                space=meeting.space,
+                compliance=meeting.compliance,
+            )
+            for meeting in meetings
+        ],
+    )
+    guide = None
+    if case.guide is not None:
+        law = case.guide.law
+        guide = guide_of_shaft(
+            model,
+            bodies[needle],
+            np.hstack([bodies[needle].rigid_modes, kept[needle].shapes]),
+            flexibilities[needle],
+            surface=case.guide.surface,
+            heights=case.guide.heights,
+            clearance=case.guide.clearance,
+            stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
+            consistent=not isinstance(law, LinearGuideLaw),
+            friction=case.guide.friction,
+            viscous=case.guide.viscous,
+        )
+    return SpatialValve(
+        model=model,
+        components=tuple(component[name] for name in model.bodies),
+        stops=tuple(meeting.name for meeting in meetings),
+        arms=np.array([meeting.space.points.mean(axis=0) - meeting.centre for meeting in meetings]),
+        guide=guide,
+        gaps=PlacedGaps(
+            tuple(_gaps(meeting) for meeting in meetings),
+            tuple(meeting.upper_moves for meeting in meetings),
+        ),
+        placement=rigid_placement(*placement, *about),
+    )
+
+
+def _about(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:
+    """Point about which the needle is tilted, and its centre of mass, as drawn [m]."""
+    return np.array([0.0, 0.0, height]), needle.centre_of_mass
+
+
+def _seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
+    """Height of first touch in the drawing of the needle: at its seat, else at its stop [m]."""
+    below = [contact for contact in contacts.values() if contact.pair.upper.name == needle]
+    contact = (below or list(contacts.values()))[0]
+    height = touch_height(contact.static.space)
+    return height - contact.pair.shift if below else height
+
+
+def _placement(case: ValveCase, height: float) -> tuple[Vector, Vector]:
+    """Position of the axis at this height, and its slope.
+
+    Raises
+    ------
+    InputError
+        For a position that the guide has no room for.
+    """
+    at, guide = case.placement, case.guide
+    if at is None:
+        return np.zeros(2), np.zeros(2)
+    if at.seed is not None and guide is not None:
+        shares = np.random.default_rng(at.seed).random(4)
+        c = guide.clearance
+        return _axis(guide, height, _in_disc(shares[:2], c), _in_disc(shares[2:], c))
+    aside = at.eccentricity * np.array([cos(at.direction), sin(at.direction)])
+    lean = at.tilt * np.array([cos(at.tilt_direction), sin(at.tilt_direction)])
+    for z in () if guide is None else guide.heights:
+        off = hypot(*(aside + lean * (z - height)))
+        if guide is not None and off > guide.clearance * (1.0 + _IN_THE_WALL):
+            raise InputError(
+                f"{case.path or 'case'}: placement",
+                got=f"a shaft {format_si(off, 'm')} off-axis in its guide at z = "
+                f"{format_si(z, 'm')}",
+                expected=f"at most the clearance, {format_si(guide.clearance, 'm')}",
+                hint="reduce placement.eccentricity or placement.tilt, or enlarge guide.clearance.",
+            )
+    return aside, lean
+
+
+def _farthest(
+    case: ValveCase, height: float, placement: tuple[Vector, Vector]
+) -> list[tuple[Vector, Vector]]:
+    """Positions and slopes of the axis that contact points must suffice for."""
+    guide = case.guide
+    if guide is None:
+        aside, lean = placement
+        turns = [_turned(2.0 * pi * k / _DIRECTIONS) for k in range(_DIRECTIONS)]
+        return [(R @ aside, R @ lean) for R in turns] if np.any([aside, lean]) else [placement]
+    found = []
+    for k in range(_DIRECTIONS):
+        towards = guide.clearance * _turned(2.0 * pi * k / _DIRECTIONS)[:, 0]
+        found += [_axis(guide, height, towards, sign * towards) for sign in (1.0, -1.0)]
+    return found
+
+
+def _turned(angle: float) -> NDArray[np.float64]:
+    return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
+
+
+def _axis(guide: CaseGuide, height: float, low: Vector, high: Vector) -> tuple[Vector, Vector]:
+    """Position at a height and slope of the axis through two points at the outer guide heights."""
+    slope = (high - low) / (guide.heights[-1] - guide.heights[0])
+    return low + slope * (height - guide.heights[0]), slope
+
+
+def _in_disc(shares: Vector, radius: float) -> Vector:
+    """Point of a disc, all places alike, from two numbers between 0 and 1."""
+    angle = 2.0 * pi * shares[1]
+    return np.asarray(radius * np.sqrt(shares[0]) * np.array([cos(angle), sin(angle)]))
+
+
+def _meeting(
+    contact: StopContact,
+    needle: str,
+    body: ElasticBody,
+    flexibilities: Mapping[str, Flexibility],
+    farthest: Sequence[Vector],
+    off_axis: float,
+    gap: float,
+) -> _Meeting:
+    pair, static = contact.pair, contact.static
+    upper_moves = pair.upper.name == needle
+    centre = pair.upper.centre_of_mass if upper_moves else body.centre_of_mass
+    space = off_axis_space(
+        pair, static.space, farthest, off_axis, centre=centre, upper_moves=upper_moves
+    )
+    compliance = extended_compliance(
+        space, static, flexibilities[pair.upper.name], flexibilities[pair.lower.name]
+    )
+    up = np.array([0.0, 0.0, gap])
+    raised = replace(pair, upper=replace(pair.upper, mesh=pair.upper.mesh.moved(up)))
+    return _Meeting(
+        name=contact.name,
+        pair=raised,
+        space=space.shifted(gap),
+        compliance=compliance,
+        upper_moves=upper_moves,
+        centre=centre + up if upper_moves else centre,
+    )
+
+
+def _gaps(meeting: _Meeting) -> RigidGaps:
+    pair = meeting.pair
+    return RigidGaps.of(
+        meeting.space,
+        pair.upper.mesh,
+        pair.upper_surface,
+        pair.lower.mesh,
+        pair.lower_surface,
+        centre=meeting.centre,
+        form=pair.form,
+    )

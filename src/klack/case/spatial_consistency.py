@@ -1,0 +1,204 @@
+"""Checks of a valve whose needle moves in three dimensions: what it needs, and cannot have yet."""
+
+from collections.abc import Mapping
+
+from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
+from klack.case.valve_sections import ValveSections
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, Key
+from klack.network.component import Component
+
+__all__ = ["check_motion", "require_axial", "require_dry_faces", "with_films"]
+
+_MOVES = ("rigid-mass",)
+_FRICTION = ("guide-friction",)
+
+
+def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: ValveRoles) -> None:
+    """Raise :class:`CaseProblem` for the first thing that a motion in space cannot have."""
+    if case.motion == "axial":
+        for key in ("guide", "placement"):
+            if getattr(case, key) is not None:
+                raise CaseProblem(
+                    (key,),
+                    got=f"'{key}' of a needle that moves along its axis",
+                    expected="motion: three-dimensional",
+                    hint="add it, or remove this section; friction along the axis is "
+                    "{type: guide-friction}.",
+                    on_key=True,
+                )
+        return
+    _check_bodies(case)
+    parts = case.network.components
+    for name, part in parts.items():
+        at: Key = ("network", "components", name)
+        if part.type in _MOVES:
+            raise CaseProblem(
+                at,
+                got=f"a {part.type} in a motion in three dimensions",
+                expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
+                hint="draw it as a body, or use motion: axial.",
+            )
+        if part.type in _FRICTION:
+            raise CaseProblem(
+                at,
+                got="friction along the axis beside a motion in three dimensions",
+                expected="a section 'guide' with friction: side forces make it there",
+                hint="remove this component; guide: {surface: ..., heights: ..., clearance: ..., "
+                "friction: 0.1}.",
+            )
+        if part.type == END_STOP:
+            _check_stop(case, name, part)
+    _check_ends(case, meetings, roles)
+    _check_placement(case)
+    if case.reduction.correction != "consistent":
+        raise CaseProblem(
+            ("reduction", "correction"),
+            got=f"'{case.reduction.correction}' with motion: three-dimensional",
+            expected="the correction 'consistent'",
+            hint="leave it out: contact points carry what the modes miss.",
+        )
+    for variant in case.run.variants:
+        if variant.endswith("lumped"):
+            raise CaseProblem(
+                ("run", "variants"),
+                got=f"the variant '{variant}' with motion: three-dimensional",
+                expected="wet or dry",
+                hint="rigid bodies on a spring move along the axis: use motion: axial for them.",
+            )
+
+
+def _check_bodies(case: ValveSections) -> None:
+    for name, body in case.bodies.items():
+        if body.geometry.dimension != 3:
+            raise CaseProblem(
+                ("bodies", name, "geometry"),
+                got="an axisymmetric body, which has no lateral motion",
+                expected="three-dimensional bodies with motion: three-dimensional",
+                hint="take 'model: swept' with 'layers: 18'.",
+            )
+
+
+def _check_stop(case: ValveSections, name: str, part: Component) -> None:
+    key: Key = ("network", "components", name)
+    if name not in case.stops:
+        raise CaseProblem(
+            key,
+            got=f"the end stop '{name}' without surfaces",
+            expected=f"its two surfaces: stops: {{{name}: {{between: ...}}}}",
+            hint="in three dimensions every stop is touched point by point.",
+        )
+    if getattr(getattr(part, "law", None), "kind", "") != "consistent":
+        raise CaseProblem(
+            (*key, "law"),
+            got="a law of its own, which contact point by point would replace",
+            expected="law: {kind: consistent}",
+            hint="write it, or use motion: axial.",
+        )
+    stop = case.stops[name]
+    if stop.friction > 0.0 or stop.worn is not None:
+        what = "friction" if stop.friction > 0.0 else "worn"
+        raise CaseProblem(
+            ("stops", name, what),
+            got=f"'{what}' with motion: three-dimensional",
+            expected="smooth faces as made",
+            hint="leave it out, or use motion: axial.",
+            on_key=True,
+        )
+
+
+def _check_ends(case: ValveSections, meetings: Mapping[str, Meeting], roles: ValveRoles) -> None:
+    sides: dict[bool, list[str]] = {True: [], False: []}
+    for name, met in meetings.items():
+        at = [side is not None and side[0] == roles.needle for side in (met.upper, met.lower)]
+        if at[0] == at[1]:
+            raise CaseProblem(
+                ("network", "components", name),
+                got=f"the end stop '{name}', which '{roles.needle}' does not touch",
+                expected="stops of the needle only with motion: three-dimensional",
+                hint="remove it, or use motion: axial.",
+            )
+        sides[at[0]].append(name)
+    for below, names in sides.items():
+        if len(names) > 1:
+            raise CaseProblem(
+                ("network", "components", names[1]),
+                got=f"a second end stop {'below' if below else 'above'} the needle",
+                expected="one at each end with motion: three-dimensional",
+                hint=f"'{names[0]}' is the first one; join both surfaces in one stop.",
+            )
+    used = {
+        met[0]
+        for name in meetings
+        for met in (meetings[name].upper, meetings[name].lower)
+        if met is not None
+    }
+    for name, part in case.network.components.items():
+        if part.type == FLEXIBLE_BODY and name not in used:
+            raise CaseProblem(
+                ("network", "components", name),
+                got=f"the body '{name}', which touches nothing",
+                expected="the needle and what it hits with motion: three-dimensional",
+                hint="remove it, or give it an end stop.",
+            )
+
+
+def _check_placement(case: ValveSections) -> None:
+    at = case.placement
+    if at is None or at.seed is None:
+        return
+    if not at.is_centred:
+        raise CaseProblem(
+            ("placement", "seed"),
+            got="a seed beside a given position",
+            expected="one of them",
+            hint="remove the seed, or eccentricity and tilt.",
+            on_key=True,
+        )
+    if case.guide is None:
+        raise CaseProblem(
+            ("placement", "seed"),
+            got="a seed without a guide",
+            expected="a guide, whose clearance bounds the position",
+            hint="add a section 'guide', or give eccentricity and tilt.",
+            on_key=True,
+        )
+
+
+def with_films(case: ValveSections) -> tuple[str, ...]:
+    """End stops with a squeeze film."""
+    return tuple(
+        name
+        for name, part in case.network.components.items()
+        if part.type == END_STOP and getattr(part, "film", None) is not None
+    )
+
+
+def require_dry_faces(case: ValveSections, variants: tuple[str, ...], where: str) -> None:
+    """Raise :class:`InputError` for variants that a motion in space does not have."""
+    if case.motion == "axial":
+        return
+    films = with_films(case)
+    for variant in variants:
+        if variant.endswith("lumped") or (films and not variant.startswith("dry")):
+            what = "rigid bodies on a spring" if variant.endswith("lumped") else ""
+            raise InputError(
+                f"{where}: variant",
+                got=f"'{variant}' with motion: three-dimensional, "
+                + (what or f"and a squeeze film at '{films[0]}'"),
+                expected="dry, or wet without squeeze films at the stops",
+                hint="squeeze films between parallel faces belong to motion: axial; leave 'film' "
+                "out, or run the variant dry.",
+            )
+
+
+def require_axial(case: ValveSections, command: str) -> None:
+    """Raise :class:`InputError` for what knows a motion along the axis only."""
+    if case.motion != "axial":
+        raise InputError(
+            f"{case.path or 'case'}: motion",
+            got=f"'{case.motion}' in {command}",
+            expected="motion: axial",
+            hint="klack stroke computes it in three dimensions; for this command set motion: axial "
+            "and remove 'guide' and 'placement'.",
+        )
