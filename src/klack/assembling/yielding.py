@@ -10,6 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from threadpoolctl import threadpool_limits
 
 from klack.case.bodies import CaseFile
 from klack.contact.mortar import ContactSpace
@@ -30,7 +31,7 @@ __all__ = ["law_loops", "law_with_yield", "loaded_body", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
 
-_LEFT_OUT = "the reduced level leaves out the yield of its faces"
+_LEFT_OUT = "the yield of the faces is left out"
 
 _ZONE = 5.0
 """Radius of the first zone, over the half width of the elastic contact at its highest force."""
@@ -82,7 +83,7 @@ def law_loops(
         return None
     if beside:
         warnings.warn(
-            f"{_LEFT_OUT}: a law has either yield or {beside}. Try: the case without the latter.",
+            f"{_LEFT_OUT}: faces have either yield or {beside}. Try: the case without the latter.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -93,9 +94,11 @@ def law_loops(
         space, C = static.space, static.compliance
         while True:
             try:
-                return loops_with_yield(
-                    static, space, C, upper, lower, energy=energy, closing=closing
-                )
+                # small matrices: threads of the BLAS would wait for each other
+                with threadpool_limits(limits=1, user_api="blas"):
+                    return loops_with_yield(
+                        static, space, C, upper, lower, energy=energy, closing=closing
+                    )
             except ReachError as error:
                 space = wider(space, error)
                 C = extended_compliance(space, static, upper.flexibility, lower.flexibility)

@@ -1,6 +1,6 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -21,6 +21,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -63,6 +64,7 @@ _FEWEST = 30
 _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
+_SET_BEYOND = 1.2  # of the deepest one that is known: a straight line goes on so far
 
 
 def certificate_modes(case: Case) -> int:
@@ -88,6 +90,7 @@ def build_interface(
     count: int | None = None,
     space: ContactSpace | None = None,
     compliance: NDArray[np.float64] | None = None,
+    limit: PressureLimit | None = None,
 ) -> InterfaceModel:
     """Interface-level model of a case.
 
@@ -104,6 +107,9 @@ def build_interface(
         Other contact points of the same surfaces than those of the static contact.
     compliance : array, shape (nc, nc), optional [m/N]
         Static compliance of both bodies at these.
+    limit : PressureLimit, optional
+        Of the points of the contact, from :func:`klack.assembling.pressure_limit.pressure_limit`;
+        those of an upper stop stay elastic.
 
     Raises
     ------
@@ -157,7 +163,7 @@ def build_interface(
                 faces=None if smooth else FaceFriction.on(above_faces, above.space, *there),
             )
         )
-    return interface_model(bodies, contacts)
+    return replace(interface_model(bodies, contacts), limit=limit if smooth else None)
 
 
 def _opposite_faces(case: Case) -> Friction:
@@ -176,6 +182,7 @@ def within_reach(
     *,
     ports: tuple[Port, Port] | None = None,
     count: int | None = None,
+    limit: PressureLimit | None = None,
 ) -> _Result:
     """Run an interface-level model on as many contact points as the motion reaches.
 
@@ -184,7 +191,7 @@ def within_reach(
 
     Parameters
     ----------
-    problem, pools, ports, count
+    problem, pools, ports, count, limit
         As given to :func:`build_interface`.
     run : callable
         Given the model; called again, with twice the reach, after a :class:`ReachError`.
@@ -198,7 +205,13 @@ def within_reach(
     compliance: NDArray[np.float64] | None = None
     while True:
         model = build_interface(
-            problem, pools, ports=ports, count=count, space=space, compliance=compliance
+            problem,
+            pools,
+            ports=ports,
+            count=count,
+            space=space,
+            compliance=compliance,
+            limit=limit,
         )
         try:
             return run(model)
@@ -367,8 +380,9 @@ def simulate_case(
     *,
     step: float | None = None,
     duration: float | None = None,
+    worn: NDArray[np.float64] | None = None,
 ) -> InterfaceResult:
-    """Run the motion of a case once, without jumps."""
+    """Run the motion of a case once, without jumps, on faces as made or worn."""
     duration = case.run.duration if duration is None else duration
     spring = case.motion.spring
     gap = case.contact.gap or 0.0
@@ -385,6 +399,7 @@ def simulate_case(
         spring_stiffness=0.0 if spring is None else spring.stiffness,
         guide=guide,
         points=model.count * duration / step <= _MOST_RECORDS,
+        worn=worn,
     )
 
 
@@ -422,10 +437,12 @@ def run_interface(
     elastic = model.omega > 0
     counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
     guided = "" if guide is None else ", guided"
+    yields = "" if model.limit is None else ", yield by a pressure limit"
     level = level_result(
         result.history,
         level="interface",
-        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points{guided}",
+        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points"
+        f"{guided}{yields}",
         dofs=model.mode_count,
         step=case.run.interface_step,
         wall_time=result.wall_time,
@@ -435,4 +452,21 @@ def run_interface(
         ),
         frictionless=frictionless,
     )
-    return replace(level, gauges=interface_gauges(problem, model, result))
+    return replace(
+        level,
+        gauges=interface_gauges(problem, model, result),
+        doubts=(*level.doubts, *_beyond(model, result)),
+    )
+
+
+def _beyond(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
+    """Doubt about a set beyond those that the pressure limit was fitted to."""
+    if model.limit is None:
+        return
+    deepest, known = float(result.worn.max()), model.limit.deepest
+    if deepest > _SET_BEYOND * known:
+        yield (
+            f"the set of the faces reaches {format_si(deepest, 'm', 3)}, beyond the "
+            f"{format_si(known, 'm', 3)} to which their pressure limit was fitted, and is an "
+            "estimate. Try: less eccentricity, tilt or speed."
+        )
