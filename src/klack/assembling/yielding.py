@@ -31,7 +31,7 @@ __all__ = ["law_loops", "law_with_yield", "loaded_body", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
 
-_LEFT_OUT = "the yield of the faces is left out"
+_LEFT_OUT = "the contact leaves out the yield of its faces"
 
 _ZONE = 5.0
 """Radius of the first zone, over the half width of the elastic contact at its highest force."""

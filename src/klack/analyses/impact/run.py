@@ -31,9 +31,10 @@ from klack.analyses.impact.record import (
     ImpactStudy,
     LawSummary,
     LevelResult,
+    RunningIn,
     SectionPicture,
 )
-from klack.analyses.impact.running_in import running_in
+from klack.analyses.impact.running_in import asks_for_more, points_running_in, running_in
 from klack.analyses.impact.section import section_picture
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
@@ -313,19 +314,21 @@ def _study(
                         assert loops is not None
                         results[level] = doubt_large_strain(results[level], loops)
         ran = running_in(case, own, loops) if loops is not None and "reduced" in results else None
-        if ran is None and (case.run.impacts > 1 or case.run.run_in):
-            warnings.warn(
-                "run.impacts: all impacts are like the first, for no level with yield was computed "
-                "or nothing yields. Try: level reduced and a material with 'yield'.",
-                AccuracyWarning,
-                stacklevel=2,
-            )
         clock("reduced", 1.0)
         if "interface" in wanted:
             with attempts.at("interface"), warnings_of("level 'interface'"):
-                results["interface"] = _run_interface(
+                results["interface"], at_points = _run_interface(
                     problem, pools, own, limit, clock, is_first=not twins
                 )
+                ran = ran or at_points
+        if ran is None and asks_for_more(case):
+            warnings.warn(
+                "run.impacts: all impacts are like the first, for no level with yield was computed "
+                "or nothing yields. Try: level reduced (bodies in the meridian plane) or "
+                "interface, and a material with 'yield'.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
         certificate = None
         if certify and reduced:
             certificate = for_comparison(
@@ -429,18 +432,19 @@ def _run_interface(
     clock: StageClock,
     *,
     is_first: bool,
-) -> LevelResult:
-    """Interface level; ``is_first`` of the levels whose faces yield, it tells what that does."""
+) -> tuple[LevelResult, RunningIn | None]:
+    """Interface level; the first one whose faces yield tells what that does, and runs them in."""
     clock("interface", 0.0)
 
-    def run(model: InterfaceModel) -> LevelResult:
+    def run(model: InterfaceModel) -> tuple[LevelResult, RunningIn | None]:
         guide = build_guide(problem, model, pools, ports=own.ports)
         setup = clock.spent((*_SET_UP[:-1], "interface"))
         result = run_interface(problem, model, guide, setup_time=setup)
         if model.limit is not None and is_first:
             elastic = simulate_case(problem.case, model.elastic(), guide).history
             tell_yield(result, elastic, _surfaces(problem.case))
-        return result
+            return result, points_running_in(problem.case, model, guide)
+        return result, None
 
     result = within_reach(problem, pools, run, ports=own.ports, limit=limit)
     clock("interface", 1.0)
