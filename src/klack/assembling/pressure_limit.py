@@ -48,7 +48,11 @@ _LOADED_MORE = 1.05
 
 
 def pressure_limit(
-    problem: ContactProblem, loops: YieldingLoops | None, progress: Progress
+    problem: ContactProblem,
+    loops: YieldingLoops | None,
+    progress: Progress,
+    *,
+    more: float | None = None,
 ) -> PressureLimit | None:
     """Limit for the interface level of a case; None where its points stay elastic.
 
@@ -59,6 +63,9 @@ def pressure_limit(
     loops : YieldingLoops or None
         Its static loops, of bodies in the meridian plane.
     progress : callable
+    more : float, optional [-]
+        Force per length of the most loaded sector over the mean, up to which the limit is needed;
+        that of the static contact without.
 
     Warns
     -----
@@ -72,8 +79,8 @@ def pressure_limit(
     if pair.upper.dimension == 2 or not yields or problem.case.contact.worn is not None:
         return None
     static = problem.static
-    lam = static.pressures[-1]
-    more = highest_load(static.space, lam) / float(static.space.axial @ lam)
+    if more is None:
+        more = highest_load(static.space, static.pressures[-1]) / float(static.pressures[-1].sum())
     case = meridian_case(problem.case, float(static.half_width[-1]), more)
     if case is None:
         return None

@@ -51,6 +51,7 @@ __all__ = [
     "certificate_modes",
     "exact_gaps",
     "run_interface",
+    "set_doubts",
     "simulate_case",
     "within_reach",
 ]
@@ -455,11 +456,11 @@ def run_interface(
     return replace(
         level,
         gauges=interface_gauges(problem, model, result),
-        doubts=(*level.doubts, *_beyond(model, result)),
+        doubts=(*level.doubts, *set_doubts(model, result)),
     )
 
 
-def _beyond(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
+def set_doubts(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
     """Doubt about a set beyond those that the pressure limit was fitted to."""
     if model.limit is None:
         return
