@@ -6,12 +6,14 @@ the materials do, a warning says so and the law stays elastic.
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from threadpoolctl import threadpool_limits
 
+from klack.assembling.limit_fit import fitted_limit
 from klack.case.bodies import CaseFile
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
@@ -105,7 +107,7 @@ def law_loops(
 
     try:
         loops = upper.flexibility.remembered(
-            "static loops with yield and radius",
+            "static loops with yield and pressure limit",
             (
                 lower.flexibility.key,
                 static.space.gap,
@@ -152,7 +154,7 @@ def loops_with_yield(
     energy: float,
     closing: float,
 ) -> YieldingLoops:
-    """Static loops up to the energy of an impact.
+    """Static loops up to the energy of an impact, and the pressure limit fitted to them.
 
     Parameters
     ----------
@@ -184,9 +186,10 @@ def loops_with_yield(
         for one, rows in ((upper, space.G_a), (lower, space.G_b))
         if one.elements_near(place, radius).any()
     ]
-    return yielding_loops(
+    loops = yielding_loops(
         YieldingContact(space, C, bodies),
         deepest=float(static.approach[-1]),
         energy=energy,
         closing=closing,
     )
+    return replace(loops, pressure_limit=fitted_limit(loops, space, C))

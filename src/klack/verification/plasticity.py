@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from klack.assembling.pressure_limit import fitted_limit
 from klack.contact.history import ImpactHistory
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.yielding_law import YieldingLaw
@@ -411,8 +410,7 @@ def _points_of_seat(pair: SoftPair) -> list[Check]:
         gap=pair.space.gap - pair.space.touch * pair.space.axial,
         axial=pair.space.axial,
     )
-    limit = fitted_limit(pair.loops, pair.space, pair.C)
-    model = replace(model, limit=limit, area=pair.space.area)
+    model = replace(model, limit=pair.loops.pressure_limit, area=pair.space.area)
     worn, found = np.zeros(model.count), []
     for n, expected in enumerate(_SEAT_IMPACTS, 1):
         run = simulate_interface(model, speed=0.3, duration=60e-6, step=20e-9, worn=worn)
