@@ -144,7 +144,7 @@ def _section(section: _Section, schema: Node, found: Mapping[str, _Section]) -> 
     node = section.node
     also = ", ".join(section.heads[1:])
     rows = ["| key | type | default | limits | description |", "|---|---|---|---|---|"]
-    required = node.get("required", ())
+    required = next((one["required"] for one in (node, *_choices(node)) if "required" in one), ())
     rows += [_row(key, node, key in required, schema, found) for key in node["properties"]]
     lines = [f"## {section.heads[0]}", _words(node.get("description", ""))]
     lines += [f"The same keys: {also}." if also else "", "\n".join(rows)]
@@ -190,7 +190,8 @@ def _type(node: Node, schema: Node, found: Mapping[str, _Section]) -> str:
         return "one of " + ", ".join(f"`{value}`" for value in node["enum"])
     if "properties" in node:
         head = found[_identity(node)].heads[0]
-        return f"[{_word(node) or 'mapping'}](#{anchor(head)})"
+        bare = "text or " if isinstance(node.get("type"), list) else ""
+        return f"{bare}[{_word(node) or 'mapping'}](#{anchor(head)})"
     choices = [choice for choice in _choices(node) if choice.get("type") != "null"]
     if choices:
         return " or ".join(dict.fromkeys(_type(choice, schema, found) for choice in choices))

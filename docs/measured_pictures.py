@@ -1,11 +1,13 @@
 """Make the pictures of the page of measured comparisons: ``python docs/measured_pictures.py``.
 
 From the six shots of the case ``struck-bar``, with and without the dome on the striker's end, come
-struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres.
+struck-bar.svg and struck-bar-ends.svg; alumina.svg from the oblique impacts of spheres;
+bounce-in-liquid.svg from bounces of spheres on a wall in a liquid.
 """
 
 from pathlib import Path
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
@@ -13,6 +15,16 @@ from klack.report.chart import COLOURS
 from klack.report.printed import STYLE, svg
 from klack.verification.measured import SHOTS, struck_bar
 from klack.verification.oblique_spheres import oblique_spheres
+from klack.verification.sphere_in_liquid import (
+    GLASS,
+    NYLON,
+    ROUGHNESS,
+    STEEL,
+    STOKES_NUMBERS,
+    film_alone,
+    measured_ratio,
+    restitution,
+)
 
 IMAGES = Path(__file__).parent / "images"
 
@@ -51,7 +63,12 @@ def figures() -> dict[str, Figure]:
     labels = ("measured", "computed, flat faces", "computed, dome of 0.12 mm")
     for figure in (whole, near):
         figure.legend(figure.axes[0].lines, labels, loc="outside lower center", ncols=3)
-    return {"struck-bar.svg": whole, "struck-bar-ends.svg": near, "alumina.svg": alumina()}
+    return {
+        "struck-bar.svg": whole,
+        "struck-bar-ends.svg": near,
+        "alumina.svg": alumina(),
+        "bounce-in-liquid.svg": bounce_in_liquid(),
+    }
 
 
 def alumina() -> Figure:
@@ -64,6 +81,26 @@ def alumina() -> Figure:
     axes.set(xlabel=curve.x_label, ylabel=curve.y_label, ylim=(0.5, 1.0))
     axes.grid(visible=True, color="#dddddd", lw=0.5)
     axes.legend()
+    return figure
+
+
+def bounce_in_liquid() -> Figure:
+    """Restitution of spheres on a wall in a liquid over their Stokes number."""
+    figure = Figure(figsize=(6.4, 3.6), layout="constrained")
+    axes = figure.add_subplot()
+    fine = np.geomspace(5.0, 3000.0, 200)
+    axes.semilogx(fine, [measured_ratio(x) for x in fine], color=COLOURS["blue"], lw=2.4,
+                  label="measured: fit exp(-35/St)")  # fmt: skip
+    axes.semilogx(fine, [film_alone(x, 3.0 * ROUGHNESS) for x in fine], color=COLOURS["black"],
+                  lw=1.0, ls=":", label="computed, film alone")  # fmt: skip
+    shapes = ((STEEL, "o", "black"), (GLASS, "s", "orange"), (NYLON, "^", "green"))
+    for sphere, marker, colour in shapes:
+        values = [restitution(sphere, x, drag=True) for x in STOKES_NUMBERS]
+        axes.semilogx(STOKES_NUMBERS, values, marker, color=COLOURS[colour], ms=4.5, mfc="none",
+                      label=f"computed, film and drag: {sphere.name}")  # fmt: skip
+    axes.set(xlabel="Stokes number", ylabel="restitution, wet over dry", ylim=(-0.03, 1.03))
+    axes.grid(visible=True, which="both", color="#dddddd", lw=0.5)
+    axes.legend(loc="lower right", fontsize=8)
     return figure
 
 

@@ -149,11 +149,53 @@ def quieter_design(folder: Path) -> dict[str, bytes]:
         return {"quieter": svg(figure)}
 
 
+def classical_chain(folder: Path) -> dict[str, bytes]:
+    """Transfer function to one node, force and spectrum; the section is that of the README."""
+    study = IMPACT.load(folder / "impact")
+    return {
+        "chain-node": (folder / "reduce" / "needle.node.svg").read_bytes(),
+        "chain-force": svg_chart(force_chart(study)),
+        "chain-spectrum": svg_chart(spectrum_chart(study)),
+    }
+
+
 def _third_octaves(path: Path) -> np.ndarray:
     """Centre frequencies [Hz] and levels [dB]."""
     rows = json.loads(path.read_text(encoding="utf-8"))["third_octave"]
     return np.array([(row["center_Hz"], row["level_dB"]) for row in rows])
 
+
+def stairs(folder: Path) -> dict[str, bytes]:
+    """Lift and velocity, wet, dry and of the synthetic record, with the echo times."""
+    record = np.loadtxt(folder / "record_synthetic.csv", delimiter=",", skiprows=3)
+    study = STROKE.load(folder / "stairs")
+    wet = study.variants["wet"]
+    with rc_context(STYLE):
+        figure = Figure(figsize=(6.7, 4.6), layout="constrained")
+        lift, speed = figure.subplots(2, 1, sharex=True)
+        for axes, column, name, scale in (
+            (lift, 1, "needle.tip displacement", 1e6),
+            (speed, 2, "needle velocity", 1.0),
+        ):
+            axes.plot(record[:, 0], record[:, column], color="#9db4d6", lw=2.2,
+                      label="recorded (synthetic), wet")  # fmt: skip
+            for label, colour, dash in (("wet", "black", "-"), ("dry", "#c2410c", ":")):
+                result = study.variants[label].result
+                values = result.channels[name].values
+                axes.plot(1e3 * result.time, scale * (values - values[0]), dash, color=colour,
+                          lw=1.1, label=f"computed, {label}")  # fmt: skip
+            for impact, count in zip(wet.impacts("seat"), (4, 3), strict=False):
+                middle = impact.time + 0.5 * impact.contact_time
+                for k in range(1, count):
+                    axes.axvline(1e3 * (middle + k * ECHO), color="#3b6fb5", lw=0.8, ls="--",
+                                 label="" if k > 1 or count < 4 else "impact + k 2L/a")  # fmt: skip
+        lift.set(ylabel="lift [um]", xlim=(1.5, 2.7))
+        speed.set(ylabel="velocity [m/s]", xlabel="time [ms]", ylim=(-0.75, 0.75))
+        figure.legend(*speed.get_legend_handles_labels(), loc="outside lower center", ncols=4)
+        return {"stairs": svg(figure)}
+
+
+ECHO = 104.08e-6  # [s], 2 L / a of the case stairs
 
 PAGES = {
     "own-step": own_step,
@@ -163,6 +205,8 @@ PAGES = {
     "measurement": measurement,
     "system-tool": system_tool,
     "quieter-design": quieter_design,
+    "stairs": stairs,
+    "classical-chain": classical_chain,
 }
 
 if __name__ == "__main__":

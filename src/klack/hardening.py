@@ -6,7 +6,13 @@ import numpy as np
 
 from klack.errors import InputError, require_positive
 
-__all__ = ["LARGEST_YIELD", "Hardening", "vickers_of_rockwell", "yield_of_hardness"]
+__all__ = [
+    "HARDNESS_SPREAD",
+    "LARGEST_YIELD",
+    "Hardening",
+    "vickers_of_rockwell",
+    "yield_of_hardness",
+]
 
 LARGEST_YIELD = 1.0 / 50.0
 """Yield stress over Young's modulus, above which strains are no longer small."""
@@ -52,6 +58,12 @@ class Hardening:
         """Rise of the tensile stress per plastic strain [Pa]."""
         return self.isotropic + self.kinematic
 
+
+HARDNESS_SPREAD = (0.5, 1.15)
+"""Lowest and highest yield stress over its estimate from a hardness.
+
+Half: soft annealed steel, which hardens at once.  15 %: steel that hardens little (10 %) and the
+scatter of the conversion between scales (5 %)."""
 
 _ROCKWELL = np.array([20.0, 25.0, 30.0, 35.0, 40.0, 45.0, 50.0, 55.0, 60.0, 65.0, 68.0])
 _VICKERS = np.array([238.0, 266.0, 302.0, 345.0, 392.0, 446.0, 513.0, 595.0, 697.0, 832.0, 940.0])

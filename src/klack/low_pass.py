@@ -63,7 +63,7 @@ class LowPass:
     def words(self) -> str:
         """For example ``Bessel low pass of order 2 at 80 kHz``."""
         name = self.kind.capitalize()
-        return f"{name} low pass of order {self.order} at {self.cut_off / 1e3:.4g} kHz"
+        return f"{name} low pass of order {self.order} at {self.cut_off / 1e3:.6g} kHz"
 
     def __call__(self, values: Floats, step: float) -> Floats:
         """Signal behind the low pass, same shape; at rest before its first sample."""

@@ -110,7 +110,8 @@ def _control_group(folder: Path, limit: str, usage: str, cached: str) -> list[Av
     try:
         most = float((folder / limit).read_text())
         used = float((folder / usage).read_text())
-        rows = dict(row.split(maxsplit=1) for row in (folder / "memory.stat").open())
+        told = (folder / "memory.stat").read_text()
+        rows = dict(row.split(maxsplit=1) for row in told.splitlines())
         left = most - used + float(rows.get(cached, 0.0))
     except (OSError, ValueError):  # no such group, or "max"
         return []

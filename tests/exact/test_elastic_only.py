@@ -1,10 +1,13 @@
 """What leaves out the yield stress of a material says so."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact.run import run_impact
+from klack.analyses.noise.source import impact_sources
 from klack.analyses.reduction.run import run_reduce
 from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.problem import build_problem
@@ -37,3 +40,19 @@ def test_elastic_materials_say_nothing():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         tell_elastic(read_case(text.replace(given, ""), SPHERES), "these are")
+
+
+def test_noise_of_an_impact_says_that_its_faces_were_new():
+    """Truth: the share of the energy in the balance of the impact."""
+    study = run_impact(load_case(SPHERES), levels=["reduced"], certify=False)
+    energies = study.levels["reduced"].energies
+    share = energies["plastic"] / energies["initial kinetic"]
+
+    (source,) = impact_sources(study)
+
+    told = [note for note in source.notes if "first on new faces" in note]
+    assert len(told) == 1
+    assert f"takes {100 * share:.2g} % of the energy" in told[0]
+    worn = replace(study.levels["reduced"], energies=energies | {"plastic": 0.0})
+    (after,) = impact_sources(replace(study, levels={"reduced": worn}))
+    assert not any("new faces" in note for note in after.notes)

@@ -22,6 +22,7 @@ from klack.gauges.rows import Line, displacement_row, strain_row, stress_row
 from klack.low_pass import LowPass
 from klack.materials import Material
 from klack.mesh.mesh import ElementBlock, Mesh
+from klack.mesh.rigid import Pose
 from klack.progress import silent
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
@@ -84,6 +85,23 @@ def test_the_strain_around_the_axis_is_that_of_the_radius():
     axial = stress_row(mesh, Line(at=line.at, direction=np.array([0.0, 1.0]), length=0.0, where=""),
                        {"body": STEEL}) @ u  # fmt: skip
     assert axial == pytest.approx(2e-3 * STEEL.lame_lambda, rel=1e-10)
+
+
+def test_errors_are_told_in_coordinates_of_the_drawing():
+    """Truth: a body that was moved by 7 mm has the coordinates of its drawing 7 mm lower."""
+    moved = distorted("quad4").moved(np.array([0.0, 7e-3]))
+    line = Line(
+        at=np.array([3e-3, 7e-3]),
+        direction=np.array([1.0, 0.0]),
+        length=1e-3,
+        where="gauge",
+        pose=Pose.along_z(7e-3),
+    )
+
+    with pytest.raises(InputError, match=r"gauge, end of .* at \(3.5, 0\) mm.* is \(3, 0\) mm"):
+        strain_row(moved, line)
+    with pytest.raises(InputError, match=r"gauge, within the gauge length: .* is \(3, 0\) mm"):
+        displacement_row(moved, line)
 
 
 def test_a_gauge_outside_of_the_body_tells_how_far_and_where_the_body_is():

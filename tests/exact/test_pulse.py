@@ -48,6 +48,16 @@ def test_a_ripple_has_its_period():
     assert pulse.ripple_period == pytest.approx(12e-6, rel=0.02)
 
 
+def test_noise_on_front_and_end_leaves_the_length():
+    """Truth: the trapezoid; noise of 5 % moves crossings of front and end by 0.5 and 1 us."""
+    noise = 5e-5 * np.random.default_rng(3).standard_normal(len(TIME))
+    pulse = measure_pulse(TIME, trapezoid() + noise, "noise")
+
+    assert pulse.front == pytest.approx(0.0, abs=1e-6)
+    assert pulse.length == pytest.approx(80e-6, abs=1e-6)
+    assert pulse.plateau == pytest.approx(1e-3, rel=0.01)
+
+
 def test_factor_and_shift_are_found_again():
     measured = trapezoid(level=-1.3e-3)
     computed = trapezoid(start=33e-6, level=1e-3, rest=0.0)

@@ -25,6 +25,7 @@ from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.voltage_table import VoltageTable
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.friction import GuideFriction
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.checks import LooseBodyWarning
@@ -425,6 +426,52 @@ def test_a_body_that_nothing_holds_is_named():
         pytest.warns(LooseBodyWarning),
         pytest.raises(InputError, match="got 'needle', unsupported"),
     ):
+        run(parts, joints)
+
+
+@pytest.mark.parametrize("push", [-0.9, 0.9])
+def test_friction_holds_a_body_that_nothing_else_does(push):
+    """Below breakaway it stays where it is drawn; the force it resists is that of the push."""
+    parts = {
+        "needle": RigidMass(mass=1e-3, points=("tip",)),
+        "force": ConstantForce(force=push),
+        "guide": GuideFriction(coulomb=0.5, breakaway=1.0),
+    }
+
+    with pytest.warns(LooseBodyWarning):
+        result = run(parts, [["needle.tip", "force.end", "guide.body"]], duration=2e-3)
+
+    assert result.start is not None
+    assert result.start.residual["needle"] == pytest.approx(push, rel=TIGHT)
+    assert "900 mN of 1 N" in result.start.notes[0]
+    moved = result.channels["needle.tip displacement"].values
+    assert np.abs(moved).max() < 1e-15  # free, it would have gone 1.8 mm
+
+
+def test_a_body_that_friction_is_too_weak_for_is_named():
+    parts = {
+        "needle": RigidMass(mass=1e-3, points=("tip",)),
+        "force": ConstantForce(force=-1.1),
+        "guide": GuideFriction(coulomb=0.5, breakaway=1.0),
+    }
+
+    with (
+        pytest.warns(LooseBodyWarning),
+        pytest.raises(InputError, match=r"got 'needle', unsupported.*or friction above it"),
+    ):
+        run(parts, [["needle.tip", "force.end", "guide.body"]])
+
+
+def test_friction_between_two_loose_bodies_holds_neither():
+    parts = {
+        "needle": RigidMass(mass=1e-3, points=("tip",)),
+        "sleeve": RigidMass(mass=1e-3, points=("tip",)),
+        "force": ConstantForce(force=-0.5),
+        "guide": GuideFriction(coulomb=1.0),
+    }
+    joints = [["needle.tip", "force.end", "guide.body"], ["sleeve.tip", "guide.guide"]]
+
+    with pytest.warns(LooseBodyWarning), pytest.raises(InputError, match="'needle', unsupported"):
         run(parts, joints)
 
 

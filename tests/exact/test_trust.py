@@ -81,6 +81,14 @@ def test_the_shortest_contact_that_carries_counts():
     assert run("reduced", steps=600, shape=two).doubts == ()
 
 
+def test_many_contacts_of_which_none_carries_a_share_count_all():
+    """25 half sines in one impact, of 4 % of its impulse and 80 steps each."""
+    many = run("interface", steps=4000, shape=lambda x: np.maximum(np.sin(50 * np.pi * x), 0.0))
+    assert many.measures.sub_contacts == 25
+    (doubt,) = many.doubts
+    assert "80 steps" in doubt
+
+
 def test_a_mode_that_rings_needs_its_steps_only_in_the_full_order():
     """(omega h)^2 / 12 = 0.5 % at 26 steps per period; modal levels take modes exactly."""
     mode = {"frequency": 250e3, "ringing": 0.05}  # 4 us, 20 steps of 200 ns

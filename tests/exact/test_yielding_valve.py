@@ -168,3 +168,29 @@ def test_a_law_that_cannot_be_leaves_the_stop_elastic(monkeypatch):
     assert any("leaves out the yield of its faces" in text for text in study.warnings)
     assert any("yields before" in text for text in study.warnings)
     assert not study.variants["dry"].result.faces
+
+
+WORN = "{force: 30 N, radius: [0 um, 20 um, 40 um], opening: [300 nm, 80 nm, 0 nm]}"
+
+
+@pytest.mark.slow
+def test_a_worn_stop_is_that_of_the_worn_impact():
+    """Reference: ``klack impact`` of the same faces; exact but for the start of the gap, 0.5 %."""
+    study = _study(("speed: 0.1 m/s}", f"speed: 0.1 m/s, worn: {WORN}}}"))
+    text = SPHERES.read_text("utf-8").replace("gap: 0 um", f"gap: 0.2 um\n  worn: {WORN}")
+    text = text.replace("speed: 0.1 m/s", "speed: 0.1 m/s, force: 20 mN")
+    expected = run_impact(read_case(text, SPHERES), levels=("reduced",)).levels["reduced"].measures
+    first = study.variants["dry"].result.events[0]
+
+    assert first.peak_force == pytest.approx(expected.peak_force, rel=5e-3)
+    assert first.contact_time == pytest.approx(expected.contact_time, rel=5e-3)
+    assert first.restitution > 0.99  # a run-in seat does not yield any more
+    assert expected.peak_force > 1.02 * _study().variants["dry"].result.events[0].peak_force
+
+
+def test_worn_faces_of_a_stop_without_a_computed_law_are_refused():
+    with pytest.raises(InputError, match=r"stops.seat.worn: .* law is not computed"):
+        _valve(
+            ("speed: 0.1 m/s}", f"speed: 0.1 m/s, worn: {WORN}}}"),
+            ("law: {kind: consistent}", "law: {kind: linear, stiffness: 1e7 N/m}"),
+        )

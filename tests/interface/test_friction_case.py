@@ -45,6 +45,30 @@ def test_interface_level_and_full_order_rub_alike(both):
     assert abs(ours.energy_residual) < 1e-12
 
 
+@pytest.mark.parametrize("friction", [0.05, 0.3])
+def test_so_they_do_with_less_and_more_of_it(tmp_path, friction):
+    found = impact(case(tmp_path, "[interface, full]", friction=friction), certify=False).levels
+    ours, full = found["interface"].measures, found["full"].measures
+    assert ours.peak_force == pytest.approx(full.peak_force, rel=0.005)
+    assert ours.contact_time == pytest.approx(full.contact_time, rel=0.01)
+    assert ours.restitution == pytest.approx(full.restitution, abs=0.002)
+
+
+@pytest.mark.parametrize(("static", "doubted"), [(0.11, False), (0.5, True)])
+def test_jumps_that_depend_on_the_step_are_told(tmp_path, static, doubted):
+    """A step shorter by the square root of 2 gives another restitution, or the same."""
+    mine = case(tmp_path, friction=0.1, static_friction=static, stribeck_speed="0.02 m/s")
+    level = impact(mine, certify=False).levels["interface"]
+    step = mine.run.interface_step / np.sqrt(2)
+    other = impact(
+        mine.model_copy(update={"run": mine.run.model_copy(update={"interface_step": step})}),
+        certify=False,
+    ).levels["interface"]
+    change = abs(other.measures.restitution - level.measures.restitution)
+    assert (change > 0.002) == doubted
+    assert any("depends on the step" in doubt for doubt in level.doubts) == doubted
+
+
 def test_the_record_tells_what_the_impact_would_be_without(both, tmp_path):
     smooth = impact(case(tmp_path)).levels["interface"]
     told = both.levels["interface"].frictionless

@@ -206,7 +206,7 @@ def test_doubts_of_an_impact_are_notes_of_its_point(ball, tmp_path):
     own = [note for note in single.warnings if "for comparison only" not in note]
     assert own
     assert set(own) <= set(record.notes[0].splitlines())
-    assert "at 1 points" in record.model
+    assert "at 1 point" in record.model
 
 
 def test_a_level_that_is_not_the_answer_says_so_at_its_point(tmp_path):

@@ -249,6 +249,7 @@ def test_matrices_with_nodes_alone(tmp_path):
         ),
         ("lumped:", "shots: {count: 3, seed: 1}\nlumped:", "surfaces"),
         ("lumped:", "reduction: {correction: attachment}\nlumped:", "in series with the law"),
+        ("lumped:", "reduction: {shifts: {needle: [-1 kHz]}}\nlumped:", "shifts of attachment"),
         (
             "reduced_step: 10 ns",
             "reduced_step: 10 ns, transfer: {from: 1 kHz, to: 9 kHz}",

@@ -8,6 +8,7 @@ from scipy.sparse import csr_array
 from klack.elasticity.eigen import eigenmodes
 from klack.errors import ConvergenceError, InputError
 from klack.reduction import dynamic_stiffness
+from klack.reduction.attachment import shift_at
 from klack.reduction.damping import LossFactor, ModalDamping, RayleighDamping
 from klack.reduction.full_order import full_order_receptance
 from klack.reduction.ports import Port, node_observer, pressure_port, surface_port
@@ -207,7 +208,6 @@ def reduce_with(parts, **changes):
         ({"ports": [Port("tip", np.ones(7))]}, "7 weights"),
         ({"modes": ByCount(9)}, "pool of 8 computed modes"),
         ({"shifts": (-1e9,)}, 'correction="attachment"'),
-        ({"shifts": (1e9,), "correction": "attachment"}, "below 0"),
         ({"damping": ModalDamping(ratio=[0.1])}, "each of the 2 elastic modes"),
         ({"recovery_surfaces": ["lid"]}, "surface 'lid'"),
     ],
@@ -215,6 +215,39 @@ def reduce_with(parts, **changes):
 def test_reduction_refuses_what_it_cannot_use(parts, changes, text):
     with pytest.raises(InputError, match=text):
         reduce_with(parts, **changes)
+
+
+@pytest.mark.parametrize(
+    ("shifts", "text"),
+    [
+        ([0.0], "its rigid motion"),
+        ([-10.0], "its rigid motion"),  # nothing but round-off is elastic
+        ([100.0], "its rigid motion"),
+        ([float("nan")], "its rigid motion"),
+        ([1.0005], "an eigenfrequency"),
+        ([3.0], "an eigenfrequency"),  # not among the kept ones
+        ([-20e3, -20e3], "is new"),
+        ([-20e3, 40e3, -20.01e3], "-20.01 kHz after -20 kHz, 40 kHz"),
+    ],
+)
+def test_shifts_without_a_mode_of_their_own_are_refused(parts, shifts, text):
+    """In Hz; 1 and 3 stand for the first and the third elastic eigenfrequency."""
+    first = parts[2].frequency
+    given = [shift_at(f * first[int(f) - 1] / int(f) if 1 <= f < 4 else f) for f in shifts]
+    with pytest.raises(InputError, match=text) as caught:
+        reduce_with(parts, shifts=given, correction="attachment")
+    assert "body 'rod'" in str(caught.value)
+    assert "\nTry: " in str(caught.value)
+
+
+def test_without_pardiso_shifted_modes_are_the_same(parts, monkeypatch):
+    shifts = [shift_at(130e3), shift_at(-20e3)]
+    with_it = reduce_with(parts, shifts=shifts, correction="attachment")
+    monkeypatch.setattr(dynamic_stiffness, "available_backends", lambda: ("superlu",))
+    without = reduce_with(parts, shifts=shifts, correction="attachment")
+
+    assert_allclose(without.omega, with_it.omega, rtol=1e-9)
+    assert_allclose(abs(without.port_shapes), abs(with_it.port_shapes), rtol=1e-6)
 
 
 def test_ports_refuse_what_they_cannot_use():

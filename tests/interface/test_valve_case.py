@@ -167,6 +167,16 @@ MISTAKES = {
         "reduction.correction",
         "linear law",
     ),
+    "shifts of attachment modes with a consistent law": (
+        changed("reduction:\n", "reduction:\n  shifts: {needle: [-20 kHz]}\n"),
+        "reduction.shifts",
+        "correction: attachment",
+    ),
+    "shifts of an unknown body": (
+        changed("reduction:\n", "reduction:\n  shifts: {neddle: [-20 kHz]}\n"),
+        "reduction.shifts.neddle",
+        "did you mean 'needle'?",
+    ),
     "lumped without stiffness": (
         changed("lumped: {stiffness: 1e9 N/m, restitution: 0.5}", ""),
         "run.variants",
@@ -191,6 +201,16 @@ MISTAKES = {
         changed("type: spring", "type: sprng"),
         "network.components.spring.type",
         "did you mean 'spring'?",
+    ),
+    "unknown shape of a film": (
+        changed("gap: 0 um,", "gap: 0 um, film: {shape: spherical, radius: 1 mm},"),
+        "network.components.seat.film.shape",
+        "did you mean 'sphere'?",
+    ),
+    "film without a shape": (
+        changed("gap: 0 um,", "gap: 0 um, film: {radius: 1 mm},"),
+        "network.components.seat.film",
+        "a mapping with the key 'shape'",
     ),
     "port on a surface that is not drawn": (
         changed(

@@ -197,6 +197,14 @@ class TestBetterValve(Tutorial):
     name = "better-valve"
 
 
+class TestStairs(Tutorial):
+    name = "stairs"
+
+
+class TestClassicalChain(Tutorial):
+    name = "classical-chain"
+
+
 def test_every_page_is_followed() -> None:
     pages = {path.stem for path in FOLDER.glob("*.md")} - {"index"}
     assert pages == {tutorial.name for tutorial in Tutorial.__subclasses__()}

@@ -47,6 +47,7 @@ def test_all_shipped_cases_are_tested():
         "needle-from-inp",
         "quieter",
         "sphere-on-rod",
+        "stairs",  # in test_workflow_stairs.py
         "struck-bar",
         "two-rods",
         "witness",  # in test_calculix_impact.py

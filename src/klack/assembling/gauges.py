@@ -12,7 +12,7 @@ from klack.gauges.rows import AROUND, Line, displacement_row, strain_row, stress
 from klack.mesh.mesh import Mesh
 from klack.mesh.rigid import Pose, rotation_matrix
 
-__all__ = ["place_gauges"]
+__all__ = ["place_gauges", "placed_point"]
 
 Floats = NDArray[np.float64]
 
@@ -59,17 +59,23 @@ def _line(case: Case, output: CaseOutput, mesh: Mesh, pose: Pose | None) -> Line
     direction: Floats | str = AROUND
     if vector is not None:
         direction = np.array(vector) / np.linalg.norm(vector)
-    if pose is not None and mesh.dimension == 2:
-        at = at + pose.shift[2] * np.array([0.0, 1.0])
-    elif pose is not None:
-        at = pose.of(at)
+    at = placed_point(at, pose)
+    if pose is not None and mesh.dimension == 3:
         direction = rotation_matrix(pose.rotation) @ np.asarray(direction)
     return Line(
         at=at,
         direction=direction,
         length=output.length,
         where=f"{case.path or 'case'}: outputs.{output.name}",
+        pose=pose,
     )
+
+
+def placed_point(at: Floats, pose: Pose | None) -> Floats:
+    """Where a point of the drawing is, shape (2,) or (3,) [m]; the same without a pose."""
+    if pose is None:
+        return at
+    return at + pose.shift[2] * np.array([0.0, 1.0]) if len(at) == 2 else pose.of(at)
 
 
 def _words(output: CaseOutput) -> str:

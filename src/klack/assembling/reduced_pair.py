@@ -52,6 +52,7 @@ __all__ = [
     "hertz_coefficient",
     "impact_system",
     "own_pair",
+    "recipe_stiffness",
     "reduce_pair",
     "simulate_bodies",
     "starting_gap",
@@ -63,6 +64,7 @@ PORT = "contact"
 
 # The pattern of the port is taken at the peak force, which depends on it weakly.
 _PATTERN_ROUNDS = 3
+_USUAL_STIFFNESS = 1e9  # [N/m] that the literature puts beside modes, corrected or not
 _CLASSICAL_SIZE = 3.0  # radius of the contact submodel over the half width of the contact
 
 
@@ -116,6 +118,12 @@ def classical_stiffness(problem: ContactProblem, peak_force: float) -> LocalStif
         size=size,
         cache=problem.flexibility_upper.cache,
     )
+
+
+def recipe_stiffness(case: Case) -> float:
+    """Contact stiffness [N/m] of the classical recipe: that of the case, or the usual 1e9 N/m."""
+    law = case.contact.local_law
+    return law.stiffness if isinstance(law, LinearLocalLaw) else _USUAL_STIFFNESS
 
 
 def first_stiffness(problem: ContactProblem) -> float:
@@ -244,6 +252,7 @@ def _reduce_at(
             damping=damping_of(problem.case.bodies[body.name].damping),
             modes_pool=pools[body.name],
             flexibility=flexibility,
+            shifts=problem.case.reduction.shifts_of(body.name, correction),
             recovery_surfaces=tuple(body.mesh.surfaces) if recovery else (),
             observers=[
                 Observer(gauge.name, gauge.row)
@@ -273,7 +282,7 @@ def _reduce_at(
     )
 
 
-def friction_doubt(case: Case, *, has_memory: bool) -> str:
+def friction_doubt(case: Case, *, has_memory: bool, correction: str = "none") -> str:
     """Doubt about a model of a case that has not all of its friction; else empty.
 
     Parameters
@@ -281,6 +290,8 @@ def friction_doubt(case: Case, *, has_memory: bool) -> str:
     case : Case
     has_memory : bool
         Its law closes and opens on two curves.
+    correction : str
+        Of its modes.
     """
     faces = case.contact.faces
     if faces.is_none:
@@ -289,10 +300,10 @@ def friction_doubt(case: Case, *, has_memory: bool) -> str:
         left = (
             f"friction {faces.kinetic:g}" if faces.kinetic else f"static_friction {faces.static:g}"
         )
-        return (
-            f"it leaves out contact.{left}: only the consistent local law has "
-            "friction. Try: level interface."
-        )
+        why = "only the consistent local law has friction"
+        if _rubs(case, correction):
+            why = "faces that lock have no law, nor have loops that it cannot follow"
+        return f"it leaves out contact.{left}: {why}. Try: level interface."
     if not faces.is_constant:
         return (
             f"its law takes contact.friction {faces.kinetic:g} at every speed of slip and leaves "
@@ -301,7 +312,7 @@ def friction_doubt(case: Case, *, has_memory: bool) -> str:
     return ""
 
 
-def _rubs(case: Case, correction: Correction) -> bool:
+def _rubs(case: Case, correction: str) -> bool:
     law = case.contact.local_law
     is_consistent = isinstance(law, ConsistentLocalLaw) and correction == "consistent"
     return is_consistent and case.contact.faces.kinetic > 0.0

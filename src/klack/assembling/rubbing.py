@@ -7,22 +7,15 @@ smooth: other levels have no need of it.
 
 import warnings
 
-import numpy as np
-from scipy.sparse import vstack
-
 from klack.assembling.bodies import BodyPair
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
 from klack.contact.local_law import LocalLaw
-from klack.contact.mortar import tangent_rows
 from klack.contact.rubbing_fit import RubbingFit, rubbing_fit
-from klack.contact.statics import ReachError, StaticContact, condensed_compliance
+from klack.contact.statics import ReachError, StaticContact, contact_compliance
 from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
-from klack.transient.rubbing_ladder import (
-    LockedError,
-    RubbingContact,
-    TangentialRows,
-    rubbing_contact,
-)
+from klack.transient.rubbing_ladder import LockedError, RubbingContact, rubbing_contact
 
 __all__ = ["fitted_loops", "static_loops"]
 
@@ -56,16 +49,15 @@ def static_loops(
     AccuracyWarning
         Where no such contact is found.
     """
-    a, b, space = pair.upper.mesh, pair.lower.mesh, static.space
-    T_a, T_b = tangent_rows(space, a, pair.upper_surface, b, pair.lower_surface)
-    up = np.zeros((a.node_count, a.dimension))
-    up[:, -1] = 1.0
-    C = condensed_compliance(
-        vstack([space.G_a, T_a], format="csr"), vstack([space.G_b, T_b], format="csr"), upper, lower
+    faces = FaceFriction.on(
+        Friction.coulomb(friction),
+        static.space,
+        *(pair.upper.mesh, pair.upper_surface),
+        *(pair.lower.mesh, pair.lower_surface),
     )
-    rows = TangentialRows(T_a=T_a, T_b=T_b, axial=T_a @ up.ravel())
+    C = contact_compliance(static.space, upper, lower, faces=faces)
     try:
-        return rubbing_contact(static, rows, C, friction, key=key)
+        return rubbing_contact(static, faces, C, key=key)
     except (LockedError, ReachError, ConvergenceError) as error:
         warnings.warn(
             f"the reduced level leaves out {key} {friction:g}: {error}",

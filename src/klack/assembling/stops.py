@@ -151,6 +151,7 @@ def build_stop(
         closing=stop.force,
         reach=stop.reach,
         progress=progress,
+        worn=None if stop.worn is None else stop.worn.faces,
     )
     rubbing = None
     if stop.friction > 0.0:
@@ -160,7 +161,7 @@ def build_stop(
                 static, pair, upper, lower, stop.friction, key=_friction_key(name)
             )
     loops = None
-    if is_consistent(case.network.components[name]):
+    if is_consistent(case.network.components[name]) and stop.worn is None:
         with warnings_of(f"stop '{name}'"):
             loops = _loops(case, stop, pair, flexibility, static, progress, name)
     loaded = static if rubbing is None else rubbing
@@ -324,6 +325,7 @@ def _peak_force(
             damping=damping_of(case.bodies[body.name].damping),
             modes_pool=pools[body.name],
             flexibility=flexibility,
+            shifts=case.reduction.shifts_of(body.name, case.reduction.correction),
         )
         for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
     )

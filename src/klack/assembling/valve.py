@@ -116,6 +116,7 @@ def _built(
             damping=damping_of(case.bodies[name].damping),
             modes_pool=pools[name],
             flexibility=flexibilities[name],
+            shifts=case.reduction.shifts_of(name, case.reduction.correction),
         )
     progress("radiating surfaces", 0.0)
     structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)

@@ -1,6 +1,7 @@
 """Materials, bodies and their reduction: the parts that every kind of case shares."""
 
 from collections.abc import Iterable, Mapping
+from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -17,15 +18,17 @@ from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.errors import InputError
 from klack.hardening import (
+    HARDNESS_SPREAD,
     LARGEST_YIELD,
     Hardening,
     vickers_of_rockwell,
     yield_of_hardness,
 )
 from klack.input.problem import CaseProblem, nearest, one_of
-from klack.input.section import Count, Name, Section, Text
+from klack.input.section import Count, Name, NamedSection, Section, Text
+from klack.material_library import MATERIALS, find_material
 from klack.materials import Material
-from klack.units import Density, Frequency, Modulus, Rate, Ratio, Time
+from klack.units import Density, Frequency, Modulus, Rate, Ratio, Time, format_si
 
 __all__ = [
     "BodyDamping",
@@ -40,6 +43,9 @@ __all__ = [
     "Reduction",
     "SurfaceName",
 ]
+
+
+_MOST_SHIFTS = 8  # more are nearly parallel or near eigenfrequencies
 
 
 class SurfaceName(NamedTuple):
@@ -97,9 +103,12 @@ class HardeningSlopes(Section):
     kinematic: Modulus = Field(default=0.0, ge=0, description="Shift of the yield surface.")
 
 
-class CaseMaterial(Section):
-    """Isotropic material: elastic, and when it yields."""
+class CaseMaterial(NamedSection):
+    """Isotropic material: elastic, and when it yields; a bare text is a name of the library."""
 
+    name: Text | None = Field(
+        default=None, description="Of the library; keys beside it replace its numbers."
+    )
     young: Modulus = Field(gt=0, description="Young's modulus; steel 210 GPa.")
     poisson: Ratio = Field(gt=-1, lt=0.5, description="Poisson's ratio; steel 0.3.")
     density: Density = Field(gt=0, description="Density; steel 7850 kg/m^3.")
@@ -115,6 +124,30 @@ class CaseMaterial(Section):
     hardening: HardeningSlopes | None = Field(
         default=None, description="Linear hardening; without it perfectly plastic."
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _from_library(cls, value: Any) -> Any:
+        name = value.get("name") if isinstance(value, Mapping) else value
+        if not isinstance(name, str):
+            return value
+        entry = find_material(name)
+        if entry is None:
+            raise CaseProblem(
+                ("name",) if isinstance(value, Mapping) else (),
+                got=f"'{name}'"[:80],
+                expected=f"a material of the library: {one_of(MATERIALS)}",
+                hint=nearest(name, MATERIALS, "give young, poisson, density instead of a name."),
+            )
+        given = value if isinstance(value, Mapping) else {"name": name}
+        numbers: dict[str, Any] = {
+            "young": f"{entry.young.value!r} Pa",
+            "poisson": entry.poisson.value,
+            "density": f"{entry.density.value!r} kg/m^3",
+        }
+        if entry.yield_stress is not None and not {"yield", "hardness"} & set(given):
+            numbers["yield"] = f"{entry.yield_stress.value!r} Pa"
+        return numbers | dict(given)
 
     @model_validator(mode="after")
     def _one_yield(self) -> Self:
@@ -132,6 +165,25 @@ class CaseMaterial(Section):
                 hint="check the unit; hardened steel has 2000 MPa.",
             )
         return self
+
+    @property
+    def doubtful_yield(self) -> tuple[float, str] | None:
+        """Lowest yield stress [Pa] behind an estimate, and what it rests on; None for a given one.
+
+        A hardness gives an estimate (:data:`klack.hardening.HARDNESS_SPREAD`); a number of the
+        library is that of another bar.
+        """
+        if self.hardness is not None:
+            low, high = (share * self.hardness.yield_stress for share in HARDNESS_SPREAD)
+            between = f"{format_si(low, 'Pa', 2)} to {format_si(high, 'Pa', 2)}"
+            return low, f"estimated from its hardness, {between}"
+        entry = None if self.name is None else find_material(self.name)
+        hardening = None if entry is None else entry.material.hardening
+        if entry is None or entry.yield_stress is None or hardening is None:
+            return None
+        if self.yield_stress is None or not isclose(self.yield_stress, hardening.yield_stress):
+            return None
+        return self.yield_stress, f"that of the library ({entry.yield_stress.source})"
 
     def named(self, name: str) -> Material:
         """As the finite elements need it."""
@@ -338,9 +390,46 @@ class Reduction(Section):
         default_factory=dict, description="Kept modes of each body; 40 where none is given."
     )
 
+    shifts: Mapping[Name, tuple[Frequency, ...]] = Field(
+        default_factory=dict,
+        description="Of a body: shifted instead of residual attachment modes, one per frequency; "
+        "exact there, below zero at an imaginary frequency.",
+        examples=[{"needle": ["-20 kHz", "150 kHz"]}],
+    )
+
+    @field_validator("shifts", mode="after")
+    @classmethod
+    def _some_shifts(
+        cls, shifts: Mapping[str, tuple[float, ...]]
+    ) -> Mapping[str, tuple[float, ...]]:
+        for body, frequencies in shifts.items():
+            if not 1 <= len(frequencies) <= _MOST_SHIFTS:
+                raise CaseProblem(
+                    (body,),
+                    got=f"{len(frequencies)} shifts",
+                    expected=f"1 to {_MOST_SHIFTS} frequencies",
+                    hint="two are usual for a free body; leave the body out for its residual mode.",
+                )
+            if len(set(frequencies)) < len(frequencies):
+                raise CaseProblem(
+                    (body,),
+                    got="the same shift twice",
+                    expected="different frequencies",
+                    hint="each adds one mode per contact; a second one at its place adds nothing.",
+                )
+        return shifts
+
     def choice(self, body: str) -> ModeChoice:
         """Modes to keep of one body."""
         return self.modes.get(body, ModeChoice(count=40))
+
+    def shifts_of(self, body: str, correction: str) -> tuple[float, ...] | None:
+        """Shifts [(rad/s)^2] of the attachment modes of a body; None for residual ones or none."""
+        if correction != "attachment" or body not in self.shifts:
+            return None
+        from klack.reduction.attachment import shift_at  # loads the solvers: not to read a case
+
+        return tuple(shift_at(frequency) for frequency in self.shifts[body])
 
 
 class CaseFile(Section):

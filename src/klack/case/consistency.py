@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from klack.case.bodies import CaseFile, SurfaceName
+from klack.case.bodies import CaseFile, Reduction, SurfaceName
 from klack.case.given_consistency import check_given, check_port
 from klack.case.impact_sections import ImpactSections
 from klack.case.outputs import check_outputs
@@ -12,7 +12,13 @@ from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
 
-__all__ = ["check_body", "check_consistency", "check_surface", "require_known"]
+__all__ = [
+    "check_body",
+    "check_consistency",
+    "check_shifts",
+    "check_surface",
+    "require_known",
+]
 
 
 def check_consistency(case: ImpactSections) -> None:
@@ -27,6 +33,7 @@ def check_consistency(case: ImpactSections) -> None:
         check_body(case, name)
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
+    check_shifts(case, case.reduction)
     _check_local_law(case)
     _check_opposite(case)
     _check_roughness(case)
@@ -34,6 +41,7 @@ def check_consistency(case: ImpactSections) -> None:
     _check_guide(case)
     _check_shots(case)
     _check_outputs(case)
+    _check_nodes(case)
     _check_ends(case)
     _check_worn(case)
     if "lumped" in case.run.levels and case.lumped is None:
@@ -58,6 +66,21 @@ def require_known(
             hint=nearest(name, known, f"name a {what} that this case defines."),
             on_key=on_key,
         )
+
+
+def check_shifts(case: CaseFile, reduction: Reduction) -> None:
+    """Check that the shifts of attachment modes are those of bodies with elements."""
+    for name in reduction.shifts:
+        key: Key = ("reduction", "shifts", name)
+        require_known(key, name, case.bodies, "body", on_key=True)
+        if case.bodies[name].reduced is not None:
+            raise CaseProblem(
+                key,
+                got=f"shifts of '{name}', which is a reduced model already",
+                expected="shifts of a body that klack reduces",
+                hint="remove them.",
+                on_key=True,
+            )
 
 
 def _check_bodies(case: ImpactSections) -> None:
@@ -296,6 +319,22 @@ def _check_outputs(case: ImpactSections) -> None:
     others += [key for key in ("guide", "opposite", "shots") if getattr(case, key) is not None]
     dimensions = {name: body.geometry.dimension for name, body in case.bodies.items()}
     check_outputs(case.outputs, dimensions, next(iter(others), ""))
+
+
+def _check_nodes(case: ImpactSections) -> None:
+    """Nodes that klack reduce reads belong to the two bodies that meet."""
+    for name, place in (case.run.transfer.nodes if case.run.transfer else {}).items():
+        key: Key = ("run", "transfer", "nodes", name)
+        between = [surface.body for surface in case.contact.between]
+        require_known(key, name, between, "body", on_key=True)
+        axes = ("r", "z") if case.bodies[name].geometry.dimension == 2 else ("x", "y", "z")
+        if len(place) != len(axes):
+            raise CaseProblem(
+                key,
+                got=f"{len(place)} coordinates",
+                expected=f"[{', '.join(axes)}] of '{name}'",
+                hint="coordinates are those of the drawing.",
+            )
 
 
 def _check_worn(case: ImpactSections) -> None:

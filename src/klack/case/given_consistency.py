@@ -77,6 +77,14 @@ def check_given(case: ImpactSections) -> None:
             hint="remove 'transfer'.",
             on_key=True,
         )
+    if case.reduction.shifts:
+        raise CaseProblem(
+            ("reduction", "shifts"),
+            got=f"shifts of attachment modes with '{name}', {what}",
+            expected="two meshed bodies: there are no attachment modes without",
+            hint="remove 'shifts'.",
+            on_key=True,
+        )
     _check_law(case, name, what)
     if not case.contact.faces.is_none:
         raise CaseProblem(

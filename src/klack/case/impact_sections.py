@@ -145,6 +145,11 @@ class CaseWorn(Section):
             )
         return self
 
+    @property
+    def faces(self) -> WornFaces:
+        """The same as arrays."""
+        return WornFaces(radius=np.array(self.radius), opening=np.array(self.opening))
+
 
 class CaseContact(Section):
     """Which surfaces meet, and how."""
@@ -229,9 +234,7 @@ class CaseContact(Section):
     @property
     def worn_faces(self) -> WornFaces | None:
         """Profile of worn faces; None for faces as made."""
-        if self.worn is None:
-            return None
-        return WornFaces(radius=np.array(self.worn.radius), opening=np.array(self.worn.opening))
+        return None if self.worn is None else self.worn.faces
 
     @property
     def faces(self) -> Friction:
@@ -287,6 +290,12 @@ class TransferSweep(Section):
     highest: Frequency = Field(alias="to", gt=0, description="Highest frequency.")
     points: Count = Field(
         default=200, ge=2, le=5000, description="Number of frequencies, logarithmic."
+    )
+    nodes: Mapping[Name, tuple[Length, ...]] = Field(
+        default_factory=dict,
+        description="Of a body: a place in its drawing, [r, z] axisymmetric or [x, y, z] solid. "
+        "klack reduce reads the node next to it, along the axis, beside the contact.",
+        examples=[{"needle": ["0 mm", "0 mm", "-0.6 mm"]}],
     )
 
     @model_validator(mode="after")

@@ -336,11 +336,17 @@ def _problem(details: ErrorDetails, data: Any, case: type[Section]) -> CaseProbl
     kind, context = details["type"], details.get("ctx", {})
     key: Key = ()
     if kind == "union_tag_invalid" and isinstance(value, dict):
-        key, value = ("kind",), value.get("kind")
+        name = _discriminator(context)
+        key, value = (name,), value.get(name)
     expected, hint = _words(kind, context, value)
     if not expected:
         expected, hint = details["msg"], "klack schema describes every key."
     return CaseProblem(key, got=_shown(value), expected=expected, hint=hint)
+
+
+def _discriminator(context: dict[str, Any]) -> str:
+    """Key that says which of several forms a section has."""
+    return str(context["discriminator"]).strip("'")
 
 
 _BOUNDS = {
@@ -384,7 +390,9 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
         ]
         return f"one of: {', '.join(names)}", nearest(str(value), names, f"write {names[0]}.")
     if kind == "union_tag_not_found":
-        return "a mapping with the key 'kind'", "write {kind: consistent}."
+        name = _discriminator(context)
+        example = "consistent" if name == "kind" else "..."
+        return f"a mapping with the key '{name}'", f"write {{{name}: {example}}}."
     if kind == "too_short":
         return f"at least {context['min_length']} of them", "add what is missing."
     if kind == "too_long":

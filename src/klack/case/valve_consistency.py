@@ -1,6 +1,6 @@
 """Checks of a case of a whole valve that need more than one section."""
 
-from klack.case.consistency import check_body, check_surface, require_known
+from klack.case.consistency import check_body, check_shifts, check_surface, require_known
 from klack.case.given_consistency import require_surfaces
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
@@ -26,6 +26,15 @@ def check_valve(case: ValveSections) -> None:
             )
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
+    check_shifts(case, case.reduction)
+    if case.reduction.shifts and case.reduction.correction != "attachment":
+        raise CaseProblem(
+            ("reduction", "shifts"),
+            got=f"shifts of attachment modes with the correction '{case.reduction.correction}'",
+            expected="the correction 'attachment'",
+            hint="remove 'shifts', or write 'correction: attachment' and give the end stops a law.",
+            on_key=True,
+        )
     _check_flexible_bodies(case)
     network = case.network.network()
     meetings = find_meetings(network)
@@ -33,6 +42,7 @@ def check_valve(case: ValveSections) -> None:
         _check_stop(case, name, meetings)
     _check_laws(case)
     _check_friction(case)
+    _check_worn(case)
     if case.lumped is None:
         for variant in case.run.variants:
             if variant.endswith("lumped"):
@@ -185,6 +195,20 @@ def _check_friction(case: ValveSections) -> None:
                 got=f"{restitution:g} beside the friction {stop.friction:g} of the same stop",
                 expected="one of them: a restitution stands for all that an impact loses",
                 hint=f"leave the restitution out, or stops.{name}.friction.",
+            )
+
+
+def _check_worn(case: ValveSections) -> None:
+    """Worn faces are those of a computed law."""
+    for name, stop in case.stops.items():
+        if stop.worn is not None and not is_consistent(case.network.components[name]):
+            raise CaseProblem(
+                ("stops", name, "worn"),
+                got="worn faces at an end stop whose law is not computed",
+                expected="the consistent law at this stop: the only one with faces",
+                hint=f"write law: {{kind: consistent}} in network.components.{name}, or leave "
+                "'worn' out.",
+                on_key=True,
             )
 
 

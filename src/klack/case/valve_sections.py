@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
 from klack.case.calibration import CaseCalibration
-from klack.case.impact_sections import Lumped
+from klack.case.impact_sections import CaseWorn, Lumped
 from klack.case.measurement import CaseMeasurement
 from klack.case.noise import CaseNoise
 from klack.case.study import CaseStudy
@@ -74,6 +74,9 @@ class CaseStop(Section):
     )
     friction: Ratio = Field(
         default=0.0, ge=0, le=MOST_FRICTION, description="Coulomb's coefficient between the faces."
+    )
+    worn: CaseWorn | None = Field(
+        default=None, description="Set of both faces after earlier impacts; default as made."
     )
 
     @property

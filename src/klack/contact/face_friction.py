@@ -11,7 +11,7 @@ from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.mesh.mesh import Mesh, Surface
 
-__all__ = ["FaceFriction", "with_still_directions"]
+__all__ = ["FaceFriction", "lifted_offset", "with_still_directions"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -64,6 +64,20 @@ class FaceFriction:
         """
         T_a, T_b = tangent_rows(space, mesh_a, surface_a, mesh_b, surface_b)
         return cls(law=law, T_a=T_a, T_b=T_b)
+
+
+def lifted_offset(rows: csr_array, dimension: int) -> NDArray[np.float64]:
+    """Change of the tangential offsets per translation of one body along +z, shape (ways nc,) [-].
+
+    Parameters
+    ----------
+    rows : sparse array, shape (ways nc, dofs of the body)
+        ``T_a`` or ``T_b`` of :class:`FaceFriction`.
+    dimension : int
+    """
+    along = np.zeros(rows.shape[1])
+    along[dimension - 1 :: dimension] = 1.0
+    return np.asarray(rows @ along)
 
 
 def with_still_directions(C: NDArray[np.float64]) -> NDArray[np.float64]:

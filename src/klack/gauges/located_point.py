@@ -17,6 +17,7 @@ from scipy.optimize import LinearConstraint, minimize
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
 from klack.mesh.mesh import ElementBlock, Mesh
+from klack.mesh.rigid import Pose
 from klack.units import format_si
 
 __all__ = ["LocatedPoint", "locate"]
@@ -59,7 +60,9 @@ class LocatedPoint:
         return np.asarray(self.block.connectivity[self.element])
 
 
-def locate(mesh: Mesh, point: Floats, where: str) -> tuple[LocatedPoint, ...]:
+def locate(
+    mesh: Mesh, point: Floats, where: str, pose: Pose | None = None
+) -> tuple[LocatedPoint, ...]:
     """Find the elements that hold a point: one inside, several where they meet.
 
     Parameters
@@ -68,6 +71,8 @@ def locate(mesh: Mesh, point: Floats, where: str) -> tuple[LocatedPoint, ...]:
     point : array, shape (dimension,) [m]
     where : str
         For the error, e.g. ``"outputs.front.at"``.
+    pose : Pose, optional
+        How the mesh came there from its drawing, in whose coordinates the error tells.
 
     Raises
     ------
@@ -87,15 +92,20 @@ def locate(mesh: Mesh, point: Floats, where: str) -> tuple[LocatedPoint, ...]:
     if best.distance > _SNAP * size:
         raise InputError(
             where,
-            got=f"a point at {_text(point)}, {format_si(best.distance, 'm')} outside of the body",
-            expected=f"a point of the body; the nearest one is {_text(best.place)}",
+            got=f"a point at {_text(point, pose)}, {format_si(best.distance, 'm')} outside of the "
+            "body",
+            expected=f"a point of the body; the nearest one is {_text(best.place, pose)}",
             hint="take that one, or correct the coordinates: they are those of the drawing.",
         )
     near = best.distance + _SHARED * size
     return tuple(item for item in found if item.distance <= near)
 
 
-def _text(point: Floats) -> str:
+def _text(point: Floats, pose: Pose | None) -> str:
+    if pose is not None and len(point) == 2:  # turned bodies move along their axis alone
+        point = point - np.array([0.0, pose.shift[2]])
+    elif pose is not None:
+        point = pose.drawn(point)
     return "(" + ", ".join(f"{round(1e3 * x, 6) + 0.0:g}" for x in point) + ") mm"
 
 

@@ -26,6 +26,7 @@ from klack.errors import InputError, require_nonnegative
 from klack.gauges.located_point import LocatedPoint, locate
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
+from klack.mesh.rigid import Pose
 
 __all__ = ["AROUND", "Line", "displacement_row", "strain_row", "stress_row"]
 
@@ -52,12 +53,15 @@ class Line:
         0 for a point.
     where : str
         For errors.
+    pose : Pose, optional
+        How the body came there from its drawing, in whose coordinates errors tell.
     """
 
     at: Floats
     direction: Floats | str
     length: float
     where: str
+    pose: Pose | None = None
 
     def __post_init__(self) -> None:
         require_nonnegative(f"{self.where}: length", self.length, "m")
@@ -68,6 +72,12 @@ class Line:
                 expected="x, y, z or three numbers",
                 hint="'around' is a direction of bodies of revolution.",
             )
+
+    def found(self, mesh: Mesh, place: Floats) -> tuple[LocatedPoint, ...]:
+        """Elements that hold one of its places; see :func:`klack.gauges.located_point.locate`."""
+        is_middle = np.array_equal(place, self.at)
+        where = self.where if is_middle else f"{self.where}, within the gauge length"
+        return locate(mesh, place, where, self.pose)
 
     def places(self) -> tuple[tuple[float, Floats], ...]:
         """Places with their weights, whose sum is one; around the axis all places are the same."""
@@ -96,7 +106,7 @@ def displacement_row(mesh: Mesh, line: Line) -> Floats:
         )
     row = np.zeros((mesh.node_count, mesh.dimension))
     for weight, place in line.places():
-        found = locate(mesh, place, line.where)
+        found = line.found(mesh, place)
         for item in found:
             N, _ = _shapes(mesh, item)
             row[item.nodes] += weight / len(found) * N[:, None] * line.direction
@@ -120,12 +130,13 @@ def strain_row(mesh: Mesh, line: Line) -> Floats:
                     direction=line.direction,
                     length=0.0,
                     where=f"{line.where}, end of the gauge length",
+                    pose=line.pose,
                 ),
             )
             for side in (1.0, -1.0)
         )
         return np.asarray((ahead - behind) / line.length)
-    found = locate(mesh, line.at, line.where)
+    found = line.found(mesh, line.at)
     parts = [_strain(mesh, item, line.direction) for item in found]
     return np.asarray(sum(parts) / len(parts))
 
@@ -142,7 +153,7 @@ def stress_row(mesh: Mesh, line: Line, materials: Mapping[str, Material]) -> Flo
     """
     row = np.zeros(mesh.dof_count)
     for weight, place in line.places():
-        found = locate(mesh, place, line.where)
+        found = line.found(mesh, place)
         for item in found:
             material = materials[item.block.solid]
             along = _strain(mesh, item, line.direction)

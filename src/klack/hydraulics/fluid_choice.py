@@ -1,7 +1,7 @@
 """The fluid of a case file: a name of the library, a few numbers, or a table."""
 
 from math import inf
-from typing import Any, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
@@ -11,7 +11,7 @@ from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
 from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
 from klack.input.problem import CaseProblem, nearest, one_of
-from klack.input.section import Section, Text
+from klack.input.section import NamedSection, Section, Text
 from klack.units import (
     Density,
     DynamicViscosity,
@@ -59,7 +59,7 @@ class DensityTable(Section):
         return TabulatedLiquid(self.pressure, self.density)
 
 
-class FluidChoice(Section):
+class FluidChoice(NamedSection):
     """The fluid of a network: a name of the library alone, or a fluid of your own.
 
     Your own needs ``viscosity`` or ``kinematic_viscosity``, and either ``density`` with
@@ -123,11 +123,6 @@ class FluidChoice(Section):
     boiling_half_width: Pressure = Field(
         default=2000.0, gt=0, description="Half of the pressure band in which it boils."
     )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _name_alone(cls, value: Any) -> Any:
-        return {"name": value} if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _complete(self) -> Self:

@@ -19,9 +19,9 @@ from klack.hydraulics.liquid import (
     walther_viscosity,
 )
 from klack.hydraulics.mixture import EntrainedGas, Vapour
+from klack.sourced import Constant
 
 __all__ = [
-    "Constant",
     "FixedProperties",
     "FluidDefinition",
     "FluidState",
@@ -41,30 +41,6 @@ _SLACK = 1e-6  # [K] for sums of degrees Celsius and 273.15
 def _vapour_density(pressure: float, temperature: float, molar_mass: float) -> float:
     """Density [kg/m^3] of an ideal gas."""
     return pressure * molar_mass / (_GAS_CONSTANT * temperature)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Constant:
-    """A constant of a fluid with its source.
-
-    Parameters
-    ----------
-    label : str
-        What it is, e.g. ``"bulk modulus, isentropic, 20 degC"``.
-    value : float or tuple of float
-        Several for a table over temperature.
-    unit : str
-    source : str
-    verified : bool
-        True when the source itself was read or recomputed; False for numbers quoted from memory
-        or by a third party, which deserve a look before a result depends on them.
-    """
-
-    label: str
-    value: float | tuple[float, ...]
-    unit: str
-    source: str
-    verified: bool
 
 
 class FluidState(NamedTuple):

@@ -7,16 +7,14 @@ fluids allow bands, and two barrels of one name differ by more than the digits g
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from klack.errors import InputError
 from klack.hydraulics.fluid_definition import (
-    Constant,
     FluidDefinition,
     MeasuredProperties,
     MineralOil,
     TaitOil,
 )
 from klack.hydraulics.liquid import PressureRange
-from klack.input.problem import nearest, one_of
+from klack.sourced import Constant, entry_named, require_entry
 
 __all__ = ["FLUIDS", "find_fluid", "library_fluid"]
 
@@ -309,7 +307,7 @@ FLUIDS: Mapping[str, FluidDefinition] = {
 
 def find_fluid(name: str) -> FluidDefinition | None:
     """Library fluid of this name, or None; case, blanks and hyphens do not matter."""
-    return next((f for key, f in FLUIDS.items() if _plain(key) == _plain(name)), None)
+    return entry_named(name, FLUIDS)
 
 
 def library_fluid(name: str) -> FluidDefinition:
@@ -321,16 +319,6 @@ def library_fluid(name: str) -> FluidDefinition:
     >>> oil.name, oil.verified
     ('ISO VG 46', False)
     """
-    found = find_fluid(name)
-    if found is None:
-        raise InputError(
-            "library_fluid: name",
-            got=f"'{name}'",
-            expected=f"one of: {one_of(FLUIDS)}",
-            hint=nearest(name, FLUIDS, "describe your own by FluidChoice or FluidDefinition."),
-        )
-    return found
-
-
-def _plain(name: str) -> str:
-    return "".join(character for character in name.lower() if character.isalnum())
+    return require_entry(
+        "library_fluid: name", name, FLUIDS, "describe your own by FluidChoice or FluidDefinition."
+    )

@@ -3,11 +3,21 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, StringConstraints, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    Strict,
+    StringConstraints,
+    model_validator,
+)
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 from klack.input.problem import CaseProblem, nearest, one_of
 
-__all__ = ["Count", "Name", "Number", "Section", "Text"]
+__all__ = ["Count", "Name", "NamedSection", "Number", "Section", "Text"]
 
 Number = Annotated[float, Strict()]
 Count = Annotated[int, Strict(), Field(ge=1)]
@@ -79,3 +89,25 @@ class Section(BaseModel):
                     on_key=True,
                 )
         return self
+
+
+class NamedSection(Section):
+    """A section with a key ``name``, for which that name alone is short: ``fluid: n-heptane``."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _name_alone(cls, value: Any) -> Any:
+        return {"name": value} if isinstance(value, str) else value
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler, /
+    ) -> JsonSchemaValue:
+        """Schema of the mapping or a text; the name can stand for the required keys."""
+        schema = handler.resolve_ref_schema(handler(core_schema))
+        required = schema.get("required", ["name"])
+        if "name" not in required:
+            del schema["required"]
+            schema["anyOf"] = [{"required": required}, {"required": ["name"]}]
+        schema["type"] = ["string", "object"]
+        return schema

@@ -1,12 +1,12 @@
 """Choice of the iron in a case: from the library, by a formula, or by a table."""
 
-from typing import Any, Self
+from typing import Self
 
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
-from klack.input.section import Number, Section, Text
+from klack.input.section import NamedSection, Number, Section, Text
 from klack.magnetics.iron import IronCurve, brauer, froehlich, measured, tanh_curve
 from klack.magnetics.iron_library import iron_curve
 from klack.units import FieldStrength, FluxDensity
@@ -36,7 +36,7 @@ class IronPoints(Section):
     field_strength: tuple[FieldStrength, ...] = Field(min_length=1, description="H, increasing.")
 
 
-class IronChoice(Section):
+class IronChoice(NamedSection):
     """Magnetisation curve of a part; a bare text is a name of the library."""
 
     name: Text | None = Field(default=None, description="Material of the library.")
@@ -44,11 +44,6 @@ class IronChoice(Section):
     tanh: SaturationNumbers | None = Field(default=None, description="Curve with a sharp knee.")
     brauer: BrauerNumbers | None = Field(default=None, description="Exponential curve.")
     table: IronPoints | None = Field(default=None, description="Measured points.")
-
-    @model_validator(mode="before")
-    @classmethod
-    def _named(cls, value: Any) -> Any:
-        return {"name": value} if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _one(self) -> Self:

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 
-from klack.errors import InputError
-from klack.input.problem import nearest, one_of
 from klack.magnetics.iron import IronCurve, rational_curve
+from klack.sourced import require_entry
 
 __all__ = ["IRON_LIBRARY", "IronEntry", "iron_curve"]
 
@@ -74,14 +73,8 @@ def iron_curve(name: str) -> IronCurve:
     >>> round(float(iron_curve("9SMnPb28").field(1.4)), 1)
     3118.6
     """
-    if name not in IRON_LIBRARY:
-        raise InputError(
-            "iron_curve",
-            got=f"the unknown material '{name}'",
-            expected=f"one of: {one_of(IRON_LIBRARY)}",
-            hint=nearest(name, IRON_LIBRARY, "give your own curve as formula or table."),
-        )
-    entry = IRON_LIBRARY[name]
+    own = "give your own curve as formula or table."
+    entry = require_entry("iron_curve: name", name, IRON_LIBRARY, own)
     return rational_curve(
         initial=entry.initial,
         peak_density=entry.peak_density,

@@ -22,6 +22,7 @@ _ROUNDS = 20
 _SETTLED = 1e-9
 _MIDDLE = (0.25, 0.75)
 _HIGH, _FLAT = 0.85, 0.7  # so high for so long: half a sine is for 0.58 of its length
+_TOP, _FOOT = 0.8, 0.2  # noise on front and end crosses their half more than once
 _QUIET = 0.3  # of the length, before the front, is left out of the level at rest
 _FEWEST = 20  # samples of a pulse
 _RIPPLE = 0.01  # of the plateau: what counts as a crest
@@ -130,8 +131,10 @@ def _plateau(
     front = end = 0.0
     for _ in range(_ROUNDS):
         x = sign * (values - rest) / plateau
-        first = int(_crossing(x, 0.5, 0, len(x), where)[0])
-        last = int(_crossing(-x, -0.5, first, len(x), where)[0])
+        top = int(_crossing(x, _TOP, 0, len(x), where)[0])
+        first = int(_crossing(x, 0.5, 0, top + 2, where)[-1])
+        foot = int(_crossing(-x, -_FOOT, top, len(x), where)[0])
+        last = int(_crossing(-x, -0.5, top, foot + 2, where)[-1])
         front, end = _instant(time, x, 0.5, first), _instant(time, x, 0.5, last)
         before = time < front - _QUIET * (end - front)
         if np.count_nonzero(before) >= 3:
@@ -206,5 +209,6 @@ def _refuse(where: str, got: str) -> NoReturn:
         where,
         got=got,
         expected="one pulse with quiet time before it, a front, a plateau, and an end",
-        hint="cut the record so that it begins before the front and ends after the pulse.",
+        hint="cut the record so that it begins before the front and ends after the pulse; smooth "
+        "noise of more than a twentieth of the plateau.",
     )

@@ -9,13 +9,13 @@ from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coe
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
-from klack.hydraulics.film import FilmShape
+from klack.hydraulics.film import FilmShape, SphereFilm
 from klack.input.problem import CaseProblem
 from klack.mechanics.stop_law import ConsistentStopLaw, LinearStopLaw, StopLaw
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Rows
-from klack.units import Compliance, Length, Ratio
+from klack.units import Compliance, Length, Ratio, format_si
 
 __all__ = ["EndStop"]
 
@@ -75,6 +75,19 @@ class EndStop(Component):
                 expected="a contact law that it applies to",
                 hint="remove it: a film alone has its own loss.",
                 on_key=True,
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _within_the_sphere(self) -> Self:
+        film = self.film
+        if isinstance(film, SphereFilm) and self.gap > film.rise * (1.0 + 1e-9):
+            raise CaseProblem(
+                ("film", "radius" if film.edge_radius is None else "edge_radius"),
+                got=f"a face that rises by {format_si(film.rise, 'm')} to its edge",
+                expected=f"a rise of the gap, {format_si(self.gap, 'm')}, or more",
+                hint="farther away the film is not that of a sphere; use shape: disc for a flat "
+                "crown, or leave edge_radius out where the sphere is whole.",
             )
         return self
 

@@ -1,8 +1,11 @@
-"""One solution with the dynamic stiffness ``K - w^2 M``: symmetric, but not definite.
+"""Solutions with the dynamic stiffness ``K - w^2 M``: symmetric, but not definite.
 
 Above the first eigenfrequency the Cholesky factorisation of the statics does not exist.  PARDISO
 (symmetric indefinite, Bunch-Kaufman pivots) does it where it is installed, SuperLU elsewhere.
 """
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +14,10 @@ from scipy.sparse.linalg import splu
 
 from klack.elasticity.factorization import available_backends
 
-__all__ = ["solve_symmetric"]
+__all__ = ["Solver", "factorized_symmetric", "solve_symmetric"]
+
+Solver = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+"""``X`` of ``A X = B`` for each ``B``, shape (n, m)."""
 
 
 def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -29,9 +35,23 @@ def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]
     >>> bool(np.allclose(solve_symmetric(A, np.array([[3.0], [3.0]])), 1.0))
     True
     """
+    with factorized_symmetric(A) as solve:
+        return solve(B)
+
+
+@contextmanager
+def factorized_symmetric(A: csr_array) -> Iterator[Solver]:
+    """Factorise once for several solutions; the factor goes with the context.
+
+    Parameters
+    ----------
+    A : csr_array, shape (n, n)
+        Full storage, symmetric, definite or not.
+    """
     if "pardiso" not in available_backends():
-        return splu(A.tocsc()).solve(B)
+        yield splu(A.tocsc()).solve
+        return
     from klack.elasticity.pardiso import PardisoFactorization
 
     with PardisoFactorization(A, definite=False) as factor:
-        return factor.solve(B)
+        yield factor.solve

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError
 from klack.reduction.reduced_body import ReducedBody
 
-__all__ = ["Receptance", "frequency_axis", "modal_sum", "reduced_receptance"]
+__all__ = ["Receptance", "frequency_axis", "modal_sum", "observed_receptance", "reduced_receptance"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -78,12 +78,7 @@ def reduced_receptance(
         Legend; made from the number of modes and the correction by default.
     """
     frequencies = frequency_axis("reduced_receptance: frequencies", frequencies)
-    omega = 2.0 * np.pi * frequencies[:, None]
-    squares = reduced.omega**2
-    if loss_factor is None:
-        denominator = squares - omega**2 + 2j * reduced.damping * reduced.omega * omega
-    else:
-        denominator = squares * (1 + 1j * loss_factor) - omega**2
+    denominator = _denominator(reduced, frequencies, loss_factor)
     values = modal_sum(reduced.port_shapes, denominator)
     if with_residual:
         values = values + reduced.residual_compliance
@@ -93,6 +88,39 @@ def reduced_receptance(
         frequencies=frequencies,
         values=values,
     )
+
+
+def observed_receptance(
+    reduced: ReducedBody, frequencies: ArrayLike, *, loss_factor: float | None = None
+) -> NDArray[np.complex128]:
+    """Displacement of the observers of a body per force at its ports: not reciprocal.
+
+    Parameters
+    ----------
+    reduced, frequencies, loss_factor
+        As of :func:`reduced_receptance`.
+
+    Returns
+    -------
+    complex array, shape (n, n_observers, n_ports) [m/N]
+        Of the modes alone.
+    """
+    axis = frequency_axis("observed_receptance: frequencies", frequencies)
+    products = np.einsum("mo,mp->mop", reduced.observer_shapes, reduced.port_shapes)
+    return np.tensordot(1.0 / _denominator(reduced, axis, loss_factor), products, axes=(1, 0))
+
+
+def _denominator(
+    reduced: ReducedBody, frequencies: NDArray[np.float64], loss_factor: float | None
+) -> NDArray[np.complex128]:
+    """Dynamic stiffness of each mode, shape (n, m) [(rad/s)^2]."""
+    omega = 2.0 * np.pi * frequencies[:, None]
+    squares = reduced.omega**2
+    if loss_factor is None:
+        return np.asarray(
+            squares - omega**2 + 2j * reduced.damping * reduced.omega * omega, dtype=np.complex128
+        )
+    return np.asarray(squares * (1 + 1j * loss_factor) - omega**2, dtype=np.complex128)
 
 
 def modal_sum(

@@ -5,8 +5,8 @@ kept modes miss of it must come back in one of two ways, never in both:
 
 - ``"consistent"``: the modes stay alone, and the local contact law takes exactly the missing
   compliance; nothing is counted twice, for any number of modes (default).
-- ``"attachment"``: one attachment mode per port joins the basis, and the contact keeps a constant
-  local stiffness; the classical recipe.
+- ``"attachment"``: one attachment mode per port (and shift) joins the basis, and the contact keeps
+  a constant local stiffness; the classical recipe.
 - ``"none"``: nothing comes back; to show what is lost.
 """
 
@@ -68,8 +68,8 @@ def reduce_body(
     flexibility : Flexibility, optional
         Of the same body; saves the only factorisation that statics and modes need.
     shifts : sequence of float [(rad/s)^2], optional
-        With ``correction="attachment"``: shifted instead of residual attachment modes, for example
-        ``(default_shift(pool.omega),)``.
+        With ``correction="attachment"``: shifted instead of residual attachment modes, one per
+        port and shift, for example ``(default_shift(pool.omega),)`` or ``shift_at`` of frequencies.
     recovery_surfaces : sequence of str
         Surfaces whose displacement can be recovered from the modes.
     recovery_nodes : int array, optional

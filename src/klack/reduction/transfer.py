@@ -17,7 +17,7 @@ and notch is finite; the axis should have at least two points per half-power ban
 (``ln 2 / eta`` per octave and more).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,7 +26,13 @@ from numpy.typing import NDArray
 from klack.errors import InputError, require_positive
 from klack.reduction.receptance import Receptance
 
-__all__ = ["TransferComparison", "compare_receptances", "mean_level_deviation", "valid_up_to"]
+__all__ = [
+    "TransferComparison",
+    "compare_curves",
+    "compare_receptances",
+    "mean_level_deviation",
+    "valid_up_to",
+]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,7 +95,6 @@ def compare_receptances(
     reference_note : str
     tolerance : float [dB]
     """
-    require_positive("compare_receptances: tolerance", tolerance, "dB")
     for candidate in candidates:
         if not np.array_equal(candidate.frequencies, reference.frequencies):
             raise InputError(
@@ -98,19 +103,50 @@ def compare_receptances(
                 expected=f"the {len(reference.frequencies)} frequencies of the reference",
                 hint="compute all receptances on one axis.",
             )
-    curves = np.array([item.drive(port) for item in (reference, *candidates)])
-    levels = 20.0 * np.log10(np.abs(curves / curves[0]))
-    means = np.array([mean_level_deviation(reference.frequencies, level) for level in levels])
+    return compare_curves(
+        reference.frequencies,
+        {item.label: item.drive(port) for item in (reference, *candidates)},
+        body=body,
+        port=port,
+        loss_factor=loss_factor,
+        reference_note=reference_note,
+        tolerance=tolerance,
+    )
+
+
+def compare_curves(
+    frequencies: NDArray[np.float64],
+    curves: Mapping[str, NDArray[np.complex128]],
+    *,
+    body: str,
+    port: str,
+    loss_factor: float,
+    reference_note: str,
+    tolerance: float = 1.0,
+) -> TransferComparison:
+    """Lay transfer functions over the first of them; see :func:`compare_receptances`.
+
+    Parameters
+    ----------
+    frequencies : array, shape (n,) [Hz]
+    curves : mapping of label to complex array, shape (n,) [m/N]
+    body, port, loss_factor, reference_note, tolerance
+        As there.
+    """
+    require_positive("compare_curves: tolerance", tolerance, "dB")
+    values = np.array(list(curves.values()))
+    levels = 20.0 * np.log10(np.abs(values / values[0]))
+    means = np.array([mean_level_deviation(frequencies, level) for level in levels])
     return TransferComparison(
         body=body,
         port=port,
-        frequencies=reference.frequencies,
-        labels=tuple(item.label for item in (reference, *candidates)),
-        curves=curves,
+        frequencies=frequencies,
+        labels=tuple(curves),
+        curves=values,
         level_deviations=levels,
         mean_deviations=means,
         tolerance=tolerance,
-        valid_up_to=np.array([valid_up_to(reference.frequencies, m, tolerance) for m in means]),
+        valid_up_to=np.array([valid_up_to(frequencies, m, tolerance) for m in means]),
         loss_factor=loss_factor,
         reference_note=reference_note,
     )

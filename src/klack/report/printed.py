@@ -4,6 +4,7 @@ SVG has letters as outlines.
 """
 
 from io import BytesIO
+from math import log
 from typing import Any
 
 import numpy as np
@@ -32,6 +33,9 @@ __all__ = ["STYLE", "plain", "png_chart", "svg", "svg_chart"]
 
 _WIDTH = 6.7
 """Width of the text of an A4 page [in]."""
+
+_NEAR_END = 0.88
+"""Share of the axis above which the label of a line stands to its left, or it would be cut."""
 
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -185,10 +189,22 @@ def _draw_panel(axes: Any, panel: Panel, x: AxisSpec) -> None:
         draw(mark.value, color="#5b626b", linewidth=0.7, dashes=(3, 3), zorder=1)
     upright = [mark for mark in panel.marks if mark.label and mark.axis == "x"]
     for i, mark in enumerate(upright):
-        _note(axes, mark.value, 0.98 - LABEL_STEP * i, " " + mark.label, "left", "top")
+        side = "right" if _share_of_axis(x, mark.value) > _NEAR_END else "left"
+        text = f"{mark.label} " if side == "right" else f" {mark.label}"
+        _note(axes, mark.value, 0.98 - LABEL_STEP * i, text, side, "top")
     for curve in panel.curves:
         _draw_curve(axes, curve)
     _scale(axes, panel.y, "y")
+
+
+def _share_of_axis(x: AxisSpec, value: float) -> float:
+    """Place of a value between the ends of an axis, 0 to 1; 0 where the axis has no range."""
+    if x.range is None:
+        return 0.0
+    low, high = x.range
+    if x.log:
+        return log(value / low) / log(high / low)
+    return (value - low) / (high - low)
 
 
 def _draw_curve(axes: Any, curve: Curve) -> None:

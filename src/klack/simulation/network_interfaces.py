@@ -106,9 +106,9 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
         x = state.gap[c] - 3.0 * rate * length
         creeping = rate * length < 1e-3 * (max(state.gap[c], 0.0) + rows.cut_off[c])
         if x <= 0.0:
-            if not (creeping and rows.cubic[c] > 0.0):
+            if not (creeping and rows.dry[c] == 0):
                 quiet = False
-        elif rows.cubic[c] > 0.0:
+        elif rows.dry[c] == 0:
             if rate * film_damping(rows, c, x) > rows.film_small[c] and not creeping:
                 quiet = False
     return quiet

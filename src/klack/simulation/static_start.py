@@ -107,6 +107,7 @@ class RestState:
 
     _state: _State
     _held: frozenset[int]
+    _stuck: frozenset[int]
     _enclosed: bool
 
 
@@ -121,7 +122,8 @@ class _RunawayError(Exception):
 def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
     """Find the static equilibrium and put the network there, in place.
 
-    Bodies with a speed at the start do not rest: they stay where they are.  Volumes with a stated
+    Bodies with a speed at the start do not rest: they stay where they are.  So do those without an
+    equilibrium whose friction holds them there.  Volumes with a stated
     pressure keep it; where nothing flows in or out, so do those without, at ambient pressure.
 
     Parameters
@@ -158,10 +160,11 @@ def begin_at_rest(
         Of a network of the same parts; it has warned already.
     """
     held = set(near._held) if near is not None else set[int]()
+    stuck = set(near._stuck) if near is not None else set[int]()
     notes: list[str] = []
     enclosed = near is not None and near._enclosed
     while True:
-        problem = _Balance(network, step, held, enclosed=enclosed)
+        problem = _Balance(network, step, held, stuck, enclosed=enclosed)
         try:
             state = _march(problem, None if near is None else near._state)
             break
@@ -171,11 +174,14 @@ def begin_at_rest(
                 notes += [_no_pressure(network, i) for i in away.volumes]
             elif not enclosed and problem.can_enclose(away.bodies):
                 enclosed = True
+            elif all(problem.dry[b] > 0.0 for b in away.bodies):
+                stuck.update(away.bodies)
             else:
                 raise _unheld(network, away.bodies) from None
     for note in notes:
         warnings.warn(note, AccuracyWarning, stacklevel=4)
-    found = RestState(state, frozenset(held), enclosed)
+    notes += problem.held_by_friction()
+    found = RestState(state, frozenset(held), frozenset(stuck), enclosed)
     return problem.put(state, tuple(notes)), found
 
 
@@ -208,9 +214,15 @@ class _Balance:
     """Residuals and slopes of the equations above, for one network."""
 
     def __init__(
-        self, network: CompiledNetwork, step: float, held: set[int], *, enclosed: bool
+        self,
+        network: CompiledNetwork,
+        step: float,
+        held: set[int],
+        stuck: set[int],
+        *,
+        enclosed: bool,
     ) -> None:
-        self.network, self.step, self.enclosed = network, step, enclosed
+        self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
         self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
@@ -219,7 +231,8 @@ class _Balance:
         self.of_body = np.repeat(np.arange(len(rigid)), rigid)
         self.shapes = np.zeros((sum(rigid), count))
         self.compliance = np.zeros((count, count))
-        self.moves = np.array([row.speed == 0.0 for row in rows.bodies])[self.of_body]
+        rests = [row.speed == 0.0 and b not in stuck for b, row in enumerate(rows.bodies)]
+        self.moves = np.array(rests)[self.of_body]
         begin, mode = 0, 0
         for row in rows.bodies:
             body, here = row.body, slice(begin, begin + len(row.ports))
@@ -232,6 +245,7 @@ class _Balance:
         self.body_of_port = np.repeat(
             np.arange(len(rows.bodies)), [len(b.ports) for b in rows.bodies]
         )
+        self.dry = self._dry_friction(rigid)
         stated = [rows.nodes[handle].stated for handle in network.node_order]
         self.stated = np.array(stated, dtype=bool)
         self.given = [i in held or bool(self.stated[i]) for i in range(nodes.volumes)]
@@ -270,6 +284,35 @@ class _Balance:
         self.code = np.zeros(3, np.int64)
         self.ranges = [limit for limit in rows.limits if limit.ports]
         self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
+
+    def _dry_friction(self, rigid: list[int]) -> Vector:
+        """Force by which friction on what cannot move away holds each body at most [N]."""
+        held = np.zeros(len(rigid))
+        for slider in self.network.rows.sliders:
+            ends = [self.network.port_of[handle] for handle in (slider.upper, slider.lower)]
+            free = [b for p in ends if p < self.ports and rigid[b := int(self.body_of_port[p])]]
+            if len(free) == 1:
+                held[free[0]] += slider.breakaway
+        return held
+
+    def held_by_friction(self) -> list[str]:
+        """Words for bodies that friction holds where they are drawn.
+
+        Raises
+        ------
+        InputError
+            Where it does not suffice.
+        """
+        left, told = self.left_on_bodies(), []
+        for b in self.stuck:
+            name = self.network.rows.bodies[b].component
+            if abs(left[name]) > self.dry[b]:
+                raise _unheld(self.network, [b])
+            told.append(
+                f"'{name}' has no equilibrium without friction, which holds it at the start: "
+                f"{format_si(abs(left[name]), 'N', 3)} of {format_si(float(self.dry[b]), 'N', 3)}."
+            )
+        return told
 
     def _columns(self) -> None:
         """Lines and inertances with a free volume at one end carry an unknown flow."""
@@ -776,7 +819,8 @@ def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
     return InputError(
         "static equilibrium",
         got=f"{' and '.join(names)}, unsupported against the forces at time zero",
-        expected="a spring, a stop or enclosed fluid in the direction of the force",
+        expected="a spring, a stop or enclosed fluid in the direction of the force, or friction "
+        "above it",
         hint="check the signs of preloads and forces (positive opens; the preload of a "
         "spring closes), add a stop, let the force start later, or give the body a 'speed': then "
         "it starts in flight.",

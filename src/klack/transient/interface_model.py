@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
-from klack.contact.face_friction import FaceFriction
+from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
 from klack.contact.pressure_limit import PressureLimit
@@ -398,9 +398,8 @@ def _axial_across(
     for contact, place in zip(contacts, places, strict=True):
         if contact.faces is not None:
             rows = contact.faces.T_a if contact.upper == moving else contact.faces.T_b
-            d = contact.space.dimension
-            lifted = np.tile(np.eye(d)[d - 1], rows.shape[1] // d)
-            out[place[len(contact.space.gap) :]] = rows @ lifted
+            lifted = lifted_offset(rows, contact.space.dimension)
+            out[place[len(contact.space.gap) :]] = lifted
     return out[count:]
 
 

@@ -109,8 +109,8 @@ class InterfaceEnergy:
 
     @property
     def least_loss(self) -> float:
-        """Smaller one of the two losses, relative to the energy turned over [-]."""
-        return min(self.damping, self.guide) / self.turned_over
+        """Smallest of the losses, relative to the energy turned over [-]."""
+        return min(self.damping, self.guide, self.friction) / self.turned_over
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -85,7 +85,7 @@ _SOFTER = 0.2
 _MANY = 8
 """The inverse is computed afresh where one unknown of so many comes or goes."""
 
-_PRICE, _PER_ROUND = 4, 10
+_PRICE, _PER_ROUND = 4, 6
 """Rounds that cost as much as a fresh inverse: the first, and one for each so many unknowns."""
 
 
@@ -256,7 +256,13 @@ def _face(closed: Closed, s: int, mu: float, yields: float, along: Matrix) -> No
 
 @inner
 def _start_afresh(
-    closed: Closed, d: int, mu: Vector, doing: States, along: Matrix, stiffer: Vector
+    closed: Closed,
+    d: int,
+    mu: Vector,
+    doing: States,
+    along: Matrix,
+    stiffer: Vector,
+    fine: bool,
 ) -> None:
     """Compute the inverse for what the points do."""
     m = 0
@@ -270,7 +276,7 @@ def _start_afresh(
                 closed.unknown[m] = d * s + kind
                 m += 1
     closed.counts[1], closed.counts[2] = m, 0
-    invert(closed)
+    invert(closed, fine)
 
 
 @inner
@@ -414,8 +420,8 @@ def _rounds(
 ) -> int:
     """Newton's method over the closed points; returns the rounds, negative where they stand still.
 
-    The inverse is computed afresh where a round did not halve what is missed, and where the rounds
-    beyond two since the last time have cost as much.
+    The inverse is computed afresh where the rounds still to come would cost more, at the pace of
+    the last one, and where the rounds beyond two since the last time have cost as much.
     """
     d = len(closed.row) // len(closed.points)
     size = d * closed.counts[0]
@@ -431,11 +437,11 @@ def _rounds(
             _as_before(closed, d, lam, doing, along, stiffer)
         _place(closed, d, mu, lam, w, doing, along, _LEAST * worst, change)
         ratio = worst / last if rounds > 2 else 0.0
-        lost = worst * ratio ** (2 + closed.counts[1] // 12) > tolerance
+        lost = worst * ratio ** (2 + closed.counts[1] // _PER_ROUND) > tolerance
         paid = closed.counts[2] + rounds - 3 > _PRICE + closed.counts[1] // _PER_ROUND
         slow = ratio > _SLOW
         if lost or paid or not _follow(closed, d, mu, doing, along, stiffer, slow):
-            _start_afresh(closed, d, mu, doing, along, stiffer)
+            _start_afresh(closed, d, mu, doing, along, stiffer, fresh > 0)
             fresh += 1
             if fresh > _FRESH:
                 return -rounds

@@ -24,17 +24,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
-from scipy.sparse import csr_array
 
 from klack.contact.complementarity import ComplementaritySolver
-from klack.contact.face_friction import with_still_directions
+from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.rubbing_fit import Loop
 from klack.contact.statics import StaticContact, check_rim
 from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_arrays import Closed
 from klack.transient.rubbing import solve_rubbing
 
-__all__ = ["LockedError", "RubbingContact", "TangentialRows", "rubbing_contact"]
+__all__ = ["LockedError", "RubbingContact", "rubbing_contact"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -51,23 +50,6 @@ class LockedError(InputError):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class TangentialRows:
-    """Offsets of the faces at the contact points, ``T_a u_a + T_b u_b``.
-
-    Parameters
-    ----------
-    T_a, T_b : sparse array, shape (ways nc, dofs of a), (ways nc, dofs of b) [-]
-        From :func:`klack.contact.mortar.tangent_rows`.
-    axial : array, shape (ways nc,) [-]
-        Offset per unit translation of a along +z.
-    """
-
-    T_a: csr_array
-    T_b: csr_array
-    axial: Vector
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RubbingContact:
     """Static states of a contact with friction.
 
@@ -77,17 +59,15 @@ class RubbingContact:
         While it closes from first touch; ``force`` is that of pressure and friction together.
     shear : array, shape (n, ways nc) [N]
         Forces across the normals at these states.
-    rows : TangentialRows
+    faces : FaceFriction
     loops : tuple of Loop
         It opens again from several states, the last one from the highest.
-    friction : float [-]
     """
 
     closing: StaticContact
     shear: Matrix
-    rows: TangentialRows
+    faces: FaceFriction
     loops: tuple[Loop, ...]
-    friction: float
 
     @property
     def max_force(self) -> float:
@@ -105,17 +85,16 @@ class RubbingContact:
             (1.0 - share) * (values[low - 1] if low else 0.0) + share * values[low]
             for values in (of.pressures, self.shear)
         )
-        space, rows = of.space, self.rows
-        resultant = float(space.axial @ lam + rows.axial @ shear)
+        space, faces = of.space, self.faces
+        resultant = float(space.axial @ lam + lifted_offset(faces.T_a, space.dimension) @ shear)
         lam, shear = lam / resultant, shear / resultant
-        return space.G_a.T @ lam + rows.T_a.T @ shear, space.G_b.T @ lam + rows.T_b.T @ shear
+        return space.G_a.T @ lam + faces.T_a.T @ shear, space.G_b.T @ lam + faces.T_b.T @ shear
 
 
 def rubbing_contact(
     static: StaticContact,
-    rows: TangentialRows,
+    faces: FaceFriction,
     C: Matrix,
-    friction: float,
     *,
     turns: Sequence[float] = TURNS,
     count: int = 24,
@@ -127,11 +106,10 @@ def rubbing_contact(
     ----------
     static : StaticContact
         Without friction.
-    rows : TangentialRows
+    faces : FaceFriction
+        Of one coefficient: where the law has two, the kinetic one counts.
     C : array, shape (d nc, d nc) [m/N]
-        Static compliance of both bodies at the rows of the gaps, then at ``rows``.
-    friction : float [-]
-        Coulomb's coefficient.
+        Of :func:`klack.contact.statics.contact_compliance`.
     turns : sequence of float
         Approaches from which it opens again, over the highest one; the last is 1.
     count : int
@@ -146,7 +124,8 @@ def rubbing_contact(
         Where the contact grows to the rim of its candidates.
     ConvergenceError
     """
-    state = _State(static, rows, C, friction)
+    friction = faces.law.kinetic
+    state = _State(static, faces, C)
     pressures, shear, opened = [], [], []
     places = {int(np.searchsorted(static.approach, t * static.approach[-1] * 0.999)) for t in turns}
     for place, approach in enumerate(static.approach):
@@ -157,7 +136,7 @@ def rubbing_contact(
             opened.append(_opened(state.copy(), approach, count, friction, key))
     closing = replace(
         static,
-        force=np.array(pressures) @ static.space.axial + np.array(shear) @ rows.axial,
+        force=np.hstack([pressures, shear]) @ state.axial,
         pressures=np.array(pressures),
         area=(np.array(pressures) > 0) @ static.space.area,
         active_count=(np.array(pressures) > 0).sum(axis=1),
@@ -166,9 +145,8 @@ def rubbing_contact(
     return RubbingContact(
         closing=closing,
         shear=np.array(shear),
-        rows=rows,
+        faces=faces,
         loops=tuple(_loop(closing, *curve) for curve in opened),
-        friction=friction,
     )
 
 
@@ -204,19 +182,18 @@ def _loop(closing: StaticContact, approach: Vector, force: Vector) -> Loop:
 class _State:
     """Forces and offsets at one approach after the other."""
 
-    def __init__(
-        self, static: StaticContact, rows: TangentialRows, C: Matrix, friction: float
-    ) -> None:
+    def __init__(self, static: StaticContact, faces: FaceFriction, C: Matrix) -> None:
         space = static.space
+        lifted = lifted_offset(faces.T_a, space.dimension)
         self.count = space.count
-        self.C = np.ascontiguousarray(with_still_directions((C + C.T) / 2.0))
-        self.axial = np.concatenate([space.axial, rows.axial])
+        self.C = np.ascontiguousarray((C + C.T) / 2.0)
+        self.axial = np.concatenate([space.axial, lifted])
         self.start = min(space.clearance, space.touch)
-        self.gap = np.append(space.gap, np.zeros(len(rows.axial)))
-        self.mu = np.full(space.count, friction)
+        self.gap = np.append(space.gap, np.zeros(len(lifted)))
+        self.mu = np.full(space.count, faces.law.kinetic)
         self.tolerance = _LEFT * static.max_force
         self.lam = np.zeros(len(self.axial))
-        self.offset = -self.start * rows.axial
+        self.offset = -self.start * lifted
         self.frictionless = ComplementaritySolver(C[: space.count, : space.count])
 
     def copy(self) -> "_State":

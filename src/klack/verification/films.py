@@ -15,6 +15,16 @@ from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.film_reference import film_by_ode, squeeze_by_volumes
 from klack.verification.interface_motion import interface_motion
 from klack.verification.one_dimension import one_contact, steel_rod
+from klack.verification.sphere_in_liquid import (
+    GLASS,
+    READ_AT,
+    STEEL,
+    elastohydrodynamic_height,
+    film_alone,
+    on_compliance,
+    restitution,
+)
+from klack.verification.tilted_films import tilted_films
 
 __all__ = ["checks"]
 
@@ -32,6 +42,8 @@ def checks() -> list[Check]:
         *_mass(),
         *_series(),
         *_rods(),
+        *_spheres(),
+        *tilted_films(),
     ]
 
 
@@ -321,6 +333,41 @@ def _film_that_vanishes(a: ReducedBody, b: ReducedBody) -> Check:
         tolerance=5e-9,
         source="contact loop without films",
     )
+
+
+def _spheres() -> list[Check]:
+    height = elastohydrodynamic_height(STEEL, 100.0)
+    smooth, rough = (
+        100.0 * (1.0 - on_compliance(STEEL, 100.0, cut_off=share * height, pull=False))
+        for share in (1e-3, 10.0)
+    )
+    return [
+        compare(
+            GROUP,
+            "sphere on a wall at St = 100, film alone: restitution [-]",
+            expected=film_alone(100.0, 0.3e-6),
+            computed=restitution(GLASS, 100.0, cut_off=0.3e-6),
+            tolerance=5e-7,
+            source="Reynolds (1886): 1 - 2 ln(h/h_r)/St",
+        ),
+        compare(
+            GROUP,
+            "smooth steel sphere, film before the bulk: critical Stokes number [-]",
+            expected=float(np.log(READ_AT / height)),
+            computed=smooth,
+            tolerance=0.04,
+            source="ln(x_0/x_r), elastohydrodynamic: Davis, Rager & Good (2002)",
+            reason="one linear compliance for the bulk, one width for the film",
+        ),
+        compare(
+            GROUP,
+            "rough steel sphere, film before the bulk: critical Stokes number [-]",
+            expected=float(np.log(READ_AT / (10.0 * height))),
+            computed=rough,
+            tolerance=5e-3,
+            source="ln(x_0/h_r): the roughness, 10 x_r, acts first",
+        ),
+    ]
 
 
 def _energy_norm(state: np.ndarray, a: ReducedBody, b: ReducedBody) -> float:

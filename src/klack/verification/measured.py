@@ -1,4 +1,4 @@
-"""Checks against measurements of others: strain pulses of struck bars, oblique impacts of spheres.
+"""Checks against measurements of others: struck bars, oblique impacts, bounces in a liquid.
 
 The recordings are shipped with the case ``struck-bar``; its README says what is known of them.  The
 end face of the strikers and the low pass of the amplifier are not: one dome and one low pass for
@@ -19,6 +19,7 @@ from klack.case.shipped import find_case
 from klack.stages import collected_warnings
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.oblique_spheres import oblique_spheres
+from klack.verification.wet_bounces import bounces_in_liquid
 
 __all__ = ["checks", "struck_bar"]
 
@@ -87,6 +88,7 @@ def checks() -> list[Check]:
             reason=_FLAT,
         ),
         *oblique_spheres(),
+        *bounces_in_liquid(),
     ]
 
 

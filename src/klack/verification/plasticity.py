@@ -58,9 +58,25 @@ _JACKSON = "Jackson & Green 2005, J. Tribol. 127:343, eqs. 10 to 18 (fit of fini
 _ETSION = "Etsion, Kligerman & Kadin 2005, IJSS 42:3716 (fit of finite elements)"
 _MARGHITU = "Jackson, Green & Marghitu 2010, Nonlinear Dyn. 60:217, eq. 22"
 _OTHER = "independent program: axisymmetric 4-node elements with mean dilatation, 1 GPa hardening"
+_HALF_SPACE = _OTHER + "; sphere of 1.25 mm on a half-space"
 
 _POINT_WORK = ((10.0, 4.872288), (30.0, 54.10526))
 """Force over that of first yield, plastic work over force and approach then (half-space)."""
+
+_POINT_APPROACH = ((3.0, 2.111663), (10.0, 5.021038), (30.0, 11.39091))
+"""Force over that of first yield, approach over its own (half-space)."""
+
+_POINT_IMPACTS = (  # first impact: speed, force and set over those of first yield; restitution
+    (2.0, 2.2806, 0.1064, 0.97528),
+    (5.0, 6.577, 0.69373, 0.90449),
+    (10.0, 14.54, 1.9644, 0.83927),
+    (20.0, 31.576, 4.8784, 0.76279),
+)
+_POINT_LATER = ((2, 0.93889), (3, 0.97492), (5, 0.99557), (10, 0.99994))
+"""Number of the impact at 10 times the speed of first yield, restitution."""
+
+_POINT_RUN_IN = 18.246
+"""Force of those impacts over that of first yield, when the faces are run in."""
 
 _SEAT_EXCESS = (  # force [N], approach beyond the elastic one [um], plastic work [uJ]
     (91.93779, 0.048548, 5.048903),
@@ -300,11 +316,23 @@ def _sphere() -> list[Check]:
             expected=expected,
             computed=float(work(ratio)) / unit,
             tolerance=0.07,
-            source=_OTHER + "; sphere of 1.25 mm on a half-space",
+            source=_HALF_SPACE,
         )
         for ratio, expected in _POINT_WORK
     ]
+    approach = PchipInterpolator(force, depth)
+    found += [
+        _check(
+            f"the same at {ratio:g} times the force of first yield: approach over its own [-]",
+            expected=expected,
+            computed=float(approach(ratio)),
+            tolerance=0.02,
+            source=_HALF_SPACE,
+        )
+        for ratio, expected in _POINT_APPROACH
+    ]
     law, one = yielding_law(loops, 0.0), _FIRST.speed(_BALL)
+    found += _ball_impacts(law, one)
     for speed in (2.0, 5.0, 10.0, 20.0):
         history = _impact(law, _BALL, speed * one)
         found.append(
@@ -325,6 +353,65 @@ def _sphere() -> list[Check]:
             tolerance=1e-10,
             source="conservation of energy",
             reason="round-off: the loss is the difference of what the tables store",
+        )
+    )
+    return found
+
+
+def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
+    """Impacts of spheres on new faces, and ten on the same ones; ``one``: speed of first yield."""
+    found = []
+    for speed, force, left, restitution in _POINT_IMPACTS:
+        history = _impact(law, _BALL, speed * one)
+        after = law.after(history.pressed)
+        where = f"first impact at {speed:g} times the speed of first yield"
+        found += [
+            _check(
+                f"{where}: force over that of first yield [-]",
+                expected=force,
+                computed=float(history.peak_force.max()) / _FIRST.force,
+                tolerance=0.02,
+                source=_HALF_SPACE,
+            ),
+            _check(
+                f"{where}: set over the approach of first yield [-]",
+                expected=left,
+                computed=after.set_after(after.reached) / _FIRST.approach,
+                tolerance=0.07,
+                source=_HALF_SPACE,
+            ),
+            _check(
+                f"{where}: restitution [-]",
+                expected=restitution,
+                computed=float(history.velocity_a[-1]) / (speed * one),
+                tolerance=0.015,
+                source=_HALF_SPACE,
+                absolute=True,
+            ),
+        ]
+    speed, histories = 10.0 * one, []
+    for _ in range(_POINT_LATER[-1][0]):
+        histories.append(_impact(law, _BALL, speed))
+        law = law.after(histories[-1].pressed)
+    found += [
+        _check(
+            f"impact {n} on the same faces at 10 times the speed of first yield: restitution [-]",
+            expected=expected,
+            computed=float(histories[n - 1].velocity_a[-1]) / speed,
+            tolerance=0.02,
+            source=_HALF_SPACE,
+            absolute=True,
+            reason="faces that are run in return nearly all in any program",
+        )
+        for n, expected in _POINT_LATER
+    ]
+    found.append(
+        _check(
+            "the same, run in: force over that of first yield [-]",
+            expected=_POINT_RUN_IN,
+            computed=float(histories[-1].peak_force.max()) / _FIRST.force,
+            tolerance=0.02,
+            source=_HALF_SPACE,
         )
     )
     return found

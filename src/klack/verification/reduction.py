@@ -1,5 +1,7 @@
 """Reduction against the exact rod: residual flexibility, receptance, attachment modes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -7,9 +9,10 @@ from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
+from klack.reduction.attachment import shift_at
 from klack.reduction.damping import LossFactor
 from klack.reduction.full_order import direct_receptance, full_order_receptance
-from klack.reduction.ports import Port, surface_port
+from klack.reduction.ports import Observer, Port, surface_port
 from klack.reduction.receptance import reduced_receptance
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
@@ -84,6 +87,7 @@ def checks() -> list[Check]:
         *_static_checks(plain, corrected, held),
         *_receptance_checks(free, lower, upper, flexibility, pool),
         _correction_check(reduced(10, "attachment")),
+        *_shift_checks(free, lower, upper, pool, flexibility),
     ]
 
 
@@ -208,6 +212,105 @@ def _correction_check(reduced: ReducedBody) -> Check:
         source="-cot(kL)/(EAk)",
         curve=_receptance_curve(axis, exact, computed.values[:, 0, 0]),
     )
+
+
+def undamped_receptance(frequency: float) -> NDArray[np.float64]:
+    """Free-free rod at a frequency [Hz], or below zero at ``i`` times it, as the columns above."""
+    E, rho = STEEL_WITHOUT_POISSON.young, STEEL_WITHOUT_POISSON.density
+    k = 2 * np.pi * abs(frequency) * np.sqrt(complex(np.sign(frequency)) * rho / E)
+    ends = -1 / (E * np.pi * RADIUS**2 * k * np.array([np.tan(k * LENGTH), np.sin(k * LENGTH)]))
+    return np.asarray(ends.real)
+
+
+def missing_with_shifts(frequencies: Sequence[float], *, kept: int) -> float:
+    """Static compliance (L/EA) that cosines and the responses at shifts [Hz] miss at a free end."""
+    first = np.sqrt(STEEL_WITHOUT_POISSON.young / STEEL_WITHOUT_POISSON.density) / (2 * LENGTH)
+    squares = np.arange(kept + 1.0, 20_001.0) ** 2  # of the omitted modes, over that of the first
+    shifts = [np.sign(f) * (f / first) ** 2 for f in frequencies]
+    responses = np.column_stack([1 / (squares - s) for s in shifts])
+    load = responses.sum(axis=0)
+    projected = load @ np.linalg.solve(responses.T @ (squares[:, None] * responses), load)
+    return float(2 / np.pi**2 * (np.sum(1 / squares) - projected))
+
+
+def _shift_checks(
+    body: ElasticBody, lower: Port, upper: Port, pool: Modes, flexibility: Flexibility
+) -> list[Check]:
+    """One kept mode and two shifted attachment modes, beyond the modes that they replace."""
+    frequencies = (190e3, -40e3)
+    shifts = [shift_at(f) for f in frequencies]
+    reduced = reduce_body(
+        body,
+        [lower],
+        modes=ByCount(1),
+        correction="attachment",
+        damping=_DAMPING,
+        observers=[Observer("far end", upper.pattern)],
+        modes_pool=pool,
+        flexibility=flexibility,
+        shifts=shifts,
+        recovery_nodes=np.arange(body.mesh.node_count),
+    )
+    deviations = []
+    for frequency, shift in zip(frequencies, shifts, strict=True):
+        read = np.column_stack([reduced.port_shapes[:, 0], reduced.observer_shapes[:, 0]])
+        computed = (reduced.port_shapes[:, 0] / (reduced.omega**2 - shift)) @ read
+        deviations.append(np.abs(computed / undamped_receptance(frequency) - 1))
+    V = np.zeros((body.dof_count, 0)) if reduced.recovery is None else reduced.recovery.shapes
+    unit = V.T @ (body.M @ V) - np.eye(reduced.mode_count)
+    squares = V.T @ (body.K @ V) - np.diag(reduced.omega**2)
+    low = (-100e3, -200e3)
+    static = reduce_body(
+        body,
+        [lower],
+        modes=ByCount(1),
+        correction="attachment",
+        damping=_DAMPING,
+        modes_pool=pool,
+        flexibility=flexibility,
+        shifts=[shift_at(f) for f in low],
+    )
+    source = "-cot(kL)/(EAk), -1/(sin(kL) EAk), undamped; imaginary k for the shift below zero"
+    return [
+        *(
+            compare(
+                _GROUP,
+                f"1 mode and attachment modes shifted to 190 and -40 kHz: largest relative "
+                f"deviation there, {name}",
+                expected=0.0,
+                computed=float(max(deviation[i] for deviation in deviations)),
+                tolerance=1e-5,
+                source=source,
+            )
+            for i, name in enumerate(("drive-point", "end-to-end (no port there)"))
+        ),
+        compare(
+            _GROUP,
+            "free rod, 1 mode and two shifts of one port: number of modes, the rigid one included",
+            expected=4.0,
+            computed=float(reduced.mode_count),
+            tolerance=0.0,
+            source="1 + 1 + 2",
+        ),
+        compare(
+            _GROUP,
+            "the same: largest deviation from orthonormality, of mass and of stiffness/omega_max^2",
+            expected=0.0,
+            computed=float(
+                max(np.abs(unit).max(), np.abs(squares).max() / reduced.omega.max() ** 2)
+            ),
+            tolerance=1e-12,
+            source="V^T M V = 1, V^T K V = diag(omega^2)",
+        ),
+        compare(
+            _GROUP,
+            "free rod, 1 mode and shifts of -100 and -200 kHz: compliance that is missing (L/EA)",
+            expected=missing_with_shifts(low, kept=1),
+            computed=static.residual_compliance[0, 0] * _SPRING,
+            tolerance=1e-3,
+            source="20 000 cosines of the rod, projected onto the same two responses",
+        ),
+    ]
 
 
 def _receptance_curve(

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from math import isnan, nan
 
 from klack.analyses.advice.settings import Setting, SettingValue
-from klack.case.bodies import CaseBody, ModeChoice, Reduction, SurfaceName
+from klack.case.bodies import CaseBody, ModeChoice, SurfaceName
 from klack.case.placement import Placement
 from klack.case.schema import Case
 from klack.contact.statics import COARSE
@@ -114,7 +114,7 @@ def axisymmetric_twin(case: Case, highest: Mapping[str, float]) -> Case | None:
             "motion": case.motion.model_copy(update={"placement": Placement()}),
             "guide": None,
             "opposite": None,
-            "reduction": Reduction(correction=case.reduction.correction, modes=modes),
+            "reduction": case.reduction.model_copy(update={"modes": modes}),
         }
     )
 

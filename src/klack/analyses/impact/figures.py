@@ -103,7 +103,8 @@ def force_chart(study: ImpactStudy) -> Chart:
     curves, differences = [], []
     reference = results[0]
     peak = reference.measures.peak_force
-    for result in results:
+    # a level that chatters fills a band: below the others
+    for result in sorted(results, key=lambda one: not _chatters(one, reference)):
         time = _since_touch(result, result.history.time)
         seen = (time >= limits[0]) & (time <= limits[1])
         curves.append(_level_curve(time[seen], result.history.force[seen], result))
@@ -135,6 +136,10 @@ def force_chart(study: ImpactStudy) -> Chart:
         panels=tuple(panels),
         note=note,
     )
+
+
+def _chatters(result: LevelResult, reference: LevelResult) -> bool:
+    return result.measures.sub_contacts > reference.measures.sub_contacts
 
 
 def _span(curves: list[Curve], least: float, most: float) -> tuple[float, float]:

@@ -53,12 +53,18 @@ def _doubt(problem: ContactProblem, highest: Iterable[float]) -> str:
     front = area * pressure
     if front < _SHARE * problem.static.max_force:
         return ""
+    contact = problem.case.contact
+    advice = (
+        "Try: more modes, or level full; the form that the case gives closes within that time."
+        if contact.has_form or contact.roughness is not None
+        else "Try: real faces (contact.crown, waviness, tilt, roughness; ground ends deviate by "
+        "0.2 to 5 um), more modes, or level full."
+    )
     return (
         f"{1e6 * area:.3g} mm^2 of the faces meet all at once, within the shortest period of the "
         f"kept modes ({format_si(period, 's', 2)}): the force rises by about "
         f"{format_si(front, 'N', 2)} in that time, and rise and peak are those of the truncation. "
-        "Try: real faces (contact.crown, waviness, tilt, roughness; ground ends deviate by 0.2 to "
-        "5 um), more modes, or level full."
+        f"{advice}"
     )
 
 

@@ -94,6 +94,12 @@ def simulate_in_full(
     )
 
 
+_JUMPS = (
+    "faces that hold more than they rub with jump, and how may depend on the step, which this "
+    "level does not check. Try: level interface, which does, or half of run.full_step."
+)
+
+
 def run_full(
     problem: ContactProblem,
     pools: Mapping[str, Modes],
@@ -148,7 +154,9 @@ def run_full(
             history, result.point_force, space.points, space.area, _friction(case, result)
         ),
     )
-    return replace(level, gauges=reading.records(case.run.full_step)), result
+    unchecked = () if case.contact.faces.is_constant else (_JUMPS,)
+    gauges = reading.records(case.run.full_step)
+    return replace(level, gauges=gauges, doubts=(*level.doubts, *unchecked)), result
 
 
 def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:

@@ -22,6 +22,7 @@ from klack.contact.friction import Friction
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.pressure_limit import PressureLimit
+from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -66,6 +67,8 @@ _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as 
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
 _SET_BEYOND = 1.2  # of the deepest one that is known: a straight line goes on so far
+_OTHER_STEP = 2.0**0.5  # a step over the one it is compared with
+_SAME_PEAK, _SAME_RESTITUTION = 0.005, 0.002  # differences that are no doubt
 
 
 def certificate_modes(case: Case) -> int:
@@ -415,6 +418,33 @@ def _compile(case: Case, model: InterfaceModel, guide: Guide | None) -> None:
     )
 
 
+def _step_doubts(
+    case: Case, model: InterfaceModel, guide: Guide | None, at: ImpactMeasures
+) -> Iterator[str]:
+    """Doubt where another step gives another impact.
+
+    Points have no mass: where friction falls with the speed of slip, one that sticks jumps, when it
+    does decides what its neighbours do, and no step is fine enough to tell.
+    """
+    if all(faces.is_constant for faces in model.friction):
+        return
+    step = case.run.interface_step
+    other = measure_impact(simulate_case(case, model, guide, step=step / _OTHER_STEP).history)
+    same = (
+        abs(other.peak_force - at.peak_force) <= _SAME_PEAK * at.peak_force
+        and not abs(other.restitution - at.restitution) > _SAME_RESTITUTION
+    )
+    if same:
+        return
+    yield (
+        f"faces that hold more than they rub with jump, and how depends on the step: peak force "
+        f"{at.peak_force:.4g} N and restitution {at.restitution:.4f} at {format_si(step, 's', 3)}, "
+        f"{other.peak_force:.4g} N and {other.restitution:.4f} at "
+        f"{format_si(step / _OTHER_STEP, 's', 3)}. Try: take that as scatter, or leave out "
+        "contact.static_friction."
+    )
+
+
 def run_interface(
     problem: ContactProblem,
     model: InterfaceModel,
@@ -456,7 +486,11 @@ def run_interface(
     return replace(
         level,
         gauges=interface_gauges(problem, model, result),
-        doubts=(*level.doubts, *set_doubts(model, result)),
+        doubts=(
+            *level.doubts,
+            *_step_doubts(case, model, guide, level.measures),
+            *set_doubts(model, result),
+        ),
     )
 
 

@@ -44,7 +44,8 @@ def run_reduced(
         wall_time=wall_time,
         setup_time=setup_time,
     )
-    return _doubted(result, friction_doubt(case, has_memory=pair.rubbing is not None))
+    has_memory, correction = pair.rubbing is not None, pair.upper.correction
+    return _doubted(result, friction_doubt(case, has_memory=has_memory, correction=correction))
 
 
 def _doubted(result: LevelResult, doubt: str) -> LevelResult:

@@ -67,6 +67,7 @@ from klack.assembling.reduced_pair import (
     classical_stiffness,
     first_stiffness,
     own_pair,
+    recipe_stiffness,
     reduce_pair,
     static_curve,
 )
@@ -106,8 +107,6 @@ _CORRECTIONS: Mapping[str, Correction] = {
     "reduced-attachment": "attachment",
     "reduced-none": "none",
 }
-_USUAL_STIFFNESS = 1e9
-"""Contact stiffness [N/m] that the literature puts beside modes, corrected or not."""
 
 
 def run_impact(
@@ -543,14 +542,17 @@ def _variant(
         pools,
         correction=_CORRECTIONS[level],
         selection=selection,
-        stiffness=_USUAL_STIFFNESS,
+        stiffness=recipe_stiffness(problem.case),
         loops=loops,
     )
 
 
 def _run_variant(case: Case, level: str, pair: ReducedPair, *, setup_time: float) -> LevelResult:
+    correction = _CORRECTION_WORDS[pair.upper.correction]
+    if pair.upper.correction == "attachment" and case.reduction.shifts:
+        correction = f"shifted {correction}"
     counts = f"{elastic_count(pair.upper)} + {elastic_count(pair.lower)} modes"
-    words = ", ".join(filter(None, (_CORRECTION_WORDS[pair.upper.correction], _law_words(pair))))
+    words = ", ".join(filter(None, (correction, _law_words(pair))))
     if level == "reduced-participation":
         words += ", modes by participation"
     return run_reduced(
@@ -563,7 +565,7 @@ _CORRECTION_WORDS = {"consistent": "", "attachment": "attachment modes", "none":
 
 def _law_words(pair: ReducedPair) -> str:
     if pair.rubbing is not None:
-        return f"consistent law with friction (losses within {100 * pair.rubbing.error:.2g} %)"
+        return "consistent law with friction"
     if pair.yields:
         return "consistent law with yield"
     if pair.local is not None:

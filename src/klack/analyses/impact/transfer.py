@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from klack.assembling.problem import ContactProblem
 from klack.case.impact_sections import TransferSweep
+from klack.case.schema import Case
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -20,14 +21,24 @@ from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount
 from klack.reduction.transfer import TransferComparison, compare_receptances
 
-__all__ = ["TRANSFER_MODES", "compare_transfer"]
+__all__ = ["LOSS_FACTOR", "TRANSFER_COUNTS", "TRANSFER_MODES", "compare_transfer", "sweep_of"]
 
-_COUNTS = (20, 50)
-TRANSFER_MODES = max(_COUNTS)
+TRANSFER_COUNTS = (20, 50)
+"""Elastic modes of the reduced bodies that are compared."""
+
+TRANSFER_MODES = max(TRANSFER_COUNTS)
 """Elastic modes of each body that the comparison needs."""
 
-# With less damping the notches between two points of the axis would decide the comparison.
-_LOSS_FACTOR = 0.01
+LOSS_FACTOR = 0.01
+"""With less damping the notches between two points of the axis would decide the comparison."""
+
+
+def sweep_of(case: Case) -> NDArray[np.float64]:
+    """Frequencies of the transfer functions of a case [Hz]."""
+    sweep = case.run.transfer or TransferSweep.model_validate(
+        {"from": "2 kHz", "to": "400 kHz", "points": 300}
+    )
+    return np.asarray(np.geomspace(sweep.lowest, sweep.highest, sweep.points))
 
 
 def compare_transfer(
@@ -41,10 +52,7 @@ def compare_transfer(
 
     Both carry the same structural damping, so that every peak and notch is finite.
     """
-    sweep = problem.case.run.transfer or TransferSweep.model_validate(
-        {"from": "2 kHz", "to": "400 kHz", "points": 300}
-    )
-    frequencies = np.geomspace(sweep.lowest, sweep.highest, sweep.points)
+    frequencies = sweep_of(problem.case)
     comparisons = []
     bodies = (
         (problem.pair.upper, problem.flexibility_upper),
@@ -66,12 +74,12 @@ def _compare(
 ) -> TransferComparison:
     full = flexibility.remembered(
         "full-order receptance",
-        (port.name, port.pattern, frequencies, _LOSS_FACTOR, pool.omega, pool.shapes),
+        (port.name, port.pattern, frequencies, LOSS_FACTOR, pool.omega, pool.shapes),
         lambda: full_order_receptance(
             body,
             [port],
             frequencies,
-            loss_factor=_LOSS_FACTOR,
+            loss_factor=LOSS_FACTOR,
             flexibility=flexibility,
             modes=pool,
         ),
@@ -79,7 +87,7 @@ def _compare(
         receptance_of_entry,
     )
     candidates: list[Receptance] = []
-    for count in _COUNTS:
+    for count in TRANSFER_COUNTS:
         if count > len(pool.omega):
             continue
         reduced = reduce_body(
@@ -87,7 +95,7 @@ def _compare(
             [port],
             modes=ByCount(count),
             correction="consistent",
-            damping=LossFactor(eta=_LOSS_FACTOR),
+            damping=LossFactor(eta=LOSS_FACTOR),
             modes_pool=pool,
             flexibility=flexibility,
         )
@@ -97,7 +105,7 @@ def _compare(
                     reduced,
                     frequencies,
                     with_residual=with_residual,
-                    loss_factor=_LOSS_FACTOR,
+                    loss_factor=LOSS_FACTOR,
                     label=f"{count} {words}",
                 )
             )
@@ -106,6 +114,6 @@ def _compare(
         candidates,
         port.name,
         body=body.name,
-        loss_factor=_LOSS_FACTOR,
+        loss_factor=LOSS_FACTOR,
         reference_note=full.note,
     )

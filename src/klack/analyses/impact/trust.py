@@ -185,13 +185,14 @@ def doubts_of_history(
 
 
 def _shortest_contact(history: ImpactHistory, measures: ImpactMeasures) -> float:
-    """Duration of the shortest contact of the first impact that carries a share of it [s]."""
-    return min(
-        phase.duration
-        for phase in _phases(history, measures)
-        if np.sum(history.force[phase.first : phase.last]) * history.step
-        >= _CARRIES * measures.impulse
-    )
+    """Duration of the shortest contact of the first impact that carries a share of it [s].
+
+    Where there are so many that none does, of those that carry as much as the largest.
+    """
+    phases = _phases(history, measures)
+    carried = [float(np.sum(history.force[p.first : p.last])) * history.step for p in phases]
+    least = min(_CARRIES * measures.impulse, max(carried))
+    return min(p.duration for p, J in zip(phases, carried, strict=True) if J >= least)
 
 
 def _rise(history: ImpactHistory, measures: ImpactMeasures) -> float:

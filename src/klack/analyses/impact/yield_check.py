@@ -69,12 +69,14 @@ def check_yield(
     Warns
     -----
     AccuracyWarning
-        Where a body with a yield stress yields, though levels compute it as elastic.
+        Where a body with a yield stress yields, though levels compute it as elastic, and where
+        that yield stress is an estimate that decides whether it does.
     """
     if not 0.0 < force <= static.max_force:
         return YieldCheck()
     pressure, is_line = _pressure(static, force)
     needed, told = nan, []
+    doubtful: dict[str, str] = {}
     for body, surface in ((pair.upper, pair.upper_surface), (pair.lower, pair.lower_surface)):
         if case.bodies[body.name].material is None:
             continue
@@ -84,6 +86,11 @@ def check_yield(
         if material.hardening is None:
             continue
         limit = material.hardening.yield_stress
+        basis = case.materials[material.name].doubtful_yield
+        if basis is not None and basis[0] < pressure / factor:
+            doubtful[material.name] = (
+                f"'{material.name}', {format_si(limit, 'Pa', 3)}, is {basis[1]}"
+            )
         first = _first_yield(static, force, factor * limit)
         if first < force:
             told.append(
@@ -98,6 +105,13 @@ def check_yield(
             "faces is softer and returns less. What has yield: the levels reduced, in the meridian "
             "plane, and interface of klack impact, klack shots, and the stops of klack stroke; "
             "bodies of three dimensions have to be drawn as profiles.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    for words in doubtful.values():
+        warnings.warn(
+            f"contact {surfaces}: the yield stress of {words}. What yields goes with it. Try: "
+            "'yield' from a tensile test, or both ends of its range (klack study).",
             AccuracyWarning,
             stacklevel=2,
         )

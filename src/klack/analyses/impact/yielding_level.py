@@ -25,14 +25,16 @@ from klack.progress import Progress
 from klack.units import format_si
 
 __all__ = [
+    "SMALL_YIELD",
     "YieldingFaces",
     "doubt_elastic_levels",
     "doubt_large_strain",
     "elastic_twin",
     "tell_yield",
+    "yield_share",
 ]
 
-_SHARE = 2e-3
+SMALL_YIELD = 2e-3
 """Of the energy: what elastic bodies may miss without a doubt."""
 
 _LARGE = 0.1
@@ -109,8 +111,8 @@ def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> No
     AccuracyWarning
         Where that is more than what elastic levels may miss.
     """
-    lost = _lost(result)
-    if lost < _SHARE:
+    lost = yield_share(result)
+    if lost < SMALL_YIELD:
         return
     other = measure_impact(elastic)
     warnings.warn(
@@ -157,8 +159,8 @@ def doubt_elastic_levels(
     yielding : collection of str
         Names of the levels that have yield.
     """
-    lost = max((_lost(results[name]) for name in yielding if name in results), default=0.0)
-    if lost < _SHARE:
+    lost = max((yield_share(results[name]) for name in yielding if name in results), default=0.0)
+    if lost < SMALL_YIELD:
         return dict(results)
     doubt = (
         f"its bodies are elastic, but yield takes {100 * lost:.2g} % of the energy of the first "
@@ -170,6 +172,7 @@ def doubt_elastic_levels(
     }
 
 
-def _lost(result: LevelResult) -> float:
+def yield_share(result: LevelResult) -> float:
+    """Share of the energy of an impact that yield takes [-]."""
     initial = result.energies.get("initial kinetic", 0.0)
     return result.energies.get("plastic", 0.0) / initial if initial > 0.0 else 0.0

@@ -10,8 +10,9 @@ from ruamel.yaml import YAML
 from klack.acoustics.comparison import first_impact
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.contact_doubts import contact_doubt
-from klack.analyses.impact.record import ContactSummary, ImpactStudy
+from klack.analyses.impact.record import ContactSummary, ImpactStudy, LevelResult
 from klack.analyses.impact.run import run_impact
+from klack.analyses.impact.yielding_level import SMALL_YIELD, yield_share
 from klack.analyses.incomplete import failure_notes
 from klack.analyses.noise.force import (
     before_impact,
@@ -223,7 +224,11 @@ def impact_sources(
                 noise=noise,
                 given=given,
                 materials=materials,
-                notes=(*failed, *_contact_notes([study.contact] if name != "lumped" else ())),
+                notes=(
+                    *failed,
+                    *_yield_notes(result),
+                    *_contact_notes([study.contact] if name != "lumped" else ()),
+                ),
             )
         )
     return tuple(found)
@@ -371,6 +376,18 @@ def _notes(variant: StrokeVariant, last: ImpactEvent | None) -> tuple[str, ...]:
 def _contact_notes(contacts: Sequence[ContactSummary | StopSummary]) -> tuple[str, ...]:
     """What speaks against the contacts that the forces come from."""
     return tuple(filter(None, map(contact_doubt, contacts)))
+
+
+def _yield_notes(result: LevelResult) -> tuple[str, ...]:
+    """Say that faces were new, where their yield took more than elastic levels may miss."""
+    share = yield_share(result)
+    if share < SMALL_YIELD:
+        return ()
+    return (
+        f"The impact is the first on new faces: their yield takes {100 * share:.2g} % of the "
+        "energy, and later impacts are harder. Try: klack impact with run.run_in, and the noise of "
+        "the worn.yaml that it writes.",
+    )
 
 
 def _require_structures(study: ImpactStudy | StrokeStudy) -> None:

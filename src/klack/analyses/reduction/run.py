@@ -7,6 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
+from klack.analyses.reduction.one_node import (
+    OneNode,
+    OneNodeImpact,
+    one_node_impacts,
+    one_nodes,
+)
 from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.given_pair import build_given_pair
 from klack.assembling.modes import mode_pools
@@ -30,29 +36,49 @@ class ReductionStudy:
     bodies : tuple of ReducedBody
     transfer : tuple of TransferComparison
         Of each body: full order first, then 20 and 50 modes with and without correction.
+    nodes : tuple of OneNode
+        Of the bodies of which the case names a node.
+    impacts : tuple of OneNodeImpact
+        With 20 and with 50 modes a body, where there is such a node.
     """
 
     case: str
     title: str
     bodies: tuple[ReducedBody, ...]
     transfer: tuple[TransferComparison, ...]
+    nodes: tuple[OneNode, ...] = ()
+    impacts: tuple[OneNodeImpact, ...] = ()
 
     def save(self, folder: Path) -> None:
-        """Write ``NAME.reduced.npz`` and ``NAME.transfer.csv`` of each body into a folder."""
+        """Write the files of each body into a folder.
+
+        ``NAME.reduced.npz``; ``NAME.transfer.csv`` and ``.svg``, at the contact; ``NAME.node.csv``
+        and ``.svg``, at the node that the case names.
+        """
+        from klack.analyses.impact.figures import transfer_chart
+        from klack.analyses.reduction.node_figure import node_chart
+        from klack.report.printed import svg_chart
+
         for body in self.bodies:
             body.save(folder / f"{body.name}.reduced.npz")
         for item in self.transfer:
-            with (folder / f"{item.body}.transfer.csv").open("w", newline="") as file:
-                writer = csv.writer(file)
-                writer.writerow(
-                    ["frequency [Hz]"]
-                    + [f"|{label}| [m/N]" for label in item.labels]
-                    + [f"deviation of {label} [dB]" for label in item.labels[1:]]
-                )
-                table = np.vstack(
-                    [item.frequencies, np.abs(item.curves), item.level_deviations[1:]]
-                ).T
-                writer.writerows([f"{value:.9g}" for value in row] for row in table)
+            _write_table(item, folder / f"{item.body}.transfer.csv")
+            (folder / f"{item.body}.transfer.svg").write_bytes(svg_chart(transfer_chart(item)))
+        for node in self.nodes:
+            _write_table(node.transfer, folder / f"{node.body}.node.csv")
+            (folder / f"{node.body}.node.svg").write_bytes(svg_chart(node_chart(node)))
+
+
+def _write_table(item: TransferComparison, path: Path) -> None:
+    with path.open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(
+            ["frequency [Hz]"]
+            + [f"|{label}| [m/N]" for label in item.labels]
+            + [f"deviation of {label} [dB]" for label in item.labels[1:]]
+        )
+        table = np.vstack([item.frequencies, np.abs(item.curves), item.level_deviations[1:]]).T
+        writer.writerows([f"{value:.9g}" for value in row] for row in table)
 
 
 def run_reduce(
@@ -77,7 +103,14 @@ def run_reduce(
     pair = own_pair(problem, pools, stiffness=first_stiffness(problem), recovery=True)
     progress("reduced", 1.0)
     transfer = compare_transfer(problem, pools, pair.ports, progress=progress)
+    nodes = one_nodes(problem, pools, pair.ports, progress=progress)
+    impacts = one_node_impacts(problem, pools, pair.ports, nodes)
     problem.close()
     return ReductionStudy(
-        case=case.name, title=case.title, bodies=(pair.upper, pair.lower), transfer=transfer
+        case=case.name,
+        title=case.title,
+        bodies=(pair.upper, pair.lower),
+        transfer=transfer,
+        nodes=nodes,
+        impacts=impacts,
     )

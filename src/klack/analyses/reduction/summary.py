@@ -7,6 +7,7 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.analysis import Measured
+from klack.analyses.impact.transfer import TRANSFER_COUNTS
 from klack.analyses.measures import (
     Column,
     Measure,
@@ -15,6 +16,8 @@ from klack.analyses.measures import (
     text_table,
     with_measures,
 )
+from klack.analyses.reduction.node_figure import place_words
+from klack.analyses.reduction.one_node import corrected_label
 from klack.analyses.reduction.run import ReductionStudy
 from klack.assembling.modes import elastic_count
 from klack.reduction.reduced_body import ReducedBody
@@ -125,6 +128,33 @@ class TransferJson(TypedDict):
     loss_factor: float
 
 
+class OneNodeJson(TypedDict):
+    """A node of a body as its output, beside the contact port."""
+
+    node: Annotated[int, Field(description="In the mesh, from 0.")]
+    place_m: Annotated[list[float], Field(description="Of the node, in the drawing.")]
+    distance_m: Annotated[float, Field(description="From the place that the case asks for.")]
+    correction: Annotated[str, Field(description="Attachment modes of the recipe, in words.")]
+    compliance_over_port: Annotated[
+        float, Field(description="Static displacement of the node over that of the port.")
+    ]
+    valid_up_to_Hz: Annotated[dict[str, float], Field(description="By the kind of reduction.")]
+
+
+class OneNodeImpactJson(TypedDict):
+    """The impact of the recipe with its gap between nodes."""
+
+    modes: Annotated[int, Field(description="Kept elastic modes of each body.")]
+    energy_change: Annotated[
+        float, Field(description="Of the energy of the impact, made by the one-node outputs.")
+    ]
+    peak_force_N: float
+    restitution: float
+    peak_force_of_ports_N: Annotated[float, Field(description="With the gap at the ports.")]
+    restitution_of_ports: float
+    energy_change_of_ports: Annotated[float, Field(description="Round-off.")]
+
+
 class ReductionJson(TypedDict):
     """``klack reduce``."""
 
@@ -132,11 +162,79 @@ class ReductionJson(TypedDict):
     case: str
     bodies: Annotated[dict[str, ReducedBodyJson], Field(description="By name.")]
     transfer: Annotated[dict[str, TransferJson], Field(description="By body.")]
+    one_node: Annotated[
+        dict[str, OneNodeJson], Field(description="By body; of those with run.transfer.nodes.")
+    ]
+    one_node_impacts: Annotated[
+        list[OneNodeImpactJson], Field(description="With 20 and 50 modes, where there is a node.")
+    ]
 
 
 def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
     """What a terminal shows: both bodies."""
     yield text_table(study.title, "body", BODY_MEASURES, ((b.name, b) for b in study.bodies))
+    if study.nodes:
+        yield _nodes_told(study)
+        yield _impacts_told(study)
+
+
+def _nodes_told(study: ReductionStudy) -> TextTable:
+    """Nodes as outputs, and how far up the recipe is right there."""
+    rows = []
+    for node in study.nodes:
+        limits = dict(zip(node.transfer.labels, node.transfer.valid_up_to, strict=True))
+        corrected = (limits.get(corrected_label(count)) for count in TRANSFER_COUNTS)
+        rows.append(
+            (
+                node.body,
+                f"{node.node} at {place_words(node)}",
+                node.correction,
+                f"{1e6 * node.distance:.3g}",
+                f"{node.compliance:.4g}",
+                *("none" if limit is None else f"{1e-3 * limit:.4g}" for limit in corrected),
+            )
+        )
+    counts = [f"{count} modes valid to [kHz]" for count in TRANSFER_COUNTS]
+    return TextTable(
+        title="Displacement of one node per contact force",
+        columns=(
+            "body",
+            "node",
+            "attachment modes",
+            "off by [um]",
+            "static, over the port",
+            *counts,
+        ),
+        rows=rows,
+        left=3,
+    )
+
+
+def _impacts_told(study: ReductionStudy) -> TextTable:
+    """Energy that these nodes make or take where they stand for the contact."""
+    rows = []
+    for item in study.impacts:
+        for name, found in (("one node", item.nodes), ("port", item.ports)):
+            rows.append(
+                (
+                    f"{item.modes} modes, {name}",
+                    f"{found.peak_force:.2f}",
+                    f"{found.restitution:.4f}",
+                    _change(100.0 * (found.energy - 1.0)),
+                )
+            )
+    return TextTable(
+        title="Impact of the recipe with its gap read there",
+        columns=("output", "peak force [N]", "restitution", "energy change [%]"),
+        rows=rows,
+    )
+
+
+def _change(percent: float) -> str:
+    """With a sign; what is below 0.005 % depends on the step and is not told."""
+    if abs(percent) < 0.005:
+        return "0.00"
+    return f"{percent:+.2f}" if abs(percent) < 1.0 else f"{percent:+.1f}"
 
 
 def reduction_measured(study: ReductionStudy) -> Iterator[Measured]:
@@ -169,4 +267,32 @@ def reduction_to_json(study: ReductionStudy) -> dict[str, Any]:
             }
             for item in study.transfer
         },
+        "one_node": {
+            node.body: {
+                "node": node.node,
+                "place_m": [float(x) for x in node.place],
+                "distance_m": node.distance,
+                "correction": node.correction,
+                "compliance_over_port": node.compliance,
+                "valid_up_to_Hz": {
+                    label: float(limit)
+                    for label, limit in zip(
+                        node.transfer.labels, node.transfer.valid_up_to, strict=True
+                    )
+                },
+            }
+            for node in study.nodes
+        },
+        "one_node_impacts": [
+            {
+                "modes": item.modes,
+                "energy_change": item.nodes.energy - 1.0,
+                "peak_force_N": item.nodes.peak_force,
+                "restitution": item.nodes.restitution,
+                "peak_force_of_ports_N": item.ports.peak_force,
+                "restitution_of_ports": item.ports.restitution,
+                "energy_change_of_ports": item.ports.energy - 1.0,
+            }
+            for item in study.impacts
+        ],
     }

@@ -422,7 +422,7 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
     surfaces = " on ".join(str(s) for s in valve.case.stops[name].between) if contact else ""
     check = None
     if contact is not None:
-        force = contact.pattern_force
+        force, worn = contact.pattern_force, valve.case.stops[name].worn
         check = check_contact(
             valve.case,
             contact.pair,
@@ -430,6 +430,7 @@ def _stop_summary(valve: Valve, name: str, part: EndStop) -> StopSummary:
             force,
             surfaces,
             has_yield=law is not None and isinstance(law.law, YieldingLaw),
+            worn_by=0.0 if worn is None else worn.force,
         )
     return StopSummary(
         name=name,

@@ -85,7 +85,8 @@ def _model(rows: Sequence[PointRow], today: PointRow) -> str:
     """Model of the case as it is, and how many points have another one; empty for strokes."""
     first = next((row.model for row in (today, *rows) if row.model), "")
     others = sum(1 for row in rows if row.model not in ("", first))
-    return f"{first}; other modes or meshes at {others} points" if others else first
+    points = "1 point" if others == 1 else f"{others} points"
+    return f"{first}; other modes, meshes or laws at {points}" if others else first
 
 
 def _column(

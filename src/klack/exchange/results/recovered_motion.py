@@ -77,6 +77,7 @@ def _recovered(
         damping=damping_of(case.bodies[elastic.name].damping),
         modes_pool=pools[elastic.name],
         flexibility=flexibility,
+        shifts=case.reduction.shifts_of(elastic.name, case.reduction.correction),
         recovery_nodes=np.arange(elastic.mesh.node_count),
     )
     shapes = np.zeros((elastic.dof_count, 0)) if body.recovery is None else body.recovery.shapes

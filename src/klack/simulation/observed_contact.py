@@ -1,0 +1,121 @@
+r"""A contact closed over observers instead of its ports, to show what that costs in energy.
+
+The force enters each body by the load vector ``b`` of its contact port, but the gap is that of one
+node (``c`` instead of ``b``), as in state-space models with one node as output.  The force then
+does the work ``F d(b^T u)`` on the body and takes ``F d(c^T u)`` from the spring of the contact;
+the difference comes from nowhere,
+
+.. math:: \Delta E = \sum_\text{bodies} \int F \, \mathrm d(b^T u - c^T u),
+
+which appears as energy of the impact or disappears from it.  The integration itself adds nothing:
+modes are propagated exactly, the force of a step is that of the discrete gradient
+(:func:`klack.simulation.contact_step.solve_step`), so that with ``c = b`` the energy is kept to
+round-off.  Bodies are taken without damping, springs and constant forces.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.contact.laws import LinearLaw
+from klack.errors import InputError, require_positive
+from klack.reduction.reduced_body import ReducedBody
+from klack.simulation.contact_step import solve_step
+from klack.simulation.propagator import modal_propagator
+
+__all__ = ["ObservedImpact", "observed_impact"]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ObservedImpact:
+    """An impact whose gap may be read elsewhere than at the loads.
+
+    Parameters
+    ----------
+    step : float [s]
+    force : array, shape (n,) [N]
+        Mean over each step.
+    restitution : float [-]
+        Of the centre of mass of the upper body, at the end of the run.
+    energy : float [-]
+        Of bodies and contact at the end, over that at the start: 1 where the gap is read where the
+        force does its work.
+    """
+
+    step: float
+    force: Floats
+    restitution: float
+    energy: float
+
+    @property
+    def peak_force(self) -> float:
+        """Largest force of any step [N]."""
+        return float(self.force.max(initial=0.0))
+
+
+def observed_impact(
+    upper: ReducedBody,
+    lower: ReducedBody,
+    *,
+    outputs: tuple[Floats, Floats],
+    stiffness: float,
+    speed: float,
+    duration: float,
+    step: float,
+) -> ObservedImpact:
+    """Impact of two reduced bodies on a linear spring between two outputs of theirs.
+
+    Parameters
+    ----------
+    upper, lower : ReducedBody
+        Contact at their first ports.
+    outputs : pair of array, shape (m,) [1/sqrt(kg)]
+        Modal amplitudes of the displacement along z that the gap is made of, of the upper and of
+        the lower body; those of the ports for a reciprocal contact.
+    stiffness : float [N/m]
+    speed : float [m/s]
+        Of the upper body in -z, at first touch.
+    duration, step : float [s]
+
+    Raises
+    ------
+    InputError
+        Where a force on the bodies would close the gap that it should open.
+    """
+    require_positive("observed_impact: speed", speed, "m/s")
+    require_positive("observed_impact: step", step, "s")
+    omega = np.concatenate([upper.omega, lower.omega])
+    load = np.concatenate([upper.port_shapes[:, 0], -lower.port_shapes[:, 0]])
+    read = np.concatenate([outputs[0], -outputs[1]])
+    modes = modal_propagator(omega, np.zeros(omega.size), step)
+    opened = float(read @ (modes.B1 * load))  # by a unit force during a step
+    if not opened > 0.0:
+        raise InputError(
+            "contact with a node as output",
+            got=f"a gap that closes by {-opened:.3g} m when 1 N pushes the bodies apart for a step",
+            expected="a node that moves with the load",
+            hint="take a node at the contact surface.",
+        )
+    q, v = np.zeros(omega.size), np.zeros(omega.size)
+    v[: upper.rigid_count] = -speed * upper.rigid_axial
+    before = 0.5 * float(v @ v)
+    law = LinearLaw(stiffness).flat()
+    depth, force = 0.0, np.zeros(max(1, int(np.ceil(duration / step))))
+    for i in range(force.size):
+        free = modes.A11 * q + modes.A12 * v
+        v = modes.A21 * q + modes.A22 * v
+        deep = -float(read @ free)
+        F = solve_step(law.kind, law.parameters, 0, 0.0, opened, depth, deep, 0.0, 0)[0]
+        q, v = free + modes.B1 * (load * F), v + modes.B2 * (load * F)
+        depth, force[i] = deep - opened * F, F
+    after = 0.5 * float(v @ v + np.sum((omega * q) ** 2))
+    after += 0.5 * stiffness * max(depth, 0.0) ** 2
+    return ObservedImpact(
+        step=step,
+        force=force,
+        restitution=float(force.sum() * step / upper.mass / speed) - 1.0,
+        energy=after / before,
+    )
