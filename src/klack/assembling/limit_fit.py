@@ -24,8 +24,12 @@ _FEWEST_POINTS = 5
 _RISE = 0.4
 """Of the limit over its first value, from which the search begins: 1.7 to 2.4 Y."""
 
-_RISES = (-12.0, 3.0)
+_RISES = (-6.0, 3.0)
 """Least and largest logarithm of the rise of one line over the first value."""
+
+_UNEVEN = 0.05
+"""Deviation that a line is worth which rises by a factor of e more than its neighbour: the limit
+rises evenly with the logarithm of the set, and what else it does is noise of the mesh."""
 
 _NONE = 10.0
 """Deviation of a limit with which no forces are found."""
@@ -64,7 +68,7 @@ def fitted_limit(loops: YieldingLoops, space: ContactSpace, C: Floats) -> Pressu
 
     def misses(powers: Floats) -> Floats:
         found = np.array([bed.deviations(j, limit(powers)) for j in chosen])
-        return np.asarray((weight[:, None] * found).ravel())
+        return np.append(weight[:, None] * found, _UNEVEN * np.diff(powers))
 
     start = np.full(len(sets) - 1, np.log(_RISE / (len(sets) - 1)))
     return limit(least_squares(misses, start, diff_step=[1e-2], ftol=1e-4, xtol=1e-3).x)

@@ -107,7 +107,7 @@ def law_loops(
 
     try:
         loops = upper.flexibility.remembered(
-            "static loops with yield and pressure limit",
+            "static loops with yield and limit",
             (
                 lower.flexibility.key,
                 static.space.gap,

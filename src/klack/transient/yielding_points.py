@@ -23,10 +23,11 @@ from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 
 __all__ = ["let_yield", "solve_yielding"]
 
-_WHOLE_STEPS = 8
+_WHOLE_STEPS = 4
 _MOST = 200
 _HALVINGS = 40
 _SMALL = 1e-10  # of the gaps without forces: what closed ones may be open by
+_PAST_A_KINK = 1e-9  # of the pressure
 _LARGE = 20.0  # change of an entry of the inverse that costs it too many digits
 _ON_THE_LINE = 1e-10  # of the pressure: as far outside of its line a point stays on it
 
@@ -147,7 +148,7 @@ def solve_yielding(
     """
     n = len(q)
     shifted, opened, moved = np.empty(n), np.zeros(n), np.empty(n)
-    last = np.zeros(n)
+    last, beyond = np.zeros(n), np.empty(n)
     rounds = 0
     for attempt in range(_MOST):
         for k in range(n):
@@ -175,12 +176,16 @@ def solve_yielding(
         share = 1.0
         if attempt >= _WHOLE_STEPS:
             share = _lowest(q, limit, worn, last, lam, opened, moved)
+        nudge = _PAST_A_KINK if share < 1.0 else 0.0
         for k in range(n):
-            last[k] += share * (lam[k] - last[k])
+            way = lam[k] - last[k]
+            last[k] += share * way
             opened[k] += share * (moved[k] - opened[k])
+            # where the energy is lowest at a kink, the line beyond it tells how to go on
+            beyond[k] = last[k] / limit.area[k] * (1.0 + nudge * np.sign(way))
         afresh = wrong > max(24, carrying.counts[0] // 4)
         for k in range(n):
-            line = _line_of(limit, last[k] / limit.area[k], worn.set[k], worn.line[k])
+            line = _line_of(limit, beyond[k], worn.set[k], worn.line[k])
             if line != worn.line[k]:
                 afresh = _take_line(A, limit, worn, carrying, k, line, afresh)
         if afresh and carrying.counts[0]:

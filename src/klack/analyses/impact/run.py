@@ -332,7 +332,9 @@ def _study(
         if certify and reduced:
             certificate = for_comparison(
                 "the error estimate",
-                lambda: _certificate(problem, pools, results, twins, limit, clock),
+                lambda: _certificate(
+                    problem, pools, results, twins, None if twins else limit, clock
+                ),
             )
         certificate = certificate or _Certificate()
         transfer: tuple[TransferComparison, ...] = ()
@@ -368,11 +370,11 @@ def _study(
         attempts.require_one(results)
         check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
     results = doubt_modal_levels(results, **at_once)
-    if limit is not None or not twins:
+    if not twins:
         _take_better(results, certificate)
     has_yield = [*twins, *(["interface"] if limit is not None else [])]
     results = doubt_elastic_levels(results, has_yield)
-    reference = best_level(results)
+    reference = next((n for n in twins if not results[n].doubts), best_level(results))
     compared = deviations(results, reference)
     missing = failure_notes(attempts.texts)
     study = ImpactStudy(
@@ -471,8 +473,8 @@ def _certificate(
 ) -> _Certificate:
     """Deviation of every reduced level from one interface-level run with more modes.
 
-    The same run with half as many modes tells whether it can serve as a reference.  Without a
-    limit its bodies are elastic: levels with yield are measured by ``twins`` without it.
+    The same run with half as many modes tells whether it can serve as a reference.  Levels with a
+    law of faces that yield are measured by ``twins`` without it, and that run has no limit then.
     """
     clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
@@ -500,10 +502,9 @@ def _certificate(
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("error estimate", 1.0)
-    elastic_ones = twins if limit is None else {}
-    histories = {name: elastic_ones.get(name, results[name].history) for name in whole}
+    histories = {name: twins.get(name, results[name].history) for name in whole}
     basis = f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points"
-    if elastic_ones:
+    if twins:
         basis += ", both with elastic bodies"
     if limit is not None:
         basis += ", yield by a pressure limit"
