@@ -15,7 +15,7 @@ from klack.errors import InputError
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.interface_run import simulate_interface
 from klack.transient.yielding_points import let_yield, solve_yielding
-from klack.verification.interface_bodies import modal_model
+from klack.verification.interface_bodies import modal_model, rigid_body
 from klack.verification.yielding_bodies import ball_in_seat
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
@@ -236,3 +236,36 @@ def test_the_meridian_case_of_solids():
         assert body.mesh.contact.size == pytest.approx(4e-6)
         assert all(support.sectors is None for support in body.fixed or ())
     assert meridian_case(case, 20e-6, 1.02).motion.speed == case.motion.speed
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_random_bodies_that_tilt_on_points_that_yield_keep_the_energy(seed):
+    """Conservation: three impacts of a rigid body off its axis, each on the faces of the last."""
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(3, 40))
+    angle = np.sort(rng.uniform(0.0, 2.0 * np.pi, count))
+    radius = 0.5e-3 * rng.uniform(0.8, 1.2, count)
+    points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(count)])
+    points[:, 0] += rng.uniform(0.0, 0.4e-3)
+    model = rigid_body(
+        mass=MASS, inertia=(2e-8, 2e-8, 1e-9), points=points, stiffness=STIFFNESS / count
+    )
+    whole = 0.3 * sqrt(MASS * STIFFNESS)  # force of the elastic impact
+    first = whole / count * 10.0 ** rng.uniform(-2.0, 0.0)
+    m = int(rng.integers(2, 8))
+    limit = PressureLimit(
+        set=np.append(0.0, np.cumsum(10.0 ** rng.uniform(-9, -6, m - 1))),
+        pressure=first * np.append(1.0, 1.0 + np.cumsum(10.0 ** rng.uniform(-2, 0, m - 1))),
+    )
+    worn = np.zeros(count)
+    for _ in range(3):
+        run = simulate_interface(
+            replace(model, limit=limit), speed=0.3, duration=80e-6, step=40e-9, worn=worn
+        )
+        assert abs(run.energy.residual) < 1e-10
+        assert run.energy.plastic >= 0.0
+        assert np.all(run.worn >= worn)
+        taken = np.sum(limit.loss(run.worn) - limit.loss(worn))
+        assert run.energy.plastic == pytest.approx(taken, rel=1e-9, abs=1e-15)
+        worn = run.worn
+    assert np.any(worn > 0.0)
