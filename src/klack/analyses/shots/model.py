@@ -15,6 +15,7 @@ from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.impact.run import ImpactBodies, impact_bodies
 from klack.analyses.shots.draw import extreme_placements, face_friction, shots_of
 from klack.analyses.shots.one_shot import ShotSetup, rigid_placement
+from klack.assembling.pressure_limit import pressure_limit
 from klack.assembling.problem import ContactProblem, contact_problem
 from klack.case.placement import Placement
 from klack.case.schema import Case
@@ -34,6 +35,7 @@ _WIDER = 4.0
 _FIRST = 0.02  # share of the reach: points with so small a gap touch first
 _FLIGHT_STEPS = 20  # before first touch, without a gap
 _SPAN_OVER_CONTACT = 3.0
+_MORE = 1.6  # force per length of the most loaded sector over the mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -129,7 +131,8 @@ def _model(
             space, problem.static, problem.flexibility_upper, problem.flexibility_lower
         )
         progress("interface", 0.8)
-    model = build_interface(problem, bodies.pools, space=space, compliance=compliance)
+    limit = pressure_limit(problem, problem.yielding(progress), progress, more=_MORE)
+    model = build_interface(problem, bodies.pools, space=space, compliance=compliance, limit=limit)
     guide = build_guide(problem, model, bodies.pools)
     progress("interface", 1.0)
     speed, gap, spring = case.motion.speed, case.contact.gap or 0.0, case.motion.spring
