@@ -213,19 +213,22 @@ def test_a_point_on_the_axis_moves_the_same_way_from_all_angles():
     np.testing.assert_allclose(moved[1:], moved[[0, 0]], atol=1e-10 * np.abs(moved).max())
 
 
-def test_traces_on_a_ring_are_the_normal_part_of_the_field():
-    body = bending("quad8")
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_traces_on_a_ring_are_the_normal_part_of_the_field(order):
+    body = bending("quad8", order)
     nodes = body.mesh.surface("outer").nodes[[0, 3]]
     normal = np.array([0.8, 0.6])
     rows = np.zeros((2, body.mesh.node_count, 2))
     rows[[0, 1], nodes] = normal
     angles = np.radians([0.0, 50.0, 190.0])
-    traces = rows_around(csr_array(rows.reshape(2, -1)), 1, angles, towards=0.2)
+    traces = rows_around(csr_array(rows.reshape(2, -1)), order, angles, towards=0.2)
     assert traces.shape == (6, body.dof_count)
     u = np.random.default_rng(1).standard_normal(body.dof_count)
     identity = csr_array(eye_array(body.mesh.node_count))
     for k, angle in enumerate(angles):
-        field = displacement_rows(identity, 1, np.full(body.mesh.node_count, angle), towards=0.2)
+        field = displacement_rows(
+            identity, order, np.full(body.mesh.node_count, angle), towards=0.2
+        )
         moved = (field @ u).reshape(-1, 3)[nodes]
         outward = [0.8 * np.cos(angle), 0.8 * np.sin(angle), 0.6]
         np.testing.assert_allclose((traces @ u).reshape(2, 3)[:, k], moved @ outward, rtol=1e-12)

@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
 from scipy.sparse import csr_array
 
 from klack.elasticity.body import ElasticBody, elastic_body
@@ -19,6 +18,7 @@ from klack.materials import Material
 from klack.mesh.mesh import Mesh
 from klack.mesh.swept import sweep
 from klack.verification.lattice import lattice_mesh
+from klack.verification.timoshenko_beam import free_bar_frequencies
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BOTH_WAYS = (0.0, np.pi / 2)
@@ -145,34 +145,6 @@ def test_static_answer_is_that_of_the_solid(held):
     np.testing.assert_allclose(field, expected, rtol=0, atol=5e-3 * np.abs(expected).max())
 
 
-ROOTS = (4.730040744862704, 7.853204624095838, 10.995607838001671)
-"""cos x cosh x = 1."""
-
-
-def beam_frequencies(radius: float, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Free beam after Euler-Bernoulli, and after Timoshenko (Huang 1961, shear after Hutchinson).
-
-    Hutchinson 2001: 6 (1 + nu)^2 / (7 + 12 nu + 4 nu^2) for a circular section.
-    """
-    nu = STEEL.poisson
-    shear = 6 * (1 + nu) ** 2 / (7 + 12 * nu + 4 * nu**2)
-    r2 = (radius / 2 / length) ** 2
-    s2 = STEEL.young / (shear * STEEL.shear_modulus) * r2
-    unit = np.sqrt(STEEL.young * radius**2 / 4 / STEEL.density) / length**2 / (2 * np.pi)
-
-    def determinant(b: float) -> float:
-        root = np.sqrt((r2 - s2) ** 2 + 4 / b**2)
-        alpha, beta = b * np.sqrt((root - r2 - s2) / 2), b * np.sqrt((root + r2 + s2) / 2)
-        mixed = b**2 * r2 * (r2 - s2) ** 2 + 3 * r2 - s2
-        slope = b / np.sqrt(1 - b**2 * r2 * s2) * mixed
-        shown = slope * np.tanh(alpha) * np.sin(beta)
-        return float(2 / np.cosh(alpha) - 2 * np.cos(beta) + shown)
-
-    euler = np.array(ROOTS) ** 2
-    timoshenko = [brentq(determinant, 0.75 * x, 1.001 * x, xtol=1e-12) for x in euler]
-    return unit * euler, unit * np.array(timoshenko)
-
-
 def test_slender_rods_bend_as_beams():
     """Length over diameter 7.5, 15, 30: Timoshenko to 4e-6, Euler-Bernoulli in the limit."""
     from_euler, from_timoshenko = [], []
@@ -181,7 +153,7 @@ def test_slender_rods_bend_as_beams():
         mesh = lattice_mesh("quad8", [np.linspace(0, radius, 4), np.linspace(0, length, cells + 1)])
         rod = fourier_body("rod", mesh, {"solid": STEEL}, order=1)
         frequency = eigenmodes(rod, count=3).frequency
-        euler, timoshenko = beam_frequencies(radius, length)
+        euler, timoshenko = free_bar_frequencies(STEEL, radius, length)
         from_euler.append(frequency / euler - 1)
         from_timoshenko.append(frequency / timoshenko - 1)
     # shear and rotary inertia lower the frequency by (radius/length)^2 times a number
