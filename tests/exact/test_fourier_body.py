@@ -234,6 +234,19 @@ def test_traces_on_a_ring_are_the_normal_part_of_the_field(order):
         np.testing.assert_allclose((traces @ u).reshape(2, 3)[:, k], moved @ outward, rtol=1e-12)
 
 
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_displacement_in_space_is_a_turning_and_a_counter_turning_part(order):
+    """u_x + i u_y = a exp(i (1 - n) theta) + b exp(i (1 + n) theta), u_z = w cos(n theta)."""
+    a, b, w = 0.7, -1.3, 0.4
+    angles = np.linspace(0.1, 6.0, 9)
+    weights = csr_array(np.ones((9, 1)))
+    field = displacement_rows(weights, order, angles) @ np.array([a, b, w])
+    x, y, z = field.reshape(9, 3).T
+    plane = a * np.exp(1j * (1 - order) * angles) + b * np.exp(1j * (1 + order) * angles)
+    np.testing.assert_allclose(x + 1j * y, plane, atol=1e-14)
+    np.testing.assert_allclose(z, w * np.cos(order * angles), atol=1e-14)
+
+
 def test_amplitudes_are_those_around_the_axis():
     body = bending("tri6")
     U, V, W = np.moveaxis(body.amplitudes(body.rigid_motions), 1, 0)

@@ -4,12 +4,14 @@ Truth: exact frequencies of a free steel cylinder D4 x L30 mm (tests/data), Timo
 """
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from quoted_output import compare
 
 from klack.analyses.reduction.run import run_reduce
 from klack.analyses.reduction.summary import reduction_to_json, reduction_told
@@ -127,3 +129,20 @@ def test_linear_elements_lock_and_are_told_of(tmp_path, family, least):
         body = bending_body(load_case(path), "long", replace(mesh, surfaces={}))
     deviation = eigenmodes(body, count=1).frequency[0] / EXACT["bending"][0] - 1
     assert least < deviation < 0.1
+
+
+def test_page_of_the_theory_prints_what_it_quotes(tmp_path, monkeypatch, capsys):
+    """The example in Python, and the table of the shipped valve."""
+    text = (Path(__file__).parents[2] / "docs" / "theory" / "elasticity.md").read_text("utf-8")
+    section = text.split("## Bending of bodies of revolution")[1].split("\n## ")[0]
+    code = re.search(r"```python\n(.*?)```", section, re.DOTALL)
+    quoted = re.search(r"```console\n\$ klack (.*?)\n(.*?)```", section, re.DOTALL)
+    assert code is not None
+    assert quoted is not None
+    exec(compile(code[1], "elasticity.md", "exec"), {})
+    frequencies, moved = capsys.readouterr().out.splitlines()
+    assert f"# {frequencies}" in code[1]
+    assert f"# {moved}" in code[1]
+    monkeypatch.chdir(tmp_path)
+    assert main(quoted[1].split()) == 0
+    compare(quoted[2], capsys.readouterr().out, "elasticity.md")

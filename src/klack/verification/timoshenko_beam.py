@@ -25,6 +25,7 @@ def free_bar_frequencies(
     ----------
     material : Material
     radius, length : float [m]
+        At least 15 radii long: the search for the roots is not made for shorter bars.
 
     Returns
     -------
