@@ -110,7 +110,7 @@ def test_without_a_node_nothing_is_added(tmp_path):
 
     assert (study.nodes, study.impacts) == ((), ())
     assert reduction_to_json(study)["one_node"] == {}
-    assert len(list(reduction_told(study))) == 1
+    assert [t.title[:13] for t in reduction_told(study)] == ["Two short rod", "Bending modes"]
 
 
 @pytest.mark.parametrize(

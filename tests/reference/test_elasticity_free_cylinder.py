@@ -11,6 +11,7 @@ import pytest
 
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
+from klack.elasticity.fourier_body import FourierBody, fourier_body
 from klack.materials import Material
 from klack.verification.lattice import lattice_mesh
 
@@ -46,6 +47,54 @@ def test_axisymmetric_modes_match_the_exact_ones(family, factor):
     assert np.abs(deviation[:8]).max() < 1e-5 * factor
     assert np.abs(deviation).max() < 1e-4 * factor
     assert (deviation > -1e-7).all()  # a conforming mesh is never softer (table: 1e-7)
+
+
+def half_section(family: str, across: int, along: int, order: int) -> FourierBody:
+    lines = [np.linspace(0.0, RADIUS, across + 1), np.linspace(0.0, LENGTH, along + 1)]
+    mesh = lattice_mesh(family, lines)
+    return fourier_body("cylinder", mesh, {"solid": STEEL}, order=order)
+
+
+@pytest.mark.parametrize(("family", "factor"), [("quad8", 1), ("tri6", 3)])
+def test_bending_modes_of_the_half_section_match_the_exact_ones(family, factor):
+    """Fourier order 1; tolerance = mesh error, with its sign."""
+    table = exact(1)
+    assert len(table) == 16
+    deviation = eigenmodes(half_section(family, 6, 90, 1), count=16).frequency / table - 1
+    assert np.abs(deviation[:3]).max() < 2e-6 * factor
+    assert np.abs(deviation).max() < 3e-5 * factor
+    assert (deviation > -1e-7).all()
+
+
+@pytest.mark.parametrize("family", ["quad8", "tri6"])
+def test_modes_of_order_two_match_the_exact_ones(family):
+    table = exact(2)
+    assert len(table) == 8
+    deviation = eigenmodes(half_section(family, 6, 90, 2), count=8).frequency / table - 1
+    assert np.abs(deviation).max() < 1e-4
+    assert (deviation > -2e-7).all()
+
+
+@pytest.mark.parametrize("family", ["quad8", "tri6"])
+def test_order_zero_has_the_axisymmetric_modes_and_the_torsion(family):
+    """Torsion of a cylinder is exact: k sqrt(G / rho) / (2 L)."""
+    frequency = eigenmodes(half_section(family, 6, 90, 0), count=6).frequency
+    torsion = np.sqrt(STEEL.shear_modulus / STEEL.density) / (2 * LENGTH) * np.arange(1, 5)
+    expected = np.sort(np.concatenate([exact(0)[:2], torsion]))
+    np.testing.assert_allclose(frequency, expected, rtol=5e-6)  # error of the mesh
+
+
+@pytest.mark.parametrize("family", ["quad8", "tri6"])
+def test_bending_of_the_half_section_converges_with_order_four(family):
+    """Quadratic elements: the error of a frequency falls with h^4."""
+    meshes = ((2, 12), (4, 24))
+    coarse, fine = (
+        eigenmodes(half_section(family, *cells, 1), count=3).frequency / exact(1)[:3] - 1
+        for cells in meshes
+    )
+    assert (fine > 0).all()
+    assert fine.max() < 3e-4
+    np.testing.assert_allclose(np.log2(coarse / fine), 4.0, atol=0.3)
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,14 @@ the materials do, a warning says so and the law stays elastic.
 
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from threadpoolctl import threadpool_limits
 
+from klack.assembling.limit_fit import fitted_limit
 from klack.case.bodies import CaseFile
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError, StaticContact, extended_compliance
@@ -30,7 +33,7 @@ __all__ = ["law_loops", "law_with_yield", "loaded_body", "loops_with_yield"]
 
 Floats = NDArray[np.float64]
 
-_LEFT_OUT = "the reduced level leaves out the yield of its faces"
+_LEFT_OUT = "the contact leaves out the yield of its faces"
 
 _ZONE = 5.0
 """Radius of the first zone, over the half width of the elastic contact at its highest force."""
@@ -82,7 +85,7 @@ def law_loops(
         return None
     if beside:
         warnings.warn(
-            f"{_LEFT_OUT}: a law has either yield or {beside}. Try: the case without the latter.",
+            f"{_LEFT_OUT}: faces have either yield or {beside}. Try: the case without the latter.",
             AccuracyWarning,
             stacklevel=2,
         )
@@ -93,16 +96,18 @@ def law_loops(
         space, C = static.space, static.compliance
         while True:
             try:
-                return loops_with_yield(
-                    static, space, C, upper, lower, energy=energy, closing=closing
-                )
+                # small matrices: threads of the BLAS would wait for each other
+                with threadpool_limits(limits=1, user_api="blas"):
+                    return loops_with_yield(
+                        static, space, C, upper, lower, energy=energy, closing=closing
+                    )
             except ReachError as error:
                 space = wider(space, error)
                 C = extended_compliance(space, static, upper.flexibility, lower.flexibility)
 
     try:
         loops = upper.flexibility.remembered(
-            "static loops with yield and radius",
+            "static loops with yield and limit",
             (
                 lower.flexibility.key,
                 static.space.gap,
@@ -149,7 +154,7 @@ def loops_with_yield(
     energy: float,
     closing: float,
 ) -> YieldingLoops:
-    """Static loops up to the energy of an impact.
+    """Static loops up to the energy of an impact, and the pressure limit fitted to them.
 
     Parameters
     ----------
@@ -181,9 +186,10 @@ def loops_with_yield(
         for one, rows in ((upper, space.G_a), (lower, space.G_b))
         if one.elements_near(place, radius).any()
     ]
-    return yielding_loops(
+    loops = yielding_loops(
         YieldingContact(space, C, bodies),
         deepest=float(static.approach[-1]),
         energy=energy,
         closing=closing,
     )
+    return replace(loops, pressure_limit=fitted_limit(loops, space, C))

@@ -5,7 +5,8 @@ r"""Stiffness and mass matrices of linear elasticity.
     K_{ij} = \int B_i^T D B_j \, dV, \qquad M_{ij} = \int \varrho N_i N_j \, dV \; 1
 
 Solids have three displacements per node; bodies of revolution (two columns of points) have u_r and
-u_z, the hoop strain u_r / r, and are integrated over the full circle of 2 pi.
+u_z, the hoop strain u_r / r, and are integrated over the full circle of 2 pi.  What else they can
+do goes by Fourier orders around the axis (:mod:`klack.elasticity.fourier_body`).
 """
 
 from collections.abc import Mapping
@@ -22,9 +23,10 @@ from klack.materials import Material
 from klack.memory import require_memory
 from klack.mesh.mesh import ElementBlock, Mesh
 
-__all__ = ["SMALLEST_JACOBIAN_RATIO", "assemble"]
+__all__ = ["SMALLEST_JACOBIAN_RATIO", "assemble", "assemble_order"]
 
 _ENTRY = 12.0  # bytes: value and column
+_NO_ORDER = -1
 
 SMALLEST_JACOBIAN_RATIO = 1e-3
 """Least accepted smallest-to-largest Jacobian within one element [-]."""
@@ -51,11 +53,54 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
     InputError
         If a solid has no material, or an element is inverted or too distorted.
     """
+    d = mesh.dimension
+    K, start, neighbours, m_values = _integrated(mesh, materials, d, _NO_ORDER)
+    M = csr_array(diagonal_blocks(start, neighbours, m_values, d), shape=K.shape)
+    return _canonical(K), _canonical(M)
+
+
+def assemble_order(
+    mesh: Mesh, materials: Mapping[str, Material], order: int
+) -> tuple[csr_array, csr_array]:
+    r"""Stiffness and mass of a body of revolution in one Fourier order around its axis.
+
+    Three amplitudes a, b, w per node, see :mod:`klack.elasticity.fourier_body`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of dimension 2.
+    materials : mapping of str to Material
+        By name of the solid.
+    order : int
+        0 or more; 0 has the axisymmetric motion and the torsion.
+
+    Returns
+    -------
+    K : csr_array, shape (3 n_nodes, 3 n_nodes) [N/m]
+    M : csr_array, shape (3 n_nodes, 3 n_nodes) [kg]
+        No coupling between amplitudes; for a and b twice the scalar matrix of w.
+
+    Raises
+    ------
+    InputError
+        As :func:`assemble`.
+    """
+    K, start, neighbours, m_values = _integrated(mesh, materials, 3, order)
+    M = csr_array(diagonal_blocks(start, neighbours, m_values, 3), shape=K.shape)
+    twice = np.tile([2.0, 2.0, 1.0], mesh.node_count)
+    M.data *= np.repeat(twice, np.diff(M.indptr))
+    return _canonical(K), _canonical(M)
+
+
+def _integrated(
+    mesh: Mesh, materials: Mapping[str, Material], per_node: int, order: int
+) -> tuple[csr_array, NDArray[np.int64], NDArray[np.int32], NDArray[np.float64]]:
+    """K, the graph of the nodes, and the values of the scalar mass matrix on it."""
     points = np.ascontiguousarray(mesh.points, dtype=np.float64)
     _check_input(mesh, materials)
-    start, neighbours = _graph(mesh)
-    d = mesh.dimension
-    k_values = np.zeros(len(neighbours) * d * d)
+    start, neighbours = _graph(mesh, per_node)
+    k_values = np.zeros(len(neighbours) * per_node**2)
     m_values = np.zeros(len(neighbours))
     for block in mesh.blocks:
         material = materials[block.solid]
@@ -67,20 +112,23 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
             material.lame_lambda,
             material.shear_modulus,
             material.density,
+            order,
             start,
             neighbours,
             k_values,
             m_values,
         )
         _check_jacobians(mesh, block, jacobians)
-    shape = (mesh.dof_count, mesh.dof_count)
-    indices, row_start = block_pattern(start, neighbours, d)
-    K = csr_array((k_values, indices, row_start), shape=shape)
-    M = csr_array(diagonal_blocks(start, neighbours, m_values, d), shape=shape)
-    for matrix in (K, M):
-        matrix.has_sorted_indices = True
-        matrix.has_canonical_format = True
-    return K, M
+    indices, row_start = block_pattern(start, neighbours, per_node)
+    size = mesh.node_count * per_node
+    K = csr_array((k_values, indices, row_start), shape=(size, size))
+    return K, start, neighbours, m_values
+
+
+def _canonical(matrix: csr_array) -> csr_array:
+    matrix.has_sorted_indices = True
+    matrix.has_canonical_format = True
+    return matrix
 
 
 def _tables(
@@ -91,23 +139,24 @@ def _tables(
     return np.ascontiguousarray(N), np.ascontiguousarray(dN), w
 
 
-def _graph(mesh: Mesh) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+def _graph(mesh: Mesh, per_node: int) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
     elements = np.concatenate([b.connectivity.ravel() for b in mesh.blocks]).astype(np.int32)
     sizes = [np.full(len(b.connectivity), b.connectivity.shape[1]) for b in mesh.blocks]
     offsets = np.concatenate([[0], np.cumsum(np.concatenate(sizes))]).astype(np.int64)
     start, neighbours = node_graph(elements, offsets, mesh.node_count)
-    if len(neighbours) * mesh.dimension**2 > np.iinfo(np.int32).max:
+    size = mesh.node_count * per_node
+    if len(neighbours) * per_node**2 > np.iinfo(np.int32).max:
         raise InputError(
             "assemble: mesh",
-            got=f"{mesh.dof_count} degrees of freedom",
+            got=f"{size} degrees of freedom",
             expected="fewer than 2^31 matrix entries",
             hint="use a coarser mesh away from the contact.",
         )
     entries = len(neighbours)
     require_memory(
         "assemble: mesh",
-        entries * (mesh.dimension**2 * _ENTRY + mesh.dimension * _ENTRY + 8.0),
-        what=f"stiffness and mass of {mesh.dof_count} degrees of freedom",
+        entries * (per_node**2 * _ENTRY + per_node * _ENTRY + 8.0),
+        what=f"stiffness and mass of {size} degrees of freedom",
         hint="larger elements away from the contact.",
     )
     return start, neighbours

@@ -15,12 +15,18 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from klack.elasticity.assembly import assemble
-from klack.elasticity.rigid_motions import held_dofs, motions_left_free, rigid_motions
+from klack.elasticity.rigid_motions import (
+    held_best,
+    held_dofs,
+    motions_left_free,
+    orthonormal_in_mass,
+    rigid_motions,
+)
 from klack.errors import InputError
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
 
-__all__ = ["ElasticBody", "elastic_body"]
+__all__ = ["ElasticBody", "checked_nodes", "elastic_body", "require_support"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +52,7 @@ class ElasticBody:
 
     @property
     def dimension(self) -> int:
-        """3 for a solid, 2 for a body of revolution."""
+        """3 for a solid, 2 for a body of revolution; as many displacements has each node."""
         return self.mesh.dimension
 
     @property
@@ -101,11 +107,21 @@ class ElasticBody:
         """Rigid modes, shape (n_dof, 6 | 1 | 0) [1/sqrt(kg)], orthonormal in the mass."""
         if self.is_fixed:
             return np.zeros((self.dof_count, 0))
-        R = rigid_motions(self.mesh, self.centre_of_mass)
-        for _ in range(2):  # the second pass removes the round-off of the first
-            L = np.linalg.cholesky(R.T @ (self.M @ R))
-            R = np.linalg.solve(L, R.T).T.astype(np.float64)
-        return np.ascontiguousarray(R)
+        return orthonormal_in_mass(rigid_motions(self.mesh, self.centre_of_mass), self.M)
+
+    @cached_property
+    def isostatic_support(self) -> NDArray[np.int64]:
+        """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""
+        d = self.dimension
+        x = self.mesh.points
+        if d == 2:
+            return np.array([2 * np.argmin(x[:, 1]) + 1])
+        first = int(np.argmax(np.linalg.norm(x - self.centre_of_mass, axis=1)))
+        second = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
+        along = (x[second] - x[first]) / np.linalg.norm(x[second] - x[first])
+        third = int(np.argmax(np.linalg.norm(np.cross(x - x[first], along), axis=1)))
+        candidates = (3 * np.array([first, second, third])[:, None] + np.arange(3)).ravel()
+        return held_best(self.rigid_modes, candidates)
 
 
 def elastic_body(
@@ -132,17 +148,24 @@ def elastic_body(
     InputError
         If the mesh is not in one piece, or the supports leave a rigid motion free.
     """
-    _check_one_piece(name, mesh)
-    nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
-    _check_nodes(name, mesh, nodes)
+    nodes = checked_nodes(name, mesh, fixed_nodes)
     K, M = assemble(mesh, materials)
     body = ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=held_dofs(mesh, nodes))
     if nodes.size:
-        _check_support(body)
+        require_support(name, rigid_motions(mesh, body.centre_of_mass)[body.fixed])
     return body
 
 
-def _check_nodes(name: str, mesh: Mesh, nodes: NDArray[np.int64]) -> None:
+def checked_nodes(name: str, mesh: Mesh, fixed_nodes: Iterable[int]) -> NDArray[np.int64]:
+    """Sorted numbers of the held nodes of a mesh that is in one piece.
+
+    Raises
+    ------
+    InputError
+        If it is not, or does not have such nodes.
+    """
+    _check_one_piece(name, mesh)
+    nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
     if nodes.size and not (nodes[0] >= 0 and nodes[-1] < mesh.node_count):
         raise InputError(
             f"body '{name}': fixed_nodes",
@@ -150,15 +173,16 @@ def _check_nodes(name: str, mesh: Mesh, nodes: NDArray[np.int64]) -> None:
             expected=f"numbers from 0 to {mesh.node_count - 1}",
             hint="node numbers count from zero in the order of mesh.points.",
         )
+    return nodes
 
 
-def _check_support(body: ElasticBody) -> None:
-    motions = rigid_motions(body.mesh, body.centre_of_mass)
-    left = motions_left_free(motions[body.fixed])
+def require_support(name: str, held: NDArray[np.float64]) -> None:
+    """Refuse a support that leaves rigid motions free, from their values at what it holds."""
+    left = motions_left_free(held)
     if left:
         raise InputError(
-            f"body '{body.name}': fixed_nodes",
-            got=f"supports that leave {left} of {motions.shape[1]} rigid motions free",
+            f"body '{name}': fixed_nodes",
+            got=f"supports that leave {left} of {held.shape[1]} rigid motions free",
             expected="a support that constrains the body, or none (a free body)",
             hint="fix nodes that do not lie on one line, for example those of a whole surface.",
         )

@@ -14,10 +14,10 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from klack.cache.entry import Entry
-from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend
 from klack.elasticity.lanczos import block_lanczos
 from klack.elasticity.statics import Flexibility
+from klack.elasticity.vibrating_body import VibratingBody
 from klack.errors import InputError, require_positive
 from klack.memory import require_memory
 
@@ -53,7 +53,7 @@ class Modes:
 
 
 def eigenmodes(
-    body: ElasticBody,
+    body: VibratingBody,
     *,
     count: int | None = None,
     max_frequency: float | None = None,
@@ -65,7 +65,7 @@ def eigenmodes(
 
     Parameters
     ----------
-    body : ElasticBody
+    body : VibratingBody
     count : int, optional
         Number of modes.
     max_frequency : float, optional [Hz]
@@ -102,12 +102,12 @@ def eigenmodes(
         return _lowest(body, _iterated(own, count, max_frequency), count, max_frequency)
 
 
-def mode_memory(body: ElasticBody, count: int) -> float:
+def mode_memory(body: VibratingBody, count: int) -> float:
     """Memory [byte] that the computation of so many modes takes beside the factor."""
     return 8.0 * body.dof_count * (_VECTORS_PER_MODE * count + _WORKING_BLOCKS * _BLOCK)
 
 
-def _require_memory(body: ElasticBody, count: int) -> None:
+def _require_memory(body: VibratingBody, count: int) -> None:
     """Refuse more modes than fit."""
     require_memory(
         f"eigenmodes of body '{body.name}': count",
@@ -118,7 +118,7 @@ def _require_memory(body: ElasticBody, count: int) -> None:
 
 
 def _lowest(
-    body: ElasticBody,
+    body: VibratingBody,
     shapes: NDArray[np.float64],
     count: int | None,
     max_frequency: float | None,
@@ -130,7 +130,7 @@ def _lowest(
     return Modes(modes.omega[:keep], np.asfortranarray(modes.shapes[:, :keep]))
 
 
-def rigid_frequencies(body: ElasticBody) -> NDArray[np.float64]:
+def rigid_frequencies(body: VibratingBody) -> NDArray[np.float64]:
     """Frequencies of the rigid modes [Hz]: zero but for round-off.
 
     Raises
@@ -155,13 +155,13 @@ def rigid_frequencies(body: ElasticBody) -> NDArray[np.float64]:
     return frequency
 
 
-def _round_off(body: ElasticBody) -> float:
+def _round_off(body: VibratingBody) -> float:
     """Bound of what rounding of the summands leaves of R^T K R [1/s^2]."""
     size = np.abs(body.rigid_modes)
     return float(np.finfo(float).eps * (size * (abs(body.K) @ size)).sum(axis=0).max())
 
 
-def _check_request(body: ElasticBody, count: int | None, max_frequency: float | None) -> None:
+def _check_request(body: VibratingBody, count: int | None, max_frequency: float | None) -> None:
     if count is None and max_frequency is None:
         raise InputError(
             f"eigenmodes of body '{body.name}'",
@@ -181,7 +181,7 @@ def _check_request(body: ElasticBody, count: int | None, max_frequency: float | 
         )
 
 
-def _dense(body: ElasticBody) -> NDArray[np.float64]:
+def _dense(body: VibratingBody) -> NDArray[np.float64]:
     """All elastic modes of a small body."""
     free = body.free
     K = body.K[free][:, free].toarray()
@@ -214,7 +214,7 @@ def _iterated(
     return shapes
 
 
-def _rayleigh_ritz(body: ElasticBody, shapes: NDArray[np.float64]) -> Modes:
+def _rayleigh_ritz(body: VibratingBody, shapes: NDArray[np.float64]) -> Modes:
     """Clean the shapes of rigid motion, and take frequencies from K and M themselves."""
     R = body.rigid_modes
     shapes = shapes - R @ (R.T @ (body.M @ shapes))

@@ -6,6 +6,9 @@ Every isotropic stiffness follows from one small tensor per pair of nodes,
 
 where ``g`` holds the three gradient components of a solid, or (d/dr, d/dz, 1/r) of a body of
 revolution.  With it the 3 x 3 block of a solid is ``lambda G + mu (G^T + tr G 1)``.
+
+A body of revolution that moves in one Fourier order n has three displacements per node; see
+:mod:`klack.elasticity.fourier_body`.
 """
 
 import numpy as np
@@ -174,6 +177,7 @@ def add_elements(
     lame_lambda: float,
     shear_modulus: float,
     density: float,
+    order: int,
     start: NDArray[np.int64],
     neighbours: NDArray[np.int32],
     K: NDArray[np.float64],
@@ -188,8 +192,10 @@ def add_elements(
     stiffness_rule, mass_rule : (N (q, n), dN (q, n, d), w (q,))
     lame_lambda, shear_modulus : float [Pa]
     density : float [kg/m^3]
+    order : int
+        Fourier order of a body of revolution with three displacements per node; -1 without.
     start, neighbours : result of :func:`node_graph`
-    K : array, shape (start[-1] * d * d,) [N/m]
+    K : array, shape (start[-1] * c * c,) [N/m], c displacements per node
         Values in the order of the full CSR matrix; changed in place.
     M : array, shape (start[-1],) [kg]
         Values of the scalar mass matrix; changed in place.
@@ -202,6 +208,8 @@ def add_elements(
     n_elements, n = connectivity.shape
     d = points.shape[1]
     axisymmetric = d == 2
+    c = d if order < 0 else 3
+    circle = 0.5 if order > 0 else 1.0  # mean of cos^2 and of sin^2 around the axis
     N_k, dN_k, w_k = stiffness_rule
     N_m, dN_m, w_m = mass_rule
     jacobians = np.empty((n_elements, 2))
@@ -219,7 +227,7 @@ def add_elements(
         for q in range(w_k.size):
             det, volume = _geometry(x, dN_k[q], N_k[q], axisymmetric, g)
             low, high = min(low, det), max(high, det)
-            weight = w_k[q] * det * volume
+            weight = w_k[q] * det * volume * circle
             for i in range(n):
                 for j in range(i, n):
                     for a in range(3):
@@ -230,7 +238,7 @@ def add_elements(
         for q in range(w_m.size):
             det, volume = _geometry(x, dN_m[q], N_m[q], axisymmetric, g)
             low, high = min(low, det), max(high, det)
-            weight = w_m[q] * det * volume * density
+            weight = w_m[q] * det * volume * circle * density
             for i in range(n):
                 s = weight * N_m[q, i]
                 for j in range(i, n):
@@ -240,21 +248,24 @@ def add_elements(
             row = connectivity[e, i]
             for j in range(i, n):
                 column = connectivity[e, j]
-                _stiffness_block(G[i, j], lame_lambda, shear_modulus, axisymmetric, block)
+                if order < 0:
+                    _stiffness_block(G[i, j], lame_lambda, shear_modulus, axisymmetric, block)
+                else:
+                    _fourier_block(G[i, j], lame_lambda, shear_modulus, order, block)
                 k = _position(neighbours, start[row], start[row + 1], column)
                 M[k] += S[i, j]
-                at = start[row] * d * d + (k - start[row]) * d
-                width = (start[row + 1] - start[row]) * d
-                for a in range(d):
-                    for b in range(d):
+                at = start[row] * c * c + (k - start[row]) * c
+                width = (start[row + 1] - start[row]) * c
+                for a in range(c):
+                    for b in range(c):
                         K[at + a * width + b] += block[a, b]
                 if j > i:
                     k = _position(neighbours, start[column], start[column + 1], row)
                     M[k] += S[i, j]
-                    at = start[column] * d * d + (k - start[column]) * d
-                    width = (start[column + 1] - start[column]) * d
-                    for a in range(d):
-                        for b in range(d):
+                    at = start[column] * c * c + (k - start[column]) * c
+                    width = (start[column + 1] - start[column]) * c
+                    for a in range(c):
+                        for b in range(c):
                             K[at + a * width + b] += block[b, a]
     return jacobians
 
@@ -274,3 +285,27 @@ def _stiffness_block(G, lame_lambda, mu, axisymmetric, block):  # type: ignore[n
         for b in range(3):
             block[a, b] = lame_lambda * G[a, b] + mu * G[b, a]
         block[a, a] += mu * trace
+
+
+@inner(nogil=True)
+def _fourier_block(G, lame_lambda, mu, n, block):  # type: ignore[no-untyped-def]
+    """Fill the (3, 3) block of one pair of nodes in order n, for the amplitudes a, b, w."""
+    rr, rz, rh = G[0, 0], G[0, 1], G[0, 2]  # components r, z, hoop
+    zr, zz, zh = G[1, 0], G[1, 1], G[1, 2]
+    hr, hz, hh = G[2, 0], G[2, 1], G[2, 2]
+    # amplitudes u, v, w of the radius, around, and along the axis
+    plane = lame_lambda + 2 * mu
+    uu = plane * (rr + hh) + lame_lambda * (rh + hr) + mu * (zz + n * n * hh)
+    uv = n * (plane * hh + lame_lambda * rh - mu * (hr - hh))
+    vu = n * (plane * hh + lame_lambda * hr - mu * (rh - hh))
+    vv = n * n * plane * hh + mu * (rr - rh - hr + hh + zz)
+    uw = lame_lambda * (rz + hz) + mu * zr
+    wu = lame_lambda * (zr + zh) + mu * rz
+    vw = n * (lame_lambda * hz - mu * zh)
+    wv = n * (lame_lambda * zh - mu * hz)
+    block[2, 2] = plane * zz + mu * (rr + n * n * hh)
+    # u = a + b, v = b - a
+    block[0, 0], block[0, 1] = uu - uv - vu + vv, uu + uv - vu - vv
+    block[1, 0], block[1, 1] = uu - uv + vu - vv, uu + uv + vu + vv
+    block[0, 2], block[1, 2] = uw - vw, uw + vw
+    block[2, 0], block[2, 1] = wu - wv, wu + wv

@@ -15,7 +15,7 @@ from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
-__all__ = ["face_dashpots", "traction_load"]
+__all__ = ["face_dashpots", "order_load", "traction_load"]
 
 Traction = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
@@ -41,6 +41,41 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
         normal = area / size[..., None]
         t = traction(x.reshape(-1, mesh.dimension), normal.reshape(-1, mesh.dimension))
         forces = np.einsum("qi,fqa,fq->fia", N, t.reshape(x.shape), size)
+        np.add.at(load, block.connectivity, forces)
+    return load.ravel()
+
+
+def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> NDArray[np.float64]:
+    r"""Forces of a traction in one Fourier order around a body of revolution.
+
+    The traction :math:`t_r \cos n\theta,\; t_\theta \sin n\theta,\; t_z \cos n\theta` does the
+    work of these forces on the degrees of freedom a, b, W of
+    :class:`klack.elasticity.fourier_body.FourierBody`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Half section.
+    surface : Surface
+    traction : function (points (q, 2) [m], outward normals (q, 2)) -> (q, 3) [Pa]
+        Amplitudes along the radius, around, and along the axis.
+    order : int
+        n.
+
+    Returns
+    -------
+    array, shape (3 n_nodes,) [N]
+    """
+    circle = 0.5 if order > 0 else 1.0
+    load = np.zeros((mesh.node_count, 3))
+    for block in surface.blocks:
+        N, x, area = _face_points(mesh, block)
+        size = np.linalg.norm(area, axis=-1)
+        normal = area / size[..., None]
+        t = traction(x.reshape(-1, 2), normal.reshape(-1, 2)).reshape(*size.shape, 3)
+        radial, around, axial = np.moveaxis(t, -1, 0)
+        along = np.stack([radial - around, radial + around, axial], axis=-1)
+        forces = circle * np.einsum("qi,fqa,fq->fia", N, along, size)
         np.add.at(load, block.connectivity, forces)
     return load.ravel()
 

@@ -1,6 +1,7 @@
 r"""Rigid motions of the nodes of a body, and the forces that given matrices answer them with."""
 
 import numpy as np
+import scipy.linalg
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -8,8 +9,11 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 
 __all__ = [
+    "held_best",
     "held_dofs",
     "motions_left_free",
+    "on_axis",
+    "orthonormal_in_mass",
     "require_rigid_motions",
     "rigid_motions",
     "without_rigid_strain",
@@ -29,9 +33,27 @@ def held_dofs(mesh: Mesh, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
     d = mesh.dimension
     held = (d * nodes[:, None] + np.arange(d)).ravel()
     if d == 2:
-        on_axis = np.flatnonzero(np.abs(mesh.points[:, 0]) <= _AXIS * np.ptp(mesh.points))
-        held = np.union1d(held, 2 * on_axis)
+        held = np.union1d(held, 2 * on_axis(mesh))
     return held
+
+
+def on_axis(mesh: Mesh) -> NDArray[np.int64]:
+    """Nodes of a body of revolution that lie on its axis."""
+    return np.flatnonzero(np.abs(mesh.points[:, 0]) <= _AXIS * np.ptp(mesh.points))
+
+
+def orthonormal_in_mass(R: NDArray[np.float64], M: csr_array) -> NDArray[np.float64]:
+    """Combine the columns so that R^T M R = 1."""
+    for _ in range(2):  # the second pass removes the round-off of the first
+        L = np.linalg.cholesky(R.T @ (M @ R))
+        R = np.linalg.solve(L, R.T).T.astype(np.float64)
+    return np.ascontiguousarray(R)
+
+
+def held_best(R: NDArray[np.float64], candidates: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Those of the candidates, as many as motions, that hold the rigid motions best."""
+    _, _, order = scipy.linalg.qr(R[candidates].T, mode="economic", pivoting=True)
+    return np.asarray(candidates[order[: R.shape[1]]])
 
 
 def motions_left_free(held: NDArray[np.float64]) -> int:

@@ -8,8 +8,8 @@ ch. 17)
 
 where P removes the resultant of the load by the inertia forces of the rigid motion, and P^T the
 rigid motion from the answer.  K^+ may be any generalised inverse: here six degrees of freedom of
-three distant nodes (one of a body of revolution) are held, which costs no reaction force because
-the load is in balance.
+three distant nodes (one of a body of revolution, two in Fourier order 1) are held, which costs no
+reaction force because the load is in balance.
 
 A factorisation cannot be stored, but what was solved with it can.  With a cache, a body that was
 factorised before is factorised again only when something is asked for that the cache does not have.
@@ -21,7 +21,6 @@ from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
@@ -30,12 +29,12 @@ from klack.cache.entry import Entry
 from klack.cache.remember import remembered
 from klack.cache.result_cache import ResultCache
 from klack.closing import Closing
-from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import WITHOUT, Budget
 from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.factor_memory import FactorMemoryError
 from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
 from klack.elasticity.refined import RefinedFactorization
+from klack.elasticity.vibrating_body import VibratingBody
 from klack.errors import InputError
 from klack.memory import require_memory
 
@@ -53,7 +52,7 @@ class Flexibility(Closing):
 
     Parameters
     ----------
-    body : ElasticBody
+    body : VibratingBody
     backend : {"auto", "pardiso", "ngsolve", "superlu"}
     threads : int, optional
         See :func:`klack.elasticity.factorization.factorize`.
@@ -67,7 +66,7 @@ class Flexibility(Closing):
 
     def __init__(
         self,
-        body: ElasticBody,
+        body: VibratingBody,
         *,
         backend: Backend = "auto",
         threads: int | None = None,
@@ -83,7 +82,7 @@ class Flexibility(Closing):
         self._MR = body.M @ self._R
         self._kept = body.free
         if self._R.shape[1]:
-            self._kept = np.setdiff1d(body.free, _isostatic_support(body), assume_unique=True)
+            self._kept = np.setdiff1d(body.free, body.isostatic_support, assume_unique=True)
         # known to be positive definite, and most of what it is needed for is in the cache
         self.remembered("factorisation", (), self._check, lambda _: _POSITIVE, lambda _: None)
 
@@ -236,19 +235,3 @@ class Flexibility(Closing):
         if R.shape[1]:
             U -= R @ (MR.T @ U)
         return U
-
-
-def _isostatic_support(body: ElasticBody) -> NDArray[np.int64]:
-    """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""
-    d = body.dimension
-    x = body.mesh.points
-    if d == 2:
-        return np.array([2 * np.argmin(x[:, 1]) + 1])
-    first = int(np.argmax(np.linalg.norm(x - body.centre_of_mass, axis=1)))
-    second = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
-    along = (x[second] - x[first]) / np.linalg.norm(x[second] - x[first])
-    third = int(np.argmax(np.linalg.norm(np.cross(x - x[first], along), axis=1)))
-    candidates = (3 * np.array([first, second, third])[:, None] + np.arange(3)).ravel()
-    # pivoted QR picks the six of the nine that hold the rigid motions best
-    _, _, order = scipy.linalg.qr(body.rigid_modes[candidates].T, pivoting=True)
-    return np.asarray(candidates[order[:6]])

@@ -154,7 +154,8 @@ class Seat(Component):
     leak area is left, an orifice in parallel.  Positive flow runs from a to b; the cavitation limit
     is that of an orifice.
 
-    Limits: concentric, quasi-steady (no inertia of the fluid in the gap), both surfaces rigid.
+    Limits: concentric (:mod:`~klack.hydraulics.off_axis_seat` is not), quasi-steady (no inertia of
+    the fluid in the gap), both surfaces rigid.
     Sources: Merritt 1967, ch. 3 and 5; areas by elementary geometry.
     """
 

@@ -25,6 +25,7 @@ from scipy.interpolate import PchipInterpolator
 
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import half_width_of
 from klack.errors import ConvergenceError
 from klack.plasticity.ladder import LoadingState, YieldingContact
@@ -94,6 +95,9 @@ class YieldingLoops:
     limit : str
         Why they end before an opening gives back the energy of the impact, so that running-in may
         go beyond them; empty where they do not.
+    pressure_limit : PressureLimit or None
+        With which points that yield for themselves take the same force and loss; None where it has
+        not been fitted, or nothing yields.
     """
 
     first_yield: float
@@ -104,6 +108,7 @@ class YieldingLoops:
     half_width: Floats
     radius: Floats
     limit: str = ""
+    pressure_limit: PressureLimit | None = None
 
     @property
     def loss(self) -> Floats:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from klack.cache.entry import Entry
+from klack.contact.pressure_limit import PressureLimit
 from klack.plasticity.ladder import LoadingState
 from klack.plasticity.loops import Opening, YieldingLoops
 
@@ -14,7 +15,7 @@ def loops_to_entry(loops: YieldingLoops) -> Entry:
     openings = (loops.elastic, *loops.openings)
     count = len(loops.elastic.approach)
     points = len(loops.states[0].pressures) if loops.states else 0
-    shape = (len(loops.states), points)
+    shape, limit = (len(loops.states), points), loops.pressure_limit
     return Entry(
         arrays={
             "first yield": np.array([loops.first_yield]),
@@ -31,6 +32,9 @@ def loops_to_entry(loops: YieldingLoops) -> Entry:
             "taken": loops.taken,
             "half width": loops.half_width,
             "radius": loops.radius,
+            "pressure limit": np.zeros((2, 0))
+            if limit is None
+            else np.array([limit.set, limit.pressure]),
         },
         text=loops.limit,
     )
@@ -39,6 +43,7 @@ def loops_to_entry(loops: YieldingLoops) -> Entry:
 def loops_of_entry(entry: Entry) -> YieldingLoops:
     """Loops of :func:`loops_to_entry`."""
     arrays = entry.arrays
+    sets, pressures = arrays["pressure limit"]
     elastic, *openings = (
         Opening(approach=approach, force=force)
         for approach, force in zip(arrays["approach"], arrays["force"], strict=True)
@@ -64,4 +69,5 @@ def loops_of_entry(entry: Entry) -> YieldingLoops:
         half_width=arrays["half width"],
         radius=arrays["radius"],
         limit=entry.text,
+        pressure_limit=PressureLimit(set=sets, pressure=pressures) if len(sets) else None,
     )

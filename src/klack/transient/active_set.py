@@ -11,7 +11,7 @@ from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import ActiveSet
 
-__all__ = ["solve_active"]
+__all__ = ["rebuild", "solve_active"]
 
 _FAST_ROUNDS = 60
 _REFRESH = 256
@@ -19,7 +19,8 @@ _REFRESH = 256
 
 
 @inner
-def _rebuild(A: NDArray, B: NDArray, index: NDArray, m: int) -> None:
+def rebuild(A: NDArray, B: NDArray, index: NDArray, m: int) -> None:
+    """Compute the inverse over the first m points of the index afresh."""
     block = np.empty((m, m))
     for i in range(m):
         for j in range(m):
@@ -185,6 +186,6 @@ def solve_active(
             if not _flip(A, carrying, bad[k], many, u):
                 return -1
         if counts[0] and (many or counts[1] > _REFRESH):
-            _rebuild(A, B, index, counts[0])
+            rebuild(A, B, index, counts[0])
             counts[1] = 0
     return -1

@@ -14,17 +14,20 @@ __all__ = [
     "GUIDE",
     "GUIDE_STRAIN",
     "OPEN_STEPS",
+    "PLASTIC",
     "ROUNDS",
     "WORK",
     "ActiveSet",
     "Bore",
     "Closed",
     "ContactPoints",
+    "Limit",
     "Modes",
     "Outside",
     "Record",
     "Rubbing",
     "State",
+    "Worn",
 ]
 
 Vector = NDArray[np.float64]
@@ -41,7 +44,8 @@ ROUNDS = 6  # of the complementarity solver
 CONTACT_STEPS = 7
 DIRECTION = 8  # sign of the last axial contact force, 0 before the first
 FRICTION = 9  # loss between the faces
-_BOOKS = 10
+PLASTIC = 10  # loss to faces that yield
+_BOOKS = 11
 
 
 class Modes(NamedTuple):
@@ -65,24 +69,42 @@ class Outside(NamedTuple):
     spring: float  # [N/m] pulls back to where q = 0
 
 
+class Limit(NamedTuple):
+    """Pressure limit of the points, see :mod:`klack.contact.pressure_limit`; empty without."""
+
+    area: Vector  # (n,) [m^2]; infinite for a point that stays elastic
+    set: Vector  # (m,) [m]
+    pressure: Vector  # (m,) [Pa]
+    softness: Vector  # (m,) [m/Pa] beyond each of them
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return the limit of points that stay elastic."""
+        return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
+
+
 class ContactPoints(NamedTuple):
     """Points that may close; none in flight, where no contact is looked at."""
 
     A: Matrix  # (d n, d n) [m/N] of ``contact_compliance``; d = 1 without friction
     traces: Matrix  # (n, M)
-    gap: Vector  # (n,) [m] at q = 0
+    gap: Vector  # (n,) [m] at q = 0, of the faces as they are: with their set
     axial: Vector  # (n,)
     tangents: Matrix  # (ways n, M), ways = d - 1
     axial_across: Vector  # (ways n,)
     static: Vector  # (n,) [-] coefficients of friction
     kinetic: Vector  # (n,) [-]
     fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
+    limit: Limit  # of points that yield; then A is changed in place
 
     @classmethod
-    def smooth(cls, A: Matrix, traces: Matrix, gap: Vector, axial: Vector) -> Self:
+    def smooth(
+        cls, A: Matrix, traces: Matrix, gap: Vector, axial: Vector, limit: Limit | None = None
+    ) -> Self:
         """Return points without friction."""
         nothing, rows = np.zeros(0), np.zeros((0, traces.shape[1]))
-        return cls(A, traces, gap, axial, rows, nothing, nothing, nothing, nothing)
+        yields = Limit.none() if limit is None else limit
+        return cls(A, traces, gap, axial, rows, nothing, nothing, nothing, nothing, yields)
 
     @classmethod
     def none(cls, modes: int) -> Self:
@@ -193,6 +215,21 @@ class Rubbing(NamedTuple):
         )
 
 
+class Worn(NamedTuple):
+    """What points that yield remember, changed in place; empty without."""
+
+    set: Vector  # (n,) [m]
+    line: NDArray[np.int64]  # (n,) of the limit, as the inverse has it; -1: elastic
+    softness: Vector  # (n,) [m/N] on that line
+    row: Vector  # (n,) scratch
+
+    @classmethod
+    def none(cls, points: int) -> Self:
+        """Return faces as made."""
+        n = points
+        return cls(np.zeros(n), np.full(n, -1, dtype=np.int64), np.zeros(n), np.zeros(n))
+
+
 class State(NamedTuple):
     """Where the bodies and their contact are, changed in place."""
 
@@ -201,19 +238,23 @@ class State(NamedTuple):
     lam: Vector  # (n,) [N] contact forces
     contact: ActiveSet
     rubbing: Rubbing
+    worn: Worn
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
     books: Vector  # sums, see ``DAMPING`` and the following names
 
     @classmethod
-    def still(cls, modes: int, points: int, heights: int, ways: int = 0) -> Self:
-        """Return a state of rest at q = 0."""
+    def still(
+        cls, modes: int, points: int, heights: int, ways: int = 0, *, yields: bool = False
+    ) -> Self:
+        """Return a state of rest at q = 0, of faces as made."""
         return cls(
             np.zeros(modes),
             np.zeros(modes),
             np.zeros(points),
             ActiveSet.none(0 if ways else points),
             Rubbing.none(points, ways),
+            Worn.none(points if yields else 0),
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
             np.zeros(_BOOKS),

@@ -29,7 +29,8 @@ and the matrix of the complementarity problem loses
 :math:`\tfrac12 \kappa (\Phi B_1 p) (\Phi B_1 p)^T` (:func:`contact_compliance`).
 
 With friction between the faces the same holds in all directions of the points
-(:mod:`klack.transient.interface_friction`).
+(:mod:`klack.transient.interface_friction`).  Points that yield leave a set, which is part of their
+gap from then on (:mod:`klack.transient.yielding_points`); its plastic work is what a step takes.
 """
 
 from typing import NamedTuple
@@ -49,6 +50,7 @@ from klack.transient.interface_arrays import (
     GUIDE,
     GUIDE_STRAIN,
     OPEN_STEPS,
+    PLASTIC,
     ROUNDS,
     WORK,
     Bore,
@@ -66,6 +68,7 @@ from klack.transient.interface_friction import (
     rub,
     tell_friction,
 )
+from klack.transient.yielding_points import let_yield, solve_yielding
 
 __all__ = [
     "FAILED",
@@ -429,8 +432,11 @@ def _pay(
     share: float,
     potential: float,
     answer: float,
+    yielded: float,
 ) -> tuple[float, float, float]:
     """Work of the mean contact forces on d = gap + Phi q against the potential, and the payment.
+
+    What faces that yield have taken is ``yielded`` [J].
 
     Returns the payment as share of the forces, the potential at the end, and what the spring has
     answered to the forces of the contact.
@@ -439,7 +445,7 @@ def _pay(
         step.both[k] = state.lam[k] + step.lam[k]
     work, stored = _work(points, state.q, step)
     whole_step = potential > 0.0 and stored > 0.0
-    owed = state.books[DEBT] + work + stored - potential
+    owed = state.books[DEBT] + work + stored - potential + yielded
     rubs = len(points.tangents) > 0 and work != 0.0
     held = 0.0  # energy of the contact across the normals
     if rubs:
@@ -472,7 +478,7 @@ def _pay(
             pay = exact
             work += pay * work_slope
             stored += pay * stored_slope
-    state.books[DEBT] += (1.0 + pay) * work + stored - potential
+    state.books[DEBT] += (1.0 + pay) * work + stored - potential + yielded
     if rubs:
         offset_change(points, state.q, step.q, step.way, step.moved)
         given, lost = friction_work(state.rubbing, step.bent, step.moved)
@@ -593,6 +599,7 @@ def march(
     taken, status : int
     """
     n, books, rubs = len(points.gap), state.books, len(points.tangents) > 0
+    yields = len(points.limit.area) > 0
     step = _start(modes, points, bore)
     guide = no_rub(len(bore.clearance), len(modes.push))
     share = _spring_share(modes.B1, modes.push, outside.spring)
@@ -614,6 +621,7 @@ def march(
             axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
+        yielded = 0.0
         if n:
             np.dot(points.traces, step.q, step.open_gap)
             least, widest = _look(points, step)
@@ -637,6 +645,20 @@ def march(
                     for k in range(n):
                         step.lam[k] = state.rubbing.forces[k]
                         step.gap[k] = step.motion[k]
+                elif yields:
+                    rounds = solve_yielding(
+                        points.A,
+                        step.open_gap,
+                        points.limit,
+                        state.worn,
+                        state.contact,
+                        step.lam,
+                        step.gap,
+                        tolerance,
+                        diagonal,
+                    )
+                    if rounds < 0:
+                        return taken, FAILED
                 else:
                     rounds = solve_active(
                         points.A,
@@ -652,6 +674,9 @@ def march(
                 if wait and _turned(points, state, step):
                     return taken, TURNED
                 books[ROUNDS] += abs(rounds)
+                if yields:
+                    yielded = let_yield(points.limit, state.worn, step.lam, points.gap)
+                    books[PLASTIC] += yielded
                 least = _close(points, state, step)
                 answer += _hold(step, modes, share)
                 _add(step, modes, 1.0)
@@ -669,7 +694,9 @@ def march(
                 for i in range(len(step.bent)):
                     step.bent[i] = 0.0
                     state.rubbing.forces[n + i] = 0.0
-            pay, potential, answer = _pay(modes, points, state, step, share, potential, answer)
+            pay, potential, answer = _pay(
+                modes, points, state, step, share, potential, answer, yielded
+            )
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
         for k in range(len(guide.most)):

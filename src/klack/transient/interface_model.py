@@ -33,6 +33,7 @@ from scipy.sparse import csr_array, vstack
 from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import contact_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -188,6 +189,8 @@ class InterfaceModel:
         What the observers of all bodies read per unit modal coordinate.
     observed_residual : array, shape (k, nc), with friction (k, d nc) [m/N]
         What they read besides, per unit contact force of each row of ``compliance``.
+    limit : PressureLimit or None
+        Of the points of the first contact, without friction; None: they stay elastic.
     """
 
     bodies: tuple[str, ...]
@@ -214,6 +217,7 @@ class InterfaceModel:
     friction: tuple[Friction, ...] = ()
     observed: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     observed_residual: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
+    limit: PressureLimit | None = None
 
     @property
     def ways(self) -> int:
@@ -231,6 +235,10 @@ class InterfaceModel:
             friction=(),
             observed_residual=self.observed_residual[:, :n],
         )
+
+    def elastic(self) -> "InterfaceModel":
+        """Return the same bodies with points that do not yield."""
+        return replace(self, limit=None)
 
     @property
     def count(self) -> int:

@@ -79,6 +79,8 @@ class InterfaceEnergy:
         of the balance except for round-off.
     friction : float [J]
         Lost in friction between the faces.
+    plastic : float [J]
+        Lost to faces that yield.
     """
 
     initial: float
@@ -88,13 +90,17 @@ class InterfaceEnergy:
     work: float
     debt: float
     friction: float = 0.0
+    plastic: float = 0.0
+
+    @property
+    def lost(self) -> float:
+        """Sum of all losses [J]."""
+        return self.damping + self.guide + self.friction + self.plastic
 
     @property
     def residual(self) -> float:
         """Energy from nowhere over the largest of initial energy and work [-]."""
-        return (
-            self.final - self.initial + self.damping + self.guide + self.friction - self.work
-        ) / self.turned_over
+        return (self.final - self.initial + self.lost - self.work) / self.turned_over
 
     @property
     def turned_over(self) -> float:
@@ -117,6 +123,8 @@ class InterfaceResult:
         In the order of time; without flight one segment holds the whole run.
     motion : RigidMotion
     energy : InterfaceEnergy
+    worn : array, shape (nc,) [m]
+        Set of the contact points at the end; no points where they stay elastic.
     steps, steps_in_contact : int
         Fine steps.
     rounds_per_step : float
@@ -130,6 +138,7 @@ class InterfaceResult:
     impacts: tuple[ImpactSegment, ...]
     motion: RigidMotion
     energy: InterfaceEnergy
+    worn: NDArray[np.float64]
     steps: int
     steps_in_contact: int
     rounds_per_step: float

@@ -31,16 +31,19 @@ from klack.transient.interface_arrays import (
     GUIDE,
     GUIDE_STRAIN,
     OPEN_STEPS,
+    PLASTIC,
     ROUNDS,
     WORK,
     ActiveSet,
     Bore,
     ContactPoints,
+    Limit,
     Modes,
     Outside,
     Record,
     Rubbing,
     State,
+    Worn,
 )
 from klack.transient.interface_kernel import (
     FAILED,
@@ -93,6 +96,7 @@ def simulate_interface(
     flight: bool = False,
     impacts: int | None = None,
     points: bool = True,
+    worn: NDArray[np.float64] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> InterfaceResult:
     """Simulate the moving body in -z through one or several impacts.
@@ -127,6 +131,8 @@ def simulate_interface(
         Stop after so many; with ``flight`` only.
     points : bool
         Keep the force of every contact point.
+    worn : array, shape (nc,), optional [m]
+        Set of the contact points that earlier impacts have left, of a model whose points yield.
     progress : callable, optional
         Called with the fraction done.
 
@@ -147,7 +153,7 @@ def simulate_interface(
     require_positive("simulate_interface: step", step, "s")
     begin = perf_counter()
     with threadpool_limits(limits=1, user_api="blas"):
-        run = _Run(model, step, force, spring_stiffness, guide, gaps, points)
+        run = _Run(model, step, force, spring_stiffness, guide, gaps, points, worn)
         run.place(offset, velocity, speed, height)
         run.go(duration, flight, impacts, progress)
     result = run.result(perf_counter() - begin)
@@ -178,7 +184,7 @@ def contact_points(
     push = np.ascontiguousarray(model.rigid[2])
     if not model.ways:
         A = contact_compliance(model.compliance, model.traces, B1, push, spring)
-        return ContactPoints.smooth(A, model.traces, model.gap, model.axial)
+        return ContactPoints.smooth(A, model.traces, model.gap, model.axial, _limit(model))
     rows = np.vstack([model.traces, model.tangents])
     counts = [last - first for _, first, last in model.contacts]
     static, kinetic, fade = np.repeat(
@@ -194,7 +200,19 @@ def contact_points(
         np.ascontiguousarray(static),
         np.ascontiguousarray(kinetic),
         np.ascontiguousarray(fade),
+        Limit.none(),
     )
+
+
+def _limit(model: InterfaceModel) -> Limit:
+    """Pressure limit of the points of one contact; those of others stay elastic."""
+    if model.limit is None:
+        return Limit.none()
+    area = np.full(model.count, np.inf)
+    first, last = model.contacts[0][1:]
+    area[first:last] = model.area[first:last]
+    law = model.limit
+    return Limit(area, law.set, law.pressure, law.softness)
 
 
 def modes_of_step(model: InterfaceModel, step: float) -> Modes:
@@ -240,6 +258,7 @@ class _Run:
         guide: Guide | None,
         gaps: Gaps | None,
         points: bool,
+        worn: NDArray[np.float64] | None,
     ) -> None:
         self.model, self.step, self.guide, self.gaps, self.points = model, step, guide, gaps, points
         self.constant, self.spring = -force, spring
@@ -254,10 +273,16 @@ class _Run:
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
         self.bore = bore_arrays(guide, M)
-        self.state = State.still(M, n, len(self.bore.clearance), model.ways)
+        yields = model.limit is not None
+        self.state = State.still(M, n, len(self.bore.clearance), model.ways, yields=yields)
+        if worn is not None and yields:
+            self.state.worn.set[:] = worn
         self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
         self.in_flight = self.state._replace(
-            lam=np.zeros(0), contact=ActiveSet.none(0), rubbing=Rubbing.none(0, 0)
+            lam=np.zeros(0),
+            contact=ActiveSet.none(0),
+            rubbing=Rubbing.none(0, 0),
+            worn=Worn.none(0),
         )
         self.taken_at = np.zeros(6)
         first, last = model.contacts[0][1:]
@@ -331,6 +356,12 @@ class _Run:
     def rigid_state(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self.model.rigid @ self.q, self.model.rigid @ self.v
 
+    @property
+    def open_gap(self) -> NDArray[np.float64]:
+        """Gaps at q = 0 without contact forces, of the faces as they are [m]."""
+        worn = self.state.worn.set
+        return self.gap0 + worn if len(worn) else self.gap0
+
     def take_gaps(self) -> None:
         """Take the gaps from the geometry at the present placement."""
         if self.gaps is None:
@@ -343,7 +374,7 @@ class _Run:
     def touch(self) -> float:
         """Travel of the moving body along -z until the first gap closes [m]."""
         facing = self.model.axial > 1e-6
-        gap = self.gap0 + self.model.traces @ self.q
+        gap = self.open_gap + self.model.traces @ self.q
         return float(np.min(gap[facing] / self.model.axial[facing]))
 
     # ------------------------------------------------------------------ motion
@@ -374,7 +405,7 @@ class _Run:
         while self.time < duration:
             stale = self.stale()
             horizon = min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step)
-            safe = self.safe(self.gap0 - stale, horizon)
+            safe = self.safe(self.open_gap - stale, horizon)
             if safe < _NEAR * self.step:
                 if stale <= _FRESH:
                     return
@@ -437,14 +468,18 @@ class _Run:
             if progress is not None:
                 progress(min(self.time / duration, 1.0))
             touched = self.books[CONTACT_STEPS] > segment.contact_steps
-            if wait and not touched and self.safe(self.gap0, self.step * 1e3) > _FAR * self.step:
+            if (
+                wait
+                and not touched
+                and self.safe(self.open_gap, self.step * 1e3) > _FAR * self.step
+            ):
                 return  # it went by
         if self.books[CONTACT_STEPS] > segment.contact_steps or not wait:
             self.check_rim()
             self.segments.append(self.close(segment))
 
     def fine(self, segment: _Segment, steps: int, wait: int) -> int:
-        points = self.contact._replace(gap=self.gap0)
+        points = self.contact._replace(gap=self.open_gap)
         taken, status, record = self.march(self.stepper(0), steps, wait, points, self.state)
         if status == FAILED:
             raise ConvergenceError(
@@ -497,7 +532,7 @@ class _Run:
         self.motion.append((self.time, position, velocity))
 
     def contact_energy(self) -> float:
-        pressed = -0.5 * self.state.lam @ (self.gap0 + self.model.traces @ self.q)
+        pressed = -0.5 * self.state.lam @ (self.open_gap + self.model.traces @ self.q)
         rubbing = self.state.rubbing
         if len(rubbing.across):
             pressed += 0.5 * rubbing.across @ rubbing.bent
@@ -582,6 +617,7 @@ class _Run:
                 work=float(spent[WORK]),
                 spring=self.spring_energy() - spring + float(spent[GUIDE_STRAIN]),
                 friction=float(spent[FRICTION]),
+                plastic=float(spent[PLASTIC]),
             ),
             external_force=side * outside,
             longest_period=model.longest_period,
@@ -660,7 +696,9 @@ class _Run:
                 work=float(self.books[WORK]),
                 debt=float(self.books[DEBT]),
                 friction=float(self.books[FRICTION]),
+                plastic=float(self.books[PLASTIC]),
             ),
+            worn=self.state.worn.set.copy(),
             steps=self.steps,
             steps_in_contact=contact_steps,
             rounds_per_step=float(self.books[ROUNDS]) / max(contact_steps, 1),

@@ -1,4 +1,4 @@
-"""Finite elements against exact elasticity: vibration, thick cylinder, rods, beam, patch."""
+"""Finite elements against exact elasticity: vibration, bending, thick cylinder, rods, beam."""
 
 from collections.abc import Iterator
 
@@ -13,6 +13,7 @@ from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.fourier_orders import fourier_checks
 from klack.verification.lattice import lattice_mesh
 
 __all__ = ["checks"]
@@ -41,6 +42,7 @@ def checks() -> list[Check]:
     return [
         *_axisymmetric_cylinder(),
         *_solid_cylinder(),
+        *fourier_checks(),
         *_thick_cylinder(),
         *_free_rod(),
         *_bent_beam(),

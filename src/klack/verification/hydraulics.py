@@ -27,6 +27,7 @@ from klack.network.step_function import evaluate
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.off_axis_gaps import off_axis_seats
 
 __all__ = ["checks"]
 
@@ -45,6 +46,7 @@ def checks() -> list[Check]:
         *_orifice(),
         *_gap(),
         *_seats(),
+        *off_axis_seats(),
         _jet(),
         *_annulus(),
         _land(),

@@ -16,6 +16,7 @@ from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.static import static_state
 from klack.verification import lifting_magnet as published
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.off_axis_gaps import off_axis_air_gaps
 
 __all__ = ["checks"]
 
@@ -31,6 +32,7 @@ def checks() -> list[Check]:
         *_energy(),
         *_iron(),
         *_edges(),
+        *off_axis_air_gaps(),
         *_eddy(),
         *_map(),
         *_lifting_magnet(),

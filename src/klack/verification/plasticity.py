@@ -1,5 +1,6 @@
 """Checks of bodies that yield: at one point, in the contact, and in time."""
 
+from dataclasses import replace
 from functools import partial
 from math import exp, log, sqrt
 
@@ -8,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from klack.contact.history import ImpactHistory
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.yielding_law import YieldingLaw
 from klack.hardening import Hardening
 from klack.mechanics.end_stop import EndStop
@@ -21,11 +23,14 @@ from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.network_run import simulate_network
 from klack.simulation.system import ContactPair, ReducedSystem
+from klack.transient.interface_run import simulate_interface
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.impacts import STEEL
+from klack.verification.interface_bodies import modal_model
 from klack.verification.yielding_bodies import (
     RADIUS,
     FirstYield,
+    SoftPair,
     ball_in_seat,
     pressed_again,
     sphere_on_sphere,
@@ -83,7 +88,7 @@ _SEAT_IMPACTS = (0.844569, 0.934541, 0.970507)  # at 0.3 m/s, one after another
 
 def checks() -> list[Check]:
     """Return all checks of bodies that yield."""
-    return [*_sheared(), *_law(), *_sphere(), *_again(), *_seat()]
+    return [*_sheared(), *_law(), *_one_point(), *_sphere(), *_again(), *_seat()]
 
 
 def _sheared() -> list[Check]:
@@ -202,6 +207,62 @@ def _impact(law: YieldingLaw, mass: float, speed: float) -> ImpactHistory:
     bodies = (rigid_mass_body("needle", mass), fixed_body("seat"))
     system = ReducedSystem(bodies=bodies, contacts=(contact,))
     return simulate_impact(system, speed=speed, duration=3.0 * time, step=time / 2000.0)
+
+
+_FIRST_PRESSURE, _RISE = 20.0, 5e6  # [Pa] on an area of 1 m^2, [Pa/m]
+
+
+def _one_point() -> list[Check]:
+    """A rigid mass on one contact point whose pressure limit rises, at the interface level."""
+    limit = PressureLimit(
+        set=np.array([0.0, 1e-6]), pressure=_FIRST_PRESSURE + np.array([0.0, 1e-6 * _RISE])
+    )
+    model = modal_model(
+        masses=(_NEEDLE, np.inf),
+        omega=np.zeros(1),
+        traces=np.full((1, 1), _NEEDLE**-0.5),
+        compliance=np.full((1, 1), 1.0 / _OPENING),
+        gap=np.zeros(1),
+    )
+    model = replace(model, limit=limit)
+    speed, soft = 0.3, 1.0 / _OPENING + 1.0 / _RISE
+    energy = 0.5 * _NEEDLE * speed**2
+    time = np.pi * sqrt(_NEEDLE * soft)
+    yielded = _FIRST_PRESSURE  # force [N] up to which the point is elastic
+    worn, found = np.zeros(1), []
+    source = "W = F_0^2/2k + (F^2 - F_0^2)/2 (1/k + 1/H); opening gives back F^2/2k"
+    for n in range(1, 4):
+        run = simulate_interface(
+            model, speed=speed, duration=1.2 * time, step=time / 4000, worn=worn
+        )
+        worn = run.worn
+        yielded = sqrt(yielded**2 + 2.0 * (energy - 0.5 * yielded**2 / _OPENING) / soft)
+        found += [
+            _check(
+                f"rigid mass on a point with a pressure limit, impact {n}: force [N]",
+                expected=yielded,
+                computed=float(run.history.force.max()),
+                tolerance=1e-5,
+                source=source,
+            ),
+            _check(
+                f"the same, impact {n}: restitution [-]",
+                expected=sqrt(0.5 * yielded**2 / _OPENING / energy),
+                computed=float(run.history.velocity_a[-1]) / speed,
+                tolerance=1e-5,
+                source=source,
+            ),
+        ]
+    found.append(
+        _check(
+            "the same: residual of the energy [relative]",
+            expected=0.0,
+            computed=abs(run.energy.residual),
+            tolerance=1e-12,
+            source="conservation of energy",
+        )
+    )
+    return found
 
 
 def _sphere() -> list[Check]:
@@ -386,8 +447,8 @@ def _again() -> list[Check]:
 
 def _seat() -> list[Check]:
     """A ball in a seat of 45 degrees, and a rigid needle that hits it."""
-    loops = ball_in_seat(size=5e-6, extent=50e-6, energy=0.5 * _NEEDLE * 0.3**2)
-    found = []
+    pair = ball_in_seat(size=5e-6, extent=50e-6, energy=0.5 * _NEEDLE * 0.3**2)
+    loops, found = pair.loops, _points_of_seat(pair)
     beyond = PchipInterpolator(loops.force, _excess(loops))
     work = PchipInterpolator(loops.force, [state.plastic_work for state in loops.states])
     source = _OTHER + "; another housing"
@@ -423,6 +484,35 @@ def _seat() -> list[Check]:
             )
         )
         law = law.after(history.pressed)
+    return found
+
+
+def _points_of_seat(pair: SoftPair) -> list[Check]:
+    """The same rigid needle on the points of that seat, with a pressure limit fitted to them."""
+    model = modal_model(
+        masses=(_NEEDLE, np.inf),
+        omega=np.zeros(1),
+        traces=pair.space.axial[:, None] * _NEEDLE**-0.5,
+        compliance=pair.C,
+        gap=pair.space.gap - pair.space.touch * pair.space.axial,
+        axial=pair.space.axial,
+    )
+    model = replace(model, limit=pair.loops.pressure_limit, area=pair.space.area)
+    worn, found = np.zeros(model.count), []
+    for n, expected in enumerate(_SEAT_IMPACTS, 1):
+        run = simulate_interface(model, speed=0.3, duration=60e-6, step=20e-9, worn=worn)
+        worn = run.worn
+        found.append(
+            _check(
+                f"needle of 3.05 g on the points of a ball in a seat, 0.3 m/s, impact {n}: "
+                "restitution [-]",
+                expected=expected,
+                computed=float(run.history.velocity_a[-1]) / 0.3,
+                tolerance=0.015 if n == 1 else 0.02,
+                source=_OTHER + "; another housing",
+                absolute=True,
+            )
+        )
     return found
 
 

@@ -11,8 +11,8 @@ from klack.verification.check import Check
 __all__ = ["COVERS", "GROUPS", "iterate_checks", "run_checks"]
 
 COVERS = {
-    "elasticity": "Finite elements against exact elasticity: free cylinder, tube, rod, beam; and "
-    "the direct solvers against each other.",
+    "elasticity": "Finite elements against exact elasticity: free cylinder, bending of bodies of "
+    "revolution, tube, rod, beam; and the direct solvers against each other.",
     "contact": "Static contact of meshed bodies: Hertz, patch test, gap between curved faces, "
     "local law, reciprocity.",
     "reduction": "What a reduced body keeps of the full one: static compliance, receptance, "

@@ -31,7 +31,15 @@ from klack.plasticity.loops import YieldingLoops
 from klack.plasticity.yielding_body import YieldingBody
 from klack.verification.impacts import STEEL
 
-__all__ = ["RADIUS", "SOFT", "FirstYield", "ball_in_seat", "pressed_again", "sphere_on_sphere"]
+__all__ = [
+    "RADIUS",
+    "SOFT",
+    "FirstYield",
+    "SoftPair",
+    "ball_in_seat",
+    "pressed_again",
+    "sphere_on_sphere",
+]
 
 RADIUS = 1.25e-3
 """Of all balls [m]."""
@@ -87,6 +95,14 @@ class FirstYield:
         return sqrt(0.8 * self.force * self.approach / mass)
 
 
+class SoftPair(NamedTuple):
+    """Two soft bodies: their static loops, contact points and elastic compliance (nc, nc) [m/N]."""
+
+    loops: YieldingLoops
+    space: ContactSpace
+    C: NDArray[np.float64]
+
+
 def sphere_on_sphere(*, size: float, extent: float, energy: float) -> YieldingLoops:
     """Loops of two equal hemispheres, each held at its equator.
 
@@ -97,7 +113,7 @@ def sphere_on_sphere(*, size: float, extent: float, energy: float) -> YieldingLo
     energy : float [J]
         Up to which.
     """
-    return _loops(*_spheres(size, extent), energy)
+    return _loops(*_spheres(size, extent), energy).loops
 
 
 def pressed_again(*, size: float, extent: float, energy: float) -> tuple[float, float]:
@@ -146,8 +162,8 @@ def _spheres(size: float, extent: float) -> tuple["_Part", "_Part"]:
     )
 
 
-def ball_in_seat(*, size: float, extent: float, energy: float) -> YieldingLoops:
-    """Loops of a hemisphere held at its equator, in a cone of 90 degrees held at its base."""
+def ball_in_seat(*, size: float, extent: float, energy: float) -> SoftPair:
+    """A hemisphere held at its equator, in a cone of 90 degrees held at its base."""
     ring = RADIUS / sqrt(2.0)
     ball = Profile(
         (0.0, -RADIUS),
@@ -192,15 +208,16 @@ class _Pair(NamedTuple):
     lower: LoadedBody
 
 
-def _loops(above: _Part, below: _Part, energy: float) -> YieldingLoops:
+def _loops(above: _Part, below: _Part, energy: float) -> SoftPair:
     """Loops of two soft bodies up to an energy [J]."""
     reach = _REACH
     while True:
         with _pressed(above, below, energy, reach) as (static, C, upper, lower):
             try:
-                return loops_with_yield(
+                loops = loops_with_yield(
                     static, static.space, C, upper, lower, energy=energy, closing=0.0
                 )
+                return SoftPair(loops, static.space, C)
             except ReachError:
                 reach = 1.5 * static.space.reach
 

@@ -60,7 +60,7 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
 
     def worn(stage: Path) -> tuple[str, ...]:
         found = study.running_in
-        if found is None or checked.path is None:
+        if found is None or checked.path is None or found.level != "reduced":
             return ()
         text = worn_text(checked.source, checked.path, found, ending.folder, version("klack"))
         (stage / WORN).write_text(text, "utf-8")

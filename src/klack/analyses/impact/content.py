@@ -242,9 +242,13 @@ def _running_in(study: ImpactStudy) -> Section:
         return Section(title=title)
     text = (
         f"{len(found.peak_force)} impacts at {quantity(study.speed, 'm/s', 3)} on the same faces, "
-        "level reduced. The land is the strip that has been in contact, as wide as an elliptic "
-        "pressure of the same second moment."
+        f"level {found.level}."
     )
+    if found.level == "reduced":
+        text += (
+            " The land is the strip that has been in contact, as wide as an elliptic pressure of "
+            "the same second moment."
+        )
     if not found.run_in:
         text += " The faces still yield at the last one: run.run_in: true adds what is missing."
     return Section(
@@ -391,6 +395,13 @@ def _contact_of(study: ImpactStudy) -> str:
     )
 
 
+def _bodies_of(study: ImpactStudy) -> str:
+    yielding = [one.label for one in study.levels.values() if "plastic" in one.energies]
+    if not yielding:
+        return "Linear elastic, isotropic bodies"
+    return f"Isotropic bodies whose faces yield at {' and '.join(yielding)}, linear elastic else,"
+
+
 def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     tops = [
         f"{quantity(float(body.frequencies[-1]), 'Hz', 3)} ({body.name})"
@@ -400,8 +411,8 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     limits = [
         (
             "Physics",
-            "Linear elastic, isotropic bodies with small deformations; "
-            f"{_contact_of(study)}; no fluid, no roughness, no plastic flow.",
+            f"{_bodies_of(study)} with small deformations; {_contact_of(study)}; no fluid, no "
+            "roughness.",
         ),
         (
             "Reduced level",

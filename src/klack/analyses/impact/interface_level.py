@@ -1,6 +1,6 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
@@ -21,6 +21,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.gap_update import PlacedGaps, RigidGaps
 from klack.contact.mortar import ContactSpace, tangent_rows
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.contact.statics import ReachError, extended_compliance
 from klack.elasticity.body import ElasticBody
@@ -49,6 +50,7 @@ __all__ = [
     "certificate_modes",
     "exact_gaps",
     "run_interface",
+    "set_doubts",
     "simulate_case",
     "within_reach",
 ]
@@ -62,6 +64,7 @@ _FEWEST = 30
 _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
+_SET_BEYOND = 1.2  # of the deepest one that is known: a straight line goes on so far
 _OTHER_STEP = 2.0**0.5  # a step over the one it is compared with
 _SAME_PEAK, _SAME_RESTITUTION = 0.005, 0.002  # differences that are no doubt
 
@@ -89,6 +92,7 @@ def build_interface(
     count: int | None = None,
     space: ContactSpace | None = None,
     compliance: NDArray[np.float64] | None = None,
+    limit: PressureLimit | None = None,
 ) -> InterfaceModel:
     """Interface-level model of a case.
 
@@ -105,6 +109,9 @@ def build_interface(
         Other contact points of the same surfaces than those of the static contact.
     compliance : array, shape (nc, nc), optional [m/N]
         Static compliance of both bodies at these.
+    limit : PressureLimit, optional
+        Of the points of the contact, from :func:`klack.assembling.pressure_limit.pressure_limit`;
+        those of an upper stop stay elastic.
 
     Raises
     ------
@@ -158,7 +165,7 @@ def build_interface(
                 faces=None if smooth else FaceFriction.on(above_faces, above.space, *there),
             )
         )
-    return interface_model(bodies, contacts)
+    return replace(interface_model(bodies, contacts), limit=limit if smooth else None)
 
 
 def _opposite_faces(case: Case) -> Friction:
@@ -177,6 +184,7 @@ def within_reach(
     *,
     ports: tuple[Port, Port] | None = None,
     count: int | None = None,
+    limit: PressureLimit | None = None,
 ) -> _Result:
     """Run an interface-level model on as many contact points as the motion reaches.
 
@@ -185,7 +193,7 @@ def within_reach(
 
     Parameters
     ----------
-    problem, pools, ports, count
+    problem, pools, ports, count, limit
         As given to :func:`build_interface`.
     run : callable
         Given the model; called again, with twice the reach, after a :class:`ReachError`.
@@ -199,7 +207,13 @@ def within_reach(
     compliance: NDArray[np.float64] | None = None
     while True:
         model = build_interface(
-            problem, pools, ports=ports, count=count, space=space, compliance=compliance
+            problem,
+            pools,
+            ports=ports,
+            count=count,
+            space=space,
+            compliance=compliance,
+            limit=limit,
         )
         try:
             return run(model)
@@ -343,8 +357,9 @@ def simulate_case(
     *,
     step: float | None = None,
     duration: float | None = None,
+    worn: NDArray[np.float64] | None = None,
 ) -> InterfaceResult:
-    """Run the motion of a case once, without jumps."""
+    """Run the motion of a case once, without jumps, on faces as made or worn."""
     duration = case.run.duration if duration is None else duration
     spring = case.motion.spring
     gap = case.contact.gap or 0.0
@@ -361,6 +376,7 @@ def simulate_case(
         spring_stiffness=0.0 if spring is None else spring.stiffness,
         guide=guide,
         points=model.count * duration / step <= _MOST_RECORDS,
+        worn=worn,
     )
 
 
@@ -375,14 +391,16 @@ def _compile(case: Case, model: InterfaceModel, guide: Guide | None) -> None:
     )
 
 
-def _step_doubt(case: Case, model: InterfaceModel, guide: Guide | None, at: ImpactMeasures) -> str:
-    """Doubt where another step gives another impact; else empty.
+def _step_doubts(
+    case: Case, model: InterfaceModel, guide: Guide | None, at: ImpactMeasures
+) -> Iterator[str]:
+    """Doubt where another step gives another impact.
 
     Points have no mass: where friction falls with the speed of slip, one that sticks jumps, when it
     does decides what its neighbours do, and no step is fine enough to tell.
     """
     if all(faces.is_constant for faces in model.friction):
-        return ""
+        return
     step = case.run.interface_step
     other = measure_impact(simulate_case(case, model, guide, step=step / _OTHER_STEP).history)
     same = (
@@ -390,8 +408,8 @@ def _step_doubt(case: Case, model: InterfaceModel, guide: Guide | None, at: Impa
         and not abs(other.restitution - at.restitution) > _SAME_RESTITUTION
     )
     if same:
-        return ""
-    return (
+        return
+    yield (
         f"faces that hold more than they rub with jump, and how depends on the step: peak force "
         f"{at.peak_force:.4g} N and restitution {at.restitution:.4f} at {format_si(step, 's', 3)}, "
         f"{other.peak_force:.4g} N and {other.restitution:.4f} at "
@@ -423,10 +441,12 @@ def run_interface(
     elastic = model.omega > 0
     counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
     guided = "" if guide is None else ", guided"
+    yields = "" if model.limit is None else ", yield by a pressure limit"
     level = level_result(
         result.history,
         level="interface",
-        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points{guided}",
+        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points"
+        f"{guided}{yields}",
         dofs=model.mode_count,
         step=case.run.interface_step,
         wall_time=result.wall_time,
@@ -436,9 +456,25 @@ def run_interface(
         ),
         frictionless=frictionless,
     )
-    doubt = _step_doubt(case, model, guide, level.measures)
     return replace(
         level,
         gauges=interface_gauges(problem, model, result),
-        doubts=(*level.doubts, doubt) if doubt else level.doubts,
+        doubts=(
+            *level.doubts,
+            *_step_doubts(case, model, guide, level.measures),
+            *set_doubts(model, result),
+        ),
     )
+
+
+def set_doubts(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
+    """Doubt about a set beyond those that the pressure limit was fitted to."""
+    if model.limit is None:
+        return
+    deepest, known = float(result.worn.max()), model.limit.deepest
+    if deepest > _SET_BEYOND * known:
+        yield (
+            f"the set of the faces reaches {format_si(deepest, 'm', 3)}, beyond the "
+            f"{format_si(known, 'm', 3)} to which their pressure limit was fitted, and is an "
+            "estimate. Try: less eccentricity, tilt or speed."
+        )

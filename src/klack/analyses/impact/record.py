@@ -239,7 +239,7 @@ class SectionPicture:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunningIn:
-    """Impacts of the same start, one after another on the same faces, at the level reduced.
+    """Impacts of the same start, one after another on the same faces.
 
     Parameters
     ----------
@@ -253,15 +253,18 @@ class RunningIn:
     set : array, shape (n,) [m]
         After each impact: how much lower the bodies touch than new ones.
     land : array, shape (n,) [m]
-        Width of the strip that has been in contact at the highest force so far.
+        Width of the strip that has been in contact at the highest force so far; nan at the
+        interface level.
     run_in : bool
         The last impact does not yield any more.
     radius : array, shape (nc,) [m]
-        Of the contact points, from the axis, rising.
+        Of the contact points, from the axis, rising; none at the interface level, where the set
+        differs round the ring.
     opening : array, shape (nc,) [m]
         Gap between both faces that has stayed at them after the last impact.
     worn_by : float [N]
-        Force up to which the faces are elastic now.
+        Force up to which the faces are elastic now; nan at the interface level.
+    level : str
     """
 
     asked: int
@@ -275,6 +278,7 @@ class RunningIn:
     radius: NDArray[np.float64]
     opening: NDArray[np.float64]
     worn_by: float
+    level: str = "reduced"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

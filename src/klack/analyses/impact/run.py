@@ -31,17 +31,18 @@ from klack.analyses.impact.record import (
     ImpactStudy,
     LawSummary,
     LevelResult,
+    RunningIn,
     SectionPicture,
 )
-from klack.analyses.impact.running_in import running_in
+from klack.analyses.impact.running_in import asks_for_more, points_running_in, running_in
 from klack.analyses.impact.section import section_picture
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
 from klack.analyses.impact.yielding_level import (
+    YieldingFaces,
     doubt_elastic_levels,
     doubt_large_strain,
     elastic_twin,
-    static_loops_of,
     tell_yield,
 )
 from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
@@ -78,6 +79,7 @@ from klack.case.schema import Case
 from klack.closing import Closing
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import Deviation
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
@@ -267,8 +269,13 @@ def _study(
         with warnings_of("modes of the case"):
             preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
         peak = min(preview.pattern_force, problem.static.max_force)
-        has_law = {"reduced", "reduced-participation"} & set(wanted)
-        loops = static_loops_of(problem, clock) if has_law else None
+        yielding = YieldingFaces.of(
+            problem,
+            laws=bool({"reduced", "reduced-participation"} & set(wanted)),
+            points="interface" in wanted or (certify and bool(reduced)),
+            progress=clock,
+        )
+        loops, limit = yielding.loops, yielding.limit
         own, classical = preview, None
         if isinstance(case.contact.local_law, SubmodelLocalLaw):
             classical = classical_stiffness(problem, peak)
@@ -306,22 +313,28 @@ def _study(
                         assert loops is not None
                         results[level] = doubt_large_strain(results[level], loops)
         ran = running_in(case, own, loops) if loops is not None and "reduced" in results else None
-        if ran is None and (case.run.impacts > 1 or case.run.run_in):
-            warnings.warn(
-                "run.impacts: all impacts are like the first, for no level with yield was computed "
-                "or nothing yields. Try: level reduced and a material with 'yield'.",
-                AccuracyWarning,
-                stacklevel=2,
-            )
         clock("reduced", 1.0)
         if "interface" in wanted:
             with attempts.at("interface"), warnings_of("level 'interface'"):
-                results["interface"] = _run_interface(problem, pools, own, clock)
+                results["interface"], at_points = _run_interface(
+                    problem, pools, own, limit, clock, is_first=not twins
+                )
+                ran = ran or at_points
+        if ran is None and asks_for_more(case):
+            warnings.warn(
+                "run.impacts: all impacts are like the first, for no level with yield was computed "
+                "or nothing yields. Try: level reduced (bodies in the meridian plane) or "
+                "interface, and a material with 'yield'.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
         certificate = None
         if certify and reduced:
             certificate = for_comparison(
                 "the error estimate",
-                lambda: _certificate(problem, pools, results, twins, clock),
+                lambda: _certificate(
+                    problem, pools, results, twins, None if twins else limit, clock
+                ),
             )
         certificate = certificate or _Certificate()
         transfer: tuple[TransferComparison, ...] = ()
@@ -339,6 +352,7 @@ def _study(
             peak,
             _surfaces(case),
             worn_by=0.0 if worn is None else worn.force,
+            has_yield=limit is not None or loops is not None,
         )
         if is_last:
             problem.close()
@@ -356,11 +370,11 @@ def _study(
         attempts.require_one(results)
         check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
     results = doubt_modal_levels(results, **at_once)
-    if twins:
-        results = doubt_elastic_levels(results, twins)
-    else:
+    if not twins:
         _take_better(results, certificate)
-    reference = best_level(results)
+    has_yield = [*twins, *(["interface"] if limit is not None else [])]
+    results = doubt_elastic_levels(results, has_yield)
+    reference = next((n for n in twins if not results[n].doubts), best_level(results))
     compared = deviations(results, reference)
     missing = failure_notes(attempts.texts)
     study = ImpactStudy(
@@ -412,16 +426,28 @@ def _require_time_to_touch(case: Case, gap: float | None) -> None:
 
 
 def _run_interface(
-    problem: ContactProblem, pools: Mapping[str, Modes], own: ReducedPair, clock: StageClock
-) -> LevelResult:
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    own: ReducedPair,
+    limit: PressureLimit | None,
+    clock: StageClock,
+    *,
+    is_first: bool,
+) -> tuple[LevelResult, RunningIn | None]:
+    """Interface level; the first one whose faces yield tells what that does, and runs them in."""
     clock("interface", 0.0)
 
-    def run(model: InterfaceModel) -> LevelResult:
+    def run(model: InterfaceModel) -> tuple[LevelResult, RunningIn | None]:
         guide = build_guide(problem, model, pools, ports=own.ports)
         setup = clock.spent((*_SET_UP[:-1], "interface"))
-        return run_interface(problem, model, guide, setup_time=setup)
+        result = run_interface(problem, model, guide, setup_time=setup)
+        if model.limit is not None and is_first:
+            elastic = simulate_case(problem.case, model.elastic(), guide).history
+            tell_yield(result, elastic, _surfaces(problem.case))
+            return result, points_running_in(problem.case, model, guide)
+        return result, None
 
-    result = within_reach(problem, pools, run, ports=own.ports)
+    result = within_reach(problem, pools, run, ports=own.ports, limit=limit)
     clock("interface", 1.0)
     return result
 
@@ -442,12 +468,13 @@ def _certificate(
     pools: Mapping[str, Modes],
     results: Mapping[str, LevelResult],
     twins: Mapping[str, ImpactHistory],
+    limit: PressureLimit | None,
     clock: StageClock,
 ) -> _Certificate:
     """Deviation of every reduced level from one interface-level run with more modes.
 
-    The same run with half as many modes tells whether it can serve as a reference.  Its bodies are
-    elastic: levels with yield are measured by ``twins`` without it.
+    The same run with half as many modes tells whether it can serve as a reference.  Levels with a
+    law of faces that yield are measured by ``twins`` without it, and that run has no limit then.
     """
     clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
@@ -465,11 +492,11 @@ def _certificate(
         return simulate_case(problem.case, model).history
 
     with warnings_of(f"error estimate, {count} modes"):
-        model, level = within_reach(problem, pools, run, count=count)
+        model, level = within_reach(problem, pools, run, count=count, limit=limit)
     history = level.history
     clock("error estimate", 0.5)
     with warnings_of(f"error estimate, {count // 2} modes"):
-        fewer = within_reach(problem, pools, run_again, count=count // 2)
+        fewer = within_reach(problem, pools, run_again, count=count // 2, limit=limit)
     names = (problem.pair.upper.name, problem.pair.lower.name)
     richer = (Modes(pools[n].omega[:count], pools[n].shapes[:, :count]) for n in names)
     elastic = model.omega > 0
@@ -479,6 +506,8 @@ def _certificate(
     basis = f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points"
     if twins:
         basis += ", both with elastic bodies"
+    if limit is not None:
+        basis += ", yield by a pressure limit"
     return _Certificate(
         estimates={name: compare_histories(history, one) for name, one in histories.items()},
         basis=basis,

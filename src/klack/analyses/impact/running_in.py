@@ -1,25 +1,38 @@
 r"""Impacts one after another on the same faces, until they do not yield any more.
 
-Every impact starts like the first; the law remembers how far the faces were pressed.  For a rigid
+Every impact starts like the first; the law remembers how far the faces were pressed, or every
+contact point its set.  For a rigid
 body of energy E the limit is the force :math:`P_\infty` whose elastic opening gives back all of it,
 :math:`W_e(P_\infty) = E` (shakedown), and what is missing falls geometrically.
 """
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from klack.analyses.impact.interface_level import simulate_case
 from klack.analyses.impact.record import RunningIn
 from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
 from klack.case.schema import Case
+from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
+from klack.transient.guide import Guide
+from klack.transient.interface_model import InterfaceModel
 from klack.units import format_si
 
-__all__ = ["running_in", "running_in_columns", "running_in_rows"]
+__all__ = [
+    "asks_for_more",
+    "points_running_in",
+    "running_in",
+    "running_in_columns",
+    "running_in_rows",
+]
 
 _RUN_IN = 1e-4
 """Share of the energy [-] that a run-in contact may still lose in yield."""
@@ -45,49 +58,41 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
         Where the faces are pressed further than the loops go.
     """
     law = pair.law
-    asked = case.run.impacts
-    if not isinstance(law, YieldingLaw) or (asked == 1 and not case.run.run_in):
+    if not isinstance(law, YieldingLaw) or not asks_for_more(case):
         return None
-    rows: list[tuple[float, ...]] = []
-    settled = False
-    while len(rows) < (_MOST if case.run.run_in else asked):
+
+    def hit(count: int) -> _Impact | None:
+        nonlocal law
+        assert isinstance(law, YieldingLaw)
         try:
             history = simulate_bodies(case, pair.upper, pair.lower, law)
         except InputError:
-            if not rows or not loops.limit:
+            if not count or not loops.limit:
                 raise
             warnings.warn(
-                f"running in ends after {len(rows)} impacts: the next one presses harder than "
+                f"running in ends after {count} impacts: the next one presses harder than "
                 f"{format_si(float(loops.force[-1]), 'N', 4)}, where the static loops end. "
                 f"{loops.limit}",
                 AccuracyWarning,
                 stacklevel=2,
             )
-            break
-        measures, before = measure_impact(history), law.loss_after(law.reached)
+            return None
+        before = law.loss_after(law.reached)
         law = law.after(history.pressed)
-        lost = law.loss_after(law.reached) - before
         force = float(np.interp(law.reached, law.largest, law.closing))
-        width = 2.0 * float(np.interp(force, loops.force, loops.half_width))
-        rows.append(
-            (
-                measures.peak_force,
-                measures.contact_time,
-                measures.restitution,
-                lost,
-                law.set_after(law.reached),
-                width,
-            )
+        return _Impact(
+            history=history,
+            lost=law.loss_after(law.reached) - before,
+            set=law.set_after(law.reached),
+            land=2.0 * float(np.interp(force, loops.force, loops.half_width)),
         )
-        settled = lost < _RUN_IN * history.ledger.initial
-        if measures.cut_off or (settled and len(rows) >= asked):
-            break
-    columns = np.array(rows).T
+
+    columns, settled = _repeated(case, hit)
     worn_by = float(np.interp(law.reached, law.largest, law.closing))
     order = np.argsort(loops.radius)
     gap = loops.plastic_gap_after(worn_by)[order]
     return RunningIn(
-        asked=asked,
+        asked=case.run.impacts,
         peak_force=columns[0],
         contact_time=columns[1],
         restitution=columns[2],
@@ -99,6 +104,96 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
         opening=gap - gap.min(),
         worn_by=worn_by,
     )
+
+
+def points_running_in(case: Case, model: InterfaceModel, guide: Guide | None) -> RunningIn | None:
+    """Impacts at the interface level on the same faces; None where the case asks for one.
+
+    Every point keeps its own set, wherever the body lands.
+
+    Parameters
+    ----------
+    case : Case
+    model : InterfaceModel
+        With a pressure limit.
+    guide : Guide or None
+    """
+    if model.limit is None or not asks_for_more(case):
+        return None
+    facing = model.axial > 1e-6
+    made = np.min(model.gap[facing] / model.axial[facing])
+    worn = np.zeros(model.count)
+
+    def hit(_: int) -> _Impact:
+        nonlocal worn
+        result = simulate_case(case, model, guide, worn=worn)
+        worn = result.worn
+        touch = np.min((model.gap + worn)[facing] / model.axial[facing])
+        return _Impact(
+            history=result.history,
+            lost=result.energy.plastic,
+            set=float(touch - made),
+            land=float("nan"),
+        )
+
+    columns, settled = _repeated(case, hit)
+    return RunningIn(
+        asked=case.run.impacts,
+        peak_force=columns[0],
+        contact_time=columns[1],
+        restitution=columns[2],
+        lost=columns[3],
+        set=columns[4],
+        land=columns[5],
+        run_in=settled,
+        radius=np.empty(0),
+        opening=np.empty(0),
+        worn_by=float("nan"),
+        level="interface",
+    )
+
+
+def asks_for_more(case: Case) -> bool:
+    """Whether the case asks for more than one impact on the same faces."""
+    return case.run.impacts > 1 or case.run.run_in
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Impact:
+    """One of them: loss to yield [J], set [m] and width of the land [m] after it."""
+
+    history: ImpactHistory
+    lost: float
+    set: float
+    land: float
+
+
+def _repeated(case: Case, hit: Callable[[int], _Impact | None]) -> tuple[NDArray[np.float64], bool]:
+    """Impacts as often as the case asks for: their numbers in columns, and whether they are run in.
+
+    ``hit`` is given how many there were, and returns None where they end.
+    """
+    rows: list[tuple[float, ...]] = []
+    settled = False
+    while len(rows) < (_MOST if case.run.run_in else case.run.impacts):
+        found = hit(len(rows))
+        if found is None:
+            break
+        measures = measure_impact(found.history)
+        rows.append(
+            (
+                measures.peak_force,
+                measures.contact_time,
+                measures.restitution,
+                found.lost,
+                found.set,
+                found.land,
+            )
+        )
+        settled = found.lost < _RUN_IN * found.history.ledger.initial
+        if measures.cut_off or (settled and len(rows) >= case.run.impacts):
+            break
+    return np.array(rows).T, settled
 
 
 def running_in_columns(found: RunningIn) -> tuple[str, ...]:
@@ -115,13 +210,14 @@ def running_in_rows(
     def row(title: str, values: np.ndarray, unit: str, digits: int) -> tuple[str, ...]:
         return (title, *(told(float(values[i]), unit, digits) for i in shown))
 
+    land = [row("width of the land", found.land, "m", 3)] if np.isfinite(found.land[0]) else []
     return (
         row("peak force", found.peak_force, "N", 5),
         row("contact time", found.contact_time, "s", 4),
         ("restitution", *(f"{found.restitution[i]:.4f}" for i in shown)),
         row("lost in yield", found.lost, "J", 3),
         row("set after it", found.set, "m", 3),
-        row("width of the land", found.land, "m", 3),
+        *land,
     )
 
 

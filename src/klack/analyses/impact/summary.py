@@ -67,6 +67,7 @@ class LevelJson(TypedDict):
 class RunningInJson(TypedDict):
     """Impacts one after another on the same faces, a number each."""
 
+    level: str
     asked: int
     run_in: Annotated[bool, Field(description="The last one does not yield any more.")]
     peak_force_N: list[Real]
@@ -74,7 +75,9 @@ class RunningInJson(TypedDict):
     restitution: list[Real]
     lost_J: Annotated[list[Real], Field(description="In yield.")]
     set_m: Annotated[list[Real], Field(description="How much lower the bodies touch after it.")]
-    land_m: Annotated[list[Real], Field(description="Width of the strip in contact so far.")]
+    land_m: Annotated[
+        list[Real], Field(description="Width of the strip in contact so far; level reduced.")
+    ]
 
 
 class ImpactJson(TypedDict):
@@ -275,6 +278,7 @@ def _running_in(found: RunningIn) -> RunningInJson:
         return [number_or_none(float(value)) for value in values]
 
     return {
+        "level": found.level,
         "asked": found.asked,
         "run_in": found.run_in,
         "peak_force_N": numbers(found.peak_force),

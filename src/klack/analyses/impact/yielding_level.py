@@ -1,20 +1,23 @@
 """Levels of an impact whose faces yield: which of them have it, and what it costs the others.
 
 The law of :mod:`klack.contact.yielding_law` is that of a centred contact in the meridian plane, on
-the reduced bodies; the other levels, and the estimate of errors, compute elastic bodies.
+the reduced bodies; the interface level has a pressure limit at every contact point
+(:mod:`klack.contact.pressure_limit`), wherever the needle lands.  The full order is elastic.
 """
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from klack.analyses.impact.record import LevelResult
+from klack.assembling.pressure_limit import pressure_limit
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
 from klack.case.impact_sections import ConsistentLocalLaw
 from klack.contact.history import ImpactHistory
+from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import measure_impact
 from klack.errors import AccuracyWarning
 from klack.plasticity.loops import YieldingLoops
@@ -23,10 +26,10 @@ from klack.units import format_si
 
 __all__ = [
     "SMALL_YIELD",
+    "YieldingFaces",
     "doubt_elastic_levels",
     "doubt_large_strain",
     "elastic_twin",
-    "static_loops_of",
     "tell_yield",
     "yield_share",
 ]
@@ -38,23 +41,45 @@ _LARGE = 0.1
 """Plastic strain from which on the elements themselves are turned and stretched too much."""
 
 
-def static_loops_of(problem: ContactProblem, progress: Progress) -> YieldingLoops | None:
-    """Static loops of the two bodies; None where they stay elastic, or are computed so.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class YieldingFaces:
+    """How the faces of an impact yield: a law for reduced levels, a limit for contact points.
 
     Parameters
     ----------
-    problem : ContactProblem
-        With its factorisations.
-    progress : callable
-
-    Warns
-    -----
-    AccuracyWarning
-        Where yield is left out though the materials have it.
+    loops : YieldingLoops or None
+        For the law of reduced levels; None where they are elastic.
+    limit : PressureLimit or None
+        For the contact points of the interface level; None where they are elastic.
     """
-    if not isinstance(problem.case.contact.local_law, ConsistentLocalLaw):
-        return None
-    return problem.yielding(progress)
+
+    loops: YieldingLoops | None
+    limit: PressureLimit | None
+
+    @classmethod
+    def of(
+        cls, problem: ContactProblem, *, laws: bool, points: bool, progress: Progress
+    ) -> "YieldingFaces":
+        """Faces of an impact whose levels have a law, contact points, or both.
+
+        Parameters
+        ----------
+        problem : ContactProblem
+            With its factorisations.
+        laws, points : bool
+        progress : callable
+
+        Warns
+        -----
+        AccuracyWarning
+            Where yield is left out though the materials have it.
+        """
+        laws = laws and isinstance(problem.case.contact.local_law, ConsistentLocalLaw)
+        loops = problem.yielding(progress) if laws or points else None
+        return cls(
+            loops=loops if laws else None,
+            limit=pressure_limit(problem, loops, progress) if points else None,
+        )
 
 
 def elastic_twin(problem: ContactProblem, pair: ReducedPair) -> ImpactHistory:
@@ -124,14 +149,14 @@ def doubt_large_strain(result: LevelResult, loops: YieldingLoops) -> LevelResult
 
 
 def doubt_elastic_levels(
-    results: Mapping[str, LevelResult], yielding: Mapping[str, ImpactHistory]
+    results: Mapping[str, LevelResult], yielding: Collection[str]
 ) -> dict[str, LevelResult]:
     """Levels with a doubt on those of elastic bodies, where yield matters.
 
     Parameters
     ----------
     results : mapping of str to LevelResult
-    yielding : mapping of str to ImpactHistory
+    yielding : collection of str
         Names of the levels that have yield.
     """
     lost = max((yield_share(results[name]) for name in yielding if name in results), default=0.0)

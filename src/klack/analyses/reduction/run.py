@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
+from klack.analyses.reduction.bending import BendingModes, bending_modes
 from klack.analyses.reduction.one_node import (
     OneNode,
     OneNodeImpact,
@@ -40,6 +41,8 @@ class ReductionStudy:
         Of the bodies of which the case names a node.
     impacts : tuple of OneNodeImpact
         With 20 and with 50 modes a body, where there is such a node.
+    bending : tuple of BendingModes
+        Of the axisymmetric bodies.
     """
 
     case: str
@@ -48,6 +51,7 @@ class ReductionStudy:
     transfer: tuple[TransferComparison, ...]
     nodes: tuple[OneNode, ...] = ()
     impacts: tuple[OneNodeImpact, ...] = ()
+    bending: tuple[BendingModes, ...] = ()
 
     def save(self, folder: Path) -> None:
         """Write the files of each body into a folder.
@@ -106,11 +110,14 @@ def run_reduce(
     nodes = one_nodes(problem, pools, pair.ports, progress=progress)
     impacts = one_node_impacts(problem, pools, pair.ports, nodes)
     problem.close()
+    bodies = (pair.upper, pair.lower)
+    bending = bending_modes(problem, pools, bodies, threads=threads, progress=progress)
     return ReductionStudy(
         case=case.name,
         title=case.title,
-        bodies=(pair.upper, pair.lower),
+        bodies=bodies,
         transfer=transfer,
         nodes=nodes,
         impacts=impacts,
+        bending=bending,
     )

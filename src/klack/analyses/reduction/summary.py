@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 from typing_extensions import TypedDict
 
@@ -32,6 +34,7 @@ __all__ = [
 ]
 
 _THEORY = "theory/reduction"
+_BENDING_TOLD = 10
 
 
 def _highest(body: ReducedBody) -> float:
@@ -155,6 +158,21 @@ class OneNodeImpactJson(TypedDict):
     energy_change_of_ports: Annotated[float, Field(description="Round-off.")]
 
 
+class BendingJson(TypedDict):
+    """Elastic modes of an axisymmetric body, the lowest of either kind."""
+
+    bending_frequencies_Hz: Annotated[
+        list[float],
+        Field(description="Of Fourier order 1; each is two modes, in directions at right angles."),
+    ]
+    axial_frequencies_Hz: Annotated[
+        list[float], Field(description="Of order 0 without torsion, as many.")
+    ]
+    rigid_modes_of_order_1: Annotated[
+        int, Field(description="2 of a free body, shift and rotation; 0 of a held one.")
+    ]
+
+
 class ReductionJson(TypedDict):
     """``klack reduce``."""
 
@@ -168,6 +186,9 @@ class ReductionJson(TypedDict):
     one_node_impacts: Annotated[
         list[OneNodeImpactJson], Field(description="With 20 and 50 modes, where there is a node.")
     ]
+    bending: Annotated[
+        dict[str, BendingJson], Field(description="By body; of axisymmetric bodies meshed here.")
+    ]
 
 
 def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
@@ -176,6 +197,8 @@ def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
     if study.nodes:
         yield _nodes_told(study)
         yield _impacts_told(study)
+    if study.bending:
+        yield _bending_told(study)
 
 
 def _nodes_told(study: ReductionStudy) -> TextTable:
@@ -228,6 +251,28 @@ def _impacts_told(study: ReductionStudy) -> TextTable:
         columns=("output", "peak force [N]", "restitution", "energy change [%]"),
         rows=rows,
     )
+
+
+def _bending_told(study: ReductionStudy) -> TextTable:
+    """Lowest modes of order 1 beside the axial ones; a dash where a body keeps no more."""
+    columns = [
+        (f"{item.body} {kind} [kHz]", frequencies)
+        for item in study.bending
+        for kind, frequencies in (("bending", item.bending), ("axial", item.axial))
+    ]
+    rows = [
+        (str(i + 1), *(_khz(frequencies, i) for _, frequencies in columns))
+        for i in range(max(len(frequencies) for _, frequencies in columns))
+    ]
+    return TextTable(
+        title="Bending modes (order 1) beside the axial ones, the lowest of each",
+        columns=("mode", *(title for title, _ in columns)),
+        rows=rows[:_BENDING_TOLD],
+    )
+
+
+def _khz(frequencies: NDArray[np.float64], i: int) -> str:
+    return f"{1e-3 * frequencies[i]:.4g}" if i < len(frequencies) else "-"
 
 
 def _change(percent: float) -> str:
@@ -295,4 +340,12 @@ def reduction_to_json(study: ReductionStudy) -> dict[str, Any]:
             }
             for item in study.impacts
         ],
+        "bending": {
+            item.body: {
+                "bending_frequencies_Hz": [float(f) for f in item.bending],
+                "axial_frequencies_Hz": [float(f) for f in item.axial],
+                "rigid_modes_of_order_1": item.rigid,
+            }
+            for item in study.bending
+        },
     }

@@ -20,7 +20,14 @@ from klack.analyses.shots.figures import (
     rebound_chart,
 )
 from klack.analyses.shots.map import shots_map
-from klack.analyses.shots.measures import DRAWN, FIRST_IMPACT, FRICTION_LOSS, ROCKING, Shot
+from klack.analyses.shots.measures import (
+    DRAWN,
+    FIRST_IMPACT,
+    FRICTION_LOSS,
+    PLASTIC_LOSS,
+    ROCKING,
+    Shot,
+)
 from klack.analyses.shots.record import ShotColumns, ShotsStudy
 from klack.analyses.shots.wording import (
     largest_size,
@@ -278,7 +285,9 @@ def _number_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
 
 def _shares(study: ShotsStudy) -> tuple[Measure[Shot], ...]:
     """Shares of the energy of approach that a page of this study has."""
-    return (ROCKING, FRICTION_LOSS) if study.faces else (ROCKING,)
+    rubbing = (FRICTION_LOSS,) if study.faces else ()
+    yielding = (PLASTIC_LOSS,) if np.any(study.shots.plastic_loss) else ()
+    return (ROCKING, *rubbing, *yielding)
 
 
 def _share_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:

@@ -21,13 +21,16 @@ def shots_mark(case: Case, seed: int, threads: int | None) -> str:
 
 
 def _data(index: int, outcome: ShotOutcome) -> Mapping[str, Any]:
+    more: dict[str, Any] = {"doubts": list(outcome.doubts)} if outcome.doubts else {}
+    if len(outcome.worn):
+        more["worn"] = outcome.worn.tolist()
     return {
         "index": index,
         "numbers": outcome.numbers,
         "height": outcome.height.tolist(),
         "force": outcome.force.tolist(),
         "approach": outcome.approach,
-    } | ({"doubts": list(outcome.doubts)} if outcome.doubts else {})
+    } | more
 
 
 def _outcome(data: Mapping[str, Any]) -> tuple[int, ShotOutcome]:
@@ -38,6 +41,7 @@ def _outcome(data: Mapping[str, Any]) -> tuple[int, ShotOutcome]:
         force=np.array(data["force"], dtype=np.float32),
         approach=float(data["approach"]),
         doubts=tuple(map(str, data.get("doubts", ()))),
+        worn=np.array(data.get("worn", ()), dtype=float),
     )
     return outcome.index, outcome
 

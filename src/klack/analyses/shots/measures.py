@@ -9,6 +9,7 @@ __all__ = [
     "DRAWN",
     "FIRST_IMPACT",
     "FRICTION_LOSS",
+    "PLASTIC_LOSS",
     "RESULTS",
     "ROCKING",
     "RULE_MEASURES",
@@ -141,6 +142,16 @@ FRICTION_LOSS = Measure[Shot](
 )
 """0 for faces without friction."""
 
+PLASTIC_LOSS = Measure[Shot](
+    key="plastic_loss",
+    name="lost in yield of the faces",
+    symbol="E_p/E_0",
+    definition="Energy that faces which yield take in the whole shot, over the energy of approach.",
+    form="share",
+    digits=2,
+)
+"""0 for elastic faces."""
+
 SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
     _THEORY,
     *DRAWN,
@@ -159,6 +170,14 @@ SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
     ),
     ROCKING,
     FRICTION_LOSS,
+    PLASTIC_LOSS,
+    Measure(
+        key="deepest_set",
+        symbol="w_max",
+        unit="m",
+        definition="Deepest set of a contact point after the shot; every shot meets the faces as "
+        "those before have left them.",
+    ),
     Measure(
         key="second_impact",
         symbol="t_2",

@@ -15,6 +15,7 @@ from klack.analyses.impact.run import ImpactBodies, impact_bodies
 from klack.analyses.shots.draw import extreme_placements, face_friction, shots_of
 from klack.analyses.shots.one_shot import ShotSetup
 from klack.assembling.off_axis import off_axis_space, touch_height
+from klack.assembling.pressure_limit import pressure_limit
 from klack.assembling.problem import ContactProblem, contact_problem
 from klack.case.placement import Placement
 from klack.case.schema import Case
@@ -31,6 +32,7 @@ __all__ = ["ShotModel", "build_shots", "centred_case", "shot_bodies", "shot_mode
 
 _FLIGHT_STEPS = 20  # before first touch, without a gap
 _SPAN_OVER_CONTACT = 3.0
+_MORE = 1.6  # force per length of the most loaded sector over the mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -126,7 +128,8 @@ def _model(
             space, problem.static, problem.flexibility_upper, problem.flexibility_lower
         )
         progress("interface", 0.8)
-    model = build_interface(problem, bodies.pools, space=space, compliance=compliance)
+    limit = pressure_limit(problem, problem.yielding(progress), progress, more=_MORE)
+    model = build_interface(problem, bodies.pools, space=space, compliance=compliance, limit=limit)
     guide = build_guide(problem, model, bodies.pools)
     progress("interface", 1.0)
     speed, gap, spring = case.motion.speed, case.contact.gap or 0.0, case.motion.spring

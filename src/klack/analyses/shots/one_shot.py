@@ -1,11 +1,12 @@
 """One drop of a valve at the interface level, from a draw to its numbers."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.impact.interface_level import set_doubts
 from klack.analyses.shots.draw import ShotDraw, polar
 from klack.analyses.shots.record import ShotColumns, ShotTraces
 from klack.contact.gap_update import RigidGaps
@@ -140,6 +141,8 @@ class ShotOutcome:
         Largest way of the moving body after first touch.
     doubts : tuple of str
         Accuracy warnings of its run, in whichever process.
+    worn : array, shape (nc,) [m]
+        Set of the contact points after it; no points where they stay elastic.
     """
 
     index: int
@@ -148,10 +151,16 @@ class ShotOutcome:
     force: NDArray[np.float32]
     approach: float
     doubts: tuple[str, ...] = ()
+    worn: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
 
 
 def simulate_shot(
-    setup: ShotSetup, draw: ShotDraw, *, impacts: int | None = None, points: bool = False
+    setup: ShotSetup,
+    draw: ShotDraw,
+    *,
+    impacts: int | None = None,
+    points: bool = False,
+    worn: NDArray[np.float64] | None = None,
 ) -> InterfaceResult:
     """Simulate the moving body as drawn.
 
@@ -163,6 +172,8 @@ def simulate_shot(
         Stop earlier than the setup says.
     points : bool
         Keep the force of every contact point.
+    worn : array, shape (nc,), optional [m]
+        Set of the faces that the shot meets; new ones without.
     """
     guide = setup.guide.with_friction(draw.friction) if setup.guide is not None else None
     return simulate_interface(
@@ -179,13 +190,16 @@ def simulate_shot(
         flight=True,
         impacts=setup.impacts if impacts is None else impacts,
         points=points,
+        worn=worn,
     )
 
 
-def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
+def run_shot(
+    setup: ShotSetup, draw: ShotDraw, worn: NDArray[np.float64] | None = None
+) -> ShotOutcome:
     """Simulate one shot and measure its first impact and its rebound."""
     with collected_warnings() as doubts:
-        result = simulate_shot(setup, draw)
+        result = simulate_shot(setup, draw, worn=worn)
     first = measure_impact(result.impacts[0].history)
     second = np.nan
     if len(result.impacts) > 1:
@@ -195,6 +209,7 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
     release = first.first_touch + first.total_contact_time
     eccentricity, direction = polar(draw.aside)
     tilt, tilt_direction = polar(draw.lean)
+    energy = 0.5 * setup.model.mass * first.approach_speed**2
     numbers = {
         "eccentricity": eccentricity,
         "direction": direction,
@@ -212,7 +227,9 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
         "impulse": first.impulse,
         "sub_contacts": float(first.sub_contacts),
         "rocking": _rocking(setup, result, release, first),
-        "friction_loss": _friction_loss(setup, result, first),
+        "friction_loss": result.impacts[0].history.ledger.friction / energy,
+        "plastic_loss": result.energy.plastic / energy,
+        "deepest_set": float(np.max(result.worn, initial=0.0)),
         "second_impact": second - first.first_touch,
         "impacts": float(len(result.impacts)),
         "energy_residual": result.energy.residual,
@@ -228,7 +245,8 @@ def run_shot(setup: ShotSetup, draw: ShotDraw) -> ShotOutcome:
         height=trace.astype(np.float32),
         force=force.astype(np.float32),
         approach=result.approach,
-        doubts=tuple(doubts),
+        doubts=(*doubts, *set_doubts(setup.model, result)),
+        worn=result.worn,
     )
 
 
@@ -310,9 +328,3 @@ def _rocking(
     v = motion.velocity[after]
     energy = setup.model.mass * float(v[:2] @ v[:2]) + float(v[3:] @ setup.inertia @ v[3:])
     return energy / (setup.model.mass * first.approach_speed**2)
-
-
-def _friction_loss(setup: ShotSetup, result: InterfaceResult, first: ImpactMeasures) -> float:
-    """Energy that the first impact loses between the faces, over that of approach."""
-    lost = result.impacts[0].history.ledger.friction
-    return lost / (0.5 * setup.model.mass * first.approach_speed**2)

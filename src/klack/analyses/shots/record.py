@@ -65,6 +65,11 @@ class ShotColumns:
     friction_loss : array [-]
         Energy that friction between the faces takes in the first impact, over the energy of
         approach; 0 in results without it.
+    plastic_loss : array [-]
+        Energy that faces which yield take in the whole shot, over the energy of approach; 0 in
+        results without it.
+    deepest_set : array [m]
+        Of a contact point, after the shot; likewise.
     second_impact : array [s]
         Time from the first touch to that of the second impact; nan if there was none.
     impacts : array [-]
@@ -90,13 +95,15 @@ class ShotColumns:
     sub_contacts: Column
     rocking: Column
     friction_loss: Column = field(default_factory=_not_kept)
+    plastic_loss: Column = field(default_factory=_not_kept)
+    deepest_set: Column = field(default_factory=_not_kept)
     second_impact: Column
     impacts: Column
     energy_residual: Column
 
     def __post_init__(self) -> None:
-        """Fill in what results of klack up to 0.1 do not have: their faces had no friction."""
-        for name in ("contact_friction", "friction_loss"):
+        """Fill in what results of klack up to 0.1 do not have: smooth, elastic faces."""
+        for name in ("contact_friction", "friction_loss", "plastic_loss", "deepest_set"):
             if not len(getattr(self, name)):
                 object.__setattr__(self, name, np.zeros(self.count))
 

@@ -1,13 +1,14 @@
 """``klack shots``: many drops of one valve, each a little different, and the centred one."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import PressureRecord
@@ -32,6 +33,7 @@ from klack.analyses.shots.one_shot import (
     traces_of,
 )
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
+from klack.analyses.workers import answer, unwrapped
 from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
@@ -50,6 +52,8 @@ __all__ = [
     "run_shots_on",
     "shot_doubts",
 ]
+
+Worn = NDArray[np.float64]
 
 _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
@@ -121,8 +125,13 @@ def run_shots(
             "highest": dropped.draws[highest],
             "lowest": dropped.draws[lowest],
         }
+        faces = {
+            "centric": dropped.worn_before(count),
+            "highest": dropped.worn_before(highest),
+            "lowest": dropped.worn_before(lowest),
+        }
         with trial():  # once more what has told its doubts
-            pressures = _pressures(model.setup, pictured)
+            pressures = _pressures(model.setup, pictured, faces)
         clock("shots", 1.0)
     return ShotsStudy(
         **case_fields(case),
@@ -152,6 +161,7 @@ def run_shots(
         warnings=(
             *dict.fromkeys([*model.notes, *notes]),
             *_unfinished(shots),
+            *_worn(shots),
             *shot_doubts(dropped),
         ),
     )
@@ -167,7 +177,7 @@ class DroppedShots:
     outcomes : tuple of ShotOutcome
         Of the draws, in their order.
     alone : ShotOutcome
-        The centred shot.
+        The centred shot; faces that yield are for it as the last of the others has left them.
     """
 
     draws: tuple[ShotDraw, ...]
@@ -178,6 +188,11 @@ class DroppedShots:
     def shots(self) -> ShotColumns:
         """Numbers of the shots as columns."""
         return columns_of(self.outcomes)
+
+    def worn_before(self, index: int) -> Worn | None:
+        """Set of the faces [m] that a shot meets; None for new or elastic ones."""
+        worn = self.outcomes[index - 1].worn if index > 0 else np.zeros(0)
+        return worn if len(worn) else None
 
     @cached_property
     def centric(self) -> ShotColumns:
@@ -203,11 +218,30 @@ def drop_shots(
     """
     draws = [draw_shot(case, seed, index, model.touch_height) for index in range(count)]
     progress("shots", 0.0)
-    alone = run_shot(model.setup, centric_draw(case))
-    run_shots_on(workers, model.setup, draws, log, progress)
-    return DroppedShots(
-        draws=tuple(draws), outcomes=tuple(log.done[draw.index] for draw in draws), alone=alone
-    )
+    setup, centric = model.setup, centric_draw(case)
+    if setup.model.limit is not None:
+        outcomes = _one_after_another(setup, draws, log, progress)
+        alone = run_shot(setup, centric, outcomes[-1].worn)
+    else:
+        alone = run_shot(setup, centric)
+        run_shots_on(workers, setup, draws, log, progress)
+        outcomes = tuple(log.done[draw.index] for draw in draws)
+    return DroppedShots(draws=tuple(draws), outcomes=outcomes, alone=alone)
+
+
+def _one_after_another(
+    setup: ShotSetup, draws: Sequence[ShotDraw], log: ShotLog, progress: Progress
+) -> tuple[ShotOutcome, ...]:
+    """Shots on faces that yield: each meets them as those before have left them."""
+    outcomes: list[ShotOutcome] = []
+    for draw in draws:
+        worn = outcomes[-1].worn if outcomes else None
+        if draw.index not in log.done:
+            found = answer(partial(run_shot, setup, draw, worn))
+            log.add(draw.index, unwrapped(f"shot {draw.index}", found))
+        outcomes.append(log.done[draw.index])
+        progress("shots", len(outcomes) / len(draws))
+    return tuple(outcomes)
 
 
 def run_shots_on(
@@ -267,17 +301,31 @@ def highest_of(shots: ShotColumns) -> int | None:
     return int(np.argmax(np.where(complete, shots.rebound_height, -np.inf)))
 
 
-def _pressures(setup: ShotSetup, pictured: Mapping[str, ShotDraw]) -> dict[str, PressureRecord]:
-    """Contact forces point by point of the first impact of some shots."""
+def _pressures(
+    setup: ShotSetup, pictured: Mapping[str, ShotDraw], faces: Mapping[str, Worn | None]
+) -> dict[str, PressureRecord]:
+    """Contact forces point by point of the first impact of some shots, on their faces."""
     records = {}
     for name, draw in pictured.items():
-        first = simulate_shot(setup, draw, impacts=1, points=True).impacts[0]
+        result = simulate_shot(setup, draw, impacts=1, points=True, worn=faces[name])
+        first = result.impacts[0]
         record = pressure_record(
             first.history, first.point_force, setup.model.points, setup.model.area
         )
         if record is not None:
             records[name] = record
     return records
+
+
+def _worn(shots: ShotColumns) -> Iterator[str]:
+    """What shots on faces that yield are told of."""
+    if np.any(shots.plastic_loss):
+        yield (
+            "the faces yield: every shot meets them as those before have left them, the centred "
+            f"one after the last. They take {100 * float(shots.plastic_loss[0]):.2g} % of the "
+            f"energy of the first shot and {100 * float(shots.plastic_loss[-1]):.2g} % of that of "
+            f"the last; the set is up to {format_si(float(shots.deepest_set[-1]), 'm', 3)} deep."
+        )
 
 
 def _distributions(case: Case) -> dict[str, str]:

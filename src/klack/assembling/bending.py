@@ -1,0 +1,39 @@
+"""Bending of the axisymmetric bodies of a case: the same half section in Fourier order 1."""
+
+import warnings
+
+from klack.assembling.held_nodes import held_nodes
+from klack.case.bodies import CaseFile
+from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.errors import AccuracyWarning
+from klack.mesh.mesh import Mesh
+
+__all__ = ["bending_body"]
+
+
+def bending_body(case: CaseFile, name: str, mesh: Mesh) -> FourierBody | None:
+    """Body in order 1, held where the case holds it, all round.
+
+    None for a solid, whose modes bend anyway, and for a body from the matrices of another program,
+    which are those of its axial motion alone.
+
+    Warns
+    -----
+    AccuracyWarning
+        For linear elements, which lock in bending.
+    """
+    body = case.bodies[name]
+    if mesh.dimension != 2 or body.matrices is not None:
+        return None
+    linear = sorted({block.family for block in mesh.blocks if not block.topology.quadratic})
+    if linear:
+        warnings.warn(
+            f"the bending frequencies of '{name}' are too high: its mesh has linear elements "
+            f"({', '.join(linear)}), which are too stiff in bending. Two of them across the radius "
+            "make a round bar too high by 2 % (quad4) to 9 % (tri3), whatever its axial modes are. "
+            "Try: elements with mid-side nodes.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    materials = case.materials_of(name, mesh.solids)
+    return fourier_body(name, mesh, materials, order=1, fixed_nodes=held_nodes(body, mesh))

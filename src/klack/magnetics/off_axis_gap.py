@@ -1,0 +1,218 @@
+r"""Air gaps of an off-axis or tilted armature: permeance, side force, tilting moment.
+
+At a constant mmf ``V`` across a gap of permeance ``P(q)`` the co-energy is :math:`W' = P V^2/2`,
+and the force along any coordinate ``q`` of the armature is
+
+.. math:: F_q = \tfrac12 V^2\, \frac{\partial P}{\partial q}
+    = \tfrac12 \frac{\varphi^2}{P^2}\, \frac{\partial P}{\partial q} .
+
+Forces that increase ``q`` are positive.  P is least centred and parallel, so an offset and a tilt
+increase themselves: a negative stiffness of guide and needle.
+
+Limits: unsaturated iron (one mmf for the whole face), no edge fields, gaps small against the radii
+where a function says so.  Saturation spreads the flux evenly and makes both weaker.
+Sources: Smythe, *Static and Dynamic Electricity* (eccentric cylinders); Woodson & Melcher 1968,
+ch. 3 (forces from co-energy).
+"""
+
+from math import pi
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from klack.errors import InputError, require_positive
+from klack.magnetics.air_gap import face_permeance
+from klack.magnetics.iron import VACUUM_PERMEABILITY
+
+__all__ = [
+    "eccentric_ring",
+    "guide_ring",
+    "ring_sectors",
+    "sector_pulls",
+    "tilted_ring_face",
+    "tilted_strip",
+]
+
+Vector = NDArray[np.float64]
+
+
+def eccentric_ring(
+    inner: float, outer: float, length: float, eccentricity: ArrayLike
+) -> tuple[Vector, Vector]:
+    r"""Permeance [H] of a radial gap between eccentric cylinders, and its slope [H/m].
+
+    .. math:: P = \frac{2\pi\mu_0 l}{\operatorname{arcosh} k}, \qquad
+        k = \frac{r_i^2 + r_o^2 - e^2}{2 r_i r_o}
+
+    exact at any clearance.  Centred it is :func:`~klack.magnetics.air_gap.ring_permeance`; for a
+    clearance :math:`c = r_o - r_i` small against the radius the slope is
+    :math:`2\pi\mu_0 r l\, e/(c^2 - e^2)^{3/2}`.
+
+    Parameters
+    ----------
+    inner, outer, length : float [m]
+        Radii, and length along the axis.
+    eccentricity : array [m]
+        Distance of the axes, at least 0 and below ``outer - inner``.
+    """
+    e = np.asarray(eccentricity, dtype=float)
+    clearance = outer - inner
+    _require_open("eccentric_ring: eccentricity", e, clearance, "the clearance")
+    over = (clearance - e) * (clearance + e) / (2.0 * inner * outer)  # k - 1
+    root = np.sqrt(over * (over + 2.0))
+    wide = np.log1p(over + root)
+    P = 2.0 * pi * VACUUM_PERMEABILITY * length / wide
+    return P, P / wide * e / (inner * outer * root)
+
+
+def guide_ring(
+    inner: float, outer: float, length: float, place: ArrayLike, *, stations: int = 32
+) -> tuple[float, Vector]:
+    r"""Permeance [H] of a radial gap whose armature is off-axis and tilted, and its slopes.
+
+    Cross sections in parallel along the axis, each an :func:`eccentric_ring` with
+
+    .. math:: e(z) = |(e_x - t_x z,\; e_y - t_y z)|
+
+    by Gauss's rule.  Half of the squared mmf times the slopes are force and moment: with ``t_x`` as
+    the slope of the armature's face, ``z = t_x x + t_y y``, the moment does its work on ``t_x``.
+
+    Parameters
+    ----------
+    inner, outer, length : float [m]
+    place : array, shape (4,) [m], [m], [-], [-]
+        Offset in the middle of the ring, and tilt.
+    stations : int
+        Cross sections; with 32 the slopes are within 1e-8 where an end comes to 90 % of the
+        clearance, within 4e-6 at 95 %.
+
+    Returns
+    -------
+    permeance : float [H]
+    slopes : array, shape (4,) [H/m], [H/m], [H], [H]
+    """
+    q = np.asarray(place, dtype=float)
+    nodes, weights = np.polynomial.legendre.leggauss(stations)
+    z = 0.5 * length * nodes
+    way = q[:2] - z[:, None] * q[2:]
+    ends = q[:2] + 0.5 * length * np.array([[1.0], [-1.0]]) * q[2:]
+    farthest = np.sqrt((ends * ends).sum(axis=1))
+    _require_open("guide_ring: place", farthest, outer - inner, "the clearance at both ends")
+    e = np.sqrt((way * way).sum(axis=1))
+    P, slope = eccentric_ring(inner, outer, length, e)
+    share = 0.5 * weights
+    along = np.divide(way, e[:, None], out=np.zeros_like(way), where=e[:, None] > 0.0)
+    pull = (share * slope)[:, None] * along
+    return float(share @ P), np.concatenate((pull.sum(axis=0), -(z[:, None] * pull).sum(axis=0)))
+
+
+def tilted_ring_face(
+    inner: float, outer: float, gap: ArrayLike, tilt: ArrayLike
+) -> tuple[Vector, Vector, Vector]:
+    r"""Permeance [H] between a ring or disc and a plane tilted to it; its slopes [H/m], [H].
+
+    .. math:: P = \mu_0 \int \frac{dA}{g + t\,r\cos\varphi} = 2\pi\mu_0
+        \left[\frac{r_o^2}{g + s_o} - \frac{r_i^2}{g + s_i}\right], \qquad s = \sqrt{g^2 - (t r)^2}
+
+    Parallel it is :func:`~klack.magnetics.air_gap.face_permeance`.  The slope with the gap is the
+    pull, that with the tilt the moment that tilts further.
+
+    Limits: the field of parallel faces at every point; a tilt of 0.1 changes it by 0.3 %
+    (:func:`tilted_strip`).
+
+    Parameters
+    ----------
+    inner, outer : float [m]
+        Radii; an inner radius of 0 makes a disc.
+    gap : array [m]
+        In the middle.
+    tilt : array [-]
+        Slope, with ``|tilt| outer < gap``.
+    """
+    g, t = np.asarray(gap, dtype=float), np.asarray(tilt, dtype=float)
+    _require_open("tilted_ring_face: tilt", np.abs(t) * outer, g, "the gap")
+    whole = 2.0 * pi * VACUUM_PERMEABILITY
+    P = dg = dt = np.zeros(np.broadcast_shapes(g.shape, t.shape))
+    for sign, r in ((1.0, outer), (-1.0, inner)):
+        s = np.sqrt((g - t * r) * (g + t * r))
+        one = sign * whole * r * r / (g + s)
+        P = P + one
+        dg = dg - one / s
+        dt = dt + one * t * r * r / (s * (g + s))
+    return P, dg, dt
+
+
+def tilted_strip(
+    length: float, width: float, gap: ArrayLike, tilt: ArrayLike
+) -> tuple[Vector, Vector, Vector]:
+    r"""Permeance [H] between a strip and a plane tilted along it; its slopes [H/m], [H].
+
+    .. math:: P = \frac{\mu_0 b}{t} \ln\frac{g + a}{g - a}, \qquad a = \tfrac12 t l
+
+    The field between planes at the angle ``alpha`` is exactly circular, with ``alpha`` in place of
+    ``t = tan(alpha)``: the faces taken as parallel at every point cost :math:`\alpha^2/3`.
+
+    Parameters
+    ----------
+    length, width : float [m]
+        Along the tilt, and across.
+    gap : array [m]
+        In the middle.
+    tilt : array [-]
+        Slope, with ``|tilt| length/2 < gap``.
+    """
+    g, t = np.asarray(gap, dtype=float), np.asarray(tilt, dtype=float)
+    a = 0.5 * length * t
+    _require_open("tilted_strip: tilt", np.abs(a), g, "the gap")
+    u = a / g
+    series = 1.0 + u * u * (1.0 / 3.0 + u * u * (0.2 + u * u / 7.0))
+    turned = u * u * u * (2.0 / 3.0 + u * u * (0.8 + u * u * 6.0 / 7.0))  # u d/du of it, over u
+    small = np.abs(u) < 1e-2
+    safe = np.where(small, 1.0, u)
+    with np.errstate(all="ignore"):
+        ratio = np.where(small, series, np.arctanh(safe) / safe)
+        rise = np.where(small, turned / np.where(u == 0.0, 1.0, u), 1.0 / (1.0 - u * u) - ratio)
+    flat = VACUUM_PERMEABILITY * width * length / g
+    dt = np.where(u == 0.0, 0.0, flat * rise / np.where(t == 0.0, 1.0, t))
+    return flat * ratio, -flat * (ratio + rise) / g, dt
+
+
+def ring_sectors(inner: float, outer: float, length: float, sectors: int) -> Vector:
+    """Areas [m^2] of the sectors of a radial gap, shape (S,), for :func:`sector_pulls`.
+
+    At the geometric mean of the radii: the sum of sectors then differs from the exact permeance by
+    ``(c^2 - e^2)/(24 r^2)`` only.
+    """
+    return np.full(sectors, 2.0 * pi * np.sqrt(inner * outer) * length / sectors)
+
+
+def sector_pulls(areas: Vector, gaps: Vector, mmf: float) -> tuple[Vector, Vector]:
+    r"""Permeances [H] of sectors in parallel, and the pull [N] that closes each, shape (S,).
+
+    .. math:: P_k = \mu_0 \frac{A_k}{g_k}, \qquad N_k = \tfrac12 V^2 \mu_0 \frac{A_k}{g_k^2}
+
+    For faces of any form: with the row of a gap over the coordinates of the armature, the pulls
+    times the rows are force and moments with the same work.
+
+    Parameters
+    ----------
+    areas, gaps : array, shape (S,) [m^2], [m]
+    mmf : float [A]
+    """
+    require_positive("sector_pulls: smallest gap", float(np.min(gaps)), "m")
+    P = face_permeance(1.0, gaps) * areas
+    return P, 0.5 * mmf**2 * P / gaps
+
+
+def _require_open(where: str, used: Vector, room: ArrayLike, what: str) -> None:
+    room = np.asarray(room, dtype=float)
+    if np.all((used >= 0.0) & (used < room)):
+        return
+    worst = np.argmax(np.where(np.isfinite(used - room), used - room, np.inf))
+    used, room = np.broadcast_arrays(used, room)
+    raise InputError(
+        where,
+        got=f"{1e6 * used.flat[worst]:.4g} um with {what} of {1e6 * room.flat[worst]:.4g} um",
+        expected="0 or more, and less than that: the faces may not touch",
+        hint="check offset and tilt; iron that touches needs a residual gap (coating, shim).",
+    )
