@@ -4,7 +4,7 @@ Truth: Hooke's law, Hertz' law, steady flow through restrictions in series, the 
 and that a run which begins in equilibrium stays there.
 """
 
-from math import pi
+from math import pi, sqrt
 
 import numpy as np
 import pytest
@@ -24,6 +24,7 @@ from klack.magnetics.force_map_solenoid import ForceMapSolenoid
 from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.voltage_table import VoltageTable
 from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.friction import GuideFriction
 from klack.mechanics.rigid_mass import RigidMass
@@ -32,6 +33,7 @@ from klack.network.checks import LooseBodyWarning
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import Ambient
+from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_result import NetworkResult, StaticStart
 from klack.simulation.network_run import simulate_network
 
@@ -507,3 +509,51 @@ def test_a_source_is_asked_for_its_value_at_time_zero():
     found = start(parts, [["body.tip", "spring.end", "push.end"]])
 
     assert found.displacement["body.tip"] == pytest.approx(4e-4, rel=1e-9)
+
+
+def lever(mass: float, reach: float) -> ReducedBody:
+    """Rigid body with a port at its centre of mass and one so far aside, in radii of inertia."""
+    axial = sqrt(mass)
+    return ReducedBody(
+        name="lever",
+        mass=mass,
+        omega=np.zeros(2),
+        damping=np.zeros(2),
+        port_names=("centre", "aside"),
+        # rigid modes that mix the shift and the rotation
+        port_shapes=np.array([[0.6, 0.6 + 0.8 * reach], [0.8, 0.8 - 0.6 * reach]]) / axial,
+        observer_names=(),
+        observer_shapes=np.zeros((2, 0)),
+        static_compliance=np.full((2, 2), 1e-12),
+        rigid_count=2,
+        rigid_axial=np.array([0.6, 0.8]) * axial,
+        dof_count=6,
+    )
+
+
+@pytest.mark.parametrize("guided", [False, True])
+def test_forces_along_the_axis_balance_along_the_axis(guided):
+    """Exact: Hooke's law; a body that can rotate as well rests where its axial forces balance."""
+    body = lever(2e-3, 0.3)
+    parts = {
+        "lever": FlexibleBody.of(body.along_axis() if guided else body),
+        "spring": Spring(stiffness=5e3, preload=0.0),
+        "push": ConstantForce(force=12.0),
+    }
+    found = start(parts, [["lever.aside", "spring.end"], ["lever.centre", "push.end"]])
+    assert found.displacement["lever.aside"] == pytest.approx(12.0 / 5e3, rel=1e-9)
+    assert abs(found.residual["lever"]) < 1e-9
+
+
+def test_a_guided_body_does_not_rotate():
+    """Exact: an eccentric force moves a body in a guide as if it acted at the centre of mass."""
+    body = lever(2e-3, 0.3)
+    push = {"push": ConstantForce(force=12.0)}
+    shares = []
+    for one in (body, body.along_axis()):
+        parts = {"lever": FlexibleBody.of(one)} | push
+        with pytest.warns(LooseBodyWarning):
+            moved = run(parts, [["lever.aside", "push.end"]], start="free", duration=1e-3)
+        way = moved.channels["lever.aside displacement"].values[-1]
+        shares.append(way / (0.5 * 12.0 / 2e-3 * moved.time[-1] ** 2))
+    assert shares == pytest.approx([1.0 + 0.3**2, 1.0], rel=1e-9)

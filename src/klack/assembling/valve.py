@@ -113,7 +113,7 @@ def _built(
     reduced = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("reduced", i / len(bodies))
-        reduced[name] = reduce_body(
+        whole = reduce_body(
             body,
             ports[name],
             modes=selection_of(case.reduction.choice(name)),
@@ -123,6 +123,7 @@ def _built(
             flexibility=flexibilities[name],
             shifts=case.reduction.shifts_of(name, case.reduction.correction),
         )
+        reduced[name] = whole.along_axis()
     progress("radiating surfaces", 0.0)
     structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
     spatial = None

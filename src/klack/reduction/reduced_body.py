@@ -1,6 +1,6 @@
 """An elastic body reduced to modal form: the object that every simulation works with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -145,6 +145,33 @@ class ReducedBody:
     def compliance_share(self) -> NDArray[np.float64]:
         """Share of the static compliance that the modes carry at each port, shape (n_ports,)."""
         return np.diag(self.modal_compliance) / np.diag(self.static_compliance)
+
+    def along_axis(self) -> Self:
+        """Return the body with no rigid motion but the shift along its axis, as in a guide.
+
+        Elastic modes stay as they are; a body that is held stays as it is.
+        """
+        r, size = self.rigid_count, float(np.linalg.norm(self.rigid_axial))
+        if r < 2 or size == 0.0:
+            return self
+        shift = self.rigid_axial / size
+
+        def kept(shapes: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.vstack([shift @ shapes[:r], shapes[r:]])
+
+        recovery = self.recovery
+        if recovery is not None:
+            recovery = replace(recovery, shapes=kept(recovery.shapes.T).T)
+        return replace(
+            self,
+            omega=self.omega[r - 1 :],
+            damping=self.damping[r - 1 :],
+            port_shapes=kept(self.port_shapes),
+            observer_shapes=kept(self.observer_shapes),
+            rigid_count=1,
+            rigid_axial=np.array([size]),
+            recovery=recovery,
+        )
 
     def port_index(self, name: str) -> int:
         """Column of a port.

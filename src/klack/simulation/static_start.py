@@ -1,6 +1,6 @@
 r"""Static equilibrium of bodies, pressures and flows at time zero.
 
-Unknown are the rigid coordinates :math:`z` of the bodies, the displacements :math:`y` of their
+Unknown are the axial coordinates :math:`z` of the free bodies, the displacements :math:`y` of their
 ports, the pressures :math:`p` that the case does not state, and the flows :math:`\dot m` of
 columns of fluid (lines, inertances):
 
@@ -36,6 +36,7 @@ from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import range_text, value_text
 from klack.network.rows import LimitRow
 from klack.network.travel import Travel
+from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import start_lines
 from klack.simulation.modal_step import ROW, ROW_Q
 from klack.simulation.network_arrays import (
@@ -92,7 +93,7 @@ _NEARLY = 1e-9  # the same where they come no closer
 class _State:
     """Unknowns, and what belongs to them."""
 
-    z: Vector  # rigid coordinates of all bodies
+    z: Vector  # axial coordinates of all free bodies
     y: Vector  # ports, the ground last
     p: Vector  # all nodes
     m: Vector  # columns
@@ -227,21 +228,23 @@ class _Balance:
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
         self.ports = count
-        rigid = [row.body.rigid_count for row in rows.bodies]
+        along = [_along(row.body) for row in rows.bodies]
+        rigid = [len(directions) for directions in along]
         self.of_body = np.repeat(np.arange(len(rigid)), rigid)
         self.shapes = np.zeros((sum(rigid), count))
         self.compliance = np.zeros((count, count))
         rests = [row.speed == 0.0 and b not in stuck for b, row in enumerate(rows.bodies)]
         self.moves = np.array(rests)[self.of_body]
         begin, mode = 0, 0
-        for row in rows.bodies:
+        self.along = along
+        for row, directions in zip(rows.bodies, along, strict=True):
             body, here = row.body, slice(begin, begin + len(row.ports))
             shapes = np.asarray(body.port_shapes)
             r = body.rigid_count
-            self.shapes[mode : mode + r, here] = shapes[:r]
+            self.shapes[mode : mode + len(directions), here] = directions @ shapes[:r]
             elastic = shapes[r:] / body.omega[r:, None]
             self.compliance[here, here] = elastic.T @ elastic
-            begin, mode = here.stop, mode + r
+            begin, mode = here.stop, mode + len(directions)
         self.body_of_port = np.repeat(
             np.arange(len(rows.bodies)), [len(b.ports) for b in rows.bodies]
         )
@@ -648,7 +651,7 @@ class _Balance:
         for b, row in enumerate(self.network.rows.bodies):
             mine = left[self.of_body == b]
             if mine.size:
-                result[row.component] = float(mine @ row.body.rigid_axial)
+                result[row.component] = float(mine @ (self.along[b] @ row.body.rigid_axial))
         return result
 
     def not_found(self, state: _State) -> ConvergenceError:
@@ -714,12 +717,13 @@ class _Balance:
             here = slice(begin, begin + len(body_row.ports))
             q = np.asarray(body.port_shapes) @ self.force[:-1][here]
             q[r:] /= body.omega[r:] ** 2
-            q[:r] = state.z[mode : mode + r]
+            directions = self.along[b]
+            q[:r] = state.z[mode : mode + len(directions)] @ directions
             for k in range(network.body_blocks[b], network.body_blocks[b + 1]):
                 part = q[ROW * (k - network.body_blocks[b]) :][:ROW]
                 place = bodies.start[k] + ROW * ROW_Q
                 bodies.laid_out[place : place + part.size] = part
-            begin, mode = here.stop, mode + r
+            begin, mode = here.stop, mode + len(directions)
 
     def _put_fluid(self, state: _State) -> None:
         network = self.network
@@ -812,6 +816,15 @@ class _Balance:
                     "pressure; give its 'pressure' if that differs."
                 )
         return tuple(told)
+
+
+def _along(body: ReducedBody) -> Matrix:
+    """Direction of the axial shift among the rigid modes, shape (1, rigid); (0, rigid) if held.
+
+    Bodies in three dimensions have six of them: forces along the axis balance along the axis.
+    """
+    size = float(np.linalg.norm(body.rigid_axial))
+    return np.atleast_2d(body.rigid_axial / size) if size > 0.0 else np.zeros((0, body.rigid_count))
 
 
 def _unheld(network: CompiledNetwork, bodies: list[int]) -> InputError:
