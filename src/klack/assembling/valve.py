@@ -110,7 +110,7 @@ def _built(
         name: build_stop(case, name, bodies, flexibilities, pools, progress) for name in case.stops
     }
     ports = {name: _ports(case, body, contacts) for name, body in bodies.items()}
-    reduced = {}
+    in_space, reduced = case.motion == "three-dimensional", {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("reduced", i / len(bodies))
         whole = reduce_body(
@@ -123,11 +123,11 @@ def _built(
             flexibility=flexibilities[name],
             shifts=case.reduction.shifts_of(name, case.reduction.correction),
         )
-        reduced[name] = whole.along_axis()
+        reduced[name] = whole if in_space else whole.along_axis()
     progress("radiating surfaces", 0.0)
     structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
     spatial = None
-    if case.motion == "three-dimensional":
+    if in_space:
         progress("contact points", 0.0)
         spatial = build_spatial(
             case, find_roles(case), bodies, flexibilities, pools, ports, contacts

@@ -1,11 +1,13 @@
 """Bodies of a running network that meet point by point, whoever moves them."""
 
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.simulation.network_arrays import Recording, Scratch
+from klack.simulation.network_result import StaticStart
 
 __all__ = ["MovingBodies"]
 
@@ -16,8 +18,11 @@ Changing = NDArray[np.generic]
 class MovingBodies(Protocol):
     """Bodies of one run; the network holds their modes whenever a record ends."""
 
-    def start(self, *, rest: bool) -> None:
-        """Place them, and bring them to rest under the forces of the network if asked to."""
+    def start(self, balance: Callable[[], StaticStart] | None) -> StaticStart | None:
+        """Place them, at rest under the forces of the network, which ``balance`` finds anew.
+
+        Without it they start as they are.  Returns the last balance found, None without any.
+        """
 
     def resume(self) -> None:
         """Go on from a stored state."""

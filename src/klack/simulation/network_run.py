@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from time import perf_counter
 from typing import Literal
 
@@ -46,12 +47,13 @@ from klack.simulation.network_result import (
     IncompleteRunError,
     NetworkResult,
     PressedFaces,
+    StaticStart,
     StepCounts,
 )
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.rubbing_step import slider_places
 from klack.simulation.spatial_motion import SpatialMotion
-from klack.simulation.static_start import start_at_rest
+from klack.simulation.static_start import RestState, begin_at_rest
 from klack.simulation.step_sizes import StepSizes, largest_divisor, step_sizes
 from klack.simulation.step_status import (
     STATUS_BRANCH,
@@ -163,15 +165,16 @@ def simulate_network(
     )
     clock = np.zeros(CLOCK, dtype=np.int64)
     clock[1] = -1
-    begun = None
+    begun, near = None, None
     if state is None and start == "rest":
-        begun = start_at_rest(network, step)
+        begun, near = begin_at_rest(network, step)
     if spatial is not None:
         network = replace(network, moving=spatial.of(network, sizes))
     if state is not None:
         _restore(network, clock, state)
     if network.moving is not None and state is None:
-        network.moving.start(rest=start == "rest")
+        balance = None if near is None else partial(_balance, network, step, near)
+        begun = network.moving.start(balance) or begun
     elif network.moving is not None:
         network.moving.resume()
     first_step, done_before = int(clock[0]), clock[2:].copy()
@@ -591,6 +594,10 @@ def _read_stores(network: CompiledNetwork) -> None:
 _IMPACTS = "impacts.unfinished"
 _SLIDERS = "sliders."
 _LAST = "record.last"
+
+
+def _balance(network: CompiledNetwork, step: float, near: RestState) -> StaticStart:
+    return begin_at_rest(network, step, near)[0]
 
 
 def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:

@@ -5,7 +5,7 @@ and guide act in the fine steps of :mod:`klack.transient.interface_kernel` where
 What the guess of the forces missed is repaired by superposition: see :class:`_Moving`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -26,6 +26,7 @@ from klack.simulation.network_arrays import (
     MISSED,
     NEAR,
     PORTS,
+    SEEN,
     WORK,
     Y0,
     Y1,
@@ -34,6 +35,7 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_network
+from klack.simulation.network_result import StaticStart
 from klack.simulation.network_run import everything, put_back
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
@@ -75,6 +77,8 @@ _FRESH = 0.04e-6  # gaps as good as new [m]
 _STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wrong by
 _SURE = 0.5  # share of the time in which no gap can close, since forces may change meanwhile
 _LONGEST = 16  # records of a flight at once
+_BALANCES = 6  # of elements and fluid with the points at the start
+_BALANCED = 1e-14  # [m]
 _STEADY = 0.04  # change of the force of a contact at rest in a step
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -193,33 +197,50 @@ class _Moving:
 
     # ------------------------------------------------------------------ start
 
-    def start(self, *, rest: bool) -> None:
-        """Place the needle, and let it settle under the forces of the network if asked to."""
+    def start(self, balance: Callable[[], StaticStart] | None) -> StaticStart | None:
+        """Place the needle, and let it settle under the forces of the network."""
         self.read()
-        placed, moving = self.coordinates(self.valve.placement), self.valve.velocity
-        self.q[: self.rigid_count] += placed
-        self.v[: self.rigid_count] += self.coordinates(moving)
+        self.q[: self.rigid_count] += self.coordinates(self.valve.placement)
+        self.v[: self.rigid_count] += self.coordinates(self.valve.velocity)
         self.take_gaps()
+        rests = balance is not None and not np.any(self.v)
+        begun = self._settle(balance) if balance is not None and rests else None
         self._silence_interfaces()
-        if rest:
-            settle_at_rest(
-                self.model,
-                self.state,
-                self.gap0,
-                self.bore,
-                self.P @ self.at[LAST : LAST + self.ports],
-                self.sizes.near * self.sizes.step,
-            )
+        if rests:
             self._begin_closed()
         else:
             shaft_pressed(self.bore, self.state)
         self.write()
-        self.at[Y0 : Y0 + self.ports] = self.P.T @ self.q
-        if not rest:
-            self.at[Y1 : Y1 + self.ports] = self.at[Y0 : Y0 + self.ports]
-            self.at[2 * PORTS : 2 * PORTS + self.ports] = self.at[Y0 : Y0 + self.ports]  # SEEN
+        here = slice(0, self.ports)
+        self.at[Y0:][here] = self.P.T @ self.q
+        if not rests:
+            self.at[Y1:][here] = self.at[SEEN:][here] = self.at[Y0:][here]
         self.valve.path.clear()
         self._tell_path(0)
+        return begun
+
+    def _settle(self, balance: Callable[[], StaticStart]) -> StaticStart | None:
+        """Rest on the contact points, and where elements and fluid balance there.
+
+        The points give another way than the law along the axis: its gaps are shifted by that.
+        """
+        begun, here = None, slice(0, self.ports)
+        gap0 = self.network.interfaces.gap0.copy()
+        needle = np.any(self.P[self.model.owner == 0] != 0.0, axis=0)
+        for _ in range(_BALANCES):
+            force = self.P @ self.at[LAST:][here]
+            settle_at_rest(self.model, self.state, self._gaps_now, self.bore, force)
+            moved = float(np.mean((self.P.T @ self.q - self.at[Y0:][here])[needle]))
+            if not np.any(self.state.lam) or abs(moved) < _BALANCED:
+                break
+            self.network.interfaces.gap0[self.order] -= self.side * moved
+            begun = balance()
+        self.network.interfaces.gap0[:] = gap0
+        return begun
+
+    def _gaps_now(self) -> Vector:
+        self.take_gaps()
+        return self.gap0
 
     def resume(self) -> None:
         """Go on from a stored state."""
