@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.simulation.network_arrays import Recording, Scratch
-from klack.simulation.network_result import StaticStart
+from klack.simulation.network_result import ChannelData, StaticStart
 
 __all__ = ["MovingBodies"]
 
@@ -57,4 +57,8 @@ class MovingBodies(Protocol):
 
     def gap(self) -> Vector:
         """Add this to a recorded gap to have the true one, of each interface [m]."""
+        ...
+
+    def channels(self, time: Vector) -> dict[str, ChannelData]:
+        """Quantities that no axial motion has, at these moments."""
         ...

@@ -213,6 +213,7 @@ def simulate_network(
     if network.moving is not None:
         for row, added in zip(rows.interfaces, network.moving.gap(), strict=True):
             channels[f"{row.component} gap"].values[:] += added
+        channels |= network.moving.channels(time.astype(float))
     result = NetworkResult(
         time=time.astype(float),
         channels=channels,

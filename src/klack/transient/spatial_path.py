@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
 __all__ = ["SpatialPath"]
 
@@ -25,6 +26,17 @@ class SpatialPath:
         while self._rows and self._rows[-1][0] >= time:
             self._rows.pop()
         self._rows.append((time, place, speed, np.linalg.norm(guide, axis=1)))
+
+    @property
+    def begun(self) -> bool:
+        """Whether it has a moment."""
+        return bool(self._rows)
+
+    def position_at(self, time: Vector) -> Vector:
+        """Position between the moments, shape (len(time), 6): cubic, with the velocities."""
+        if len(self._rows) < 2:
+            return np.repeat(self.position, len(time), axis=0)
+        return np.asarray(CubicHermiteSpline(self.time, self.position, self.velocity)(time))
 
     @property
     def time(self) -> Vector:

@@ -9,8 +9,9 @@ the elastic modes at rest, :math:`q_e = \Omega^{-2} (f_e + \Phi_e^T \lambda)`, c
 and the guide one such point more at each height, along its present normal.  The forces on the rigid
 coordinates balance in the end of proximal steps (R. T. Rockafellar, SIAM J. Control Optim. 14
 (1976) 877): :math:`z_{k+1} = z_k + \sigma (f_r + \Phi_r^T \lambda_{k+1})`, each of them one
-complementarity problem with :math:`C + \sigma \Phi_r \Phi_r^T`.  What nothing holds creeps; the
-rotation about the axis, which smooth faces of revolution do not hold, is left out.
+complementarity problem with :math:`C + \sigma \Phi_r \Phi_r^T`.  The rotation about the axis, which
+smooth faces of revolution do not hold, is left out.  A ball in its seat is free to tilt as well:
+there the facets of a mesh leave some 1e-5 of the force, and the needle creeps.
 """
 
 import warnings
@@ -28,10 +29,11 @@ __all__ = ["settle_at_rest", "shaft_pressed"]
 
 Vector = NDArray[np.float64]
 
-_SOFTER = 100.0  # a proximal step than the contact points
-_MOST = 300
+_SOFTER = 1e4  # a proximal step than the contact points
+_MOST = 40
 _FOUND = 1e-12  # of the force on the bodies
-_DOUBT = 1e-6
+_DOUBT = 1e-3
+_SLOW = 0.9  # no less of the force left than before: what is left moves the needle across
 
 
 def settle_at_rest(
@@ -61,7 +63,7 @@ def settle_at_rest(
     Warns
     -----
     AccuracyWarning
-        Where more than 1e-6 of the force is left.
+        Where more than 1e-3 of the force is left.
     """
     elastic = model.omega > 0.0
     soft = np.where(elastic, 1.0 / np.where(elastic, model.omega, 1.0) ** 2, 0.0)
@@ -73,7 +75,7 @@ def settle_at_rest(
     scale = float(np.linalg.norm(force)) or 1.0
     spin = _spin(model, rigid)
     force = force - spin * (spin @ force)
-    active, left = np.zeros(points + heights, dtype=bool), np.inf
+    active, left, before = np.zeros(points + heights, dtype=bool), np.inf, np.inf
     for _ in range(_MOST):
         rows, gap, local = _rows(model, state, bore, gaps())
         turned = rows @ (spin * (spin @ state.q))
@@ -86,8 +88,9 @@ def settle_at_rest(
         push = rows.T @ lam
         state.q[:] = given + answer * push
         left = float(np.linalg.norm((force + push)[rigid])) / scale
-        if left < _FOUND:
+        if left < _FOUND or (left < _DOUBT and left > _SLOW * before):
             break
+        before = left
     state.v[:] = 0.0
     state.lam[:] = lam[:points]
     carrying = np.flatnonzero(state.lam > 0.0)

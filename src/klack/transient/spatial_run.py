@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from klack.contact.step_constants import NO_LAW
 from klack.errors import ConvergenceError, InputError
@@ -35,7 +36,7 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_network
-from klack.simulation.network_result import StaticStart
+from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import everything, put_back
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
@@ -78,7 +79,7 @@ _STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wr
 _SURE = 0.5  # share of the time in which no gap can close, since forces may change meanwhile
 _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
-_BALANCED = 1e-14  # [m]
+_BALANCED = 1e-12  # [m]
 _STEADY = 0.04  # change of the force of a contact at rest in a step
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -204,7 +205,10 @@ class _Moving:
         self.v[: self.rigid_count] += self.coordinates(self.valve.velocity)
         self.take_gaps()
         rests = balance is not None and not np.any(self.v)
-        begun = self._settle(balance) if balance is not None and rests else None
+        begun = None
+        if balance is not None and rests:
+            with threadpool_limits(limits=1, user_api="blas"):
+                begun = self._settle(balance)
         self._silence_interfaces()
         if rests:
             self._begin_closed()
@@ -216,7 +220,6 @@ class _Moving:
         if not rests:
             self.at[Y1:][here] = self.at[SEEN:][here] = self.at[Y0:][here]
         self.valve.path.clear()
-        self._tell_path(0)
         return begun
 
     def _settle(self, balance: Callable[[], StaticStart]) -> StaticStart | None:
@@ -277,6 +280,22 @@ class _Moving:
         """Add this to a recorded gap to have the true one, of each interface [m]."""
         return np.full(len(self.order), -_AWAY)
 
+    def channels(self, time: Vector) -> dict[str, ChannelData]:
+        """Way of the axis of the needle across itself, and the forces of the guide."""
+        path, needle = self.valve.path, self.valve.components[0]
+        at = path.position_at(time)
+        arm = float(self.valve.arms[np.argmax(self.side), 2])  # of its lower end
+        slope = np.column_stack([at[:, 4], -at[:, 3]])
+        place = at[:, :2] + arm * slope
+        told = {}
+        for i, name in enumerate(("x", "y")):
+            told[f"{needle} {name}"] = ChannelData(unit="m", values=place[:, i])
+            told[f"{needle} tilt {name}"] = ChannelData(unit="rad", values=slope[:, i])
+        for k in range(len(self.bore.clearance)):
+            force = np.interp(time, path.time, path.guide_force[:, k])
+            told[f"guide {k + 1} force"] = ChannelData(unit="N", values=force)
+        return told
+
     def changing(self) -> dict[str, NDArray[np.generic]]:
         """All arrays that a step changes and the next one begins with."""
         return {
@@ -329,10 +348,25 @@ class _Moving:
         report: Vector,
     ) -> int:
         """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
-        done = 0
         if not looks:
             return self._loop(recording, scratch, clock, block, look, 0, 0, report)
         self.read()
+        if not self.valve.path.begun:
+            self._tell_path(int(clock[0]))
+        with threadpool_limits(limits=1, user_api="blas"):
+            return self._looks(recording, scratch, clock, block, look, looks, report)
+
+    def _looks(
+        self,
+        recording: Recording,
+        scratch: Scratch,
+        clock: Index,
+        block: int,
+        look: int,
+        looks: int,
+        report: Vector,
+    ) -> int:
+        done = 0
         self.fresh = True
         span = look * block * self.sizes.step
         while done < looks:
@@ -625,11 +659,12 @@ class _Moving:
         network, state = self.network, self.network.interface_state
         first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
         now = round(t / self.sizes.step)
+        faces, y = network.interfaces, np.append(self.P.T @ self.q, 0.0)
         for c, row in enumerate(self.order):
             a, b = self.model.contacts[c][1:]
             smallest = float(np.min(self.gap0[a:b] + self.model.traces[a:b] @ self.q))
             lam = self.state.lam[a:b]
-            state.gap[row] = _AWAY + max(smallest, 0.0)
+            state.gap[row] = faces.gap0[row] + y[faces.upper[row]] - y[faces.lower[row]]
             if not points:
                 continue
             force = np.where(self.side[c] * record.force > 0.0, np.abs(record.force), 0.0)
