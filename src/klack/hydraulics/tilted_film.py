@@ -16,14 +16,24 @@ tension (an obstacle problem for the mean pressure of every sector) it is ``P^T 
 
 from dataclasses import dataclass
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import njit
 from klack.errors import InputError, require_nonnegative, require_positive
+from klack.hydraulics.ring_system import eliminate_ring, solve_ring
 
-__all__ = ["SectorFilm", "sector_film", "sector_forces", "sector_step"]
+__all__ = [
+    "Land",
+    "SectorFilm",
+    "film_pressure",
+    "land_of",
+    "sector_film",
+    "sector_forces",
+    "sector_step",
+]
 
 Array = NDArray[np.float64]
 
@@ -282,9 +292,11 @@ def _solved(
     tension: float,
     rate: float,
 ) -> tuple[Array, Array]:
-    force, slopes = _film(
-        film.between, film.along, film.around, film.load, film.area, film.shared,
-        mobility, np.ascontiguousarray(closing, dtype=float), change, *edges, tension, rate,
+    heights = film.sectors * film.circles
+    ways = np.eye(heights) if rate else np.zeros((heights, 0))
+    force, slopes = film_pressure(
+        land_of(film), mobility, np.ascontiguousarray(closing, dtype=float), change, *edges,
+        tension, rate, ways,
     )  # fmt: skip
     return np.asarray(force), np.asarray(slopes)
 
@@ -300,14 +312,25 @@ def _require_heights(where: str, film: SectorFilm, heights: Array) -> None:
     require_positive(where, float(np.min(heights)), "m")
 
 
+class Land(NamedTuple):
+    """Arrays of a :class:`SectorFilm` that its pressure is made of."""
+
+    between: Array
+    along: Array
+    around: Array
+    load: Array
+    area: Array
+    shared: int
+
+
+def land_of(film: SectorFilm) -> Land:
+    """Return the arrays of a film."""
+    return Land(film.between, film.along, film.around, film.load, film.area, film.shared)
+
+
 @njit
-def _film(
-    between: Array,
-    along: Array,
-    around: Array,
-    load: Array,
-    area: Array,
-    shared: int,
+def film_pressure(
+    land: Land,
     mobility: Array,
     closing: Array,
     change: Array,
@@ -315,89 +338,202 @@ def _film(
     still: Array,
     tension: float,
     rate: float,
+    ways: Array,
 ) -> tuple[Array, Array]:
-    """Forces on the circles; their slopes too where ``rate`` (1 over the step) is not 0.
+    """Forces on the circles, and how they change along some ways of the heights.
 
-    ``mobility`` at the points of all sectors and ``change``, its slope with the height there;
-    ``head`` and ``still`` belong to the pressures at the edges.
+    Parameters
+    ----------
+    land : Land
+    mobility, change : array (S, G) [m^3/(Pa s)]
+        ``h^3/12 mu`` at the points of all sectors, and its slope with the height there.
+    closing : array (S, N) [m/s]
+    head, still : array (G, Q) [Pa m^2], (N,) [N]
+        Of the pressures at the edges.
+    tension : float [Pa]
+    rate : float [1/s]
+        How the closing falls with the heights: 1 over a step.
+    ways : array (S N, w)
+
+    Returns
+    -------
+    forces : array (S, N) [N]
+    slopes : array (S N, w)
     """
+    between, along, around, load, area, shared = land
     S, G = mobility.shape
     N, Q = between.shape[1], load.shape[1]
     own = Q - shared
-    n = shared + S * own
-    K, push, L = np.zeros((n, n)), np.zeros(n), np.zeros((S * N, n))
-    at = np.empty((S, Q), dtype=np.int64)  # places of the amplitudes of a sector
-    for k in range(S):
-        for a in range(Q):
-            at[k, a] = a if a < shared else shared + k * own + a - shared
+    L = np.zeros((N, Q))
+    for p in range(G):
+        for j in range(N):
+            for a in range(Q):
+                L[j, a] += between[p, j] * load[p, a]
+    blocks, links = np.zeros((S, own, own)), np.zeros((S, own, own))
+    border, corner = np.zeros((S, own, shared)), np.zeros((shared, shared))
+    x, y = np.zeros((S, own, 1)), np.zeros((shared, 1))
     for k in range(S):
         after = (k + 1) % S
         for p in range(G):
             m, m_after = mobility[k, p], mobility[after, p]
             across = 2.0 * m * m_after / (m + m_after)  # half a sector of each, in series
             for a in range(Q):
-                i = at[k, a]
-                for j in range(N):
-                    L[k * N + j, i] += between[p, j] * load[p, a]
-                push[i] -= m * head[p, a]
                 for b in range(Q):
-                    K[i, at[k, b]] += m * along[p, a, b]
+                    value = m * along[p, a, b]
                     if a >= shared and b >= shared:
                         flow = across * around[p, a, b]
-                        K[i, at[k, b]] += flow
-                        K[at[after, a], at[after, b]] += flow
-                        K[i, at[after, b]] -= flow
-                        K[at[after, a], at[k, b]] -= flow
-    LT = L.T.copy()
-    push += LT @ closing.copy().reshape(S * N)
-    P = np.linalg.solve(K, push)
+                        blocks[k, a - shared, b - shared] += value + flow
+                        blocks[after, a - shared, b - shared] += flow
+                        links[k, a - shared, b - shared] -= flow
+                    elif a >= shared:
+                        border[k, a - shared, b] += value
+                    elif b < shared:
+                        corner[a, b] += value
+                drive = -m * head[p, a]
+                if a >= shared:
+                    x[k, a - shared, 0] += drive
+                else:
+                    y[a, 0] += drive
+        for a in range(Q):
+            drive = 0.0
+            for j in range(N):
+                drive += L[j, a] * closing[k, j]
+            if a >= shared:
+                x[k, a - shared, 0] += drive
+            else:
+                y[a, 0] += drive
+    ring = eliminate_ring(blocks, links, border, corner)
+    solve_ring(ring, links, x, y)
     held = np.zeros(S, dtype=np.bool_)
-    C = np.zeros((S, n))
+    mean = np.zeros(Q)  # of the amplitudes in the force on a sector
+    for j in range(N):
+        for a in range(Q):
+            mean[a] += L[j, a]
     if tension < np.inf:
         room = np.empty(S)
+        base = tension * np.sum(area) + np.sum(still)
         for k in range(S):
-            for j in range(N):
-                C[k] += L[k * N + j]
-            room[k] = C[k] @ P + tension * np.sum(area) + np.sum(still)
+            room[k] = base
+            for a in range(Q):
+                room[k] += mean[a] * (x[k, a - shared, 0] if a >= shared else y[a, 0])
         if np.min(room) < 0.0:
-            Y = np.linalg.solve(K, C.T.copy())
-            lift, held = _obstacle(C @ Y, room)
-            P += Y @ lift
-    force = (L @ P).reshape(S, N) + still
-    slopes = np.zeros((S * N, S * N))
-    if rate == 0.0:
-        return force, slopes
-    R = -rate * LT
+            every = np.arange(S)
+            X, Y = _lifted(ring, links, mean, shared, every)
+            W = np.zeros((S, S))
+            for k in range(S):
+                for i in range(S):
+                    for a in range(Q):
+                        W[k, i] += mean[a] * (X[k, a - shared, i] if a >= shared else Y[a, i])
+            lift, held = _obstacle(W, room)
+            for i in range(S):
+                if lift[i] != 0.0:
+                    for k in range(S):
+                        for a in range(own):
+                            x[k, a, 0] += X[k, a, i] * lift[i]
+                    for a in range(shared):
+                        y[a, 0] += Y[a, i] * lift[i]
+    P = np.empty((S, Q))
+    force = np.empty((S, N))
     for k in range(S):
+        for a in range(Q):
+            P[k, a] = x[k, a - shared, 0] if a >= shared else y[a, 0]
+        for j in range(N):
+            force[k, j] = still[j]
+            for a in range(Q):
+                force[k, j] += L[j, a] * P[k, a]
+    count = ways.shape[1]
+    slopes = np.zeros((S * N, count))
+    if count == 0:
+        return force, slopes
+    X, Y = np.zeros((S, own, count)), np.zeros((shared, count))
+    moved = np.empty(count)
+    for k in range(S):
+        for d in range(count):
+            for a in range(Q):
+                drive = 0.0
+                for j in range(N):
+                    drive -= rate * L[j, a] * ways[k * N + j, d]
+                if a >= shared:
+                    X[k, a - shared, d] += drive
+                else:
+                    Y[a, d] += drive
         for p in range(G):
             m = mobility[k, p]
+            for d in range(count):
+                moved[d] = 0.0
+                for j in range(N):
+                    moved[d] += change[k, p] * between[p, j] * ways[k * N + j, d]
             for a in range(Q):
                 drive = head[p, a]
                 for b in range(Q):
-                    drive += along[p, a, b] * P[at[k, b]]
-                for j in range(N):
-                    R[at[k, a], k * N + j] -= change[k, p] * between[p, j] * drive
-            for other in ((k - 1) % S, (k + 1) % S):
+                    drive += along[p, a, b] * P[k, b]
+                for d in range(count):
+                    if a >= shared:
+                        X[k, a - shared, d] -= moved[d] * drive
+                    else:
+                        Y[a, d] -= moved[d] * drive
+            for side in range(2):
+                other = (k - 1) % S if side == 0 else (k + 1) % S
                 o = mobility[other, p]
-                share = 2.0 * (o / (m + o)) ** 2 * change[k, p]
+                share = 2.0 * (o / (m + o)) ** 2
                 for a in range(shared, Q):
                     drive = 0.0
                     for b in range(shared, Q):
-                        drive += around[p, a, b] * (P[at[k, b]] - P[at[other, b]])
-                    for j in range(N):
-                        moved = share * between[p, j] * drive
-                        R[at[k, a], k * N + j] -= moved
-                        R[at[other, a], k * N + j] += moved
-    X = np.linalg.solve(K, R)
+                        drive += around[p, a, b] * (P[k, b] - P[other, b])
+                    for d in range(count):
+                        X[k, a - shared, d] -= share * moved[d] * drive
+                        X[other, a - shared, d] += share * moved[d] * drive
+    solve_ring(ring, links, X, Y)
     kept = np.flatnonzero(held)
     if kept.size > 0:
-        T = np.empty((kept.size, n))
-        for row in range(kept.size):
-            T[row] = C[kept[row]]
-        Y = np.linalg.solve(K, T.T.copy())
-        X -= Y @ np.linalg.solve(T @ Y, T @ X)
-    slopes[:, :] = L @ X
+        raised, raised_shared = _lifted(ring, links, mean, shared, kept)
+        n = kept.size
+        A, b = np.zeros((n, n)), np.zeros((n, count))
+        for row in range(n):
+            k = kept[row]
+            for a in range(Q):
+                for column in range(n):
+                    A[row, column] += mean[a] * (
+                        raised[k, a - shared, column] if a >= shared else raised_shared[a, column]
+                    )
+                for d in range(count):
+                    b[row, d] += mean[a] * (X[k, a - shared, d] if a >= shared else Y[a, d])
+        taken = np.linalg.solve(A, b)
+        for row in range(n):
+            for d in range(count):
+                for k in range(S):
+                    for a in range(own):
+                        X[k, a, d] -= raised[k, a, row] * taken[row, d]
+                for a in range(shared):
+                    Y[a, d] -= raised_shared[a, row] * taken[row, d]
+    for k in range(S):
+        for j in range(N):
+            for d in range(count):
+                for a in range(Q):
+                    slopes[k * N + j, d] += L[j, a] * (
+                        X[k, a - shared, d] if a >= shared else Y[a, d]
+                    )
     return force, slopes
+
+
+@njit
+def _lifted(
+    ring: tuple[Array, Array, Array, Array, Array],
+    links: Array,
+    mean: Array,
+    shared: int,
+    sectors: NDArray[np.int64],
+) -> tuple[Array, Array]:
+    """Amplitudes by a unit of lift in each of these sectors."""
+    S, own = links.shape[0], links.shape[1]
+    X, Y = np.zeros((S, own, sectors.size)), np.zeros((shared, sectors.size))
+    for column in range(sectors.size):
+        for a in range(own):
+            X[sectors[column], a, column] = mean[a + shared]
+        for a in range(shared):
+            Y[a, column] = mean[a]
+    solve_ring(ring, links, X, Y)
+    return X, Y
 
 
 @njit
