@@ -12,6 +12,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
 from klack.assembling.off_axis import off_axis_space, touch_height
 from klack.assembling.stops import StopContact
+from klack.assembling.tilting_land import tilting_film
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
@@ -147,6 +148,11 @@ def build_spatial(
             tuple(meeting.upper_moves for meeting in meetings),
         ),
         placement=rigid_placement(*placement, *about),
+        films=tuple(
+            tilting_film(meeting.name, film, meeting.space)
+            for meeting in meetings
+            if (film := getattr(parts[meeting.name], "film", None)) is not None
+        ),
     )
 
 

@@ -8,7 +8,7 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 from klack.network.component import Component
 
-__all__ = ["check_motion", "require_axial", "require_dry_faces", "with_films"]
+__all__ = ["check_motion", "require_axial", "require_bodies"]
 
 _MOVES = ("rigid-mass",)
 _FRICTION = ("guide-friction",)
@@ -165,30 +165,17 @@ def _check_placement(case: ValveSections) -> None:
         )
 
 
-def with_films(case: ValveSections) -> tuple[str, ...]:
-    """End stops with a squeeze film."""
-    return tuple(
-        name
-        for name, part in case.network.components.items()
-        if part.type == END_STOP and getattr(part, "film", None) is not None
-    )
-
-
-def require_dry_faces(case: ValveSections, variants: tuple[str, ...], where: str) -> None:
+def require_bodies(case: ValveSections, variants: tuple[str, ...], where: str) -> None:
     """Raise :class:`InputError` for variants that a motion in space does not have."""
     if case.motion == "axial":
         return
-    films = with_films(case)
     for variant in variants:
-        if variant.endswith("lumped") or (films and not variant.startswith("dry")):
-            what = "rigid bodies on a spring" if variant.endswith("lumped") else ""
+        if variant.endswith("lumped"):
             raise InputError(
                 f"{where}: variant",
-                got=f"'{variant}' with motion: three-dimensional, "
-                + (what or f"and a squeeze film at '{films[0]}'"),
-                expected="dry, or wet without squeeze films at the stops",
-                hint="squeeze films between parallel faces belong to motion: axial; leave 'film' "
-                "out, or run the variant dry.",
+                got=f"'{variant}' with motion: three-dimensional, and rigid bodies on a spring",
+                expected="dry or wet",
+                hint="rigid bodies on a spring move along the axis: use motion: axial for them.",
             )
 
 

@@ -9,7 +9,7 @@ from pydantic import model_validator
 from klack.case.free_parameters import free_parameters
 from klack.case.noise_consistency import check_noise
 from klack.case.reader import Lines
-from klack.case.spatial_consistency import require_dry_faces
+from klack.case.spatial_consistency import require_bodies
 from klack.case.valve_consistency import check_valve
 from klack.case.valve_sections import ValveSections
 from klack.case.variants import VARIANTS, Variant
@@ -70,7 +70,7 @@ class ValveCase(ValveSections):
                     expected=f"its stiffness, because the variant '{variant}' is asked for",
                     hint="add 'lumped: {stiffness: 1e9 N/m}'.",
                 )
-        require_dry_faces(self, variants, str(self.path or "case"))
+        require_bodies(self, variants, str(self.path or "case"))
         return tuple(v for v in VARIANTS if v in variants)
 
     def one_variant(self, name: str | None = None) -> Variant:

@@ -108,6 +108,13 @@ class Film(Section):
         default=None, description="Absolute; the vapour pressure if absent, negative for tension."
     )
 
+    sectors: int = Field(
+        default=36,
+        ge=8,
+        le=360,
+        description="Into which the land is cut round its circumference where it can tilt.",
+    )
+
     @model_validator(mode="after")
     def _cut_off_above_roughness(self) -> Self:
         if self.roughness and self.cut_off and self.cut_off < _LOWEST_HEIGHTS * self.roughness:

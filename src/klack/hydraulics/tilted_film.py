@@ -488,7 +488,7 @@ def film_pressure(
     if kept.size > 0:
         raised, raised_shared = _lifted(ring, links, mean, shared, kept)
         n = kept.size
-        A, b = np.zeros((n, n)), np.zeros((n, count))
+        A, right = np.zeros((n, n)), np.zeros((n, count))
         for row in range(n):
             k = kept[row]
             for a in range(Q):
@@ -497,8 +497,8 @@ def film_pressure(
                         raised[k, a - shared, column] if a >= shared else raised_shared[a, column]
                     )
                 for d in range(count):
-                    b[row, d] += mean[a] * (X[k, a - shared, d] if a >= shared else Y[a, d])
-        taken = np.linalg.solve(A, b)
+                    right[row, d] += mean[a] * (X[k, a - shared, d] if a >= shared else Y[a, d])
+        taken = np.linalg.solve(A, right)
         for row in range(n):
             for d in range(count):
                 for k in range(S):

@@ -21,6 +21,7 @@ __all__ = [
     "Bore",
     "Closed",
     "ContactPoints",
+    "Films",
     "Limit",
     "Modes",
     "Outside",
@@ -60,6 +61,7 @@ class Modes(NamedTuple):
     loss: Matrix  # (6, M) Q11, Q12, Q22, L1, L2, S of the damping; (0, M): undamped
     push: Vector  # (M,) modal force of 1 N along +z on the moving body, spread over its mass
     drift: Matrix  # (bodies, M) centres of mass along z
+    step: float  # [s]
 
 
 class Outside(NamedTuple):
@@ -134,6 +136,38 @@ class Bore(NamedTuple):
         return cls(
             *(across, along, turn, np.zeros((0, 2)), empty, empty),
             *(np.zeros((0, 2, 2)), empty, empty),
+        )
+
+
+class Films(NamedTuple):
+    """Films between faces: heights are lift + r (tilt_x cos + tilt_y sin) + what roughness leaves.
+
+    Lands of several films lie one behind the other in ``land``:
+    see :func:`klack.transient.tilting_films.land_at`.
+    """
+
+    rows: Cube  # (k, 3, M) lift and tilts per modal coordinate [-], [1/m]
+    offset: Matrix  # (k, 3) [m], [-] the same at q = 0
+    lowest: Vector  # (k,) [m] height that roughness leaves
+    reach: Vector  # (k,) [m] largest radius
+    viscosity: Vector  # (k,) [Pa s]
+    tension: Vector  # (k,) [Pa] largest mean one of a sector; [N] of a film without a land
+    shear: Vector  # (k,) [N s] force over closing speed, times the height
+    axial: Vector  # (k,) [-] axial force per force along the lift
+    arms: Cube  # (k, n, 3) lift and tilts per gap of a contact point: force and moments per force
+    compliance: Cube  # (k, 3, 3) of the bulk under film and contact, in series with both
+    sizes: NDArray[np.int64]  # (k, 5) sectors, circles, points, functions, shared ones
+    start: NDArray[np.int64]  # (k,) in ``land``
+    land: Vector
+
+    @classmethod
+    def none(cls, modes: int) -> Self:
+        """Return no film."""
+        nothing, numbers = np.zeros(0), np.zeros(0, dtype=np.int64)
+        return cls(
+            *(np.zeros((0, 3, modes)), np.zeros((0, 3)), nothing, nothing, nothing, nothing),
+            *(nothing, nothing, np.zeros((0, 0, 3)), np.zeros((0, 3, 3))),
+            *(np.zeros((0, 5), dtype=np.int64), numbers, nothing),
         )
 
 
@@ -241,11 +275,19 @@ class State(NamedTuple):
     worn: Worn
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
+    films: Matrix  # (f, 7) force and moments of the last step, of the one before, energy lost
     books: Vector  # sums, see ``DAMPING`` and the following names
 
     @classmethod
     def still(
-        cls, modes: int, points: int, heights: int, ways: int = 0, *, yields: bool = False
+        cls,
+        modes: int,
+        points: int,
+        heights: int,
+        ways: int = 0,
+        *,
+        yields: bool = False,
+        films: int = 0,
     ) -> Self:
         """Return a state of rest at q = 0, of faces as made."""
         return cls(
@@ -257,6 +299,7 @@ class State(NamedTuple):
             Worn.none(points if yields else 0),
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
+            np.zeros((films, 7)),
             np.zeros(_BOOKS),
         )
 
@@ -272,10 +315,18 @@ class Record(NamedTuple):
     pressed: Vector  # [N] the part of ``force`` that is not friction; (0,) without friction
     across: NDArray[np.float32]  # (steps, ways n) [N] mean friction of every point, or (0, 0)
     doing: NDArray[np.int8]  # (steps, n) open, stuck or slipping at the end, or (0, 0)
+    film: Matrix  # (steps, f) [N] mean axial force of each film
 
     @classmethod
     def empty(
-        cls, steps: int, bodies: int, points: int, ways: int = 0, *, keep_points: bool
+        cls,
+        steps: int,
+        bodies: int,
+        points: int,
+        ways: int = 0,
+        *,
+        keep_points: bool,
+        films: int = 0,
     ) -> Self:
         """Return room for so many steps."""
         force, gap, outside = np.zeros((3, steps))
@@ -289,4 +340,5 @@ class Record(NamedTuple):
             np.zeros(steps if ways else 0),
             np.zeros((kept if ways else 0, ways * points), dtype=np.float32),
             np.zeros((kept if ways else 0, points if ways else 0), dtype=np.int8),
+            np.zeros((steps, films)),
         )

@@ -55,6 +55,7 @@ from klack.transient.interface_arrays import (
     WORK,
     Bore,
     ContactPoints,
+    Films,
     Modes,
     Outside,
     Record,
@@ -68,6 +69,7 @@ from klack.transient.interface_friction import (
     rub,
     tell_friction,
 )
+from klack.transient.tilting_films import bend_faces, bulk_work, count_squeeze, squeeze
 from klack.transient.yielding_points import let_yield, solve_yielding
 
 __all__ = [
@@ -579,6 +581,7 @@ def march(
     outside: Outside,
     points: ContactPoints,
     bore: Bore,
+    films: Films,
     state: State,
     record: Record,
 ) -> tuple[int, int]:
@@ -589,7 +592,7 @@ def march(
     steps : int
     wait : int
         Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
-    modes, outside, points, bore, state
+    modes, outside, points, bore, films, state
         See :mod:`klack.transient.interface_arrays`.
     record : Record
         Out, for at least ``steps`` steps.
@@ -606,6 +609,8 @@ def march(
     diagonal = 0.0
     for k in range(n):
         diagonal += points.A[k, k] / n
+    for k in range(len(films.lowest)):
+        bend_faces(films, k, state.films[k, :3], points.gap)
     potential = _potential(points, state)
     smallest = 0.0  # gap of the step before
     for taken in range(steps):
@@ -619,6 +624,11 @@ def march(
         rubs_guide = begin_rub(bore, state.guide_force, step.normal, guide)
         if rubs_guide:
             axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
+        for k in range(len(films.lowest)):
+            if not squeeze(films, k, modes, state, step.q, step.kick):
+                return taken, FAILED
+            _add(step, modes, 1.0)
+            bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
         yielded = 0.0
@@ -677,6 +687,8 @@ def march(
                 if yields:
                     yielded = let_yield(points.limit, state.worn, step.lam, points.gap)
                     books[PLASTIC] += yielded
+                for k in range(len(films.lowest)):
+                    yielded += bulk_work(films, k, state, step.lam)
                 least = _close(points, state, step)
                 answer += _hold(step, modes, share)
                 _add(step, modes, 1.0)
@@ -699,6 +711,9 @@ def march(
             )
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
+        for k in range(len(films.lowest)):
+            count_squeeze(films, k, state, step.q, step.lam)
+            record.film[taken, k] = films.axial[k] * state.films[k, 0]
         for k in range(len(guide.most)):
             braking += guide.force[k, 0]
         mean_gap = 0.5 * (least + smallest) if taken else least
@@ -706,4 +721,6 @@ def march(
         smallest = least
         if wait and books[OPEN_STEPS] > wait:
             return taken + 1, OPEN
+    for k in range(len(films.lowest)):
+        bend_faces(films, k, -state.films[k, :3], points.gap)
     return steps, FINISHED

@@ -37,6 +37,7 @@ from klack.transient.interface_arrays import (
     ActiveSet,
     Bore,
     ContactPoints,
+    Films,
     Limit,
     Modes,
     Outside,
@@ -223,7 +224,7 @@ def modes_of_step(model: InterfaceModel, step: float) -> Modes:
         L = damping_loss(model.omega, model.damping, step)
         loss = np.array([L.Q11, L.Q12, L.Q22, L.L1, L.L2, L.S])
     push = np.ascontiguousarray(model.rigid[2])
-    return Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, loss, push, model.drift)
+    return Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, loss, push, model.drift, step)
 
 
 class _Segment:
@@ -272,7 +273,7 @@ class _Run:
         self.clearance = max(
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
-        self.bore = bore_arrays(guide, M)
+        self.bore, self.films = bore_arrays(guide, M), Films.none(M)
         yields = model.limit is not None
         self.state = State.still(M, n, len(self.bore.clearance), model.ways, yields=yields)
         if worn is not None and yields:
@@ -517,7 +518,9 @@ class _Run:
             steps, len(self.model.bodies), n, ways, keep_points=self.points and n > 0
         )
         outside = Outside(self.constant, self.spring)
-        taken, status = march(steps, wait, modes, outside, points, self.bore, state, record)
+        taken, status = march(
+            steps, wait, modes, outside, points, self.bore, self.films, state, record
+        )
         return taken, status, record
 
     # ------------------------------------------------------------------ records

@@ -67,6 +67,8 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
 from klack.transient.spatial_path import SpatialPath
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
+from klack.transient.tilting_film import TiltingFilm, film_arrays
+from klack.transient.tilting_films import bend_faces, film_state, film_strain
 
 __all__ = ["SpatialValve"]
 
@@ -80,6 +82,7 @@ _SURE = 0.5  # share of the time in which no gap can close, since forces may cha
 _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
 _BALANCED = 1e-12  # [m]
+_FILM_SHARE = 0.05  # of the height of a film that a step without contact may change
 _STEADY = 0.04  # change of the force of a contact at rest in a step
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -107,6 +110,8 @@ class SpatialValve:
         the displacement along the axis that the network has.
     velocity : array, shape (6,) [m/s], [rad/s]
         At the start, beside what the network has.
+    films : tuple of TiltingFilm
+        Lands of squeeze films, for the stops that have one in the network.
     path : SpatialPath
         Filled while it runs.
     """
@@ -119,6 +124,7 @@ class SpatialValve:
     gaps: Gaps | None = None
     placement: Vector = field(default_factory=lambda: np.zeros(6))
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
+    films: tuple[TiltingFilm, ...] = ()
     path: SpatialPath = field(default_factory=SpatialPath)
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
@@ -176,7 +182,14 @@ class _Moving:
         self.resting = contact_points(model, self.whole.B1, sizes.coarse * h)
         self.nothing = ContactPoints.none(model.mode_count)
         self.bore = bore_arrays(valve.guide, model.mode_count)
-        self.state = State.still(model.mode_count, model.count, len(self.bore.clearance))
+        wet = {row.component: row.film for row in network.rows.interfaces if row.film is not None}
+        self.squeezed = [film for film in valve.films if film.stop in wet]
+        series = {row.component: row.series_compliance for row in network.rows.interfaces}
+        self.films = film_arrays(model, self.squeezed, wet, series)
+        self.state = State.still(
+            model.mode_count, model.count, len(self.bore.clearance), films=len(self.squeezed)
+        )
+        self.coarser = {1: self.fine}  # modes over so many fine steps
         self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
         self.apart = self.state._replace(
             lam=np.zeros(0), contact=ActiveSet.none(0), rubbing=Rubbing.none(0, 0)
@@ -301,6 +314,7 @@ class _Moving:
         return {
             "forces": self.state.lam,
             "guide": self.state.guide_force,
+            "films": self.state.films,
             "carried": self.state.carried,
             "books": self.books,
             "gaps": self.gap0,
@@ -313,12 +327,16 @@ class _Moving:
     def stores(self) -> dict[str, float]:
         """Energies [J] that contacts and guide hold."""
         self.read()
-        held = {}
+        held, bent = {}, self.gap0.copy()
+        for k in range(len(self.squeezed)):
+            bend_faces(self.films, k, self.state.films[k, :3], bent)
         for stop, (_, a, b) in zip(self.valve.stops, self.model.contacts, strict=True):
-            depth = self.gap0[a:b] + self.model.traces[a:b] @ self.q
+            depth = bent[a:b] + self.model.traces[a:b] @ self.q
             held[f"{stop} contact"] = float(-0.5 * self.state.lam[a:b] @ depth)
         if len(self.bore.clearance):
             held["guide strain"] = float(self.books[GUIDE_STRAIN])
+        for k, film in enumerate(self.squeezed):
+            held[f"{film.stop} under its film"] = film_strain(self.films, k, self.state)
         return held
 
     def losses(self) -> dict[str, float]:
@@ -328,12 +346,15 @@ class _Moving:
             lost["bodies damping"] = float(self.books[DAMPING] + self.flags[1])
         if len(self.bore.clearance):
             lost["guide friction"] = float(self.books[GUIDE])
+        for k, film in enumerate(self.squeezed):
+            lost[f"{film.stop} film"] = float(self.state.films[k, 6])
         return lost
 
     def forget_losses(self) -> None:
         """Begin a new energy balance."""
         self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
         self.flags[1] = 0.0
+        self.state.films[:, 6] = 0.0
 
     # ------------------------------------------------------------------ motion
 
@@ -402,6 +423,8 @@ class _Moving:
             self.take_gaps(careful=True)
             safe = self._safe(horizon, self._stale())
         fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
+        if self.squeezed:  # a film acts wherever the needle is
+            fly = 0
         while fly and not self._unguided(fly * span):
             fly //= 2
         return fly, safe * _SURE < span
@@ -525,7 +548,7 @@ class _Moving:
         begin_step(steps, steps / last, t, H, self.fresh, arrays, scratch)
         self.fresh = False
         rest = level == COARSE
-        count, modes = (1, self.whole) if rest else (steps, self.fine)
+        count, modes = (1, self.whole) if rest else self._parts(steps, H, points)
         kept = self._keep()
         at, here = self.at, self.ports
         self.network.interface_state.far[:] = 0.0
@@ -564,6 +587,23 @@ class _Moving:
         end_step(steps, H, excess, record, record_time, arrays, recording, scratch)
         return STATUS_DONE
 
+    def _parts(self, steps: int, H: float, points: bool) -> tuple[int, Modes]:
+        """Into how many steps a macro step is cut, and the modes over one of them.
+
+        Fine ones where points or the guide may act; for a film alone its heights change by little.
+        """
+        longest = 1
+        if not points and self.squeezed and self._unguided(H):
+            longest = steps
+            for k in range(len(self.squeezed)):
+                lift = max(film_state(self.films, k, self.q)[0], 0.0) + self.films.lowest[k]
+                way = abs(float(self.films.rows[k, 0] @ self.v)) * H
+                while longest > 1 and way * longest > _FILM_SHARE * lift * steps:
+                    longest //= 2
+        if longest not in self.coarser:
+            self.coarser[longest] = modes_of_step(self.model, longest * self.sizes.step)
+        return steps // longest, self.coarser[longest]
+
     def _length(self, level: int, default: int) -> int:
         return self.steps.get(level, default) if level >= 0 else default
 
@@ -572,12 +612,14 @@ class _Moving:
     ) -> Record:
         """Fine steps under a constant modal force, that of ``modes.push``."""
         n = self.model.count if points else 0
-        record = Record.empty(count, len(self.model.bodies), n, keep_points=False)
+        record = Record.empty(
+            count, len(self.model.bodies), n, keep_points=False, films=len(self.squeezed)
+        )
         touching = self.nothing
         if points:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
-        _, status = march(count, 0, modes, _NONE, touching, self.bore, state, record)
+        _, status = march(count, 0, modes, _NONE, touching, self.bore, self.films, state, record)
         if status == FAILED or not np.all(np.isfinite(self.q)):
             report[2] = t
             raise ConvergenceError(
@@ -660,24 +702,27 @@ class _Moving:
         first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
         now = round(t / self.sizes.step)
         faces, y = network.interfaces, np.append(self.P.T @ self.q, 0.0)
+        stops = self.valve.stops
+        films = {self.order[stops.index(f.stop)]: k for k, f in enumerate(self.squeezed)}
         for c, row in enumerate(self.order):
             a, b = self.model.contacts[c][1:]
             smallest = float(np.min(self.gap0[a:b] + self.model.traces[a:b] @ self.q))
             lam = self.state.lam[a:b]
             state.gap[row] = faces.gap0[row] + y[faces.upper[row]] - y[faces.lower[row]]
-            if not points:
-                continue
+            pressed = record.film[:, films[row]] if row in films else np.zeros(len(record.force))
+            scratch.sums[first + 2 * row + 1] += h * float(np.sum(pressed))
             force = np.where(self.side[c] * record.force > 0.0, np.abs(record.force), 0.0)
-            force, gap = np.append(force, 0.0), np.append(record.gap, smallest)
-            acted = force > 0.0
+            acted = np.append(force > 0.0, False)
             told = acted.copy()
             told[1:] |= acted[:-1]  # a step without force ends a contact
             told[-1] &= not np.any(lam > 0.0)
-            self.force[c] = force[-2]
-            if not np.any(lam > 0.0):
-                self.closed[c] = np.nan
-            elif np.isnan(self.closed[c]):
-                self.closed[c] = float(now)
+            told[:-1] |= np.abs(pressed) > faces.film_felt[row]
+            if points:
+                self.force[c] = force[-1]
+                if not np.any(lam > 0.0):
+                    self.closed[c] = np.nan
+                elif np.isnan(self.closed[c]):
+                    self.closed[c] = float(now)
             rows = np.flatnonzero(told)
             if not len(rows):
                 continue
@@ -685,7 +730,9 @@ class _Moving:
             end = min(place + len(rows), recording.fine.shape[1])
             some, into = rows[: end - place], recording.fine[row, place:end]
             into[:, 0], into[:, 1] = t + some * h, h
-            into[:, 2], into[:, 3], into[:, 4] = force[some], 0.0, gap[some]
+            into[:, 2] = np.append(force, 0.0)[some]
+            into[:, 3] = np.append(pressed, 0.0)[some]
+            into[:, 4] = np.append(record.gap, smallest)[some]
             recording.filled[row] = place + len(rows)
             scratch.sums[first + 2 * row] += h * float(np.sum(force))
             scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))
@@ -728,6 +775,13 @@ class _Moving:
         if careful and np.min(fresh + self.model.traces @ self.q) <= 0.0:
             return
         self.gap0[:], self.taken_at[:] = fresh, at
+        self._lift_films()
+
+    def _lift_films(self) -> None:
+        """Let films begin at the present gaps."""
+        at = {name: slice(first, last) for name, first, last in self.model.contacts}
+        for k, film in enumerate(self.squeezed):
+            self.films.offset[k] = film.fit @ self.gap0[at[film.stop]] - film.base
 
     def _stale(self) -> float:
         """Largest possible difference of the gaps from those of the geometry [m]."""
@@ -773,7 +827,10 @@ class _Moving:
     def _keep(self) -> _Kept:
         contact = self.state.contact
         m = int(contact.counts[0])
-        vectors = (self.q, self.v, self.state.lam, self.state.guide_force, self.books)
+        vectors = (
+            *(self.q, self.v, self.state.lam, self.state.guide_force, self.books),
+            self.state.films,
+        )
         return _Kept(
             tuple(values.copy() for values in vectors),
             contact.active.copy(),
@@ -784,7 +841,10 @@ class _Moving:
 
     def _put_back(self, kept: _Kept) -> None:
         contact = self.state.contact
-        vectors = (self.q, self.v, self.state.lam, self.state.guide_force, self.books)
+        vectors = (
+            *(self.q, self.v, self.state.lam, self.state.guide_force, self.books),
+            self.state.films,
+        )
         for values, old in zip(vectors, kept.vectors, strict=True):
             values[...] = old
         m = int(kept.counts[0])
@@ -825,14 +885,16 @@ def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
         problem = f"the stops {stops} in the network and {sorted(valve.stops)} in space"
     elif rows.sliders:
         problem = f"friction along the axis ('{rows.sliders[0].component}')"
-    elif any(row.film is not None for row in rows.interfaces):
-        problem = "a film between faces"
+    elif lands := {row.component for row in rows.interfaces if row.film is not None} - {
+        film.stop for film in valve.films
+    }:
+        problem = f"a film at '{min(lands)}' that has no land"
     elif model.ways:
         problem = "friction between faces"
     if problem:
         raise InputError(
             "motion in three dimensions",
             got=problem,
-            expected="the same bodies and end stops, a guide instead of friction, dry smooth faces",
+            expected="the same bodies and end stops, a guide instead of friction, smooth faces",
             hint="leave it out, or let the needle move along its axis.",
         )

@@ -18,6 +18,7 @@ from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
 from klack.transient.interface_arrays import (
     Bore,
+    Films,
     Modes,
     Outside,
     Record,
@@ -284,10 +285,11 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
     march(
         steps,
         0,
-        Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift),
+        Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift, step),
         Outside(0.0, 0.0),
         contact_points(model, P.B1, step),
         Bore.none(M),
+        Films.none(M),
         state,
         Record.empty(steps, len(model.bodies), n, model.ways, keep_points=False),
     )

@@ -1,0 +1,129 @@
+"""Squeeze films between faces that tilt: from their lands to arrays of the compiled step."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.hydraulics.tilted_film import SectorFilm
+from klack.network.rows import FilmRow
+from klack.transient.interface_arrays import Films
+from klack.transient.interface_model import InterfaceModel
+
+__all__ = ["TiltingFilm", "film_arrays"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class TiltingFilm:
+    """Land of a film at the contact points of an end stop.
+
+    Parameters
+    ----------
+    stop : str
+        Name of the contact in the model.
+    land : SectorFilm or None
+        None for a film that no tilt changes: a sphere.
+    cubic : float [m^4]
+        Force of the land over viscosity and closing speed, times the height cubed.
+    slope : float [-]
+        Sine of the angle between the axis and the land: 1 for a flat one.
+    fit : array, shape (3, n)
+        Lift [-] and tilts [1/m] that fit gaps of the contact points best.
+    base : array, shape (3,)
+        The same of the gaps of the centred faces in touch.
+    """
+
+    stop: str
+    land: SectorFilm | None
+    cubic: float
+    slope: float
+    fit: Array
+    base: Array
+
+
+def film_arrays(
+    model: InterfaceModel,
+    films: Sequence[TiltingFilm],
+    rows: Mapping[str, FilmRow],
+    series: Mapping[str, float],
+) -> Films:
+    """Arrays of films for the compiled step, at the gaps of the model.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    films : sequence of TiltingFilm
+    rows : mapping of str to FilmRow
+        Of each of their stops, between parallel faces along the axis.
+    series : mapping of str to float [m/N]
+        Compliance along the axis of the bulk of the bodies at these stops.
+    """
+    if not films:
+        return Films.none(model.mode_count)
+    at = {name: slice(first, last) for name, first, last in model.contacts}
+    here = [rows[film.stop] for film in films]
+    lands = [_laid_out(film.land) for film in films]
+    sizes = [len(land) for land in lands]
+    slope = np.array([film.slope for film in films])
+    return Films(
+        np.array([film.fit @ model.traces[at[film.stop]] for film in films]),
+        np.array([film.fit @ model.gap[at[film.stop]] - film.base for film in films]),
+        slope * [row.cut_off for row in here],
+        np.array([0.0 if f.land is None else f.land.outer_radius for f in films]),
+        np.array([row.cubic * f.slope / f.cubic for f, row in zip(films, here, strict=True)]),
+        np.array([row.suction / (f.slope * _area(f)) for f, row in zip(films, here, strict=True)]),
+        np.array([row.linear for row in here]) / slope,
+        slope,
+        np.array([_arms(model, film) for film in films]),
+        np.array([_bulk(model, film, series[film.stop]) for film in films]),
+        np.array([_sizes(film.land) for film in films], dtype=np.int64),
+        np.array(np.cumsum([0, *sizes[:-1]]), dtype=np.int64),
+        np.concatenate(lands),
+    )
+
+
+def _arms(model: InterfaceModel, film: TiltingFilm) -> Array:
+    """Lift and tilts at the contact points of the stop of a film, zero at others, shape (n, 3)."""
+    arms = np.zeros((model.count, 3))
+    for name, first, last in model.contacts:
+        if name == film.stop:
+            arms[first:last, 0], arms[first:last, 1:] = 1.0, model.points[first:last, :2]
+    return arms
+
+
+def _bulk(model: InterfaceModel, film: TiltingFilm, series: float) -> Array:
+    """Compliance of the bulk for a force and moments, as of an elastic bed under the touching ring.
+
+    Along the axis it is ``series``; a bed of the same stiffness under a ring of radius r has the
+    tilting compliance 2/r^2 times as large.
+    """
+    points = slice(*next(c[1:] for c in model.contacts if c[0] == film.stop))
+    radius = np.linalg.norm(model.points[points, :2], axis=1)
+    weight = film.fit[0]
+    square = float(weight @ radius**2 / np.sum(weight))
+    return film.slope**2 * series * np.diag([1.0, 2.0 / square, 2.0 / square])
+
+
+def _area(film: TiltingFilm) -> float:
+    """Of the land [m^2]; 1 without one."""
+    if film.land is None:
+        return 1.0
+    return pi * (film.land.outer_radius**2 - film.land.inner_radius**2)
+
+
+def _sizes(land: SectorFilm | None) -> list[int]:
+    if land is None:
+        return [0, 0, 0, 0, 0]
+    points, functions = land.load.shape
+    return [land.sectors, land.circles, points, functions, land.shared]
+
+
+def _laid_out(land: SectorFilm | None) -> Array:
+    if land is None:
+        return np.zeros(0)
+    parts = (land.rows(), land.between, land.along, land.around, land.load, land.area)
+    return np.concatenate([part.ravel() for part in parts])

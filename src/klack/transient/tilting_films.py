@@ -1,0 +1,254 @@
+r"""Squeeze films between faces that tilt, in the compiled step of the interface level.
+
+A film sees lift and tilts :math:`u = (g, t_x, t_y)` of its land, and gives back the force and the
+moments :math:`f` that do the work of its pressure (:mod:`klack.hydraulics.tilted_film`),
+
+.. math:: h = \max(g + r\,(t_x \cos\theta + t_y \sin\theta), 0) + h_r, \qquad
+    u = u_0 + Y q + D (f + S^T \lambda), \qquad g_k = g_{0k} + (\Phi q + C_l \lambda + S D f)_k .
+
+Film and contact lie side by side on the bulk of the bodies, whose compliance D is in series with
+both (as along the axis: :class:`klack.mechanics.end_stop.EndStop`); S are lift and tilts at the
+contact points.  Forces are means over a step, from the heights at both of its ends, so that the
+work of the film is dissipated at every step size; the bulk holds :math:`\tfrac12 f^T D f + f^T D
+S^T \lambda`.  The film is found before the contact, with the contact forces of the step before.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.compiling.jit import njit
+from klack.hydraulics.tilted_film import Land, film_pressure
+from klack.transient.interface_arrays import Films, Modes, State
+
+__all__ = [
+    "bend_faces",
+    "bulk_work",
+    "count_squeeze",
+    "film_state",
+    "film_strain",
+    "squeeze",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+_ROUNDS, _HALVINGS = 60, 30
+_FOUND = 1e-13  # heights that do not fit, over lift and the least height
+_NEARLY = 1e-6  # the same where round-off or a corner leaves more
+
+
+@njit
+def land_at(films: Films, k: int) -> Land:
+    """Arrays of the land of film ``k``."""
+    S, N, G, Q, shared = films.sizes[k]
+    at, data = films.start[k] + S * N * 3, films.land
+    between = data[at : at + G * N].reshape((G, N))
+    at += G * N
+    along = data[at : at + G * Q * Q].reshape((G, Q, Q))
+    at += G * Q * Q
+    around = data[at : at + G * Q * Q].reshape((G, Q, Q))
+    at += G * Q * Q
+    load = data[at : at + G * Q].reshape((G, Q))
+    at += G * Q
+    return Land(between, along, around, load, data[at : at + N], shared)
+
+
+@njit
+def _spread(films: Films, k: int) -> Matrix:
+    """Heights of the circles of all sectors per unit of lift and tilts, shape (S N, 3)."""
+    S, N = films.sizes[k, 0], films.sizes[k, 1]
+    begin = films.start[k]
+    return films.land[begin : begin + S * N * 3].reshape((S * N, 3))
+
+
+@njit
+def film_state(films: Films, k: int, q: Vector) -> Vector:
+    """Lift and tilts of a film without its own compliance, shape (3,)."""
+    u = np.empty(3)
+    for c in range(3):
+        u[c] = films.offset[k, c]
+        for i in range(len(q)):
+            u[c] += films.rows[k, c, i] * q[i]
+    return u
+
+
+@njit
+def contact_resultant(films: Films, k: int, lam: Vector) -> Vector:
+    """Force and moments of contact forces under a film, shape (3,)."""
+    held = np.zeros(3)
+    for i in range(len(lam)):
+        if lam[i] > 0.0:
+            for c in range(3):
+                held[c] += films.arms[k, i, c] * lam[i]
+    return held
+
+
+@njit
+def bend_faces(films: Films, k: int, change: Vector, gap: Vector) -> None:
+    """Open the gaps of contact points by a change of the film's force and moments."""
+    D = films.compliance[k]
+    for i in range(len(gap)):
+        for c in range(3):
+            for d in range(3):
+                gap[i] += films.arms[k, i, c] * D[c, d] * change[d]
+
+
+@njit
+def _raw_heights(films: Films, k: int, u: Vector) -> Matrix:
+    """Gaps of the circles of all sectors, shape (S, N) [m]; below 0 where closed."""
+    S, N = films.sizes[k, 0], films.sizes[k, 1]
+    spread, x = _spread(films, k), np.zeros((S, N))
+    for s in range(S):
+        for j in range(N):
+            for c in range(3):
+                x[s, j] += spread[s * N + j, c] * u[c]
+    return x
+
+
+@njit
+def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple[Vector, Matrix]:
+    """Mean force and moments over a step, and their slopes with its end."""
+    f, slopes = np.zeros(3), np.zeros((3, 3))
+    lowest = films.lowest[k]
+    if films.sizes[k, 0]:
+        x0, x1 = _raw_heights(films, k, u0), _raw_heights(films, k, u1)
+        spread, land = _spread(films, k), land_at(films, k)
+        S, N = x0.shape
+        G = land.between.shape[0]
+        mobility, change = np.empty((S, G)), np.empty((S, G))
+        viscous = 6.0 * films.viscosity[k]
+        for s in range(S):
+            for p in range(G):
+                a, b = 0.0, 0.0
+                for j in range(N):
+                    a += land.between[p, j] * x0[s, j]
+                    b += land.between[p, j] * x1[s, j]
+                open_now = b > 0.0
+                a, b = max(a, 0.0) + lowest, max(b, 0.0) + lowest
+                mobility[s, p] = a * a * b * b / (viscous * (a + b))
+                change[s, p] = 0.0
+                if open_now:
+                    change[s, p] = a * a * b * (2.0 * a + b) / (viscous * (a + b) ** 2)
+        head, still = np.zeros(land.load.shape), np.zeros(N)
+        force, along = film_pressure(
+            land, mobility, (x0 - x1) / step, change, head, still,
+            films.tension[k], 1.0 / step, spread,
+        )  # fmt: skip
+        for s in range(S):
+            for j in range(N):
+                for c in range(3):
+                    f[c] += spread[s * N + j, c] * force[s, j]
+                    for d in range(3):
+                        slopes[c, d] += spread[s * N + j, c] * along[s * N + j, d]
+    if films.shear[k] > 0.0:
+        a, b = max(u0[0], 0.0) + lowest, max(u1[0], 0.0) + lowest
+        # mean of 1/h over the way
+        share = np.log(a / b) / (a - b) if abs(a - b) > 1e-6 * a else 2.0 / (a + b)
+        drag = films.shear[k] * share * (u0[0] - u1[0]) / step
+        if films.sizes[k, 0] == 0 and drag < -films.tension[k]:
+            drag = -films.tension[k]
+        else:
+            slopes[0, 0] -= films.shear[k] / (b * step)
+        f[0] += drag
+    return f, slopes
+
+
+@njit
+def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> bool:
+    """Modal force of a film over the step that leads to ``q`` without it; False if none is found.
+
+    Newton's method on lift and tilts, halved where it goes too far: what they do to the heights and
+    the film to them pull the same way.
+    """
+    step, reach = modes.step, films.reach[k]
+    rows, D = films.rows[k], films.compliance[k]
+    soft, before = np.zeros((3, 3)), film_state(films, k, state.q)
+    free = film_state(films, k, q)
+    held = contact_resultant(films, k, state.lam)
+    for c in range(3):
+        state.films[k, c + 3] = state.films[k, c]
+        for d in range(3):
+            soft[c, d] = D[c, d]
+            before[c] += D[c, d] * (state.films[k, d] + held[d])
+            free[c] += D[c, d] * held[d]
+            for i in range(len(q)):
+                soft[c, d] += rows[c, i] * modes.B1[i] * rows[d, i]
+    tiny = _FOUND * (films.lowest[k] + abs(before[0]) + abs(free[0] - before[0]))
+    u = before.copy()
+    f, slopes = _pressed(films, k, before, u, step)
+    left = free + soft @ f - u
+    size = _size(left, reach)
+    rounds = 0
+    while size > tiny and rounds < _ROUNDS:
+        rounds += 1
+        change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
+        share, now = 1.0, size
+        for _ in range(_HALVINGS):
+            tried = u + share * change
+            f, slopes = _pressed(films, k, before, tried, step)
+            left = free + soft @ f - tried
+            now = _size(left, reach)
+            if now < size:
+                break
+            share *= 0.5
+        u = tried
+        if not now < size:  # round-off
+            break
+        size = now
+    if not size < _NEARLY / _FOUND * tiny:
+        return False
+    for i in range(len(q)):
+        kick[i] = 0.0
+        for c in range(3):
+            kick[i] += rows[c, i] * f[c]
+    for c in range(3):
+        state.films[k, c] = f[c]
+    return True
+
+
+@njit
+def _size(u: Vector, reach: float) -> float:
+    """Largest height that lift and tilts make [m]."""
+    return abs(u[0]) + reach * np.sqrt(u[1] ** 2 + u[2] ** 2)
+
+
+@njit
+def bulk_work(films: Films, k: int, state: State, lam: Vector) -> float:
+    """Work [J] of the contact forces, up to ``lam``, on the bulk that a film bends."""
+    D, work = films.compliance[k], 0.0
+    first, last = contact_resultant(films, k, state.lam), contact_resultant(films, k, lam)
+    for c in range(3):
+        for d in range(3):
+            change = state.films[k, d] - state.films[k, d + 3]
+            work += 0.5 * (first[c] + last[c]) * D[c, d] * change
+    return work
+
+
+@njit
+def bulk_energy(films: Films, k: int, force: Vector, held: Vector) -> float:
+    """Energy [J] that the bulk holds by a film beside that by contact forces, ``held``."""
+    D, energy = films.compliance[k], 0.0
+    for c in range(3):
+        for d in range(3):
+            energy += D[c, d] * force[d] * (0.5 * force[c] + held[c])
+    return energy
+
+
+@njit
+def count_squeeze(films: Films, k: int, state: State, q: Vector, lam: Vector) -> None:
+    """Add the loss of a film over the step that leads to ``q`` and the contact forces ``lam``."""
+    f = state.films[k]
+    lost = bulk_work(films, k, state, lam)
+    lost += bulk_energy(films, k, f[3:6], contact_resultant(films, k, state.lam))
+    lost -= bulk_energy(films, k, f[:3], contact_resultant(films, k, lam))
+    for c in range(3):
+        for i in range(len(q)):
+            lost -= f[c] * films.rows[k, c, i] * (q[i] - state.q[i])
+    state.films[k, 6] += lost
+
+
+@njit
+def film_strain(films: Films, k: int, state: State) -> float:
+    """Energy [J] that a film holds in the bulk."""
+    held = contact_resultant(films, k, state.lam)
+    return float(bulk_energy(films, k, state.films[k, :3], held))
