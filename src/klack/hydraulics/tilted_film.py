@@ -37,7 +37,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_POINTS = 12  # Gauss points between two circles
+_POINTS, _FEWER = 12, 6  # Gauss points between two circles
 _FEWEST_SECTORS = 4
 _ACTIVE_SETS = 60  # before relaxation takes over
 
@@ -138,7 +138,8 @@ def sector_film(
             )
     width, angle = outer_radius - inner_radius, 2.0 * pi / sectors
     panels = max(circles - 1, 1)
-    x, weight = np.polynomial.legendre.leggauss(_POINTS)
+    points = _FEWER if outer_radius < 2.0 * inner_radius else _POINTS
+    x, weight = np.polynomial.legendre.leggauss(points)
     half = 0.5 * width / panels
     starts = 2.0 * half * np.arange(panels)[:, None]
     inside = (starts + half * (1.0 + x)).ravel()  # above the inner radius

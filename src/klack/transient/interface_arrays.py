@@ -160,16 +160,6 @@ class Films(NamedTuple):
     start: NDArray[np.int64]  # (k,) in ``land``
     land: Vector
 
-    @classmethod
-    def none(cls, modes: int) -> Self:
-        """Return no film."""
-        nothing, numbers = np.zeros(0), np.zeros(0, dtype=np.int64)
-        return cls(
-            *(np.zeros((0, 3, modes)), np.zeros((0, 3)), nothing, nothing, nothing, nothing),
-            *(nothing, nothing, np.zeros((0, 0, 3)), np.zeros((0, 3, 3))),
-            *(np.zeros((0, 5), dtype=np.int64), numbers, nothing),
-        )
-
 
 class ActiveSet(NamedTuple):
     """Contact points that carry, and the inverse of their compliance."""

@@ -581,7 +581,7 @@ def march(
     outside: Outside,
     points: ContactPoints,
     bore: Bore,
-    films: Films,
+    films: Films | None,
     state: State,
     record: Record,
 ) -> tuple[int, int]:
@@ -593,6 +593,7 @@ def march(
     wait : int
         Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
     modes, outside, points, bore, films, state
+        ``films`` is None without any: their code is not compiled then.
         See :mod:`klack.transient.interface_arrays`.
     record : Record
         Out, for at least ``steps`` steps.
@@ -609,8 +610,9 @@ def march(
     diagonal = 0.0
     for k in range(n):
         diagonal += points.A[k, k] / n
-    for k in range(len(films.lowest)):
-        bend_faces(films, k, state.films[k, :3], points.gap)
+    if films is not None:
+        for k in range(len(films.lowest)):
+            bend_faces(films, k, state.films[k, :3], points.gap)
     potential = _potential(points, state)
     smallest = 0.0  # gap of the step before
     for taken in range(steps):
@@ -624,11 +626,12 @@ def march(
         rubs_guide = begin_rub(bore, state.guide_force, step.normal, guide)
         if rubs_guide:
             axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
-        for k in range(len(films.lowest)):
-            if not squeeze(films, k, modes, state, step.q, step.kick):
-                return taken, FAILED
-            _add(step, modes, 1.0)
-            bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
+        if films is not None:
+            for k in range(len(films.lowest)):
+                if not squeeze(films, k, modes, state, step.q, step.kick):
+                    return taken, FAILED
+                _add(step, modes, 1.0)
+                bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
         yielded = 0.0
@@ -687,8 +690,9 @@ def march(
                 if yields:
                     yielded = let_yield(points.limit, state.worn, step.lam, points.gap)
                     books[PLASTIC] += yielded
-                for k in range(len(films.lowest)):
-                    yielded += bulk_work(films, k, state, step.lam)
+                if films is not None:
+                    for k in range(len(films.lowest)):
+                        yielded += bulk_work(films, k, state, step.lam)
                 least = _close(points, state, step)
                 answer += _hold(step, modes, share)
                 _add(step, modes, 1.0)
@@ -711,9 +715,10 @@ def march(
             )
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
-        for k in range(len(films.lowest)):
-            count_squeeze(films, k, state, step.q, step.lam)
-            record.film[taken, k] = films.axial[k] * state.films[k, 0]
+        if films is not None:
+            for k in range(len(films.lowest)):
+                count_squeeze(films, k, state, step.q, step.lam)
+                record.film[taken, k] = films.axial[k] * state.films[k, 0]
         for k in range(len(guide.most)):
             braking += guide.force[k, 0]
         mean_gap = 0.5 * (least + smallest) if taken else least
@@ -721,6 +726,7 @@ def march(
         smallest = least
         if wait and books[OPEN_STEPS] > wait:
             return taken + 1, OPEN
-    for k in range(len(films.lowest)):
-        bend_faces(films, k, -state.films[k, :3], points.gap)
+    if films is not None:
+        for k in range(len(films.lowest)):
+            bend_faces(films, k, -state.films[k, :3], points.gap)
     return steps, FINISHED

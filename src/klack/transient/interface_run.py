@@ -37,7 +37,6 @@ from klack.transient.interface_arrays import (
     ActiveSet,
     Bore,
     ContactPoints,
-    Films,
     Limit,
     Modes,
     Outside,
@@ -273,7 +272,7 @@ class _Run:
         self.clearance = max(
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
-        self.bore, self.films = bore_arrays(guide, M), Films.none(M)
+        self.bore = bore_arrays(guide, M)
         yields = model.limit is not None
         self.state = State.still(M, n, len(self.bore.clearance), model.ways, yields=yields)
         if worn is not None and yields:
@@ -518,9 +517,7 @@ class _Run:
             steps, len(self.model.bodies), n, ways, keep_points=self.points and n > 0
         )
         outside = Outside(self.constant, self.spring)
-        taken, status = march(
-            steps, wait, modes, outside, points, self.bore, self.films, state, record
-        )
+        taken, status = march(steps, wait, modes, outside, points, self.bore, None, state, record)
         return taken, status, record
 
     # ------------------------------------------------------------------ records

@@ -185,7 +185,7 @@ class _Moving:
         wet = {row.component: row.film for row in network.rows.interfaces if row.film is not None}
         self.squeezed = [film for film in valve.films if film.stop in wet]
         series = {row.component: row.series_compliance for row in network.rows.interfaces}
-        self.films = film_arrays(model, self.squeezed, wet, series)
+        self.films = film_arrays(model, self.squeezed, wet, series) if self.squeezed else None
         self.state = State.still(
             model.mode_count, model.count, len(self.bore.clearance), films=len(self.squeezed)
         )
@@ -593,11 +593,12 @@ class _Moving:
         Fine ones where points or the guide may act; for a film alone its heights change by little.
         """
         longest = 1
-        if not points and self.squeezed and self._unguided(H):
+        films = self.films
+        if not points and films is not None and self._unguided(H):
             longest = steps
             for k in range(len(self.squeezed)):
-                lift = max(film_state(self.films, k, self.q)[0], 0.0) + self.films.lowest[k]
-                way = abs(float(self.films.rows[k, 0] @ self.v)) * H
+                lift = max(film_state(films, k, self.q)[0], 0.0) + films.lowest[k]
+                way = abs(float(films.rows[k, 0] @ self.v)) * H
                 while longest > 1 and way * longest > _FILM_SHARE * lift * steps:
                     longest //= 2
         if longest not in self.coarser:
@@ -779,6 +780,8 @@ class _Moving:
 
     def _lift_films(self) -> None:
         """Let films begin at the present gaps."""
+        if self.films is None:
+            return
         at = {name: slice(first, last) for name, first, last in self.model.contacts}
         for k, film in enumerate(self.squeezed):
             self.films.offset[k] = film.fit @ self.gap0[at[film.stop]] - film.base

@@ -57,13 +57,12 @@ def film_arrays(
     ----------
     model : InterfaceModel
     films : sequence of TiltingFilm
+        One or more.
     rows : mapping of str to FilmRow
         Of each of their stops, between parallel faces along the axis.
     series : mapping of str to float [m/N]
         Compliance along the axis of the bulk of the bodies at these stops.
     """
-    if not films:
-        return Films.none(model.mode_count)
     at = {name: slice(first, last) for name, first, last in model.contacts}
     here = [rows[film.stop] for film in films]
     lands = [_laid_out(film.land) for film in films]

@@ -8,9 +8,11 @@ moments :math:`f` that do the work of its pressure (:mod:`klack.hydraulics.tilte
 
 Film and contact lie side by side on the bulk of the bodies, whose compliance D is in series with
 both (as along the axis: :class:`klack.mechanics.end_stop.EndStop`); S are lift and tilts at the
-contact points.  Forces are means over a step, from the heights at both of its ends, so that the
-work of the film is dissipated at every step size; the bulk holds :math:`\tfrac12 f^T D f + f^T D
-S^T \lambda`.  The film is found before the contact, with the contact forces of the step before.
+contact points.  Where faces are closed the height stays, and no film acts.
+
+Forces are means over a step, from the heights at both of its ends, so that the work of the film is
+dissipated at every step size.  The bulk holds :math:`\tfrac12 f^T D f + f^T D S^T \lambda`.  The
+film is found before the contact, with the contact forces of the step before.
 """
 
 import numpy as np
@@ -32,8 +34,8 @@ __all__ = [
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-_ROUNDS, _HALVINGS = 60, 30
-_FOUND = 1e-13  # heights that do not fit, over lift and the least height
+_ROUNDS, _HALVINGS = 40, 12
+_FOUND = 1e-11  # heights that do not fit, over lift and the least height
 _NEARLY = 1e-6  # the same where round-off or a corner leaves more
 
 
@@ -112,6 +114,8 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
     lowest = films.lowest[k]
     if films.sizes[k, 0]:
         x0, x1 = _raw_heights(films, k, u0), _raw_heights(films, k, u1)
+        if max(np.max(x0), np.max(x1)) <= 0.0:
+            return f, slopes
         spread, land = _spread(films, k), land_at(films, k)
         S, N = x0.shape
         G = land.between.shape[0]
@@ -130,10 +134,16 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
                 if open_now:
                     change[s, p] = a * a * b * (2.0 * a + b) / (viscous * (a + b) ** 2)
         head, still = np.zeros(land.load.shape), np.zeros(N)
+        closing, ways = np.empty((S, N)), spread.copy()
+        for s in range(S):
+            for j in range(N):
+                closing[s, j] = (max(x0[s, j], 0.0) - max(x1[s, j], 0.0)) / step
+                if x1[s, j] <= 0.0:
+                    for c in range(3):
+                        ways[s * N + j, c] = 0.0
         force, along = film_pressure(
-            land, mobility, (x0 - x1) / step, change, head, still,
-            films.tension[k], 1.0 / step, spread,
-        )  # fmt: skip
+            land, mobility, closing, change, head, still, films.tension[k], 1.0 / step, ways
+        )
         for s in range(S):
             for j in range(N):
                 for c in range(3):
@@ -144,10 +154,10 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
         a, b = max(u0[0], 0.0) + lowest, max(u1[0], 0.0) + lowest
         # mean of 1/h over the way
         share = np.log(a / b) / (a - b) if abs(a - b) > 1e-6 * a else 2.0 / (a + b)
-        drag = films.shear[k] * share * (u0[0] - u1[0]) / step
+        drag = films.shear[k] * share * (a - b) / step
         if films.sizes[k, 0] == 0 and drag < -films.tension[k]:
             drag = -films.tension[k]
-        else:
+        elif u1[0] > 0.0:
             slopes[0, 0] -= films.shear[k] / (b * step)
         f[0] += drag
     return f, slopes

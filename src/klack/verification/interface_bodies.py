@@ -18,7 +18,6 @@ from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
 from klack.transient.interface_arrays import (
     Bore,
-    Films,
     Modes,
     Outside,
     Record,
@@ -289,7 +288,7 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
         Outside(0.0, 0.0),
         contact_points(model, P.B1, step),
         Bore.none(M),
-        Films.none(M),
+        None,
         state,
         Record.empty(steps, len(model.bodies), n, model.ways, keep_points=False),
     )
