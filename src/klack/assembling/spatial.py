@@ -14,6 +14,7 @@ from klack.assembling.off_axis import off_axis_space, touch_height
 from klack.assembling.stops import StopContact
 from klack.assembling.tilting_land import tilting_film
 from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.motion_of_valve import ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.gap_update import PlacedGaps, RigidGaps
@@ -29,6 +30,7 @@ from klack.reduction.reduce import kept_modes
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
 from klack.transient.spatial_run import SpatialValve
+from klack.transient.tilting_film import BearingFilm
 from klack.units import format_si
 
 __all__ = ["build_spatial"]
@@ -148,12 +150,19 @@ def build_spatial(
             tuple(meeting.upper_moves for meeting in meetings),
         ),
         placement=rigid_placement(*placement, *about),
+        bearing=_bearing(case.guide),
         films=tuple(
             tilting_film(meeting.name, film, meeting.space)
             for meeting in meetings
             if (film := getattr(parts[meeting.name], "film", None)) is not None
         ),
     )
+
+
+def _bearing(guide: ValveGuide | None) -> BearingFilm | None:
+    if guide is None or guide.film is None:
+        return None
+    return BearingFilm(length=guide.film.length, cut_off=guide.film.cut_off)
 
 
 def _about(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:

@@ -11,10 +11,9 @@ from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
 from klack.case.calibration import CaseCalibration
-from klack.case.guide import CaseGuide
 from klack.case.impact_sections import CaseWorn, Lumped
 from klack.case.measurement import CaseMeasurement
-from klack.case.motion_of_valve import ValveMotion, ValvePlacement
+from klack.case.motion_of_valve import ValveGuide, ValveMotion, ValvePlacement
 from klack.case.noise import CaseNoise
 from klack.case.study import CaseStudy
 from klack.case.variants import Variant
@@ -168,7 +167,7 @@ class ValveSections(CaseFile):
         description="axial: all bodies move along the axis, stops have a law; three-dimensional: "
         "all bodies keep their rigid freedoms and modes, and touch point by point.",
     )
-    guide: CaseGuide | None = Field(
+    guide: ValveGuide | None = Field(
         default=None, description="Guide of the needle in three dimensions; default none."
     )
     placement: ValvePlacement | None = Field(

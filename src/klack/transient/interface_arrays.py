@@ -156,6 +156,8 @@ class Films(NamedTuple):
     axial: Vector  # (k,) [-] axial force per force along the lift
     arms: Cube  # (k, n, 3) lift and tilts per gap of a contact point: force and moments per force
     compliance: Cube  # (k, 3, 3) of the bulk under film and contact, in series with both
+    bearing: Vector  # (g,) [N s] of heights of the guide: mu L^3 R / c^2, see ``guide_film``
+    room: Vector  # (g,) [m] c: clearance and what roughness leaves
     sizes: NDArray[np.int64]  # (k, 5) sectors, circles, points, functions, shared ones
     start: NDArray[np.int64]  # (k,) in ``land``
     land: Vector
@@ -266,6 +268,7 @@ class State(NamedTuple):
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
     films: Matrix  # (f, 7) force and moments of the last step, of the one before, energy lost
+    bearing: Matrix  # (g, 3) [N] force of the film in the guide in the last step, energy lost [J]
     books: Vector  # sums, see ``DAMPING`` and the following names
 
     @classmethod
@@ -290,6 +293,7 @@ class State(NamedTuple):
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
             np.zeros((films, 7)),
+            np.zeros((heights, 3)),
             np.zeros(_BOOKS),
         )
 

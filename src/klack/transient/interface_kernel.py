@@ -41,6 +41,7 @@ from numpy.typing import NDArray
 from klack.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
+from klack.transient.guide_films import count_bearing, squeeze_guide
 from klack.transient.guide_friction import begin_rub, no_rub, rub_guide
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
@@ -632,6 +633,10 @@ def march(
                     return taken, FAILED
                 _add(step, modes, 1.0)
                 bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
+            for k in range(len(films.room)):
+                if not squeeze_guide(films, k, modes, bore, state, step.q, step.kick):
+                    return taken, FAILED
+                _add(step, modes, 1.0)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
         yielded = 0.0
@@ -719,6 +724,8 @@ def march(
             for k in range(len(films.lowest)):
                 count_squeeze(films, k, state, step.q, step.lam)
                 record.film[taken, k] = films.axial[k] * state.films[k, 0]
+            for k in range(len(films.room)):
+                count_bearing(k, bore, state, step.q)
         for k in range(len(guide.most)):
             braking += guide.force[k, 0]
         mean_gap = 0.5 * (least + smallest) if taken else least

@@ -67,7 +67,7 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
 from klack.transient.spatial_path import SpatialPath
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
-from klack.transient.tilting_film import TiltingFilm, film_arrays
+from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import bend_faces, film_state, film_strain
 
 __all__ = ["SpatialValve"]
@@ -112,6 +112,8 @@ class SpatialValve:
         At the start, beside what the network has.
     films : tuple of TiltingFilm
         Lands of squeeze films, for the stops that have one in the network.
+    bearing : BearingFilm, optional
+        Film in the guide, where the network has a fluid.
     path : SpatialPath
         Filled while it runs.
     """
@@ -125,6 +127,7 @@ class SpatialValve:
     placement: Vector = field(default_factory=lambda: np.zeros(6))
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
+    bearing: BearingFilm | None = None
     path: SpatialPath = field(default_factory=SpatialPath)
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
@@ -185,7 +188,14 @@ class _Moving:
         wet = {row.component: row.film for row in network.rows.interfaces if row.film is not None}
         self.squeezed = [film for film in valve.films if film.stop in wet]
         series = {row.component: row.series_compliance for row in network.rows.interfaces}
-        self.films = film_arrays(model, self.squeezed, wet, series) if self.squeezed else None
+        bearing, room = np.zeros(0), np.zeros(0)
+        rows = network.rows
+        if valve.bearing is not None and valve.guide is not None and rows.fluid is not None:
+            viscosity = float(rows.fluid.viscosity(rows.ambient.pressure))
+            bearing, room = valve.bearing.arrays(valve.guide, viscosity)
+        self.films = None
+        if self.squeezed or len(bearing):
+            self.films = film_arrays(model, self.squeezed, wet, series, bearing, room)
         self.state = State.still(
             model.mode_count, model.count, len(self.bore.clearance), films=len(self.squeezed)
         )
@@ -315,6 +325,7 @@ class _Moving:
             "forces": self.state.lam,
             "guide": self.state.guide_force,
             "films": self.state.films,
+            "bearing": self.state.bearing,
             "carried": self.state.carried,
             "books": self.books,
             "gaps": self.gap0,
@@ -346,6 +357,8 @@ class _Moving:
             lost["bodies damping"] = float(self.books[DAMPING] + self.flags[1])
         if len(self.bore.clearance):
             lost["guide friction"] = float(self.books[GUIDE])
+        if self.films is not None and len(self.films.room):
+            lost["guide film"] = float(np.sum(self.state.bearing[:, 2]))
         for k, film in enumerate(self.squeezed):
             lost[f"{film.stop} film"] = float(self.state.films[k, 6])
         return lost
@@ -355,6 +368,7 @@ class _Moving:
         self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
         self.flags[1] = 0.0
         self.state.films[:, 6] = 0.0
+        self.state.bearing[:, 2] = 0.0
 
     # ------------------------------------------------------------------ motion
 
@@ -423,7 +437,7 @@ class _Moving:
             self.take_gaps(careful=True)
             safe = self._safe(horizon, self._stale())
         fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
-        if self.squeezed:  # a film acts wherever the needle is
+        if self.films is not None:  # a film acts wherever the needle is
             fly = 0
         while fly and not self._unguided(fly * span):
             fly //= 2
@@ -595,12 +609,19 @@ class _Moving:
         longest = 1
         films = self.films
         if not points and films is not None and self._unguided(H):
-            longest = steps
+            changes = [0.0]  # of heights over the macro step, over what is left of them
             for k in range(len(self.squeezed)):
                 lift = max(film_state(films, k, self.q)[0], 0.0) + films.lowest[k]
-                way = abs(float(films.rows[k, 0] @ self.v)) * H
-                while longest > 1 and way * longest > _FILM_SHARE * lift * steps:
-                    longest //= 2
+                rise, *tilts = films.rows[k] @ self.v
+                way = abs(rise) + films.reach[k] * float(np.hypot(*tilts))
+                changes.append(way * H / lift)
+            for k in range(len(films.room)):
+                place = self.bore.offset[k] + self.bore.traces[k] @ self.q
+                way = float(np.hypot(*(self.bore.traces[k] @ self.v)))
+                changes.append(way * H / (films.room[k] - float(np.hypot(*place))))
+            longest = steps
+            while longest > 1 and max(changes) * longest > _FILM_SHARE * steps:
+                longest //= 2
         if longest not in self.coarser:
             self.coarser[longest] = modes_of_step(self.model, longest * self.sizes.step)
         return steps // longest, self.coarser[longest]
@@ -832,7 +853,7 @@ class _Moving:
         m = int(contact.counts[0])
         vectors = (
             *(self.q, self.v, self.state.lam, self.state.guide_force, self.books),
-            self.state.films,
+            *(self.state.films, self.state.bearing),
         )
         return _Kept(
             tuple(values.copy() for values in vectors),
@@ -846,7 +867,7 @@ class _Moving:
         contact = self.state.contact
         vectors = (
             *(self.q, self.v, self.state.lam, self.state.guide_force, self.books),
-            self.state.films,
+            *(self.state.films, self.state.bearing),
         )
         for values, old in zip(vectors, kept.vectors, strict=True):
             values[...] = old

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from klack.hydraulics.tilted_film import SectorFilm
 from klack.network.rows import FilmRow
+from klack.transient.guide import Guide
 from klack.transient.interface_arrays import Films
 from klack.transient.interface_model import InterfaceModel
 
-__all__ = ["TiltingFilm", "film_arrays"]
+__all__ = ["BearingFilm", "TiltingFilm", "film_arrays"]
 
 Array = NDArray[np.float64]
 
@@ -45,11 +46,34 @@ class TiltingFilm:
     base: Array
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BearingFilm:
+    """Film at each height of a guide, a short bearing.
+
+    Parameters
+    ----------
+    length : float [m]
+        Along the axis.
+    cut_off : float [m]
+        Height that the roughness leaves.
+    """
+
+    length: float
+    cut_off: float
+
+    def arrays(self, guide: Guide, viscosity: float) -> tuple[Array, Array]:
+        """``mu L^3 R / c^2`` [N s] and clearance with the cut-off [m] at each height."""
+        room = guide.clearance + self.cut_off
+        return viscosity * self.length**3 * guide.radius / room**2, room
+
+
 def film_arrays(
     model: InterfaceModel,
     films: Sequence[TiltingFilm],
     rows: Mapping[str, FilmRow],
     series: Mapping[str, float],
+    bearing: Array,
+    room: Array,
 ) -> Films:
     """Arrays of films for the compiled step, at the gaps of the model.
 
@@ -57,31 +81,39 @@ def film_arrays(
     ----------
     model : InterfaceModel
     films : sequence of TiltingFilm
-        One or more.
     rows : mapping of str to FilmRow
         Of each of their stops, between parallel faces along the axis.
     series : mapping of str to float [m/N]
         Compliance along the axis of the bulk of the bodies at these stops.
+    bearing, room : array, shape (g,) [N s], [m]
+        Of the films at the heights of the guide; empty without.
     """
     at = {name: slice(first, last) for name, first, last in model.contacts}
-    here = [rows[film.stop] for film in films]
+    here = [(film, rows[film.stop]) for film in films]
     lands = [_laid_out(film.land) for film in films]
-    sizes = [len(land) for land in lands]
+    starts = np.cumsum([0, *(len(land) for land in lands)])[:-1]
     slope = np.array([film.slope for film in films])
+    M, n = model.mode_count, model.count
+
+    def each(values: list[Array], *shape: int) -> Array:
+        return np.array(values) if values else np.zeros((0, *shape))
+
     return Films(
-        np.array([film.fit @ model.traces[at[film.stop]] for film in films]),
-        np.array([film.fit @ model.gap[at[film.stop]] - film.base for film in films]),
-        slope * [row.cut_off for row in here],
-        np.array([0.0 if f.land is None else f.land.outer_radius for f in films]),
-        np.array([row.cubic * f.slope / f.cubic for f, row in zip(films, here, strict=True)]),
-        np.array([row.suction / (f.slope * _area(f)) for f, row in zip(films, here, strict=True)]),
-        np.array([row.linear for row in here]) / slope,
-        slope,
-        np.array([_arms(model, film) for film in films]),
-        np.array([_bulk(model, film, series[film.stop]) for film in films]),
-        np.array([_sizes(film.land) for film in films], dtype=np.int64),
-        np.array(np.cumsum([0, *sizes[:-1]]), dtype=np.int64),
-        np.concatenate(lands),
+        rows=each([film.fit @ model.traces[at[film.stop]] for film in films], 3, M),
+        offset=each([film.fit @ model.gap[at[film.stop]] - film.base for film in films], 3),
+        lowest=slope * [row.cut_off for _, row in here],
+        reach=np.array([0.0 if f.land is None else f.land.outer_radius for f in films]),
+        viscosity=np.array([row.cubic * film.slope / film.cubic for film, row in here]),
+        tension=np.array([row.suction / (film.slope * _area(film)) for film, row in here]),
+        shear=np.array([row.linear for _, row in here]) / slope,
+        axial=slope,
+        arms=each([_arms(model, film) for film in films], n, 3),
+        compliance=each([_bulk(model, film, series[film.stop]) for film in films], 3, 3),
+        bearing=bearing,
+        room=room,
+        sizes=np.array([_sizes(film.land) for film in films], dtype=np.int64).reshape(-1, 5),
+        start=np.array(starts, dtype=np.int64),
+        land=np.concatenate([np.zeros(0), *lands]),
     )
 
 
