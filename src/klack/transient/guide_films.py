@@ -15,6 +15,7 @@ from klack.transient.interface_arrays import Bore, Films, Modes, State
 __all__ = ["count_bearing", "shaft_place", "squeeze_guide"]
 
 Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
 
 _ROUNDS, _HALVINGS = 40, 12
 _FOUND, _NEARLY = 1e-11, 1e-6  # places that do not fit, over the clearance
@@ -38,55 +39,70 @@ def _within(place: Vector, clearance: float) -> float:
 
 
 @njit
-def squeeze_guide(
-    films: Films, k: int, modes: Modes, bore: Bore, state: State, q: Vector, kick: Vector
-) -> bool:
-    """Modal force of the film at a height over the step that leads to ``q`` without it.
+def _bearings(
+    films: Films, bore: Bore, before: Matrix, after: Matrix, step: float
+) -> tuple[Vector, Matrix]:
+    """Forces of all heights over a step, shape (2 g,), and their slopes with the places after."""
+    heights = len(films.room)
+    force, slopes = np.zeros(2 * heights), np.zeros((2 * heights, 2 * heights))
+    for k in range(heights):
+        room, strength = films.room[k], films.bearing[k]
+        first = _within(before[k], bore.clearance[k]) / room
+        last = _within(after[k], bore.clearance[k]) / room
+        x, y, steep = guide_film_step(
+            first * before[k, 0], first * before[k, 1],
+            last * after[k, 0], last * after[k, 1], step,
+        )  # fmt: skip
+        force[2 * k], force[2 * k + 1] = strength * x, strength * y
+        for c in range(2):
+            for d in range(2):  # of a shaft that does not slide along the wall
+                slopes[2 * k + c, 2 * k + d] = strength * steep[c, d] * last
+    return force, slopes
 
-    Newton's method on the place at the end of the step, halved where it goes too far; False if none
-    is found.
+
+@njit
+def squeeze_guide(
+    films: Films, modes: Modes, bore: Bore, state: State, q: Vector, kick: Vector
+) -> bool:
+    """Modal force of the films at all heights over the step that leads to ``q`` without them.
+
+    Newton's method on the places at the end of the step, halved where it goes too far; False if
+    they are not found.
     """
-    room, clearance = films.room[k], bore.clearance[k]
-    before, free = shaft_place(bore, k, state.q), shaft_place(bore, k, q)
-    before *= _within(before, clearance)
-    soft = np.zeros((2, 2))
-    for c in range(2):
-        for d in range(2):
-            for i in range(len(q)):
-                soft[c, d] += bore.traces[k, c, i] * modes.B1[i] * bore.traces[k, d, i]
-    u, f, slopes = before.copy(), np.zeros(2), np.zeros((2, 2))
-    left, size, found = free - u, np.inf, False
-    change = np.zeros(2)
-    for rounds in range(_ROUNDS):
-        if rounds > 0:
-            change = np.linalg.solve(np.eye(2) - soft @ slopes, left)
+    heights, M = len(films.room), len(q)
+    n = 2 * heights
+    rows = bore.traces.reshape((n, M))
+    before, free = np.empty((heights, 2)), np.empty(n)
+    for k in range(heights):
+        before[k] = shaft_place(bore, k, state.q)
+        free[2 * k : 2 * k + 2] = shaft_place(bore, k, q)
+    soft = (rows * modes.B1) @ rows.T
+    u = before.copy().reshape(n)
+    force, slopes = _bearings(films, bore, before, before, modes.step)
+    left = free - u
+    size, least = np.max(np.abs(left)), np.min(films.room)
+    rounds = 0
+    while size > _FOUND * least and rounds < _ROUNDS:
+        rounds += 1
+        change = np.linalg.solve(np.eye(n) - soft @ slopes, left)
         share, now = 1.0, size
         for _ in range(_HALVINGS):
             tried = u + share * change
-            inside = _within(tried, clearance)
-            x, y, steep = guide_film_step(
-                before[0] / room, before[1] / room,
-                inside * tried[0] / room, inside * tried[1] / room, modes.step,
-            )  # fmt: skip
-            force = np.array([x, y]) * films.bearing[k]
-            rest = free + soft @ force - tried
-            now = np.sqrt(rest[0] ** 2 + rest[1] ** 2)
+            force, slopes = _bearings(films, bore, before, tried.reshape((heights, 2)), modes.step)
+            left = free + soft @ force - tried
+            now = np.max(np.abs(left))
             if now < size:
                 break
             share *= 0.5
+        u = tried
         if not now < size:  # round-off
             break
-        u, f, left, size = tried, force, rest, now
-        # the wall turns no way across it into a way along it
-        slopes = steep * (films.bearing[k] / room) * inside
-        if size <= _FOUND * room:
-            found = True
-            break
-    if not (found or size < _NEARLY * room):
+        size = now
+    if not size < _NEARLY * least:
         return False
-    for i in range(len(q)):
-        kick[i] = bore.traces[k, 0, i] * f[0] + bore.traces[k, 1, i] * f[1]
-    state.bearing[k, 0], state.bearing[k, 1] = f[0], f[1]
+    kick[:] = rows.T @ force
+    for k in range(heights):
+        state.bearing[k, 0], state.bearing[k, 1] = force[2 * k], force[2 * k + 1]
     return True
 
 

@@ -93,6 +93,11 @@ All steps done; open for long enough; no active set found; a contact would begin
 other way (the other stop), and that step is not taken.
 """
 
+_PAY_FROM = 1e-10
+"""Smallest work of a step over the energy of the contact that pays debts.
+
+Of bodies at rest debt and work are round-off, and their ratio is anything."""
+
 _PAY_LIMIT = 1e-3
 """Share of a contact force that may always pay the energy debt.
 
@@ -458,7 +463,7 @@ def _pay(
         given, lost = friction_work(state.rubbing, step.bent, step.moved)
         owed += held + given + lost
     pay = 0.0
-    if owed != 0.0 and work != 0.0:
+    if owed != 0.0 and abs(work) > _PAY_FROM * (potential + stored):
         limit = 1.0
         if whole_step:  # what the contact still holds must suffice
             limit = min(max(_PAY_LIMIT, 2.0 * abs(owed) / potential), 1.0)
@@ -633,8 +638,8 @@ def march(
                     return taken, FAILED
                 _add(step, modes, 1.0)
                 bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
-            for k in range(len(films.room)):
-                if not squeeze_guide(films, k, modes, bore, state, step.q, step.kick):
+            if len(films.room):
+                if not squeeze_guide(films, modes, bore, state, step.q, step.kick):
                     return taken, FAILED
                 _add(step, modes, 1.0)
         least = 0.0

@@ -239,9 +239,8 @@ class _Moving:
             shaft_pressed(self.bore, self.state)
         self.write()
         here = slice(0, self.ports)
-        self.at[Y0:][here] = self.P.T @ self.q
-        if not rests:
-            self.at[Y1:][here] = self.at[SEEN:][here] = self.at[Y0:][here]
+        for row in (Y0, Y1, SEEN):
+            self.at[row:][here] = self.P.T @ self.q
         self.valve.path.clear()
         return begun
 

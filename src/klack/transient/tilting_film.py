@@ -102,7 +102,7 @@ def film_arrays(
         rows=each([film.fit @ model.traces[at[film.stop]] for film in films], 3, M),
         offset=each([film.fit @ model.gap[at[film.stop]] - film.base for film in films], 3),
         lowest=slope * [row.cut_off for _, row in here],
-        reach=np.array([0.0 if f.land is None else f.land.outer_radius for f in films]),
+        reach=np.array([1e-3 if f.land is None else f.land.outer_radius for f in films]),
         viscosity=np.array([row.cubic * film.slope / film.cubic for film, row in here]),
         tension=np.array([row.suction / (film.slope * _area(film)) for film, row in here]),
         shear=np.array([row.linear for _, row in here]) / slope,

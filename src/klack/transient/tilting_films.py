@@ -34,9 +34,12 @@ __all__ = [
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-_ROUNDS, _HALVINGS = 40, 12
+_ROUNDS, _SEARCHES = 60, 12
+_ENOUGH = 0.2  # of the slope of the potential: found along a change
+_ASIDE = 1e-6  # of the way without the film
+_ROUND_OFF = 1e-16
 _FOUND = 1e-11  # heights that do not fit, over lift and the least height
-_NEARLY = 1e-6  # the same where round-off or a corner leaves more
+_NEARLY = 1e-4  # the same at a corner, where sectors take turns in opening and closing
 
 
 @njit
@@ -167,8 +170,8 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
 def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> bool:
     """Modal force of a film over the step that leads to ``q`` without it; False if none is found.
 
-    Newton's method on lift and tilts, halved where it goes too far: what they do to the heights and
-    the film to them pull the same way.
+    Newton's method on lift and tilts.  They minimise a convex potential, that of ``soft`` and that
+    of the film; along a change its slope is brought near zero where Newton's step goes too far.
     """
     step, reach = modes.step, films.reach[k]
     rows, D = films.rows[k], films.compliance[k]
@@ -184,29 +187,46 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
             for i in range(len(q)):
                 soft[c, d] += rows[c, i] * modes.B1[i] * rows[d, i]
     tiny = _FOUND * (films.lowest[k] + abs(before[0]) + abs(free[0] - before[0]))
-    u = before.copy()
+    stiff = np.linalg.inv(soft)
+    # a corner lies between closing and opening: begin on the right side of it
+    u = before + _ASIDE * (free - before)
     f, slopes = _pressed(films, k, before, u, step)
     left = free + soft @ f - u
     size = _size(left, reach)
+    best, least = f.copy(), size
     rounds = 0
     while size > tiny and rounds < _ROUNDS:
         rounds += 1
         change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
-        share, now = 1.0, size
-        for _ in range(_HALVINGS):
+        along = stiff @ change
+        first = along @ left  # of the slope of the potential along the change, with its sign turned
+        if not first > 0.0:
+            change = np.linalg.solve(np.eye(3) + soft @ _resisting(slopes, reach), left)
+            along = stiff @ change
+            first = along @ left
+        low, high, at_low, at_high, share = 0.0, 1.0, first, 0.0, 1.0
+        for _ in range(_SEARCHES):
             tried = u + share * change
             f, slopes = _pressed(films, k, before, tried, step)
             left = free + soft @ f - tried
-            now = _size(left, reach)
-            if now < size:
+            now = along @ left
+            if (share == 1.0 and now >= 0.0) or abs(now) <= _ENOUGH * abs(first):
                 break
-            share *= 0.5
+            if now > 0.0:
+                low, at_low, at_high = share, now, 0.5 * at_high
+            else:
+                high, at_high, at_low = share, now, at_low if share == 1.0 else 0.5 * at_low
+            share = low + (high - low) * at_low / (at_low - at_high)
         u = tried
-        if not now < size:  # round-off
+        size = _size(left, reach)
+        if size < least:
+            least = size
+            best[:] = f
+        if _size(share * change, reach) <= _ROUND_OFF * _size(u, reach):
             break
-        size = now
-    if not size < _NEARLY / _FOUND * tiny:
+    if not least < _NEARLY / _FOUND * tiny:
         return False
+    f = best
     for i in range(len(q)):
         kick[i] = 0.0
         for c in range(3):
@@ -214,6 +234,19 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
     for c in range(3):
         state.films[k, c] = f[c]
     return True
+
+
+@njit
+def _resisting(slopes: Matrix, reach: float) -> Matrix:
+    """The part of a film's stiffness that resists: symmetric, without what is below zero.
+
+    Cavitating sectors beside closed ones have a little of the other kind.
+    """
+    scale = np.array([1.0, 1.0 / reach, 1.0 / reach])
+    stiff = -0.5 * (slopes + slopes.T) * np.outer(scale, scale)
+    values, shapes = np.linalg.eigh(stiff)
+    stiff = (shapes * np.maximum(values, 0.0)) @ shapes.T
+    return stiff / np.outer(scale, scale)
 
 
 @njit

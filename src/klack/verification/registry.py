@@ -28,6 +28,8 @@ COVERS = {
     "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, jams.",
     "plasticity": "Faces that yield: one point, spheres and a seat on finite elements, running-in, "
     "impacts in time.",
+    "off-axis": "A needle in space: films that tilt, films in its guide, drops and starts in a "
+    "network.",
     "spectra": "Spectra of pulses, Parseval, and one-third-octave bands of IEC 61260-1.",
     "vibration": "Mobility, force on the support, energy injected, plates, and radiation of "
     "pistons.",
@@ -53,7 +55,7 @@ COVERS = {
 """Group -> what it covers, in one sentence."""
 
 GROUPS = tuple(COVERS)
-"""Module names in this package; each has ``checks() -> list[Check]``."""
+"""Modules in this package, by name, with hyphens; each has ``checks() -> list[Check]``."""
 
 
 def run_checks(groups: Iterable[str] | None = None) -> list[Check]:
@@ -70,7 +72,7 @@ def iterate_checks(
     """Yield group after group with its checks, as they finish; ``started`` receives each name."""
     for group in _known(groups):
         started(group)
-        module = import_module(f"klack.verification.{group}")
+        module = import_module(f"klack.verification.{group.replace('-', '_')}")
         try:
             checks = list(module.checks())
         except KlackError as error:
