@@ -225,19 +225,19 @@ def _check_roughness(case: ImpactSections) -> None:
     contact = case.contact
     if contact.roughness is None:
         return
+    drawn = case.shots is not None and case.shots.contact_friction is not None
     others: list[tuple[Key, bool, str]] = [
         (("contact", "friction"), not contact.faces.is_none, "friction between rough faces"),
+        (("shots", "contact_friction"), drawn, "drawn friction between rough faces"),
         (("contact", "local_law"), contact.local_law.kind != "consistent", "a given local law"),
-        (("guide",), case.guide is not None, "a guide"),
         (("opposite",), case.opposite is not None, "an upper stop"),
-        (("shots",), case.shots is not None, "shots"),
     ]
     for key, is_there, what in others:
         if is_there:
             raise CaseProblem(
                 ("contact", "roughness"),
                 got=f"rough faces and {what} ({'.'.join(map(str, key))})",
-                expected="one of them: a layer of asperities has the levels reduced and full",
+                expected="one of them: no level has a layer of asperities together with that",
                 hint="remove one of them; contact.crown goes with all.",
                 on_key=True,
             )

@@ -109,6 +109,13 @@ class FaceRoughness(Section):
             )
         return self
 
+    @property
+    def in_words(self) -> str:
+        """For example ``asperities of 200 nm rms``."""
+        if self.rms is None:
+            return "asperities by a measured curve"
+        return f"asperities of {format_si(self.rms, 'm', 3)} rms"
+
     def _with_round_summits(self) -> Self:
         """Refuse summits as high as they are round: spheres that touch at their tips are flat."""
         assert self.rms is not None

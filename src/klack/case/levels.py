@@ -15,5 +15,11 @@ Level = Literal[
 ]
 LEVELS: tuple[Level, ...] = get_args(Level)
 
-ROUGH_LEVELS: tuple[Level, ...] = ("lumped", "reduced", "reduced-participation", "full")
+ROUGH_LEVELS: tuple[Level, ...] = (
+    "lumped",
+    "reduced",
+    "reduced-participation",
+    "interface",
+    "full",
+)
 """Levels that take faces with a layer of asperities."""

@@ -13,6 +13,7 @@ __all__ = [
     "FRICTION",
     "GUIDE",
     "GUIDE_STRAIN",
+    "LAYER",
     "OPEN_STEPS",
     "PLASTIC",
     "ROUNDS",
@@ -22,9 +23,11 @@ __all__ = [
     "Closed",
     "ContactPoints",
     "Films",
+    "Layer",
     "Limit",
     "Modes",
     "Outside",
+    "Pressed",
     "Record",
     "Rubbing",
     "State",
@@ -46,7 +49,8 @@ CONTACT_STEPS = 7
 DIRECTION = 8  # sign of the last axial contact force, 0 before the first
 FRICTION = 9  # loss between the faces
 PLASTIC = 10  # loss to faces that yield
-_BOOKS = 11
+LAYER = 11  # energy held by layers of asperities, less half the product of force and closure
+_BOOKS = 12
 
 
 class Modes(NamedTuple):
@@ -85,6 +89,20 @@ class Limit(NamedTuple):
         return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
 
 
+class Layer(NamedTuple):
+    """Layer of asperities on the points, see :mod:`klack.contact.asperity_layer`; empty without."""
+
+    area: Vector  # (n,) [m^2]
+    closure: Vector  # (m,) [m]
+    pressure: Vector  # (m,) [Pa]
+    energy: Vector  # (m,) [J/m^2]
+
+    @classmethod
+    def none(cls) -> Self:
+        """Return the layer of smooth points."""
+        return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
+
+
 class ContactPoints(NamedTuple):
     """Points that may close; none in flight, where no contact is looked at."""
 
@@ -98,21 +116,31 @@ class ContactPoints(NamedTuple):
     kinetic: Vector  # (n,) [-]
     fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
     limit: Limit  # of points that yield; then A is changed in place
+    layer: Layer  # of rough points
 
     @classmethod
-    def smooth(
-        cls, A: Matrix, traces: Matrix, gap: Vector, axial: Vector, limit: Limit | None = None
+    def frictionless(
+        cls,
+        A: Matrix,
+        traces: Matrix,
+        gap: Vector,
+        axial: Vector,
+        limit: Limit | None = None,
+        layer: Layer | None = None,
     ) -> Self:
         """Return points without friction."""
         nothing, rows = np.zeros(0), np.zeros((0, traces.shape[1]))
-        yields = Limit.none() if limit is None else limit
-        return cls(A, traces, gap, axial, rows, nothing, nothing, nothing, nothing, yields)
+        return cls(
+            *(A, traces, gap, axial, rows, nothing, nothing, nothing, nothing),
+            Limit.none() if limit is None else limit,
+            Layer.none() if layer is None else layer,
+        )
 
     @classmethod
     def none(cls, modes: int) -> Self:
         """Return no point at all."""
         nothing = np.zeros(0)
-        return cls.smooth(np.zeros((0, 0)), np.zeros((0, modes)), nothing, nothing)
+        return cls.frictionless(np.zeros((0, 0)), np.zeros((0, modes)), nothing, nothing)
 
 
 class Bore(NamedTuple):
@@ -256,6 +284,24 @@ class Worn(NamedTuple):
         return cls(np.zeros(n), np.full(n, -1, dtype=np.int64), np.zeros(n), np.zeros(n))
 
 
+class Pressed(NamedTuple):
+    """What rough points remember, changed in place; empty without."""
+
+    force: Vector  # (n,) [N] last forces
+    before: Vector  # (n,) [N] those a step earlier: both make the first guess
+    stiffness: Vector  # (n,) [N/m] of the layer, as the inverse has it; 0: open
+    points: NDArray[np.int64]  # (n,) the first ``counts[0]`` are in the inverse
+    inverse: Matrix  # (n, n) [N/m] of A and of the compliance of the layer over these points
+    counts: NDArray[np.int64]  # points in the inverse
+
+    @classmethod
+    def none(cls, points: int) -> Self:
+        """Return points that do not touch."""
+        n = points
+        order, counts = np.zeros(n, dtype=np.int64), np.zeros(1, dtype=np.int64)
+        return cls(np.zeros(n), np.zeros(n), np.zeros(n), order, np.zeros((n, n)), counts)
+
+
 class State(NamedTuple):
     """Where the bodies and their contact are, changed in place."""
 
@@ -265,6 +311,7 @@ class State(NamedTuple):
     contact: ActiveSet
     rubbing: Rubbing
     worn: Worn
+    pressed: Pressed
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
     films: Matrix  # (f, 7) force and moments of the last step, of the one before, energy lost
@@ -281,15 +328,17 @@ class State(NamedTuple):
         *,
         yields: bool = False,
         films: int = 0,
+        rough: bool = False,
     ) -> Self:
         """Return a state of rest at q = 0, of faces as made."""
         return cls(
             np.zeros(modes),
             np.zeros(modes),
             np.zeros(points),
-            ActiveSet.none(0 if ways else points),
+            ActiveSet.none(0 if ways or rough else points),
             Rubbing.none(points, ways),
             Worn.none(points if yields else 0),
+            Pressed.none(points if rough else 0),
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
             np.zeros((films, 7)),

@@ -31,6 +31,17 @@ and the matrix of the complementarity problem loses
 With friction between the faces the same holds in all directions of the points
 (:mod:`klack.transient.interface_friction`).  Points that yield leave a set, which is part of their
 gap from then on (:mod:`klack.transient.yielding_points`); its plastic work is what a step takes.
+
+Points with a layer of asperities (:mod:`klack.transient.rough_points`) have no complementarity but
+:math:`\lambda_1 = A p(-g_1)`, and the energy of the layer besides,
+
+.. math:: U = \tfrac12 \lambda^T C_l \lambda + \sum_k A_k \int_0^{-g_k} p \, dc ,
+
+which is convex in :math:`d = g_0 + \Phi q`.  Their mean force is
+:math:`(\tfrac12 - \theta) \lambda_0 + (\tfrac12 + \theta) \lambda_1` with the one
+:math:`\theta` for which its work is the change of U.  The end alone takes more than that change,
+the start alone less: :math:`\theta` is never beyond :math:`\pm\tfrac12`, and of the order of a
+step.  For one point on a rigid body this is the mean pressure of the layer between two closures.
 """
 
 from typing import NamedTuple
@@ -50,6 +61,7 @@ from klack.transient.interface_arrays import (
     DIRECTION,
     GUIDE,
     GUIDE_STRAIN,
+    LAYER,
     OPEN_STEPS,
     PLASTIC,
     ROUNDS,
@@ -70,6 +82,7 @@ from klack.transient.interface_friction import (
     rub,
     tell_friction,
 )
+from klack.transient.rough_points import layer_energy, solve_rough
 from klack.transient.tilting_films import bend_faces, bulk_work, count_squeeze, squeeze
 from klack.transient.yielding_points import let_yield, solve_yielding
 
@@ -496,6 +509,57 @@ def _pay(
 
 
 @phase
+def _balance(
+    modes: Modes,
+    points: ContactPoints,
+    state: State,
+    step: _Step,
+    share: float,
+    potential: float,
+    answer: float,
+    held: float,
+) -> tuple[float, float]:
+    """Weigh the forces of rough points so that their work is the change of energy.
+
+    What the layers have taken beyond the potential is ``held`` [J].  Returns the potential at the
+    end, and what the spring has answered to the forces of the contact.
+    """
+    n, M = len(points.gap), len(state.q)
+    for i in range(M):
+        step.kick[i] = 0.0
+    for k in range(n):
+        step.both[k] = state.lam[k] + step.lam[k]
+        change = step.lam[k] - state.lam[k]
+        if change != 0.0:
+            for i in range(M):
+                step.kick[i] += change * points.traces[k, i]
+    back = _hold(step, modes, share)
+    work, stored = _work(points, state.q, step)
+    slope, square, given = 0.0, 0.0, 0.0
+    for k in range(n):
+        if step.both[k] > 0.0:
+            travel, moved = 0.0, 0.0
+            for i in range(M):
+                travel += points.traces[k, i] * (step.q[i] - state.q[i])
+                moved += points.traces[k, i] * modes.B1[i] * step.kick[i]
+            change = step.lam[k] - state.lam[k]
+            slope += change * (travel - 0.5 * moved)
+            square += change * moved
+            given += 0.5 * step.lam[k] * moved
+    weight = _payment(state.books[DEBT] + work + stored - potential + held, slope, square)
+    weight = min(max(weight, -0.5), 0.5)
+    _add(step, modes, weight)
+    for k in range(n):
+        step.both[k] += 2.0 * weight * (step.lam[k] - state.lam[k])
+    work, stored = _work(points, state.q, step)
+    # the forces are not solved for anew: they have done -lam moved, twice what ``stored`` counts
+    held -= weight * given
+    state.books[LAYER] -= weight * given
+    state.books[DEBT] += work + stored - potential + held
+    return stored, answer + weight * back
+
+
+@phase
 def _tell_forces(
     points: ContactPoints, state: State, step: _Step, pay: float, record: Record, taken: int
 ) -> None:
@@ -609,7 +673,7 @@ def march(
     taken, status : int
     """
     n, books, rubs = len(points.gap), state.books, len(points.tangents) > 0
-    yields = len(points.limit.area) > 0
+    yields, rough = len(points.limit.area) > 0, len(points.layer.area) > 0
     step = _start(modes, points, bore)
     guide = no_rub(len(bore.clearance), len(modes.push))
     share = _spring_share(modes.B1, modes.push, outside.spring)
@@ -644,7 +708,7 @@ def march(
                 _add(step, modes, 1.0)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
-        yielded = 0.0
+        taken_up = 0.0  # by what yields, or by layers beyond the potential
         if n:
             np.dot(points.traces, step.q, step.open_gap)
             least, widest = _look(points, step)
@@ -682,6 +746,18 @@ def march(
                     )
                     if rounds < 0:
                         return taken, FAILED
+                elif rough:
+                    rounds = solve_rough(
+                        points.A,
+                        step.open_gap,
+                        points.layer,
+                        state.pressed,
+                        step.lam,
+                        step.gap,
+                    )
+                    if rounds < 0:
+                        return taken, FAILED
+                    state.contact.counts[0] = np.count_nonzero(step.lam)
                 else:
                     rounds = solve_active(
                         points.A,
@@ -698,11 +774,15 @@ def march(
                     return taken, TURNED
                 books[ROUNDS] += abs(rounds)
                 if yields:
-                    yielded = let_yield(points.limit, state.worn, step.lam, points.gap)
-                    books[PLASTIC] += yielded
+                    taken_up = let_yield(points.limit, state.worn, step.lam, points.gap)
+                    books[PLASTIC] += taken_up
+                elif rough:
+                    held = layer_energy(points.layer, step.lam, step.gap)
+                    taken_up = held - books[LAYER]
+                    books[LAYER] = held
                 if films is not None:
                     for k in range(len(films.lowest)):
-                        yielded += bulk_work(films, k, state, step.lam)
+                        taken_up += bulk_work(films, k, state, step.lam)
                 least = _close(points, state, step)
                 answer += _hold(step, modes, share)
                 _add(step, modes, 1.0)
@@ -720,9 +800,15 @@ def march(
                 for i in range(len(step.bent)):
                     step.bent[i] = 0.0
                     state.rubbing.forces[n + i] = 0.0
-            pay, potential, answer = _pay(
-                modes, points, state, step, share, potential, answer, yielded
-            )
+            pay = 0.0
+            if rough:
+                potential, answer = _balance(
+                    modes, points, state, step, share, potential, answer, taken_up
+                )
+            else:
+                pay, potential, answer = _pay(
+                    modes, points, state, step, share, potential, answer, taken_up
+                )
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
         if films is not None:

@@ -30,6 +30,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
+from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
@@ -191,6 +192,8 @@ class InterfaceModel:
         What they read besides, per unit contact force of each row of ``compliance``.
     limit : PressureLimit or None
         Of the points of the first contact, without friction; None: they stay elastic.
+    layer : AsperityLayer or None
+        On the points of the only contact, without friction or yield; None: they are smooth.
     """
 
     bodies: tuple[str, ...]
@@ -218,6 +221,7 @@ class InterfaceModel:
     observed: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     observed_residual: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))
     limit: PressureLimit | None = None
+    layer: AsperityLayer | None = None
 
     @property
     def ways(self) -> int:

@@ -30,6 +30,7 @@ from klack.transient.interface_arrays import (
     FRICTION,
     GUIDE,
     GUIDE_STRAIN,
+    LAYER,
     OPEN_STEPS,
     PLASTIC,
     ROUNDS,
@@ -37,9 +38,11 @@ from klack.transient.interface_arrays import (
     ActiveSet,
     Bore,
     ContactPoints,
+    Layer,
     Limit,
     Modes,
     Outside,
+    Pressed,
     Record,
     Rubbing,
     State,
@@ -60,6 +63,7 @@ from klack.transient.interface_result import (
     InterfaceResult,
     RigidMotion,
 )
+from klack.transient.rough_points import layer_energy, solve_rough
 
 __all__ = ["Gaps", "bore_arrays", "contact_points", "modes_of_step", "simulate_interface"]
 
@@ -180,11 +184,18 @@ def contact_points(
     step : float [s]
     spring : float [N/m]
         Of a spring that holds the moving body.
+
+    Raises
+    ------
+    InputError
+        For a layer of asperities beside friction, yield or a second contact.
     """
+    _require_layer_alone(model)
     push = np.ascontiguousarray(model.rigid[2])
     if not model.ways:
         A = contact_compliance(model.compliance, model.traces, B1, push, spring)
-        return ContactPoints.smooth(A, model.traces, model.gap, model.axial, _limit(model))
+        laws = _limit(model), _layer(model)
+        return ContactPoints.frictionless(A, model.traces, model.gap, model.axial, *laws)
     rows = np.vstack([model.traces, model.tangents])
     counts = [last - first for _, first, last in model.contacts]
     static, kinetic, fade = np.repeat(
@@ -201,6 +212,7 @@ def contact_points(
         np.ascontiguousarray(kinetic),
         np.ascontiguousarray(fade),
         Limit.none(),
+        Layer.none(),
     )
 
 
@@ -213,6 +225,30 @@ def _limit(model: InterfaceModel) -> Limit:
     area[first:last] = model.area[first:last]
     law = model.limit
     return Limit(area, law.set, law.pressure, law.softness)
+
+
+def _require_layer_alone(model: InterfaceModel) -> None:
+    others = {
+        "friction": bool(model.ways),
+        "points that yield": model.limit is not None,
+        "a second contact": len(model.contacts) > 1,
+    }
+    beside = next((name for name, is_there in others.items() if is_there), None)
+    if model.layer is not None and beside is not None:
+        raise InputError(
+            "interface level: layer",
+            got=f"a layer of asperities and {beside}",
+            expected="one of them",
+            hint="set the layer of the model to None, or leave the other out.",
+        )
+
+
+def _layer(model: InterfaceModel) -> Layer:
+    """Layer of asperities of the points."""
+    law = model.layer
+    if law is None:
+        return Layer.none()
+    return Layer(model.area, law.closure, law.pressure, law.state(law.closure)[2])
 
 
 def modes_of_step(model: InterfaceModel, step: float) -> Modes:
@@ -274,7 +310,9 @@ class _Run:
         )
         self.bore = bore_arrays(guide, M)
         yields = model.limit is not None
-        self.state = State.still(M, n, len(self.bore.clearance), model.ways, yields=yields)
+        rough = model.layer is not None
+        heights = len(self.bore.clearance)
+        self.state = State.still(M, n, heights, model.ways, yields=yields, rough=rough)
         if worn is not None and yields:
             self.state.worn.set[:] = worn
         self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
@@ -283,6 +321,7 @@ class _Run:
             contact=ActiveSet.none(0),
             rubbing=Rubbing.none(0, 0),
             worn=Worn.none(0),
+            pressed=Pressed.none(0),
         )
         self.taken_at = np.zeros(6)
         first, last = model.contacts[0][1:]
@@ -324,6 +363,7 @@ class _Run:
         # the spring counts from q = 0 in the kernel
         self.constant += self.spring * self.start_lift
         self.press()
+        self.settle()
         self.start_energy = self.energy()
         self.keep_motion()
 
@@ -339,6 +379,23 @@ class _Run:
             "kc,kcd,kd", self.state.guide_force, self.bore.compliance, self.state.guide_force
         )
         self.books[GUIDE_STRAIN] = 0.5 * float(held)
+
+    def settle(self) -> None:
+        """Press the layer of faces that are placed into each other."""
+        gap, lam = self.open_gap + self.model.traces @ self.q, self.state.lam
+        if self.model.layer is None or not np.any(gap < 0.0):
+            return
+        C, ends, pressed = self.model.compliance, np.zeros(len(gap)), self.state.pressed
+        if solve_rough(C, gap, self.contact.layer, pressed, lam, ends) < 0:
+            raise ConvergenceError(
+                "interface level: no contact forces found at the start.\n"
+                "Try: a start without contact."
+            )
+        pressed.before[:] = lam
+        pressed.counts[0] = 0  # its inverse is that of the bodies at rest
+        pressed.stiffness[:] = 0.0
+        self.state.contact.counts[0] = np.count_nonzero(lam)
+        self.books[LAYER] = layer_energy(self.contact.layer, lam, ends)
 
     def coordinates(self, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rigid modal coordinates of a translation and rotation vector."""
@@ -533,6 +590,7 @@ class _Run:
 
     def contact_energy(self) -> float:
         pressed = -0.5 * self.state.lam @ (self.open_gap + self.model.traces @ self.q)
+        pressed += self.books[LAYER]
         rubbing = self.state.rubbing
         if len(rubbing.across):
             pressed += 0.5 * rubbing.across @ rubbing.bent

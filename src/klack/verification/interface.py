@@ -46,6 +46,7 @@ from klack.verification.interface_impacts import (
     hertz_impact,
     two_spheres,
 )
+from klack.verification.rough_point import rough_checks
 
 __all__ = ["checks"]
 
@@ -67,6 +68,7 @@ def checks() -> list[Check]:
         *_sphere_on_beam(),
         *_metal_bar(),
         *_order(),
+        *rough_checks(),
         *_complementarity(),
         *_guide(),
         *_two_stops(),

@@ -279,7 +279,8 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
     P = modal_propagator(model.omega, model.damping, step)
     push = np.ascontiguousarray(model.rigid[2])
     none = np.zeros((0, M))
-    state = State.still(M, n, 0, model.ways)
+    yields, rough = model.limit is not None, model.layer is not None
+    state = State.still(M, n, 0, model.ways, yields=yields, rough=rough)
     state.q[:], state.v[:] = q, v
     march(
         steps,

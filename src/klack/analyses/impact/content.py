@@ -385,6 +385,8 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
 
 def _contact_of(study: ImpactStudy) -> str:
     rubbing = [f"'{result.level}'" for result in study.ordered if result.energies.get("friction")]
+    if study.contact.layer:
+        return f"frictionless contact of faces with {study.contact.layer}, which stay elastic"
     if not rubbing:
         return "frictionless contact of smooth surfaces"
     if len(rubbing) == len(study.ordered):
@@ -411,8 +413,8 @@ def _limits(study: ImpactStudy) -> tuple[tuple[str, str], ...]:
     limits = [
         (
             "Physics",
-            f"{_bodies_of(study)} with small deformations; {_contact_of(study)}; no fluid, no "
-            "roughness.",
+            f"{_bodies_of(study)} with small deformations; {_contact_of(study)}; no "
+            f"fluid{'' if study.contact.layer else ', no roughness'}.",
         ),
         (
             "Reduced level",

@@ -112,19 +112,7 @@ def build_interface(
     limit : PressureLimit, optional
         Of the points of the contact, from :func:`klack.assembling.pressure_limit.pressure_limit`;
         those of an upper stop stay elastic.
-
-    Raises
-    ------
-    InputError
-        For rough faces, whose layer this level does not have.
     """
-    if problem.pair.layer is not None:
-        raise InputError(
-            f"{problem.case.path or 'case'}: contact.roughness",
-            got="rough faces at the interface level",
-            expected="smooth faces there",
-            hint="leave contact.roughness out; contact.crown goes with every level.",
-        )
     bodies = [
         InterfaceBody(
             body=body,
@@ -165,7 +153,8 @@ def build_interface(
                 faces=None if smooth else FaceFriction.on(above_faces, above.space, *there),
             )
         )
-    return replace(interface_model(bodies, contacts), limit=limit if smooth else None)
+    model = interface_model(bodies, contacts)
+    return replace(model, limit=limit if smooth else None, layer=pair.layer)
 
 
 def _opposite_faces(case: Case) -> Friction:
@@ -441,12 +430,13 @@ def run_interface(
     elastic = model.omega > 0
     counts = [str(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies))]
     guided = "" if guide is None else ", guided"
-    yields = "" if model.limit is None else ", yield by a pressure limit"
+    faces = "" if model.limit is None else ", yield by a pressure limit"
+    if model.layer is not None:
+        faces = ", rough"
     level = level_result(
         result.history,
         level="interface",
-        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points"
-        f"{guided}{yields}",
+        label=f"interface, {' + '.join(counts)} modes, {model.count} contact points{guided}{faces}",
         dofs=model.mode_count,
         step=case.run.interface_step,
         wall_time=result.wall_time,

@@ -56,6 +56,8 @@ class ContactSummary:
         Why no error can be judged on these meshes, each in a few words.
     needed_yield : float [Pa]
         Yield stress from which on both bodies stay elastic; nan where it is not known.
+    layer : str
+        Asperities of rough faces in words; empty for smooth ones.
     approach, force, area : array, shape (n,) [m], [N], [m^2]
         Ladder from first touch.
     """
@@ -70,6 +72,7 @@ class ContactSummary:
     points_across: int = 0
     doubts: tuple[str, ...] = ()
     needed_yield: float = float("nan")
+    layer: str = ""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -480,8 +480,6 @@ def _certificate(
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
     if not whole:
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
-    if problem.pair.layer is not None:
-        return _Certificate(doubt="the interface level, which estimates errors, has no roughness")
     count = certificate_modes(problem.case)
 
     def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:
@@ -602,7 +600,7 @@ def _surfaces(case: Case) -> str:
 
 
 def _contact_summary(problem: ContactProblem, check: ContactCheck) -> ContactSummary:
-    static = problem.static
+    static, rough = problem.static, problem.case.contact.roughness
     return ContactSummary(
         surfaces=_surfaces(problem.case),
         points=static.space.count,
@@ -611,6 +609,7 @@ def _contact_summary(problem: ContactProblem, check: ContactCheck) -> ContactSum
         points_across=check.points_across,
         doubts=check.doubts,
         needed_yield=check.needed_yield,
+        layer="" if rough is None else rough.in_words,
         approach=static.approach,
         force=static.force,
         area=static.area,

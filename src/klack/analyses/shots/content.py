@@ -348,6 +348,8 @@ def _limits(study: ShotsStudy) -> tuple[tuple[str, str], ...]:
         "contact of smooth surfaces with Coulomb friction, whose coefficient is the same at every "
         "point and in every impact of a shot"
         if study.faces
+        else f"frictionless contact of faces with {study.layer}, which stay elastic"
+        if study.layer
         else "frictionless contact of smooth surfaces"
     )
     return (

@@ -192,6 +192,8 @@ class ShotsStudy(CaseRecord):
         The guide in words; empty without one.
     faces : str
         Friction between the faces in words; empty without.
+    layer : str
+        Asperities of rough faces in words; empty for smooth ones.
     mass : float [kg]
         Of the moving body.
     modes : tuple of int
@@ -235,3 +237,4 @@ class ShotsStudy(CaseRecord):
     rule: RuleVerdict
     pressures: Mapping[str, PressureRecord]
     faces: str = ""
+    layer: str = ""

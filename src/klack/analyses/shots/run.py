@@ -147,6 +147,7 @@ def run_shots(
         surfaces=f"{case.contact.moving} on {case.contact.stop}",
         guide=_guide_in_words(case.guide),
         faces=_faces_in_words(case),
+        layer="" if case.contact.roughness is None else case.contact.roughness.in_words,
         mass=model.setup.model.mass,
         modes=model.modes,
         points=model.setup.model.count,
