@@ -107,8 +107,6 @@ class SpatialValve:
         the displacement along the axis that the network has.
     velocity : array, shape (6,) [m/s], [rad/s]
         At the start, beside what the network has.
-    path : SpatialPath
-        Filled while it runs.
     """
 
     model: InterfaceModel
@@ -119,7 +117,6 @@ class SpatialValve:
     gaps: Gaps | None = None
     placement: Vector = field(default_factory=lambda: np.zeros(6))
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
-    path: SpatialPath = field(default_factory=SpatialPath)
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
         """Return them in a network.
@@ -160,6 +157,7 @@ class _Moving:
 
     def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
         self.valve, self.network, self.sizes = valve, network, sizes
+        self.path = SpatialPath()
         model = valve.model
         self.model, self.ports = model, len(network.ports)
         self.place_q, self.place_v, self.P = _places(valve, network)
@@ -219,7 +217,7 @@ class _Moving:
         self.at[Y0:][here] = self.P.T @ self.q
         if not rests:
             self.at[Y1:][here] = self.at[SEEN:][here] = self.at[Y0:][here]
-        self.valve.path.clear()
+        self.path.clear()
         return begun
 
     def _settle(self, balance: Callable[[], StaticStart]) -> StaticStart | None:
@@ -254,7 +252,7 @@ class _Moving:
         self.state.contact.points[: len(carrying)] = carrying
         self.state.contact.counts[:] = len(carrying), 0
         self._renew(self.resting.A if self.flags[0] else self.points.A)
-        self.valve.path.clear()
+        self.path.clear()
 
     def _silence_interfaces(self) -> None:
         """Let the points act in place of the interfaces of the network."""
@@ -282,7 +280,7 @@ class _Moving:
 
     def channels(self, time: Vector) -> dict[str, ChannelData]:
         """Way of the axis of the needle across itself, and the forces of the guide."""
-        path, needle = self.valve.path, self.valve.components[0]
+        path, needle = self.path, self.valve.components[0]
         at = path.position_at(time)
         arm = float(self.valve.arms[np.argmax(self.side), 2])  # of its lower end
         slope = np.column_stack([at[:, 4], -at[:, 3]])
@@ -351,7 +349,7 @@ class _Moving:
         if not looks:
             return self._loop(recording, scratch, clock, block, look, 0, 0, report)
         self.read()
-        if not self.valve.path.begun:
+        if not self.path.begun:
             self._tell_path(int(clock[0]))
         with threadpool_limits(limits=1, user_api="blas"):
             return self._looks(recording, scratch, clock, block, look, looks, report)
@@ -692,7 +690,7 @@ class _Moving:
 
     def _tell_path(self, steps: int) -> None:
         rigid = self.model.rigid
-        self.valve.path.add(
+        self.path.add(
             steps * self.sizes.step, rigid @ self.q, rigid @ self.v, self.state.guide_force
         )
 
