@@ -81,6 +81,9 @@ _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
 _BALANCED = 1e-12  # [m]
 _STEADY = 0.04  # change of the force of a contact at rest in a step
+_AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
+_LOST = 1  # energy that damping took in flights [J]
+_STEADILY = 2  # 1: forces changed little in the last record
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
 
@@ -185,8 +188,7 @@ class _Moving:
         # closed since [fine steps], nan while open; axial force of the last step
         self.closed = np.full(len(model.contacts), np.nan)
         self.force = np.zeros(len(model.contacts))
-        self.steady = False
-        self.flags = np.zeros(2)  # 1 at rest: inverse of long steps; energy that flights lost [J]
+        self.flags = np.zeros(3)  # see the names above
         self.order = [
             [row.component for row in network.rows.interfaces].index(stop) for stop in valve.stops
         ]
@@ -208,6 +210,7 @@ class _Moving:
             with threadpool_limits(limits=1, user_api="blas"):
                 begun = self._settle(balance)
         self._silence_interfaces()
+        self.network.interface_state.gap[:] += _AWAY
         if rests:
             self._begin_closed()
         else:
@@ -246,12 +249,6 @@ class _Moving:
     def resume(self) -> None:
         """Go on from a stored state."""
         self._silence_interfaces()
-        self.read()
-        carrying = np.flatnonzero(self.state.lam > 0.0)
-        self.state.contact.active[:] = self.state.lam > 0.0
-        self.state.contact.points[: len(carrying)] = carrying
-        self.state.contact.counts[:] = len(carrying), 0
-        self._renew(self.resting.A if self.flags[0] else self.points.A)
         self.path.clear()
 
     def _silence_interfaces(self) -> None:
@@ -259,9 +256,7 @@ class _Moving:
         rows, state = self.network.interfaces, self.network.interface_state
         rows.kind[:] = NO_LAW
         rows.dry[:] = 1
-        if not np.any(rows.gap0 > 0.5 * _AWAY):
-            rows.gap0[:] += _AWAY
-            state.gap[:] += _AWAY
+        rows.gap0[:] += _AWAY
         for values in (state.e, state.force, state.chi, state.deepest, state.force_before):
             values[:] = 0.0
         state.since[:] = np.inf
@@ -323,7 +318,7 @@ class _Moving:
         """Energies [J] lost since the start of the run."""
         lost = {}
         if np.any(self.model.damping > 0.0):
-            lost["bodies damping"] = float(self.books[DAMPING] + self.flags[1])
+            lost["bodies damping"] = float(self.books[DAMPING] + self.flags[_LOST])
         if len(self.bore.clearance):
             lost["guide friction"] = float(self.books[GUIDE])
         return lost
@@ -331,7 +326,7 @@ class _Moving:
     def forget_losses(self) -> None:
         """Begin a new energy balance."""
         self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
-        self.flags[1] = 0.0
+        self.flags[_LOST] = 0.0
 
     # ------------------------------------------------------------------ motion
 
@@ -349,6 +344,7 @@ class _Moving:
         if not looks:
             return self._loop(recording, scratch, clock, block, look, 0, 0, report)
         self.read()
+        self._take_carrying()
         if not self.path.begun:
             self._tell_path(int(clock[0]))
         with threadpool_limits(limits=1, user_api="blas"):
@@ -422,7 +418,7 @@ class _Moving:
         self.read()
         if np.any(self.model.damping > 0.0):
             given = float(np.sum(self.at[WORK:][here])) - work
-            self.flags[1] += given - (self._modal_energy() - before)
+            self.flags[_LOST] += given - (self._modal_energy() - before)
         self.fresh = True
         return status
 
@@ -608,10 +604,10 @@ class _Moving:
 
     def _rests(self, clock: Index) -> bool:
         """Whether the needle lies on a stop long enough, and steadily."""
-        if self.flags[0]:
+        if self.flags[_AT_REST]:
             return True
         long = float(clock[0]) - self.closed >= self.rest
-        if self.sizes.coarse > 1 and np.any(long) and self.steady:
+        if self.sizes.coarse > 1 and np.any(long) and self.flags[_STEADILY]:
             self._rest_on(rest=True)
             return True
         return False
@@ -619,7 +615,8 @@ class _Moving:
     def _steady(self, before: Vector) -> None:
         """Note whether forces changed little in this record."""
         scale = np.maximum(np.abs(before), np.abs(self.force))
-        self.steady = bool(np.all(np.abs(self.force - before) <= _STEADY * scale))
+        steady = np.all(np.abs(self.force - before) <= _STEADY * scale)
+        self.flags[_STEADILY] = float(steady)
 
     def _still(self, record: Record) -> bool:
         """Whether a long step met nothing that it cannot see."""
@@ -628,9 +625,17 @@ class _Moving:
         steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
         return steady and bool(self.state.contact.counts[0] > 0)
 
+    def _take_carrying(self) -> None:
+        """Let the points carry that have a force, as in a stored state."""
+        contact, carrying = self.state.contact, np.flatnonzero(self.state.lam > 0.0)
+        contact.active[:] = self.state.lam > 0.0
+        contact.points[: len(carrying)] = carrying
+        contact.counts[0] = len(carrying)
+        self._renew(self.resting.A if self.flags[_AT_REST] else self.points.A)
+
     def _rest_on(self, *, rest: bool) -> None:
         """Change between fine steps and those at rest: their contact matrices differ."""
-        self.flags[0] = float(rest)
+        self.flags[_AT_REST] = float(rest)
         self._renew(self.resting.A if rest else self.points.A)
 
     def _renew(self, A: NDArray[np.float64]) -> None:
