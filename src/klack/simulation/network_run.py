@@ -248,7 +248,7 @@ def simulate_network(
         books.least_loss / scale,
         limit=_BALANCE,
         advice="a shorter step",
-        loss_limit=_BALANCE if network.moving is None else _GUIDED,
+        loss_limit=None if network.moving is None else _GUIDED,
     )
     return result
 
@@ -599,8 +599,8 @@ _SLIDERS = "sliders."
 _LAST = "record.last"
 
 
-def _balance(network: CompiledNetwork, step: float, near: RestState) -> StaticStart:
-    return begin_at_rest(network, step, near)[0]
+def _balance(network: CompiledNetwork, step: float, near: RestState, shift: Vector) -> StaticStart:
+    return begin_at_rest(network, step, near, shift)[0]
 
 
 def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:

@@ -95,6 +95,10 @@ _PAY_LIMIT = 1e-3
 
 More may, where the debt is more than that share of the energy that the contact holds."""
 
+_ROUND_OFF = 1e-10
+"""Share of the energy that the contact holds, up to which a debt waits: at rest it is round-off,
+and so is the work that would pay it."""
+
 
 class _Step(NamedTuple):
     """The step that is being taken: forces over it, state at its end."""
@@ -455,7 +459,7 @@ def _pay(
         given, lost = friction_work(state.rubbing, step.bent, step.moved)
         owed += held + given + lost
     pay = 0.0
-    if owed != 0.0 and work != 0.0:
+    if abs(owed) > _ROUND_OFF * max(potential, stored) and work != 0.0:
         limit = 1.0
         if whole_step:  # what the contact still holds must suffice
             limit = min(max(_PAY_LIMIT, 2.0 * abs(owed) / potential), 1.0)
