@@ -33,7 +33,7 @@ def stroke(duration: float, friction: float = 0.15, **more: object) -> NetworkRe
 
 @pytest.mark.parametrize(("step", "coarse"), [(40e-9, 1), (40e-9, None), (20e-9, None)])
 def test_energy_of_a_stroke_off_its_axis_closes(step, coarse):
-    run = stroke(450e-6, step=step, coarse=coarse)
+    run = stroke(330e-6, step=step, coarse=coarse)
 
     books, land = run.books, run.channels["needle.land displacement"].values
     # points of the stop are as far as its mean, but for the tilt: 1 um
@@ -47,7 +47,7 @@ def test_energy_of_a_stroke_off_its_axis_closes(step, coarse):
 
 def test_a_shaft_that_does_not_rub_loses_next_to_nothing_in_its_guide():
     """The bore is elastic: what a step of 40 ns loses or gains there is numerical."""
-    books = stroke(450e-6, friction=0.0, step=20e-9).books
+    books = stroke(330e-6, friction=0.0, step=20e-9).books
 
     assert abs(books.losses["guide friction"]) < 1e-3 * books.scale
 

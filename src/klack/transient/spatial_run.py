@@ -307,9 +307,14 @@ class _Moving:
         for i, name in enumerate(("x", "y")):
             told[f"{needle} {name}"] = ChannelData(unit="m", values=place[:, i])
             told[f"{needle} tilt {name}"] = ChannelData(unit="rad", values=slope[:, i])
-        for k in range(len(self.bore.clearance)):
+        heights = () if self.valve.guide is None else self.valve.guide.heights
+        for k, height in enumerate(heights):
             force = np.interp(time, path.time, path.guide_force[:, k])
             told[f"guide {k + 1} force"] = ChannelData(unit="N", values=force)
+            arm = float(height - self.model.centre[2])
+            here = self.bore.offset[k] + at[:, :2] + arm * slope
+            for i, name in enumerate(("x", "y")):
+                told[f"guide {k + 1} {name}"] = ChannelData(unit="m", values=here[:, i])
         return told
 
     def changing(self) -> dict[str, NDArray[np.generic]]:
