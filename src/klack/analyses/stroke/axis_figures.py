@@ -15,7 +15,8 @@ __all__ = ["axis_over_time_chart", "axis_path_chart"]
 Floats = NDArray[np.float64]
 
 _ROUND = 181  # points of a circle
-_WIDE = 2.6  # width of the page over the height of one panel, which makes circles round
+_WIDE = 2.6  # width of a panel over its height, which makes circles round
+_HIGH = 1.39  # of a panel
 _MOST = 3000  # points of a path
 _MARKED = 12  # impacts
 _ROOM = 1.15
@@ -58,7 +59,7 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
                 width=1.2,
                 listed=label,
             ),
-            _dot(path[:1], "start", "black", (), label=label),
+            _dot(path[:1], "start", "black", (), label=label, width=3.5),
         ]
         for k, stop in enumerate(dict.fromkeys(e.stop for e in variant.result.events[:_MARKED])):
             events = [event for event in variant.result.events[:_MARKED] if event.stop == stop]
@@ -71,6 +72,7 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
             Panel(
                 y=AxisSpec(label=f"y at {height}", unit="µm", range=(-reach, reach)),
                 curves=tuple(curves),
+                share=_HIGH,
             )
         )
     wide = _WIDE * reach
@@ -137,7 +139,7 @@ def _dot(at: Floats, name: str, colour: Colour, names: tuple[str, ...], *, label
         label=name,
         colour=colour,
         drawn="points",
-        width=2.0,
+        width=width,
         listed=label,
         names=names,
     )
