@@ -1,4 +1,4 @@
-"""Commands that know a motion along the axis only; truth: one clear error, before any body is built."""
+"""Commands that know a motion along the axis only; truth: one clear error, and nothing built."""
 
 from pathlib import Path
 
@@ -13,8 +13,9 @@ FITTED = (
     "lower: 8 N, upper: 16 N}}}\n"
 )
 POLISHED = (
-    "study:\n  parameters: {network.components.spring.preload: {range: [8 N, 16 N]}}\n"
-    "  objectives: {opening_time: minimise}\n  search: {polish: 4}\n"
+    "study:\n  parameters: {network.components.spring.preload: {from: 8 N, to: 16 N}}\n"
+    "  measures: [opening_time]\n  objectives: {opening_time: minimise}\n"
+    "  search: {polish: 4}\n"
 )
 
 

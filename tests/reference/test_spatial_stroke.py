@@ -71,5 +71,5 @@ def test_a_needle_has_to_fit_into_its_guide():
     with pytest.raises(InputError, match="off-axis in its guide"):
         stroke(off)
     beside = SPACE.replace("[4 mm, 13 mm]", "[4 mm, 25 mm]").replace("400 us,", "2 us,")
-    with pytest.raises(InputError, match="25 mm|height"):
+    with pytest.raises(InputError, match="height"):
         stroke(beside)

@@ -132,7 +132,15 @@ def _at(variant: StrokeVariant, path: Floats, times: list[float]) -> Floats:
     return np.column_stack([np.interp(times, time, path[:, i]) for i in range(2)])
 
 
-def _dot(at: Floats, name: str, colour: Colour, names: tuple[str, ...], *, label: bool) -> Curve:
+def _dot(
+    at: Floats,
+    name: str,
+    colour: Colour,
+    names: tuple[str, ...],
+    *,
+    label: bool,
+    width: float = 2.0,
+) -> Curve:
     return Curve(
         x=at[:, 0],
         y=at[:, 1],
