@@ -67,9 +67,9 @@ def test_a_stored_stroke_is_the_same_and_goes_on(tmp_path):
 
 @pytest.mark.slow
 def test_a_needle_has_to_fit_into_its_guide():
-    off = SPACE.replace("{seed: 3}", "{eccentricity: 5 um}").replace("400 us,", "2 us,")
+    off = SPACE.replace("{seed: 3}", "{eccentricity: 5 um}").replace("400 us,", "20 us,")
     with pytest.raises(InputError, match="off-axis in its guide"):
         stroke(off)
-    beside = SPACE.replace("[4 mm, 13 mm]", "[4 mm, 25 mm]").replace("400 us,", "2 us,")
+    beside = SPACE.replace("[4 mm, 13 mm]", "[4 mm, 25 mm]").replace("400 us,", "20 us,")
     with pytest.raises(InputError, match="height"):
         stroke(beside)

@@ -26,7 +26,7 @@ class MovingBodies(Protocol):
         """
 
     def resume(self) -> None:
-        """Go on from a stored state."""
+        """Continue from a stored state."""
 
     def advance(
         self,

@@ -270,7 +270,7 @@ class _Moving:
         return self.gap0
 
     def resume(self) -> None:
-        """Go on from a stored state."""
+        """Continue from a stored state."""
         self._silence_interfaces()
         self.path.clear()
 

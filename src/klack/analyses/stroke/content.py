@@ -53,7 +53,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         ),
         _comparison(study, wet=True),
         Section(
-            title="Off the axis",
+            title="Off-axis motion",
             charts=_named(axis_over_time_chart(study), axis_path_chart(study)),
         ),
         Section(title="First impacts", charts=_named(*_first_impacts(study))),
@@ -420,7 +420,7 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Contact",
-            "Point by point on smooth faces, off the axis as well; fluid, magnet and springs act "
+            "Point by point on smooth faces, off-axis as well; fluid, magnet and springs act "
             "along the axis, wherever the needle is. Small rotations; the bore of the guide does "
             "not move, and no film fills it."
             if space
