@@ -27,8 +27,9 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
 
     None for a motion along the axis, and without a guide.
     """
-    variant, guide = study.reference, guide_of(study)
-    if guide is None or not moves_in_space(study, variant):
+    variant = study.reference
+    guide = guide_of(study) if moves_in_space(study, variant) else None
+    if guide is None:
         return None
     last = len(guide.heights)
     clearance = 1e6 * guide.clearance
