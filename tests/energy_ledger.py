@@ -32,10 +32,19 @@ _limits = dict(LIMITS)
 _check, _start = energy_balance.check_energy_balance, workers._start
 
 
-def judge(run: str, residual: float, least_loss: float, *, limit: float, advice: str) -> None:
+def judge(
+    run: str,
+    residual: float,
+    least_loss: float,
+    *,
+    limit: float,
+    advice: str,
+    loss_limit: float | None = None,
+) -> None:
     """Stand in for ``check_energy_balance``: raise where it warns, and at tighter limits."""
     allowed = _limits.get(run, limit)
-    if not (abs(residual) <= allowed and least_loss >= -allowed):
+    least = allowed if loss_limit is None else loss_limit
+    if not (abs(residual) <= allowed and least_loss >= -least):
         where = os.environ.get("PYTEST_CURRENT_TEST", "a worker process")
         raise AssertionError(
             f"{where}: a run of {run} leaves an energy residual of {residual:.3e} and has a least "

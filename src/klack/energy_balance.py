@@ -9,7 +9,13 @@ __all__ = ["check_energy_balance"]
 
 
 def check_energy_balance(
-    run: str, residual: float, least_loss: float, *, limit: float, advice: str
+    run: str,
+    residual: float,
+    least_loss: float,
+    *,
+    limit: float,
+    advice: str,
+    loss_limit: float | None = None,
 ) -> None:
     """Warn when the energy balance does not close, or a loss is negative.
 
@@ -27,6 +33,8 @@ def check_energy_balance(
         What the solver promises.
     advice : str
         What to try, a clause without full stop.
+    loss_limit : float, optional [-]
+        What it promises of losses; ``limit`` by default.
 
     Raises
     ------
@@ -50,11 +58,13 @@ def check_energy_balance(
     faults = []
     if abs(residual) > limit:
         faults.append(f"does not close by {abs(residual):.1e} of the energy throughput")
-    if least_loss < -limit:
+    kept = limit
+    if least_loss < -(limit if loss_limit is None else loss_limit):
+        kept = limit if faults or loss_limit is None else loss_limit
         faults.append(f"has a loss that returned {abs(least_loss):.1e} of it")
     if faults:
         warnings.warn(
-            f"{run}: the energy balance {' and '.join(faults)}, more than the {limit:.0e} to "
+            f"{run}: the energy balance {' and '.join(faults)}, more than the {kept:.0e} to "
             f"which this solver keeps it. Try: {advice}.",
             AccuracyWarning,
             stacklevel=3,

@@ -13,6 +13,7 @@ from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.assembling.valve import build_valve
 from klack.case.schema import Case
+from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_meetings, find_roles
 from klack.errors import AccuracyWarning, InputError
@@ -153,6 +154,7 @@ def _of_given(case: Case, progress: Progress, threads: int | None) -> CaseModels
 
 
 def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseModels:
+    require_axial(case, "the export of models")
     valve = build_valve(case, progress, threads=threads)
     provenance = _provenance(case, {name: body.mesh for name, body in valve.bodies.items()})
     rows = valve.network.rows()

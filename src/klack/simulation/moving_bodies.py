@@ -18,14 +18,15 @@ Changing = NDArray[np.generic]
 class MovingBodies(Protocol):
     """Bodies of one run; the network holds their modes whenever a record ends."""
 
-    def start(self, balance: Callable[[], StaticStart] | None) -> StaticStart | None:
+    def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         """Place them, at rest under the forces of the network, which ``balance`` finds anew.
 
+        It is told by how much each port is elsewhere than bodies along the axis have it [m].
         Without it they start as they are.  Returns the last balance found, None without any.
         """
 
     def resume(self) -> None:
-        """Go on from a stored state."""
+        """Continue from a stored state."""
 
     def advance(
         self,

@@ -143,8 +143,8 @@ CLOCK = 8
 :class:`klack.simulation.network_result.StepCounts`."""
 
 SETTLED = (2e-4, 1e-6), (5e-5, 1e-12)
-"""Of a macro step, then of a fine one: displacement by the missed force, over the longest way of a
-port, and energy that catching up costs over the work of the step."""
+"""Of a macro step, then of a fine one: displacement by the missed force, over the longest
+displacement of a port, and energy that catching up costs over the work of the step."""
 
 _FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
 FEW_REPEATS = 8  # are enough, unless what still changes is round-off

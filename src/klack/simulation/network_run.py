@@ -80,6 +80,7 @@ Kept = Sequence[tuple[Changing, Changing]]
 
 _BLOCK = 16  # most fine steps between two looks at the record, without macro steps
 _BALANCE = 1e-6  # energy residual over its scale; 1e-9 is usual
+_GUIDED = 1e-3  # a loss in three dimensions: of a guide it is known as well, as in klack shots
 _CHUNK = 250_000  # fine steps of a chunk: about 0.1 s
 _PYTHON_CHUNK = 2_500  # the same with step functions in Python, some of which cannot step back
 _LOOK = 1.5e-6  # [s] longest time between two looks of the search for impacts
@@ -247,6 +248,7 @@ def simulate_network(
         books.least_loss / scale,
         limit=_BALANCE,
         advice="a shorter step",
+        loss_limit=None if network.moving is None else _GUIDED,
     )
     return result
 
@@ -597,8 +599,8 @@ _SLIDERS = "sliders."
 _LAST = "record.last"
 
 
-def _balance(network: CompiledNetwork, step: float, near: RestState) -> StaticStart:
-    return begin_at_rest(network, step, near)[0]
+def _balance(network: CompiledNetwork, step: float, near: RestState, shift: Vector) -> StaticStart:
+    return begin_at_rest(network, step, near, shift)[0]
 
 
 def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:

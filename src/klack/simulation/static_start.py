@@ -149,7 +149,10 @@ def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
 
 
 def begin_at_rest(
-    network: CompiledNetwork, step: float, near: RestState | None = None
+    network: CompiledNetwork,
+    step: float,
+    near: RestState | None = None,
+    shift: Vector | None = None,
 ) -> tuple[StaticStart, RestState]:
     """:func:`start_at_rest`, from the equilibrium of a network that hardly differs.
 
@@ -159,13 +162,15 @@ def begin_at_rest(
         As of :func:`start_at_rest`.
     near : RestState, optional
         Of a network of the same parts; it has warned already.
+    shift : array, shape (ports,), optional [m]
+        By which the ports are elsewhere than bodies that move along the axis have them.
     """
     held = set(near._held) if near is not None else set[int]()
     stuck = set(near._stuck) if near is not None else set[int]()
     notes: list[str] = []
     enclosed = near is not None and near._enclosed
     while True:
-        problem = _Balance(network, step, held, stuck, enclosed=enclosed)
+        problem = _Balance(network, step, held, stuck, enclosed=enclosed, shift=shift)
         try:
             state = _march(problem, None if near is None else near._state)
             break
@@ -222,8 +227,10 @@ class _Balance:
         stuck: set[int],
         *,
         enclosed: bool,
+        shift: Vector | None = None,
     ) -> None:
         self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
+        self.shift = 0.0 if shift is None else shift
         self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
@@ -562,7 +569,7 @@ class _Balance:
 
     def _bent(self, state: _State) -> Vector:
         bent = state.y[:-1] - self.shapes.T @ state.z - self.compliance @ self.force[:-1]
-        return np.asarray(bent)
+        return np.asarray(bent - self.shift)
 
     def _net(self, state: _State) -> Vector:
         """Mass that flows into each free volume [kg/s]; an enclosed one lets none through."""

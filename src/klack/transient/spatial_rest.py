@@ -6,16 +6,19 @@ the elastic modes at rest, :math:`q_e = \Omega^{-2} (f_e + \Phi_e^T \lambda)`, c
 .. math:: g = g_0 + \Phi_r z + \Phi_e \Omega^{-2} f_e + C \lambda, \qquad
     C = C_l + \Phi_e \Omega^{-2} \Phi_e^T, \qquad 0 \le \lambda \perp g \ge 0,
 
-and the guide one such point more at each height, along its present normal.  The forces on the rigid
-coordinates balance in the end of proximal steps (R. T. Rockafellar, SIAM J. Control Optim. 14
-(1976) 877): :math:`z_{k+1} = z_k + \sigma (f_r + \Phi_r^T \lambda_{k+1})`, each of them one
-complementarity problem with :math:`C + \sigma \Phi_r \Phi_r^T`.  The rotation about the axis, which
-smooth faces of revolution do not hold, is left out.  A ball in its seat is free to tilt as well:
-there the facets of a mesh leave some 1e-5 of the force, and the needle creeps.
+and the guide is made of such points too, straight walls that touch its bore, one more in each step
+(J. E. Kelley, J. SIAM 8 (1960) 703).  The forces on the rigid coordinates balance in the end of
+proximal steps (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877),
+:math:`z_{k+1} = z_k + \sigma (f_r + \Phi_r^T \lambda_{k+1})`, each of them one complementarity
+problem with :math:`C + \sigma \Phi_r \Phi_r^T`.  The rotation about the axis, which smooth faces of
+revolution do not hold, is left out.  A ball in its seat is free to tilt as well: there the facets
+of a mesh leave some 1e-5 of the force, and the needle creeps.
 """
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,9 +33,11 @@ __all__ = ["settle_at_rest", "shaft_pressed"]
 Vector = NDArray[np.float64]
 
 _SOFTER = 1e4  # a proximal step than the contact points
-_MOST = 40
+_MOST = 100
 _FOUND = 1e-12  # of the force on the bodies
 _DOUBT = 1e-3
+_SAME = 1e-10  # walls so alike are one
+_TURNS = 3  # without success, while walls come and go
 _SLOW = 0.9  # no less of the force left than before: what is left moves the needle across
 
 
@@ -67,7 +72,7 @@ def settle_at_rest(
     """
     elastic = model.omega > 0.0
     soft = np.where(elastic, 1.0 / np.where(elastic, model.omega, 1.0) ** 2, 0.0)
-    points, heights = model.count, len(bore.clearance)
+    points = model.count
     rigid = ~elastic
     largest = float(np.max(np.sum(model.traces[:, rigid] ** 2, axis=1), initial=0.0))
     stiff = float(np.mean(np.diag(model.compliance)))
@@ -75,22 +80,30 @@ def settle_at_rest(
     scale = float(np.linalg.norm(force)) or 1.0
     spin = _spin(model, rigid)
     force = force - spin * (spin @ force)
-    active, left, before = np.zeros(points + heights, dtype=bool), np.inf, np.inf
+    left, before, stalled = np.inf, np.inf, 0
+    walls = _Walls.none()
+    lam = np.zeros(points)
     for _ in range(_MOST):
-        rows, gap, local = _rows(model, state, bore, gaps())
+        walls = walls.carrying(lam[points:])
+        active = np.append(lam[:points] > 0.0, np.ones(len(walls.height), dtype=bool))
+        walls = walls.with_present(bore, state.q)
+        rows, gap, local = _rows(model, bore, gaps(), walls)
+        active = np.append(active, np.zeros(len(rows) - len(active), dtype=bool))
         turned = rows @ (spin * (spin @ state.q))
         rows -= np.outer(rows @ spin, spin)
         given = soft * force + np.where(rigid, state.q + sigma * force, 0.0)
         seen = rows @ given + turned
         answer = soft + np.where(rigid, sigma, 0.0)
         A = local + (rows * answer) @ rows.T
-        lam, active, _ = solve_lcp(0.5 * (A + A.T), gap + seen, active)
+        lam, _, _ = solve_lcp(0.5 * (A + A.T), gap + seen, active)
         push = rows.T @ lam
         state.q[:] = given + answer * push
         left = float(np.linalg.norm((force + push)[rigid])) / scale
-        if left < _FOUND or (left < _DOUBT and left > _SLOW * before):
-            break
+        left = max(left, walls.missed(bore, state.q, lam[points:], rows[points:, rigid]) / scale)
+        stalled = stalled + 1 if left > _SLOW * before else 0
         before = left
+        if left < _FOUND or (left < _DOUBT and stalled > (_TURNS if np.any(lam[points:]) else 0)):
+            break
     state.v[:] = 0.0
     state.lam[:] = lam[:points]
     carrying = np.flatnonzero(state.lam > 0.0)
@@ -121,24 +134,73 @@ def _spin(model: InterfaceModel, rigid: NDArray[np.bool_]) -> Vector:
     return spin
 
 
-def _rows(
-    model: InterfaceModel, state: State, bore: Bore, gap: Vector
-) -> tuple[NDArray[np.float64], Vector, NDArray[np.float64]]:
-    """Traces, gaps at q = 0 and local compliance of contact points, then of heights of the guide.
+@dataclass(frozen=True, eq=False)
+class _Walls:
+    """Straight walls that touch the round bore: outside of all of them the shaft cannot be.
 
-    A shaft in the middle of the bore has no normal; any does.
+    Tangents of a disc hold in all of it, so those of former positions stay, while they carry.
     """
-    place = bore.offset + bore.traces @ state.q
-    distance = np.linalg.norm(place, axis=1)
-    normal = np.where(distance[:, None] > 0.0, place, [1.0, 0.0])
-    normal = normal / np.linalg.norm(normal, axis=1)[:, None]
-    rows = np.vstack([model.traces, -np.einsum("kc,kci->ki", normal, bore.traces)])
-    free = bore.clearance - np.einsum("kc,kc->k", normal, bore.offset)
-    held = np.einsum("kc,kcd,kd->k", normal, bore.compliance, normal)
+
+    height: NDArray[np.int64]  # (w,) number of the height in the bore
+    normal: NDArray[np.float64]  # (w, 2) outwards
+
+    @classmethod
+    def none(cls) -> Self:
+        """No wall."""
+        return cls(np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
+
+    def carrying(self, force: Vector) -> Self:
+        """Those with a force."""
+        keep = np.flatnonzero(force > 0.0)
+        return type(self)(self.height[keep], self.normal[keep])
+
+    def with_present(self, bore: Bore, q: Vector) -> Self:
+        """These and, at each height, the one nearest to the shaft.
+
+        A shaft in the middle of the bore has no nearest one; any does.
+        """
+        place = bore.offset + bore.traces @ q
+        distance = np.linalg.norm(place, axis=1)
+        normal = np.where(distance[:, None] > 0.0, place, [1.0, 0.0])
+        normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+        known = [
+            bool(np.any(self.normal[self.height == k] @ normal[k] > 1.0 - _SAME))
+            for k in range(len(distance))
+        ]
+        new = np.flatnonzero(~np.array(known, dtype=bool))
+        return type(self)(
+            np.concatenate([self.height, new]), np.concatenate([self.normal, normal[new]])
+        )
+
+    def missed(self, bore: Bore, q: Vector, force: Vector, rows: NDArray[np.float64]) -> float:
+        """Largest modal force by which the round bore pushes unlike these walls."""
+        missed = 0.0
+        for k in range(len(bore.clearance)):
+            here = self.height == k
+            place, C = bore.offset[k] + bore.traces[k] @ q, bore.compliance[k]
+            pressed, distance = np.zeros(2), float(np.hypot(*place))
+            if distance > bore.clearance[k]:
+                n = place / distance
+                pressed = (distance - bore.clearance[k]) / float(n @ C @ n) * n
+            wrong = float(np.linalg.norm(pressed - force[here] @ self.normal[here]))
+            missed = max(missed, wrong * float(np.linalg.norm(rows[here], axis=1).max()))
+        return missed
+
+
+def _rows(
+    model: InterfaceModel, bore: Bore, gap: Vector, walls: _Walls
+) -> tuple[NDArray[np.float64], Vector, NDArray[np.float64]]:
+    """Traces, gaps at q = 0 and local compliance of contact points, then of walls."""
+    k, normal = walls.height, walls.normal
+    rows = np.vstack([model.traces, -np.einsum("wc,wci->wi", normal, bore.traces[k])])
+    free = bore.clearance[k] - np.einsum("wc,wc->w", normal, bore.offset[k])
+    held = np.einsum("wc,wcd,vd->wv", normal, bore.compliance[k], normal)
+    held[k[:, None] != k] = 0.0
+    held[np.diag_indices(len(k))] *= 1.0 + _SAME
     n = model.count
     local = np.zeros((len(rows), len(rows)))
     local[:n, :n] = model.compliance
-    local[range(n, len(rows)), range(n, len(rows))] = held
+    local[n:, n:] = held
     return rows, np.concatenate([gap, free]), local
 
 

@@ -5,6 +5,7 @@ and guide act in the fine steps of :mod:`klack.transient.interface_kernel` where
 What the guess of the forces missed is repaired by superposition: see :class:`_Moving`.
 """
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from klack.contact.step_constants import NO_LAW
-from klack.errors import ConvergenceError, InputError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.simulation.modal_step import ROW, ROW_Q, ROW_V
 from klack.simulation.network_arrays import (
     AHEAD,
@@ -69,6 +70,7 @@ from klack.transient.spatial_path import SpatialPath
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import bend_faces, film_state, film_strain
+from klack.units import format_si
 
 __all__ = ["SpatialValve"]
 
@@ -83,7 +85,12 @@ _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
 _BALANCED = 1e-12  # [m]
 _FILM_SHARE = 0.05  # of the height of a film that a step without contact may change
+_SLOW = 0.5  # of the difference before: it does not vanish
+_NOT_AT_REST = 2e-9  # [m]
 _STEADY = 0.04  # change of the force of a contact at rest in a step
+_AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
+_LOST = 1  # energy that damping took in flights [J]
+_STEADILY = 2  # 1: forces changed little in the last record
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
 
@@ -114,8 +121,6 @@ class SpatialValve:
         Lands of squeeze films, for the stops that have one in the network.
     bearing : BearingFilm, optional
         Film in the guide, where the network has a fluid.
-    path : SpatialPath
-        Filled while it runs.
     """
 
     model: InterfaceModel
@@ -128,7 +133,6 @@ class SpatialValve:
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
     bearing: BearingFilm | None = None
-    path: SpatialPath = field(default_factory=SpatialPath)
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
         """Return them in a network.
@@ -169,6 +173,7 @@ class _Moving:
 
     def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
         self.valve, self.network, self.sizes = valve, network, sizes
+        self.path = SpatialPath()
         model = valve.model
         self.model, self.ports = model, len(network.ports)
         self.place_q, self.place_v, self.P = _places(valve, network)
@@ -210,8 +215,7 @@ class _Moving:
         # closed since [fine steps], nan while open; axial force of the last step
         self.closed = np.full(len(model.contacts), np.nan)
         self.force = np.zeros(len(model.contacts))
-        self.steady = False
-        self.flags = np.zeros(2)  # 1 at rest: inverse of long steps; energy that flights lost [J]
+        self.flags = np.zeros(3)  # see the names above
         self.order = [
             [row.component for row in network.rows.interfaces].index(stop) for stop in valve.stops
         ]
@@ -221,7 +225,7 @@ class _Moving:
 
     # ------------------------------------------------------------------ start
 
-    def start(self, balance: Callable[[], StaticStart] | None) -> StaticStart | None:
+    def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         """Place the needle, and let it settle under the forces of the network."""
         self.read()
         self.q[: self.rigid_count] += self.coordinates(self.valve.placement)
@@ -233,6 +237,7 @@ class _Moving:
             with threadpool_limits(limits=1, user_api="blas"):
                 begun = self._settle(balance)
         self._silence_interfaces()
+        self.network.interface_state.gap[:] += _AWAY
         if rests:
             self._begin_closed()
         else:
@@ -241,26 +246,46 @@ class _Moving:
         here = slice(0, self.ports)
         for row in (Y0, Y1, SEEN):
             self.at[row:][here] = self.P.T @ self.q
-        self.valve.path.clear()
+        self.path.clear()
         return begun
 
-    def _settle(self, balance: Callable[[], StaticStart]) -> StaticStart | None:
+    def _settle(self, balance: Callable[[Vector], StaticStart]) -> StaticStart | None:
         """Rest on the contact points, and where elements and fluid balance there.
 
-        The points give another way than the law along the axis: its gaps are shifted by that.
+        The points let ports go elsewhere than the law along the axis does, each its own way.  That
+        law, which only balances the forces, does not see it.
         """
-        begun, here = None, slice(0, self.ports)
-        gap0 = self.network.interfaces.gap0.copy()
-        needle = np.any(self.P[self.model.owner == 0] != 0.0, axis=0)
-        for _ in range(_BALANCES):
-            force = self.P @ self.at[LAST:][here]
+        begun, here, faces = None, slice(0, self.ports), self.network.interfaces
+        gap0, shift = faces.gap0.copy(), np.zeros(self.ports)
+        left = np.inf
+        for balanced in range(_BALANCES):
+            force, kept = self.P @ self.at[LAST:][here], self._keep()
             settle_at_rest(self.model, self.state, self._gaps_now, self.bore, force)
-            moved = float(np.mean((self.P.T @ self.q - self.at[Y0:][here])[needle]))
-            if not np.any(self.state.lam) or abs(moved) < _BALANCED:
+            moved = self.P.T @ self.q - self.at[Y0:][here]
+            before, left = left, float(np.max(np.abs(moved), initial=0.0))
+            if left < _BALANCED:
                 break
-            self.network.interfaces.gap0[self.order] -= self.side * moved
-            begun = balance()
-        self.network.interfaces.gap0[:] = gap0
+            if balanced > 1 and left > _SLOW * before:  # it creeps, or has no force to balance
+                self._put_back(kept)
+                left = before
+                break
+            shift += moved
+            ports = np.append(shift, np.zeros(PORTS))  # the ground does not move
+            faces.gap0[:] = gap0 - ports[faces.upper] + ports[faces.lower]
+            try:
+                begun = balance(shift)
+            except ConvergenceError:  # next to no force is left to balance
+                break
+        faces.gap0[:] = gap0
+        if left > _NOT_AT_REST:
+            warnings.warn(
+                f"the start is not quite at rest: bodies and what acts on them differ by "
+                f"{format_si(left, 'm', 2)} of displacement, so the valve begins with a small "
+                "motion. Check the forces at time zero: something should press the needle on a "
+                "stop.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
         return begun
 
     def _gaps_now(self) -> Vector:
@@ -268,24 +293,16 @@ class _Moving:
         return self.gap0
 
     def resume(self) -> None:
-        """Go on from a stored state."""
+        """Continue from a stored state."""
         self._silence_interfaces()
-        self.read()
-        carrying = np.flatnonzero(self.state.lam > 0.0)
-        self.state.contact.active[:] = self.state.lam > 0.0
-        self.state.contact.points[: len(carrying)] = carrying
-        self.state.contact.counts[:] = len(carrying), 0
-        self._renew(self.resting.A if self.flags[0] else self.points.A)
-        self.valve.path.clear()
+        self.path.clear()
 
     def _silence_interfaces(self) -> None:
         """Let the points act in place of the interfaces of the network."""
         rows, state = self.network.interfaces, self.network.interface_state
         rows.kind[:] = NO_LAW
         rows.dry[:] = 1
-        if not np.any(rows.gap0 > 0.5 * _AWAY):
-            rows.gap0[:] += _AWAY
-            state.gap[:] += _AWAY
+        rows.gap0[:] += _AWAY
         for values in (state.e, state.force, state.chi, state.deepest, state.force_before):
             values[:] = 0.0
         state.since[:] = np.inf
@@ -304,7 +321,7 @@ class _Moving:
 
     def channels(self, time: Vector) -> dict[str, ChannelData]:
         """Way of the axis of the needle across itself, and the forces of the guide."""
-        path, needle = self.valve.path, self.valve.components[0]
+        path, needle = self.path, self.valve.components[0]
         at = path.position_at(time)
         arm = float(self.valve.arms[np.argmax(self.side), 2])  # of its lower end
         slope = np.column_stack([at[:, 4], -at[:, 3]])
@@ -313,9 +330,14 @@ class _Moving:
         for i, name in enumerate(("x", "y")):
             told[f"{needle} {name}"] = ChannelData(unit="m", values=place[:, i])
             told[f"{needle} tilt {name}"] = ChannelData(unit="rad", values=slope[:, i])
-        for k in range(len(self.bore.clearance)):
+        heights = () if self.valve.guide is None else self.valve.guide.heights
+        for k, height in enumerate(heights):
             force = np.interp(time, path.time, path.guide_force[:, k])
             told[f"guide {k + 1} force"] = ChannelData(unit="N", values=force)
+            arm = float(height - self.model.centre[2])
+            here = self.bore.offset[k] + at[:, :2] + arm * slope
+            for i, name in enumerate(("x", "y")):
+                told[f"guide {k + 1} {name}"] = ChannelData(unit="m", values=here[:, i])
         return told
 
     def changing(self) -> dict[str, NDArray[np.generic]]:
@@ -353,7 +375,7 @@ class _Moving:
         """Energies [J] lost since the start of the run."""
         lost = {}
         if np.any(self.model.damping > 0.0):
-            lost["bodies damping"] = float(self.books[DAMPING] + self.flags[1])
+            lost["bodies damping"] = float(self.books[DAMPING] + self.flags[_LOST])
         if len(self.bore.clearance):
             lost["guide friction"] = float(self.books[GUIDE])
         if self.films is not None and len(self.films.room):
@@ -365,7 +387,7 @@ class _Moving:
     def forget_losses(self) -> None:
         """Begin a new energy balance."""
         self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
-        self.flags[1] = 0.0
+        self.flags[_LOST] = 0.0
         self.state.films[:, 6] = 0.0
         self.state.bearing[:, 2] = 0.0
 
@@ -385,7 +407,8 @@ class _Moving:
         if not looks:
             return self._loop(recording, scratch, clock, block, look, 0, 0, report)
         self.read()
-        if not self.valve.path.begun:
+        self._take_carrying()
+        if not self.path.begun:
             self._tell_path(int(clock[0]))
         with threadpool_limits(limits=1, user_api="blas"):
             return self._looks(recording, scratch, clock, block, look, looks, report)
@@ -460,7 +483,7 @@ class _Moving:
         self.read()
         if np.any(self.model.damping > 0.0):
             given = float(np.sum(self.at[WORK:][here])) - work
-            self.flags[1] += given - (self._modal_energy() - before)
+            self.flags[_LOST] += given - (self._modal_energy() - before)
         self.fresh = True
         return status
 
@@ -673,10 +696,10 @@ class _Moving:
 
     def _rests(self, clock: Index) -> bool:
         """Whether the needle lies on a stop long enough, and steadily."""
-        if self.flags[0]:
+        if self.flags[_AT_REST]:
             return True
         long = float(clock[0]) - self.closed >= self.rest
-        if self.sizes.coarse > 1 and np.any(long) and self.steady:
+        if self.sizes.coarse > 1 and np.any(long) and self.flags[_STEADILY]:
             self._rest_on(rest=True)
             return True
         return False
@@ -684,7 +707,8 @@ class _Moving:
     def _steady(self, before: Vector) -> None:
         """Note whether forces changed little in this record."""
         scale = np.maximum(np.abs(before), np.abs(self.force))
-        self.steady = bool(np.all(np.abs(self.force - before) <= _STEADY * scale))
+        steady = np.all(np.abs(self.force - before) <= _STEADY * scale)
+        self.flags[_STEADILY] = float(steady)
 
     def _still(self, record: Record) -> bool:
         """Whether a long step met nothing that it cannot see."""
@@ -693,9 +717,17 @@ class _Moving:
         steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
         return steady and bool(self.state.contact.counts[0] > 0)
 
+    def _take_carrying(self) -> None:
+        """Let the points carry that have a force, as in a stored state."""
+        contact, carrying = self.state.contact, np.flatnonzero(self.state.lam > 0.0)
+        contact.active[:] = self.state.lam > 0.0
+        contact.points[: len(carrying)] = carrying
+        contact.counts[0] = len(carrying)
+        self._renew(self.resting.A if self.flags[_AT_REST] else self.points.A)
+
     def _rest_on(self, *, rest: bool) -> None:
         """Change between fine steps and those at rest: their contact matrices differ."""
-        self.flags[0] = float(rest)
+        self.flags[_AT_REST] = float(rest)
         self._renew(self.resting.A if rest else self.points.A)
 
     def _renew(self, A: NDArray[np.float64]) -> None:
@@ -760,7 +792,7 @@ class _Moving:
 
     def _tell_path(self, steps: int) -> None:
         rigid = self.model.rigid
-        self.valve.path.add(
+        self.path.add(
             steps * self.sizes.step, rigid @ self.q, rigid @ self.v, self.state.guide_force
         )
 

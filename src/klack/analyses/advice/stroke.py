@@ -21,6 +21,7 @@ from klack.analyses.advice.settings import Setting, SettingValue, applied
 from klack.analyses.stroke.run import run_variant, variant_network
 from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.valve import Valve, build_valve, build_valve_bodies
+from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.variants import Variant
 from klack.elasticity.body import ElasticBody
@@ -119,8 +120,10 @@ def advise_stroke(
     Raises
     ------
     InputError
-        For a valve whose first impact does not come within the run.
+        For a valve whose first impact does not come within the run, and for a motion in three
+        dimensions.
     """
+    require_axial(case, "klack advise")
     begin = perf_counter()
     measures = stroke_measures(error)
     case = explicit_modes(case).model_copy(update={"noise": None})

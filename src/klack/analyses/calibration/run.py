@@ -26,6 +26,7 @@ from klack.case.case_tree import CaseTree
 from klack.case.free_parameters import FreeParameter, free_parameters
 from klack.case.key_path import written_at
 from klack.case.measurement import CaseMeasurement
+from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.cores import available_cores
@@ -119,12 +120,14 @@ def run_calibration(
     Raises
     ------
     InputError
-        For a case without what is needed, or strokes without the fitted channels.
+        For a case without what is needed, a motion in three dimensions, or strokes without the
+        fitted channels.
     ConvergenceError
         A trial that cannot be computed.
     """
     begin = perf_counter()
     case = tree.case()
+    require_axial(case, "klack calibrate")
     section = calibration_of(case)
     parameters = free_parameters(case)
     _require_written(tree, parameters)

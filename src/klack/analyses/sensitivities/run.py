@@ -19,6 +19,7 @@ from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.study.chosen_measures import ChosenMeasure
 from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
 from klack.case.case_tree import CaseTree
+from klack.case.spatial_consistency import require_axial
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
@@ -78,10 +79,12 @@ def run_sensitivities(
     Raises
     ------
     InputError
-        For a parameter, a measure or a variant that cannot be differentiated.
+        For a parameter, a measure or a variant that cannot be differentiated, and for a motion in
+        three dimensions.
     ConvergenceError
         When a step fails.
     """
+    require_axial(case, "klack sensitivities")
     begin = perf_counter()
     space = slope_space(case, source, parameters)
     chosen = _measures(case, source, measures)

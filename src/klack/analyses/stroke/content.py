@@ -8,6 +8,8 @@ import numpy as np
 from klack.analyses.impact.content import body_table, size_verdict
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
+from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
+from klack.analyses.stroke.axis_place import axis_place, moves_in_space
 from klack.analyses.stroke.figures import (
     actuation_chart,
     echo_chart,
@@ -22,6 +24,7 @@ from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.summary import (
+    AXIS_COLUMNS,
     TIME_COLUMNS,
     first_impact,
     start_text,
@@ -49,6 +52,10 @@ def stroke_content(study: StrokeStudy) -> Content:
             tables=_time_tables(study),
         ),
         _comparison(study, wet=True),
+        Section(
+            title="Off-axis motion",
+            charts=_named(axis_over_time_chart(study), axis_path_chart(study)),
+        ),
         Section(title="First impacts", charts=_named(*_first_impacts(study))),
         Section(title="Echoes of the lines", charts=_named(*_echoes(study))),
         _comparison(study, wet=False),
@@ -169,11 +176,17 @@ def _impacts(study: StrokeStudy) -> Section:
                 f"Variant '{variant.name}' has {len(events)} impacts; the first {_MOST_IMPACTS} "
                 "are listed, the result and klack stroke --json have all of them."
             )
+        places = [axis_place(study, variant, event.time) for event in events[:_MOST_IMPACTS]]
         rows = [
-            (f"{i + 1}. {event.stop}", *(measure.on_page(event) for measure in _SHOWN))
-            for i, event in enumerate(events[:_MOST_IMPACTS])
+            (
+                f"{i + 1}. {event.stop}",
+                *(measure.on_page(event) for measure in _SHOWN),
+                *(() if place is None else (place.position, place.tilt)),
+            )
+            for i, (event, place) in enumerate(zip(events, places, strict=False))
         ]
         columns = (variant.name, *(measure.title or measure.name for measure in _SHOWN))
+        columns += AXIS_COLUMNS if moves_in_space(study, variant) else ()
         tables.append(Table(columns=columns, rows=tuple(rows)))
     return Section(title="All impacts", paragraphs=tuple(paragraphs), tables=tuple(tables))
 
@@ -396,16 +409,22 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
     rough = " and ".join(f"'{stop.name}'" for stop in study.stops if stop.friction)
     contact = f"contact, frictionless but at {rough}," if rough else "frictionless contact"
+    space = moves_in_space(study, study.reference)
+    motion = "Motion in three dimensions" if space else "Motion along one axis"
     limits = [
         (
             "Physics",
-            f"Motion along one axis; linear elastic bodies with small deformations; {contact} "
+            f"{motion}; linear elastic bodies with small deformations; {contact} "
             "without plastic flow; one-dimensional waves in lines, chambers with one "
             "pressure each; magnetic fluxes in a network of reluctances.",
         ),
         (
             "Contact",
-            "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
+            "Point by point on smooth faces, off-axis as well; fluid, magnet and springs act "
+            "along the axis, wherever the needle is. Small rotations; the bore of the guide does "
+            "not move, and no film fills it."
+            if space
+            else "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
             "contact are outside the assumptions.",
         ),
     ]

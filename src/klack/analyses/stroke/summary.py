@@ -11,6 +11,7 @@ from klack.analyses.analysis import Measured
 from klack.analyses.contact_doubts import contact_doubt, contact_to_json, elastic_above
 from klack.analyses.json_parts import ContactJson, OwnComponents, Real, Version
 from klack.analyses.measures import json_of, number_or_none, text_table, with_measures
+from klack.analyses.stroke.axis_place import AxisPlace, axis_place, moves_in_space
 from klack.analyses.stroke.measures import (
     EVENT_MEASURES,
     NOT_REACHED,
@@ -25,6 +26,7 @@ from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
+    "AXIS_COLUMNS",
     "TIME_COLUMNS",
     "StrokeJson",
     "first_impact",
@@ -48,10 +50,22 @@ TIME_COLUMNS = (
     "of",
 )
 
+AXIS_COLUMNS = ("axis at seat x, y [um]", "tilt x, y [mrad]")
+"""Place of the axis at a touch."""
+
 _TOLD = 20
 """Impacts of a variant on a terminal."""
 _NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as the first one."""
+
+
+class AxisJson(TypedDict):
+    """Where the axis of the needle is, in three dimensions."""
+
+    x_m: Annotated[float, Field(description="At the height of the seat.")]
+    y_m: float
+    tilt_x_rad: Annotated[float, Field(description="Slope of the axis along x, upwards.")]
+    tilt_y_rad: float
 
 
 @with_measures(EVENT_MEASURES)
@@ -59,6 +73,9 @@ class EventJson(TypedDict):
     """One impact of a stroke."""
 
     stop: Annotated[str, Field(description="Name of the end stop.")]
+    axis: Annotated[
+        AxisJson | None, Field(description="At first touch; null for a motion along the axis.")
+    ]
 
 
 class PassageJson(TypedDict):
@@ -108,6 +125,10 @@ class VariantJson(TimesJson):
     """One variant of a stroke; opening and closing are those of the needle."""
 
     label: str
+    motion: Literal["axial", "three-dimensional"]
+    axis: Annotated[
+        AxisJson | None, Field(description="At the start; null for a motion along the axis.")
+    ]
     start: Annotated[StartJson | None, Field(description="Null for a continued or free start.")]
     failure: Annotated[str | None, Field(description="Why the run ended early.")]
     fine_record_ends_s: Annotated[
@@ -138,7 +159,7 @@ class StrokeJson(VariantJson):
 
 def stroke_to_json(study: StrokeStudy) -> StrokeJson:
     """Plain numbers in SI, the unit in the key: see :class:`StrokeJson`."""
-    variants = {name: _numbers(variant) for name, variant in study.variants.items()}
+    variants = {name: _numbers(study, variant) for name, variant in study.variants.items()}
     reference = study.reference.name
     return {
         "schema": "klack-stroke/1",
@@ -170,6 +191,7 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
             title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
         events = variant.result.events[:_TOLD]
         yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
+        yield from _axis_told(study, variant)
         yield from yield_told(variant)
     for stop in study.stops:
         if doubt := contact_doubt(stop):
@@ -206,6 +228,31 @@ def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
         for times in variant.times
         for way, passage in times.in_order
     )
+
+
+def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable]:
+    """Where the axis is at the start and at each touch; nothing for a motion along the axis."""
+    moments = [("start", float(variant.result.time[0]))]
+    moments += [(event.stop, event.time) for event in variant.result.events[:_TOLD]]
+    rows = [
+        (word, f"{1e3 * time:.4f}", place.position, place.tilt)
+        for word, time in moments
+        if (place := axis_place(study, variant, time)) is not None
+    ]
+    if rows:
+        title = f"{variant.name}: axis of the needle"
+        yield TextTable(title=title, columns=("at", "time [ms]", *AXIS_COLUMNS), rows=tuple(rows))
+
+
+def _axis(place: AxisPlace | None) -> AxisJson | None:
+    if place is None:
+        return None
+    return {
+        "x_m": place.x,
+        "y_m": place.y,
+        "tilt_x_rad": place.tilt_x,
+        "tilt_y_rad": place.tilt_y,
+    }
 
 
 def yield_told(variant: StrokeVariant) -> Iterator[str]:
@@ -264,14 +311,21 @@ def _from_to(displacements: list[float]) -> str:
     return " to ".join(format_si(y, "m", 3) for y in ends)
 
 
-def _numbers(variant: StrokeVariant) -> VariantJson:
+def _numbers(study: StrokeStudy, variant: StrokeVariant) -> VariantJson:
     result = variant.result
     found: Any = {
         "label": variant.label,
+        "motion": "three-dimensional" if moves_in_space(study, variant) else "axial",
+        "axis": _axis(axis_place(study, variant, float(result.time[0]))),
         "failure": result.failure or None,
         "fine_record_ends_s": {stop: number_or_none(t) for stop, t in cut_records(result).items()},
         "events": [
-            {"stop": event.stop, **json_of(EVENT_MEASURES, event)} for event in result.events
+            {
+                "stop": event.stop,
+                "axis": _axis(axis_place(study, variant, event.time)),
+                **json_of(EVENT_MEASURES, event),
+            }
+            for event in result.events
         ],
         **json_of(VARIANT_MEASURES, variant),
         **_times(variant.needle_times),

@@ -47,6 +47,8 @@ def require_gradients(source: StudySource, asked: AskedPoints, space: Space) -> 
 
     if not isinstance(asked.case, ValveCase):
         raise refused("an impact of two bodies, without derivatives")
+    if asked.case.motion != "axial":
+        raise refused("a motion in three dimensions, without derivatives")
     wanted = {*source.study.objectives, *source.study.constraints}
     without = [x.name for x in asked.chosen if x.name in wanted and not has_slope(x)]
     if without:

@@ -124,11 +124,14 @@ class _Strokes:
         part = case.network.components[str(place[2])]
         if part.type == FLEXIBLE_BODY:
             return place[3] != "speed"
-        return part.type == END_STOP and place[3] == "law"
+        if part.type != END_STOP:
+            return False
+        # in three dimensions the gap is that between the meshes
+        return place[3] == "law" or (place[3] == "gap" and case.motion != "axial")
 
     def holds_interpreter(self, asked: AskedPoints[ValveCase]) -> bool:
-        """The noise does."""
-        return any(item.is_noise for item in asked.chosen)
+        """The noise does, and a motion in three dimensions."""
+        return asked.case.motion != "axial" or any(item.is_noise for item in asked.chosen)
 
     def build(
         self,
@@ -154,6 +157,7 @@ class _Strokes:
                 laws=valve.laws,
                 network=valve.network,
                 structures=valve.structures,
+                spatial=valve.spatial,
             ),
             bodies=body_summaries(valve),
             stops=stop_summaries(valve),
@@ -170,7 +174,7 @@ class _Strokes:
         places: Sequence[int],
         threads: int | None,
     ) -> int:
-        """Threads for these points: one where a component calls Python.
+        """Threads for these points: one where the time loop is in Python.
 
         Raises
         ------
@@ -185,7 +189,7 @@ class _Strokes:
                 rows = variant_network(valve, variant).rows()
             except KlackError:
                 continue  # its row will say
-            if has_python_steps(rows):
+            if has_python_steps(rows) or valve.spatial is not None:
                 return 1
             run = valve.case.run
             records = run.duration / run.record

@@ -1,0 +1,172 @@
+"""Figures of the axis of a needle that moves in three dimensions: from above, and over time."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.stroke.axis_place import guide_of, moves_in_space
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.report.chart import AxisSpec, Chart, Colour, Curve, Mark, Panel
+from klack.report.looks import look_of
+from klack.report.thinning import thinned
+from klack.units import format_si
+
+__all__ = ["axis_over_time_chart", "axis_path_chart"]
+
+Floats = NDArray[np.float64]
+
+_ROUND = 181  # points of a circle
+_WIDE = 2.6  # width of a panel over its height, which makes circles round
+_HIGH = 1.39  # of a panel
+_MOST = 3000  # points of a path
+_MARKED = 12  # impacts
+_ROOM = 1.15
+
+
+def axis_path_chart(study: StrokeStudy) -> Chart | None:
+    """The axis from above, at the lowest and the highest height of the guide.
+
+    None for a motion along the axis, and without a guide.
+    """
+    variant = study.reference
+    guide = guide_of(study) if moves_in_space(study, variant) else None
+    if guide is None:
+        return None
+    last = len(guide.heights)
+    clearance = 1e6 * guide.clearance
+    angle = np.linspace(0.0, 2.0 * np.pi, _ROUND)
+    panels = []
+    reach = clearance
+    paths = [_path(variant, number) for number in (last, 1)]
+    for path in paths:
+        reach = max(reach, float(np.abs(path).max()))
+    reach *= _ROOM
+    for number, path in zip((last, 1), paths, strict=True):
+        every = max(1, len(path) // _MOST)
+        label = number == last
+        curves = [
+            Curve(
+                x=clearance * np.cos(angle),
+                y=clearance * np.sin(angle),
+                label="clearance of the guide",
+                style="dashed",
+                colour="grey",
+                listed=label,
+            ),
+            Curve(
+                x=path[::every, 0],
+                y=path[::every, 1],
+                label="path of the axis",
+                colour="sky",
+                width=1.2,
+                listed=label,
+            ),
+            _dot(path[:1], "start", "black", (), label=label, width=3.5),
+        ]
+        for k, stop in enumerate(dict.fromkeys(e.stop for e in variant.result.events[:_MARKED])):
+            events = [event for event in variant.result.events[:_MARKED] if event.stop == stop]
+            at = _at(variant, path, [event.time for event in events])
+            names = tuple(f"{stop} at {format_si(event.time, 's', 4)}" for event in events)
+            colour: Colour = ("red", "blue")[k % 2]
+            curves.append(_dot(at, f"touch of '{stop}'", colour, names, label=label))
+        height = format_si(guide.heights[number - 1], "m", 3)
+        panels.append(
+            Panel(
+                y=AxisSpec(label=f"y at {height}", unit="µm", range=(-reach, reach)),
+                curves=tuple(curves),
+                share=_HIGH,
+            )
+        )
+    wide = _WIDE * reach
+    return Chart(
+        name="axis-path",
+        title="Path of the needle axis, from above",
+        x=AxisSpec(label="x", unit="µm", range=(-wide, wide)),
+        panels=tuple(panels),
+        note=(
+            "Axis of the undeformed needle at the highest and the lowest height of its guide. "
+            "Outside of the circle the bore presses on the shaft, or the shaft is bent. Dots: "
+            f"where the axis is at the first {_MARKED} impacts."
+        ),
+    )
+
+
+def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
+    """Position at the seat, tilt, and forces of the guide; None for a motion along the axis."""
+    variant = study.reference
+    if not moves_in_space(study, variant):
+        return None
+    needle, time = study.needle, 1e3 * variant.result.time
+    touches = tuple(Mark(value=1e3 * event.time) for event in variant.result.events[:_MARKED])
+    panels = [
+        _panel(variant, [(f"{needle} {a}", a) for a in "xy"], "axis at seat", "µm", 1e6, touches),
+        _panel(variant, [(f"{needle} tilt {a}", a) for a in "xy"], "tilt", "mrad", 1e3, touches),
+    ]
+    guide = guide_of(study)
+    if guide is not None:
+        forces = [
+            (f"guide {k + 1} force", f"guide at {format_si(z, 'm', 3)}")
+            for k, z in enumerate(guide.heights)
+        ]
+        panels.append(_panel(variant, forces, "guide force", "N", 1.0, touches, first=2))
+    return Chart(
+        name="axis-time",
+        title="Needle off its axis",
+        x=AxisSpec(label="time", unit="ms", range=(float(time[0]), float(time[-1]))),
+        panels=tuple(panels),
+        note=(
+            "Position of the axis at the height of the seat, slope of the axis, and side forces of "
+            "the guide at the ends of the records. Thin upright lines: impacts. After the first "
+            "few impacts the path depends on the least detail: another step, or another "
+            "micrometre at the start, gives another one of the same kind."
+        ),
+    )
+
+
+def _path(variant: StrokeVariant, number: int) -> Floats:
+    """Position of the axis at a height of the guide [um], shape (n, 2)."""
+    found = [variant.channel(f"guide {number} {a}") for a in "xy"]
+    return 1e6 * np.column_stack([channel.values for channel in found if channel is not None])
+
+
+def _at(variant: StrokeVariant, path: Floats, times: list[float]) -> Floats:
+    time = variant.result.time
+    return np.column_stack([np.interp(times, time, path[:, i]) for i in range(2)])
+
+
+def _dot(
+    at: Floats,
+    name: str,
+    colour: Colour,
+    names: tuple[str, ...],
+    *,
+    label: bool,
+    width: float = 2.0,
+) -> Curve:
+    return Curve(
+        x=at[:, 0],
+        y=at[:, 1],
+        label=name,
+        colour=colour,
+        drawn="points",
+        width=width,
+        listed=label,
+        names=names,
+    )
+
+
+def _panel(
+    variant: StrokeVariant,
+    names: list[tuple[str, str]],
+    label: str,
+    unit: str,
+    factor: float,
+    marks: tuple[Mark, ...],
+    first: int = 0,
+) -> Panel:
+    curves = []
+    for k, (channel, word) in enumerate(names):
+        data = variant.channel(channel)
+        if data is not None:
+            x, y = thinned(1e3 * variant.result.time, factor * data.values)
+            curves.append(look_of(first + k).curve(x, y, word))
+    return Panel(y=AxisSpec(label=label, unit=unit), curves=tuple(curves), marks=marks, share=0.6)

@@ -1,0 +1,75 @@
+"""A stroke of finite-element bodies in three dimensions.
+
+Truth: the axial stroke of the same bodies where the needle is centred; the same numbers after
+storing; the run in one part.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
+from klack.analyses.stroke.run import run_stroke
+from klack.analyses.stroke.summary import stroke_to_json
+from klack.case.valve_reader import read_valve_case
+from klack.errors import InputError
+
+CASE = Path(__file__).parents[2] / "docs" / "how-to" / "stroke_off_axis.yaml"
+SPACE = CASE.read_text(encoding="utf-8")
+GUIDE = next(line + "\n" for line in SPACE.splitlines() if line.startswith("guide:"))
+
+
+def stroke(text, **more):
+    return run_stroke(read_valve_case(text, CASE), **more)
+
+
+@pytest.mark.slow
+def test_a_centred_needle_makes_the_axial_stroke():
+    centred = SPACE.replace("placement: {seed: 3}\n", "").replace("400 us,", "200 us,")
+    axial = centred.replace("motion: three-dimensional\n", "").replace(GUIDE, "")
+
+    ours, theirs = (stroke(text).reference.result.events[0] for text in (centred, axial))
+
+    assert ours.stop == theirs.stop == "opening"
+    # the law of the stop has the pattern of 40 N only: 5e-5 on a finer mesh
+    assert ours.peak_force == pytest.approx(theirs.peak_force, rel=2e-3)
+    assert ours.restitution == pytest.approx(theirs.restitution, abs=5e-3)
+    assert ours.time == pytest.approx(theirs.time, rel=2e-3)  # it starts 40 nm less deep
+
+
+@pytest.mark.slow
+def test_a_stored_stroke_is_the_same_and_goes_on(tmp_path):
+    whole = stroke(SPACE)
+    first = stroke(SPACE.replace("400 us, v", "99.84 us, v"))
+    STROKE.save(first, tmp_path)
+    loaded = STROKE.load(tmp_path)
+    after = stroke(SPACE.replace("400 us, v", "300.8 us, v"), after=loaded)
+
+    assert stroke_to_json(loaded) == stroke_to_json(first)
+    result = after.reference.result
+    begin = len(first.reference.result.time) - 1
+    for name, channel in whole.reference.result.channels.items():
+        scale = float(np.abs(channel.values).max())
+        expected = channel.values[begin : begin + 40]  # up to the stop
+        np.testing.assert_allclose(
+            result.channels[name].values[:40], expected, rtol=1e-9, atol=1e-12 * scale
+        )
+    told = stroke_to_json(whole)
+    assert told["motion"] == "three-dimensional"
+    for event in told["events"]:
+        assert abs(event["axis"]["tilt_x_rad"]) < 8e-6 / 9e-3 * 1.3  # bore, and what it gives
+    path = axis_path_chart(whole)
+    assert [panel.y.label for panel in path.panels] == ["y at 13 mm", "y at 4 mm"]
+    assert len(axis_over_time_chart(whole).panels) == 3
+
+
+@pytest.mark.slow
+def test_a_needle_has_to_fit_into_its_guide():
+    off = SPACE.replace("{seed: 3}", "{eccentricity: 5 um}").replace("400 us,", "20 us,")
+    with pytest.raises(InputError, match="off-axis in its guide"):
+        stroke(off)
+    beside = SPACE.replace("[4 mm, 13 mm]", "[4 mm, 25 mm]").replace("400 us,", "20 us,")
+    with pytest.raises(InputError, match="height"):
+        stroke(beside)
