@@ -1,0 +1,305 @@
+"""``klack shots`` of a whole valve: many strokes in three dimensions, and the centred one."""
+
+import pickle
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from klack.analyses.logged_work import LoggedWork
+from klack.analyses.record import case_fields, run_fields
+from klack.analyses.shots.doubts import grouped_doubts
+from klack.analyses.shots.run import guide_in_words
+from klack.analyses.stroke.run import body_summaries, stop_summaries
+from klack.analyses.stroke_shots.log import STROKE_LOG, StrokeLog, strokes_mark
+from klack.analyses.stroke_shots.one_stroke import (
+    StrokeOutcome,
+    StrokeSetup,
+    StrokeTask,
+    run_one_stroke,
+    stop_columns,
+)
+from klack.analyses.stroke_shots.record import StrokeColumns, StrokeShotsStudy, VariantShots
+from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve
+from klack.assembling.position_in_guide import largest_eccentricity
+from klack.assembling.valve import Valve, build_valve
+from klack.cache.setting import result_cache
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import ValveRoles, find_roles
+from klack.case.variants import Variant
+from klack.cores import available_cores
+from klack.errors import ConvergenceError, InputError, require_positive
+from klack.progress import Progress, silent
+from klack.stages import StageClock, collected_warnings
+from klack.transient.spatial_run import SpatialValve
+from klack.units import format_si
+
+__all__ = ["run_stroke_shots"]
+
+
+def run_stroke_shots(
+    case: ValveCase,
+    *,
+    variants: Sequence[str] = (),
+    count: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    folder: Path | None = None,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> StrokeShotsStudy:
+    """Compute many strokes of one valve, in several variants with the same draws.
+
+    Parameters
+    ----------
+    case : ValveCase
+        In three dimensions, with a guide and a section ``shots``.
+    variants : sequence of str
+        ``wet``, ``dry``; those of the case by default.
+    count, seed : int, optional
+        Instead of those of the case.
+    workers : int, optional
+        Processes; as many as there are cores without.
+    folder : Path, optional
+        Where finished strokes are kept until all are there: an interrupted run resumes from them.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations.
+
+    Raises
+    ------
+    InputError
+        A case without strokes in three dimensions, numbers that cannot be.
+    ConvergenceError
+        Where no stroke of a variant can be computed, or one on which the next ones depend.
+    """
+    begin = perf_counter()
+    stated = shots_of_valve(case)
+    wanted = case.require_variants(tuple(variants) or case.run.variants)
+    count = stated.count if count is None else count
+    require_positive("shots: count", count, "strokes")
+    seed = stated.seed if seed is None else seed
+    workers = available_cores() if workers is None else workers
+    roles = find_roles(case)
+    clock = StageClock(progress, result_cache())
+    with STROKE_LOG.open(folder, strokes_mark(case, seed, threads)) as log:
+        with collected_warnings() as notes:
+            valve = build_valve(case, clock, threads=threads)
+            setup = _setup(valve, roles)
+            starts = Starts.of(valve, _body(case, roles), seed)
+        resumed = sum(key in log.done for key in _keys(wanted, count))
+        strokes = _Strokes(setup, starts, wanted, count, clock)
+        strokes.run(workers, log, carry=stated.carry)
+        found = {name: _variant(setup, name, count, log) for name in wanted}
+        _require_some(found)
+        clock("strokes", 1.0)
+    return StrokeShotsStudy(
+        **case_fields(case),
+        **run_fields(begin, clock, "mosqito"),
+        seed=seed,
+        workers=workers,
+        carry=stated.carry,
+        resumed=resumed,
+        stroke_time=clock.spent(("strokes",)),
+        duration=case.run.duration,
+        needle=roles.needle,
+        seat=roles.seat,
+        opening_stop=roles.opening_stop,
+        guide=guide_in_words(case.guide),
+        distributions=_distributions(case),
+        largest_eccentricity=_largest(case, setup.spatial, starts),
+        mass=next(body.mass for body in setup.bodies if body.name == _body(case, roles)),
+        points={name: b - a for name, a, b in setup.spatial.model.contacts},
+        variants=found,
+        warnings=tuple(dict.fromkeys([*notes, *_doubts(wanted, count, log)])),
+    )
+
+
+def _keys(variants: Sequence[Variant], count: int) -> Iterator[tuple[str, int]]:
+    for name in variants:
+        yield name, CENTRED
+        for index in range(count):
+            yield name, index
+
+
+def _setup(valve: Valve, roles: ValveRoles) -> StrokeSetup:
+    """What strokes need of a valve, laid out as in any other process.
+
+    Arrays that have been sent lie in memory in another order than those of views: the same bits in
+    every process take the same layout.
+    """
+    if valve.spatial is None:
+        raise InputError(
+            "motion", got="axial", expected="three-dimensional", hint="set it in the case."
+        )
+    slim = Valve(
+        case=valve.case,
+        bodies={},
+        reduced={},
+        contacts={},
+        laws=valve.laws,
+        network=valve.network,
+        structures=valve.structures,
+    )
+    setup = StrokeSetup(
+        valve=slim,
+        spatial=valve.spatial,
+        roles=roles,
+        bodies=body_summaries(valve),
+        stops=stop_summaries(valve),
+    )
+    try:
+        sent: StrokeSetup = pickle.loads(pickle.dumps(setup))
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            "network.components",
+            got=f"a component that other processes cannot import ({error})",
+            expected="classes of a module",
+            hint="move the class of your own to a module that --component names.",
+        ) from error
+    return sent
+
+
+def _body(case: ValveCase, roles: ValveRoles) -> str:
+    return str(getattr(case.network.components[roles.needle], "body", ""))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Strokes:
+    """Strokes of some variants with the same draws."""
+
+    setup: StrokeSetup
+    starts: Starts
+    variants: tuple[Variant, ...]
+    count: int
+    progress: Progress
+
+    def run(self, workers: int, log: StrokeLog, *, carry: bool) -> None:
+        """Compute those that the log does not have, and keep them there."""
+        self.progress("strokes", 0.0)
+        first = [self.starts.centred()]
+        if not carry:
+            first += [self.starts.drawn(index) for index in range(self.count)]
+        with LoggedWork(
+            run_one_stroke, self.setup, workers, log, lambda key: f"stroke {key[1]} ({key[0]})"
+        ) as work:
+            self._complete(work, dict.fromkeys(self.variants, first))
+            if carry:
+                for index in range(self.count):
+                    self._complete(
+                        work, {name: [self._next(name, index, log)] for name in self.variants}
+                    )
+
+    def _next(self, variant: Variant, index: int, log: StrokeLog) -> StrokeStart:
+        """Start where the stroke before has left the needle; the first one as drawn."""
+        if index == 0:
+            return self.starts.drawn(0)
+        before = log.done[variant, index - 1]
+        if before.failure:
+            raise ConvergenceError(
+                f"stroke {index - 1} ({variant}): {before.failure}\n"
+                f"Try: --shots {index - 1} for those before it; the next ones would start where it "
+                "ends."
+                if index > 1
+                else f"stroke 0 ({variant}): {before.failure}"
+            )
+        return self.starts.after(index, before.end)
+
+    def _complete(
+        self,
+        work: "LoggedWork[tuple[str, int], StrokeOutcome]",
+        starts: Mapping[Variant, Sequence[StrokeStart]],
+    ) -> None:
+        total = len(self.variants) * (self.count + 1)
+        tasks = {
+            (name, start.index): StrokeTask(variant=name, start=start)
+            for name, items in starts.items()
+            for start in items
+        }
+        for _ in work.completed(tasks):
+            self.progress("strokes", min(len(work.log.done) / total, 1.0))
+
+
+def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> VariantShots:
+    outcomes = [log.done[name, index] for index in range(count)]
+    alone = log.done[name, CENTRED]
+    order = sorted(setup.spatial.stops, key=lambda stop: stop != setup.roles.seat)
+    begun = [item for item in (*outcomes, alone) if item.label != name]
+    return VariantShots(
+        name=name,
+        label=begun[0].label if begun else name,
+        strokes=_stroke_columns(outcomes),
+        stops={stop: stop_columns([item.stops[stop] for item in outcomes]) for stop in order},
+        centric=_stroke_columns([alone]),
+        centric_stops={stop: stop_columns([alone.stops[stop]]) for stop in order},
+        time=setup.trace_time,
+        lift=np.stack([item.lift for item in outcomes]),
+        centric_lift=alone.lift,
+        failures={str(item.index): item.failure for item in outcomes if item.failure},
+    )
+
+
+def _stroke_columns(outcomes: Sequence[StrokeOutcome]) -> StrokeColumns:
+    names = [item.name for item in fields(StrokeColumns)]
+    return StrokeColumns(
+        **{name: np.array([item.stroke[name] for item in outcomes]) for name in names}
+    )
+
+
+def _require_some(found: Mapping[str, VariantShots]) -> None:
+    """Raise the first failure of a variant of which no stroke has ended."""
+    for name, shots in found.items():
+        if len(shots.failures) == shots.strokes.count:
+            first, text = next(iter(shots.failures.items()))
+            raise ConvergenceError(
+                f"stroke {first} ({name}), and all others: {text}\n"
+                "Try: klack stroke with the same case, which tells more."
+            )
+
+
+def _largest(case: ValveCase, spatial: SpatialValve, starts: Starts) -> dict[str, float]:
+    """What the guide allows to the axis at the height of each stop [m]."""
+    if case.guide is None:
+        return {}
+    heights = {
+        stop: float(starts.centre[2] + arm[2])
+        for stop, arm in zip(spatial.stops, spatial.arms, strict=True)
+    }
+    return {stop: largest_eccentricity(case.guide, z) for stop, z in heights.items()}
+
+
+def _distributions(case: ValveCase) -> dict[str, str]:
+    shots, words = shots_of_valve(case), {}
+    if case.placement is not None:
+        words["eccentricity and tilt"] = "the placement of the case, for the first stroke"
+    elif shots.draws_position and shots.eccentricity is not None and shots.tilt is not None:
+        words["eccentricity"] = shots.eccentricity.text("m")
+        words["tilt"] = shots.tilt.text("rad")
+    elif case.guide is not None:
+        words["eccentricity and tilt"] = (
+            f"axis uniformly within the clearance of {format_si(case.guide.clearance, 'm')} at "
+            "the lowest and the highest guiding height"
+        )
+    if shots.carry:
+        words["later strokes"] = "start where the one before has left the needle across its axis"
+    if shots.friction is not None:
+        words["friction in the guide"] = shots.friction.text("")
+    elif case.guide is not None:
+        words["friction in the guide"] = format_si(case.guide.friction, "")
+    return words
+
+
+def _doubts(variants: Sequence[Variant], count: int, log: StrokeLog) -> Iterator[str]:
+    """Doubts and failures of single strokes."""
+    for name in variants:
+        alone = log.done[name, CENTRED]
+        for text in [*alone.doubts, *filter(None, [alone.failure])]:
+            yield f"'{name}': the centred stroke: {text}"
+        outcomes = [log.done[name, index] for index in range(count)]
+        doubts = [(item.index, item.doubts) for item in outcomes]
+        yield from (f"'{name}': {text}" for text in grouped_doubts(doubts, "strokes"))
+        failed = [(i.index, [f"it failed: {i.failure}"] if i.failure else []) for i in outcomes]
+        yield from (f"'{name}': {text}" for text in grouped_doubts(failed, "strokes"))
