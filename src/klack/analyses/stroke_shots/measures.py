@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from klack.analyses.measures import Measure, described_in
+from klack.analyses.stroke_shots.highest import HighestRebound
 
 __all__ = [
     "AT_TOUCH",
@@ -104,19 +105,17 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
 )
 """Of the whole of a stroke, with a distribution of their own."""
 
-STROKE_MEASURES: tuple[Measure[Row], ...] = (
+STROKE_MEASURES: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
     *STARTED,
     *RESULTS,
-    *described_in(
-        _THEORY,
-        Measure(key="impacts", symbol="n", definition="Impacts on all stops.", kind="whole"),
-        Measure(
-            key="energy_residual",
-            symbol="r_E",
-            definition="Residual of the energy balance over the throughput: round-off in a correct "
-            "run.",
-            form="power",
-        ),
+    Measure(key="impacts", symbol="n", definition="Impacts on all stops.", kind="whole"),
+    Measure(
+        key="energy_residual",
+        symbol="r_E",
+        definition="Residual of the energy balance over the throughput: round-off in a correct "
+        "run.",
+        form="power",
     ),
 )
 """All columns of a stroke."""
@@ -209,23 +208,21 @@ COMPARED: tuple[Measure[Row], ...] = described_in(
 )
 """Of the first impact on a stop, with a distribution of their own."""
 
-FIRST_TOUCH_MEASURES: tuple[Measure[Row], ...] = (
+FIRST_TOUCH_MEASURES: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
     *AT_TOUCH,
     *COMPARED,
-    *described_in(
-        _THEORY,
-        Measure(
-            key="impacts",
-            name="impacts on the stop",
-            symbol="n",
-            definition="Impacts on this stop in the whole stroke, the first one among them.",
-            kind="whole",
-        ),
+    Measure(
+        key="impacts",
+        name="impacts on the stop",
+        symbol="n",
+        definition="Impacts on this stop in the whole stroke, the first one among them.",
+        kind="whole",
     ),
 )
 """All columns of the first impact on a stop."""
 
-HIGHEST_MEASURES: tuple[Measure[Row], ...] = described_in(
+HIGHEST_MEASURES: tuple[Measure[HighestRebound], ...] = described_in(
     _THEORY,
     Measure(
         key="stroke",

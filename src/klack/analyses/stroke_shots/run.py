@@ -13,7 +13,7 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.doubts import grouped_doubts
 from klack.analyses.shots.run import guide_in_words
 from klack.analyses.stroke.run import body_summaries, stop_summaries
-from klack.analyses.stroke_shots.log import STROKE_LOG, StrokeLog, strokes_mark
+from klack.analyses.stroke_shots.log import STROKE_LOG, StrokeKey, StrokeLog, strokes_mark
 from klack.analyses.stroke_shots.one_stroke import (
     StrokeOutcome,
     StrokeSetup,
@@ -93,7 +93,9 @@ def run_stroke_shots(
         resumed = sum(key in log.done for key in _keys(wanted, count))
         strokes = _Strokes(setup, starts, wanted, count, clock)
         strokes.run(workers, log, carry=stated.carry)
-        found = {name: _variant(setup, name, count, log) for name in wanted}
+        found: dict[str, VariantShots] = {
+            name: _variant(setup, name, count, log) for name in wanted
+        }
         _require_some(found)
         clock("strokes", 1.0)
     return StrokeShotsStudy(
@@ -210,11 +212,11 @@ class _Strokes:
 
     def _complete(
         self,
-        work: "LoggedWork[tuple[str, int], StrokeOutcome]",
+        work: "LoggedWork[StrokeKey, StrokeOutcome]",
         starts: Mapping[Variant, Sequence[StrokeStart]],
     ) -> None:
         total = len(self.variants) * (self.count + 1)
-        tasks = {
+        tasks: dict[StrokeKey, StrokeTask] = {
             (name, start.index): StrokeTask(variant=name, start=start)
             for name, items in starts.items()
             for start in items

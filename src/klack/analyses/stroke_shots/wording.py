@@ -1,0 +1,103 @@
+"""Answers of many strokes, in sentences."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from klack.analyses.stroke_shots.highest import HighestRebound, highest_rebound
+from klack.analyses.stroke_shots.record import StrokeShotsStudy
+from klack.analyses.stroke_shots.scatter import Scattered, scatter_ratio, scattered, wet_and_dry
+from klack.units import format_si
+
+__all__ = ["stroke_answers", "told_value"]
+
+_ANSWERED = ("peak_force", "rebound_height", "contact_time")
+
+
+def stroke_answers(study: StrokeShotsStudy) -> Iterator[str]:
+    """Scatter of each variant, wet against dry, and the highest rebound from each stop."""
+    pairs = wet_and_dry(study)
+    for name, shots in study.variants.items():
+        for stop in shots.stops:
+            text = _scatter(stop, scattered(shots))
+            if text:
+                yield f"{name}, '{stop}': {text}"
+    for wet, dry in pairs.values():
+        if wet.measure.key in _ANSWERED or wet.measure.key == "injected_energy":
+            text = _ratio(wet, dry)
+            if text:
+                yield text
+    for name, shots in study.variants.items():
+        for stop in shots.stops:
+            found = highest_rebound(shots, stop)
+            if found is not None:
+                yield f"{name}, '{stop}': {_highest(found)}"
+
+
+def told_value(value: float, unit: str, digits: int = 4) -> str:
+    """A value in a sentence or a table of a terminal; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"
+
+
+def _scatter(stop: str, items: tuple[Scattered, ...]) -> str:
+    parts = []
+    for item in items:
+        known = item.values[np.isfinite(item.values)]
+        if item.stop == stop and item.measure.key in _ANSWERED and known.size > 1:
+            mean, deviation = float(np.mean(known)), float(np.std(known))
+            share = f" ({100.0 * deviation / mean:.2g} %)" if mean > 0.0 else ""
+            unit = item.measure.unit
+            parts.append(
+                f"{item.measure.name} {told_value(mean, unit)} with a standard deviation of "
+                f"{told_value(deviation, unit, 3)}{share}"
+            )
+    return f"{'; '.join(parts)}." if parts else ""
+
+
+def _ratio(wet: Scattered, dry: Scattered) -> str:
+    found = scatter_ratio(wet.values, dry.values)
+    if not np.isfinite(found.ratio):
+        return ""
+    at = f" at '{wet.stop}'" if wet.stop else ""
+    within = ""
+    if np.isfinite(found.low):
+        within = f" (95 % interval {100.0 * found.low:.3g} to {100.0 * found.high:.3g} %)"
+    return (
+        f"The scatter of the {wet.measure.name}{at} wet is {100.0 * found.ratio:.3g} % of dry"
+        f"{within}, over {found.pairs} strokes with the same draws."
+    )
+
+
+def _highest(found: HighestRebound) -> str:
+    text = (
+        f"the highest of {found.count} rebounds is stroke {found.stroke}, "
+        f"{told_value(found.rebound_height, 'm')}, eccentricity at touch "
+        f"{told_value(found.eccentricity, 'm', 3)}: "
+    )
+    if found.is_most_centred:
+        text += "the most centred one."
+    else:
+        text += (
+            f"the {_ordinal(found.place)} most centred, not the most centred one, which is stroke "
+            f"{found.most_centred} with {told_value(found.most_centred_height, 'm')} at "
+            f"{told_value(found.most_centred_eccentricity, 'm', 3)}."
+        )
+    if np.isfinite(found.relative_height_bias):
+        text += (
+            f" The stroke that starts centred has {told_value(found.centred_height, 'm')}: the "
+            f"highest is {100.0 * found.relative_height_bias:+.2f} % off, its restitution "
+            f"{found.restitution_bias:+.4f}."
+        )
+    return text
+
+
+def _ordinal(number: int) -> str:
+    """Number in an order.
+
+    >>> [_ordinal(n) for n in (1, 2, 3, 4, 11, 22)]
+    ['1st', '2nd', '3rd', '4th', '11th', '22nd']
+    """
+    ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    return f"{number}{'th' if 10 < number % 100 < 14 else ending}"
