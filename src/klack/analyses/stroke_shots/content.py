@@ -31,7 +31,7 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
     """Texts, tables and figures of a study."""
     stops = tuple(next(iter(study.variants.values())).stops)
     charts = [rebound_chart(study, stop) for stop in stops]
-    answers = [sentence(text) for text in stroke_answers(study)]
+    answers = [sentence(text) for text in stroke_answers(study, _printed)]
     sections = [
         Section(title="Histograms", picture=histograms(study)),
         _wet_against_dry(study),
@@ -102,7 +102,7 @@ def _drawn(study: StrokeShotsStudy) -> Section:
             "where the stroke before has left the needle" if study.carry else "drawn anew",
         ),
         ("guide", study.guide),
-        ("mass of the needle", quantity(1e3 * study.mass, "g")),
+        ("mass of the needle", quantity(study.mass, "kg")),
         ("length of a stroke", quantity(study.duration, "s", 3)),
         *((f"contact points of '{stop}'", count(n)) for stop, n in study.points.items()),
         *((f"variant {name}", shots.label) for name, shots in study.variants.items()),
@@ -174,6 +174,10 @@ def _cells(stroke: Row, first: Row) -> tuple[str, ...]:
         _plain(first["impacts"], 0),
         power(stroke["energy_residual"]) if np.isfinite(stroke["energy_residual"]) else "–",
     )
+
+
+def _printed(value: float, unit: str, digits: int) -> str:
+    return quantity(value, unit, digits) if unit != "1" else _plain(value, 4)
 
 
 def _plain(value: float, decimals: int) -> str:

@@ -12,7 +12,7 @@ __all__ = ["VARIANT_COLOURS", "lift_chart", "rebound_chart"]
 
 Floats = NDArray[np.float64]
 
-VARIANT_COLOURS: dict[str, Colour] = {"wet": "blue", "dry": "orange"}
+VARIANT_COLOURS: dict[str, Colour] = {"wet": "blue", "dry": "green"}
 _MOST_TRACES = 60
 """Thin lines of strokes; more would only cover each other and cost bytes."""
 

@@ -22,6 +22,7 @@ __all__ = ["Drawing", "histograms", "touch_map"]
 _SHOWN = ("peak_force", "contact_time", "rebound_height", "restitution")
 _OF_STROKE = ("closing_time", "injected_energy", "radiated_energy")
 _ACROSS = 3
+_LEVER = 3e-3  # [m] of the lines that show the tilt
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,8 +105,8 @@ def touch_map(study: StrokeShotsStudy) -> Drawing | None:
         return Drawing(
             svg(figure),
             "Every dot is the axis of the needle at the height of the stop when a stroke first "
-            "touches it; the arrow leads to where the upper end is tilted, its length is the tilt "
-            "over a millimetre. Circle: what the guide allows to the axis of a rigid needle.",
+            "touches it; the line leads to where the axis is 3 mm above. Circle: what the guide "
+            "allows to the axis of a rigid needle.",
         )
 
 
@@ -117,7 +118,7 @@ def _touch_panel(axis, study: StrokeShotsStudy, stop: str) -> None:  # type: ign
         columns = shots.stops[stop]
         colour = COLOURS[VARIANT_COLOURS.get(name, "black")]
         x, y = _plane(1e6 * columns.eccentricity, columns.direction)
-        u, v = _plane(1e3 * columns.tilt, columns.tilt_direction)  # [um] over a millimetre
+        u, v = _plane(1e6 * _LEVER * columns.tilt, columns.tilt_direction)
         axis.quiver(
             x,
             y,
@@ -129,6 +130,9 @@ def _touch_panel(axis, study: StrokeShotsStudy, stop: str) -> None:  # type: ign
             color=colour,
             alpha=0.45,
             width=0.004,
+            headwidth=0.0,
+            headlength=0.0,
+            headaxislength=0.0,
         )
         axis.scatter(x, y, s=12.0, color=colour, linewidths=0.0, zorder=3, label=name)
         best = highest_rebound(shots, stop)

@@ -116,7 +116,7 @@ def run_stroke_shots(
         mass=next(body.mass for body in setup.bodies if body.name == _body(case, roles)),
         points={name: b - a for name, a, b in setup.spatial.model.contacts},
         variants=found,
-        warnings=tuple(dict.fromkeys([*notes, *_doubts(wanted, count, log)])),
+        warnings=tuple(dict.fromkeys([*notes, *_missing(found), *_doubts(wanted, count, log)])),
     )
 
 
@@ -305,3 +305,23 @@ def _doubts(variants: Sequence[Variant], count: int, log: StrokeLog) -> Iterator
         yield from (f"'{name}': {text}" for text in grouped_doubts(doubts, "strokes"))
         failed = [(i.index, [f"it failed: {i.failure}"] if i.failure else []) for i in outcomes]
         yield from (f"'{name}': {text}" for text in grouped_doubts(failed, "strokes"))
+
+
+def _missing(found: Mapping[str, VariantShots]) -> Iterator[str]:
+    """What strokes did not reach, so that statistics and the highest rebound are without them."""
+    for name, shots in found.items():
+        count = shots.strokes.count
+        for stop, columns in shots.stops.items():
+            touched = np.isfinite(columns.eccentricity)
+            if not np.all(touched):
+                yield (
+                    f"'{name}': {count - int(np.sum(touched))} of {count} strokes do not hit "
+                    f"'{stop}'. Try: a longer run.duration, if they should."
+                )
+            unturned = touched & ~np.isfinite(columns.rebound_height)
+            if np.any(unturned):
+                yield (
+                    f"'{name}': {int(np.sum(unturned))} of {count} strokes have no rebound height "
+                    f"at '{stop}', and are not compared by it: the stroke ends, or another stop is "
+                    "touched, before the needle turns back. Try: a longer run.duration."
+                )

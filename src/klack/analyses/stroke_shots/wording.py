@@ -1,6 +1,6 @@
 """Answers of many strokes, in sentences."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -11,15 +11,31 @@ from klack.units import format_si
 
 __all__ = ["stroke_answers", "told_value"]
 
+Told = Callable[[float, str, int], str]
+
 _ANSWERED = ("peak_force", "rebound_height", "contact_time")
 
 
-def stroke_answers(study: StrokeShotsStudy) -> Iterator[str]:
-    """Scatter of each variant, wet against dry, and the highest rebound from each stop."""
+def told_value(value: float, unit: str, digits: int = 4) -> str:
+    """A value in a sentence or a table of a terminal; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"
+
+
+def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator[str]:
+    """Scatter of each variant, wet against dry, and the highest rebound from each stop.
+
+    Parameters
+    ----------
+    study : StrokeShotsStudy
+    told : callable
+        Writes a value with its unit and so many digits.
+    """
     pairs = wet_and_dry(study)
     for name, shots in study.variants.items():
         for stop in shots.stops:
-            text = _scatter(stop, scattered(shots))
+            text = _scatter(stop, scattered(shots), told)
             if text:
                 yield f"{name}, '{stop}': {text}"
     for wet, dry in pairs.values():
@@ -31,17 +47,10 @@ def stroke_answers(study: StrokeShotsStudy) -> Iterator[str]:
         for stop in shots.stops:
             found = highest_rebound(shots, stop)
             if found is not None:
-                yield f"{name}, '{stop}': {_highest(found)}"
+                yield f"{name}, '{stop}': {_highest(found, told)}"
 
 
-def told_value(value: float, unit: str, digits: int = 4) -> str:
-    """A value in a sentence or a table of a terminal; a dash where there is none."""
-    if not np.isfinite(value):
-        return "–"
-    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"
-
-
-def _scatter(stop: str, items: tuple[Scattered, ...]) -> str:
+def _scatter(stop: str, items: tuple[Scattered, ...], told: Told) -> str:
     parts = []
     for item in items:
         known = item.values[np.isfinite(item.values)]
@@ -50,8 +59,8 @@ def _scatter(stop: str, items: tuple[Scattered, ...]) -> str:
             share = f" ({100.0 * deviation / mean:.2g} %)" if mean > 0.0 else ""
             unit = item.measure.unit
             parts.append(
-                f"{item.measure.name} {told_value(mean, unit)} with a standard deviation of "
-                f"{told_value(deviation, unit, 3)}{share}"
+                f"{item.measure.name} {told(mean, unit, 4)} with a standard deviation of "
+                f"{told(deviation, unit, 3)}{share}"
             )
     return f"{'; '.join(parts)}." if parts else ""
 
@@ -70,23 +79,23 @@ def _ratio(wet: Scattered, dry: Scattered) -> str:
     )
 
 
-def _highest(found: HighestRebound) -> str:
+def _highest(found: HighestRebound, told: Told) -> str:
     text = (
         f"the highest of {found.count} rebounds is stroke {found.stroke}, "
-        f"{told_value(found.rebound_height, 'm')}, eccentricity at touch "
-        f"{told_value(found.eccentricity, 'm', 3)}: "
+        f"{told(found.rebound_height, 'm', 4)}, eccentricity at touch "
+        f"{told(found.eccentricity, 'm', 3)}: "
     )
     if found.is_most_centred:
         text += "the most centred one."
     else:
         text += (
             f"the {_ordinal(found.place)} most centred, not the most centred one, which is stroke "
-            f"{found.most_centred} with {told_value(found.most_centred_height, 'm')} at "
-            f"{told_value(found.most_centred_eccentricity, 'm', 3)}."
+            f"{found.most_centred} with {told(found.most_centred_height, 'm', 4)} at "
+            f"{told(found.most_centred_eccentricity, 'm', 3)}."
         )
     if np.isfinite(found.relative_height_bias):
         text += (
-            f" The stroke that starts centred has {told_value(found.centred_height, 'm')}: the "
+            f" The stroke that starts centred has {told(found.centred_height, 'm', 4)}: the "
             f"highest is {100.0 * found.relative_height_bias:+.2f} % off, its restitution "
             f"{found.restitution_bias:+.4f}."
         )
