@@ -38,6 +38,9 @@ from klack.units import format_si
 
 __all__ = ["run_stroke_shots"]
 
+_SLOW = 0.2
+"""Share of the median speed below which an impact is of another kind than the others."""
+
 
 def run_stroke_shots(
     case: ValveCase,
@@ -317,6 +320,19 @@ def _missing(found: Mapping[str, VariantShots]) -> Iterator[str]:
                 yield (
                     f"'{name}': {count - int(np.sum(touched))} of {count} strokes do not hit "
                     f"'{stop}'. Try: a longer run.duration, if they should."
+                )
+            if not np.any(touched):
+                continue
+            speed = columns.approach_speed
+            slow = touched & (speed < _SLOW * float(np.median(speed[touched])))
+            if np.any(slow):
+                first = int(np.flatnonzero(slow)[0])
+                yield (
+                    f"'{name}': the first impact on '{stop}' is a mere touch in "
+                    f"{int(np.sum(slow))} of {count} strokes, {format_si(speed[first], 'm/s', 3)} "
+                    f"in stroke {first} against a median of "
+                    f"{format_si(float(np.median(speed[touched])), 'm/s', 3)}: statistics mix "
+                    "both. Look at the lift; another duration of the drive may avoid the touch."
                 )
             unturned = touched & ~np.isfinite(columns.rebound_height)
             if np.any(unturned):
