@@ -29,7 +29,14 @@ from klack.stages import collected_warnings
 from klack.transient.spatial_path import SpatialPath
 from klack.transient.spatial_run import SpatialValve
 
-__all__ = ["StrokeOutcome", "StrokeSetup", "StrokeTask", "run_one_stroke", "stop_columns"]
+__all__ = [
+    "StrokeOutcome",
+    "StrokeSetup",
+    "StrokeTask",
+    "rebound_height",
+    "run_one_stroke",
+    "stop_columns",
+]
 
 Vector = NDArray[np.float64]
 Numbers = dict[str, float]
@@ -253,7 +260,7 @@ def _stop_numbers(
     variant: StrokeVariant, stop: str, path: SpatialPath, arm: float, *, above: bool
 ) -> Numbers:
     """First impact on one stop, ``arm`` [m] above the centre of mass of the needle."""
-    event = first_impact(variant, stop)
+    event, side = first_impact(variant, stop), -1.0 if above else 1.0
     if event is None:
         return {
             **dict.fromkeys([item.name for item in fields(StopColumns)], _NAN),
@@ -273,17 +280,33 @@ def _stop_numbers(
         "contact_time": event.contact_time,
         "impulse": event.impulse,
         "restitution": event.restitution,
-        "rebound_height": _rebound_height(variant.result, event, path, -1.0 if above else 1.0),
+        "rebound_height": rebound_height(variant.result.events, event, path, side),
         "energy_loss": event.energy_loss,
         "impacts": float(sum(item.time >= event.time for item in variant.impacts(stop))),
     }
 
 
-def _rebound_height(
-    result: NetworkResult, event: ImpactEvent, path: SpatialPath, side: float
+def rebound_height(
+    events: Sequence[ImpactEvent], event: ImpactEvent, path: SpatialPath, side: float
 ) -> float:
-    """Farthest turn of the centre of mass from the stop before another stop is touched."""
-    others = [e.time for e in result.events if e.time > event.time and e.stop != event.stop]
+    """Farthest turn of the centre of mass from a stop after an impact, before another is touched.
+
+    Parameters
+    ----------
+    events : sequence of ImpactEvent
+        Of the whole stroke.
+    event : ImpactEvent
+    path : SpatialPath
+    side : float
+        1 for a stop below the needle, -1 for one above.
+
+    Returns
+    -------
+    float [m]
+        From the place at first touch; 0 where the needle comes to rest there, nan where it does
+        not turn, or still moves away at the end.
+    """
+    others = [e.time for e in events if e.time > event.time and e.stop != event.stop]
     until = min(others, default=float(path.time[-1]))
     z = CubicHermiteSpline(path.time, path.position[:, 2], path.velocity[:, 2])
     turns = z.derivative().roots(extrapolate=False)

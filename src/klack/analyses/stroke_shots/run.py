@@ -2,7 +2,7 @@
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from pathlib import Path
 from time import perf_counter
 
@@ -36,7 +36,7 @@ from klack.stages import StageClock, collected_warnings
 from klack.transient.spatial_run import SpatialValve
 from klack.units import format_si
 
-__all__ = ["run_stroke_shots"]
+__all__ = ["compute_strokes", "run_stroke_shots", "stroke_setup"]
 
 _SLOW = 0.2
 """Share of the median speed below which an impact is of another kind than the others."""
@@ -91,11 +91,10 @@ def run_stroke_shots(
     with STROKE_LOG.open(folder, strokes_mark(case, seed, threads)) as log:
         with collected_warnings() as notes:
             valve = build_valve(case, clock, threads=threads)
-            setup = _setup(valve, roles)
+            setup = stroke_setup(valve, roles)
             starts = Starts.of(valve, _body(case, roles), seed)
         resumed = sum(key in log.done for key in _keys(wanted, count))
-        strokes = _Strokes(setup, starts, wanted, count, clock)
-        strokes.run(workers, log, carry=stated.carry)
+        compute_strokes(setup, starts, wanted, count, workers, log, clock)
         found: dict[str, VariantShots] = {
             name: _variant(setup, name, count, log) for name in wanted
         }
@@ -130,7 +129,7 @@ def _keys(variants: Sequence[Variant], count: int) -> Iterator[tuple[str, int]]:
             yield name, index
 
 
-def _setup(valve: Valve, roles: ValveRoles) -> StrokeSetup:
+def stroke_setup(valve: Valve, roles: ValveRoles) -> StrokeSetup:
     """What strokes need of a valve, laid out as in any other process.
 
     Arrays that have been sent lie in memory in another order than those of views: the same bits in
@@ -172,60 +171,63 @@ def _body(case: ValveCase, roles: ValveRoles) -> str:
     return str(getattr(case.network.components[roles.needle], "body", ""))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Strokes:
-    """Strokes of some variants with the same draws."""
+def compute_strokes(
+    setup: StrokeSetup,
+    starts: Starts,
+    variants: Sequence[Variant],
+    count: int,
+    workers: int,
+    log: StrokeLog,
+    progress: Progress,
+) -> None:
+    """Compute the strokes that the log does not have, the centred one first, and keep them there.
 
-    setup: StrokeSetup
-    starts: Starts
-    variants: tuple[Variant, ...]
-    count: int
-    progress: Progress
+    Raises
+    ------
+    InputError
+        For a position that the guide has no room for.
+    ConvergenceError
+        For a stroke that failed, where the next one would start from its end.
+    """
+    carry = shots_of_valve(starts.case).carry
+    total = len(variants) * (count + 1)
+    progress("strokes", 0.0)
+    first = [starts.centred()] + ([] if carry else [starts.drawn(i) for i in range(count)])
+    with LoggedWork(
+        run_one_stroke, setup, workers, log, lambda key: f"stroke {key[1]} ({key[0]})"
+    ) as work:
+        _complete(work, dict.fromkeys(variants, first), total, progress)
+        for index in range(count if carry else 0):
+            following = {name: [_next(starts, name, index, log)] for name in variants}
+            _complete(work, following, total, progress)
 
-    def run(self, workers: int, log: StrokeLog, *, carry: bool) -> None:
-        """Compute those that the log does not have, and keep them there."""
-        self.progress("strokes", 0.0)
-        first = [self.starts.centred()]
-        if not carry:
-            first += [self.starts.drawn(index) for index in range(self.count)]
-        with LoggedWork(
-            run_one_stroke, self.setup, workers, log, lambda key: f"stroke {key[1]} ({key[0]})"
-        ) as work:
-            self._complete(work, dict.fromkeys(self.variants, first))
-            if carry:
-                for index in range(self.count):
-                    self._complete(
-                        work, {name: [self._next(name, index, log)] for name in self.variants}
-                    )
 
-    def _next(self, variant: Variant, index: int, log: StrokeLog) -> StrokeStart:
-        """Start where the stroke before has left the needle; the first one as drawn."""
-        if index == 0:
-            return self.starts.drawn(0)
-        before = log.done[variant, index - 1]
-        if before.failure:
-            raise ConvergenceError(
-                f"stroke {index - 1} ({variant}): {before.failure}\n"
-                f"Try: --shots {index - 1} for those before it; the next ones would start where it "
-                "ends."
-                if index > 1
-                else f"stroke 0 ({variant}): {before.failure}"
-            )
-        return self.starts.after(index, before.end)
+def _next(starts: Starts, variant: Variant, index: int, log: StrokeLog) -> StrokeStart:
+    """Start where the stroke before has left the needle; the first one as drawn."""
+    if index == 0:
+        return starts.drawn(0)
+    before = log.done[variant, index - 1]
+    if before.failure:
+        raise ConvergenceError(
+            f"stroke {index - 1} ({variant}): {before.failure}\n"
+            "The next one would start where it ends. Try: fewer --shots, or shots.carry: false."
+        )
+    return starts.after(index, before.end)
 
-    def _complete(
-        self,
-        work: "LoggedWork[StrokeKey, StrokeOutcome]",
-        starts: Mapping[Variant, Sequence[StrokeStart]],
-    ) -> None:
-        total = len(self.variants) * (self.count + 1)
-        tasks: dict[StrokeKey, StrokeTask] = {
-            (name, start.index): StrokeTask(variant=name, start=start)
-            for name, items in starts.items()
-            for start in items
-        }
-        for _ in work.completed(tasks):
-            self.progress("strokes", min(len(work.log.done) / total, 1.0))
+
+def _complete(
+    work: LoggedWork[StrokeKey, StrokeOutcome],
+    starts: Mapping[Variant, Sequence[StrokeStart]],
+    total: int,
+    progress: Progress,
+) -> None:
+    tasks: dict[StrokeKey, StrokeTask] = {
+        (name, start.index): StrokeTask(variant=name, start=start)
+        for name, items in starts.items()
+        for start in items
+    }
+    for _ in work.completed(tasks):
+        progress("strokes", min(len(work.log.done) / total, 1.0))
 
 
 def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> VariantShots:
