@@ -25,6 +25,8 @@ from klack.analyses.stroke_shots.scatter import (
 )
 from klack.analyses.stroke_shots.summary import stroke_shots_to_json
 from klack.analyses.stroke_shots.wording import stroke_answers
+from klack.errors import InputError
+from klack.exchange.results.dataset import dataset_of
 from klack.report.html import render_html
 from klack.report.pdf import render_pdf
 
@@ -250,3 +252,16 @@ def test_strokes_without_an_impact_leave_a_report(missing):
     assert "strokes, in a row" in content.subtitle
     assert render_pdf(content).startswith(b"%PDF")
     json.dumps(stroke_shots_to_json(study(variants={"dry": shots})), allow_nan=False)
+
+
+def test_a_dataset_has_every_stroke_and_the_centred_one_last():
+    record = study()
+    found = dataset_of(record, STROKE_SHOTS.measured(record), run="dry")
+
+    assert found.attrs["run"] == "dry"
+    assert found["stroke"].values.tolist() == [*range(COUNT), -1]
+    assert found["seat_eccentricity"].values.tolist() == [*OFF, 0.0]
+    assert found["seat_peak_force"].attrs["units"] == "N"
+    assert found["lift"].shape == (COUNT + 1, 11)
+    with pytest.raises(InputError, match="one of: wet, dry"):
+        dataset_of(record, (), run="damp")

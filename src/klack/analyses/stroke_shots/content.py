@@ -17,7 +17,7 @@ from klack.analyses.stroke_shots.summary import (
     correlation_rows,
     ratio_rows,
 )
-from klack.analyses.stroke_shots.wording import stroke_answers
+from klack.analyses.stroke_shots.wording import highest_answers, ratio_answers, scatter_answers
 from klack.report.page import Content, Section, Table
 from klack.report.wording import count, power, quantity, sentence
 
@@ -31,13 +31,18 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
     """Texts, tables and figures of a study."""
     stops = tuple(next(iter(study.variants.values())).stops)
     charts = [rebound_chart(study, stop) for stop in stops]
-    answers = [sentence(text) for text in stroke_answers(study, _printed)]
+    answers = [
+        sentence(text) for text in (*highest_answers(study, _printed), *ratio_answers(study))
+    ]
     sections = [
-        Section(title="Histograms", picture=histograms(study)),
+        Section(
+            title="Scatter",
+            paragraphs=tuple(sentence(text) for text in scatter_answers(study, _printed)),
+            picture=histograms(study),
+        ),
         _wet_against_dry(study),
         Section(
-            title="Is the highest rebound the most centred one?",
-            paragraphs=tuple(answers),
+            title="Rebound and eccentricity",
             charts=tuple(chart for chart in charts if chart is not None),
         ),
         Section(title="Placement at touch", picture=touch_map(study)),
@@ -80,7 +85,7 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
 
 
 def _wet_against_dry(study: StrokeShotsStudy) -> Section:
-    rows = ratio_rows(study)
+    rows = ratio_rows(study, _printed)
     table = Table(columns=RATIO_COLUMNS, rows=rows)
     return Section(title="Scatter wet against dry", tables=(table,) if rows else ())
 

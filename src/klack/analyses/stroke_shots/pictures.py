@@ -58,8 +58,8 @@ def histograms(study: StrokeShotsStudy) -> Drawing | None:
         figure.legend(handles, list(study.variants), loc="outside upper left", ncols=2)
         return Drawing(
             svg(figure),
-            f"How many of {study.count} strokes fall into each class. The line down is the stroke "
-            "that starts centred.",
+            f"How many of {study.count} strokes fall into each class. Dashed: the stroke that "
+            "starts centred.",
         )
 
 

@@ -27,7 +27,7 @@ from klack.analyses.stroke_shots.scatter import (
     scattered,
     wet_and_dry,
 )
-from klack.analyses.stroke_shots.wording import stroke_answers, told_value
+from klack.analyses.stroke_shots.wording import Told, stroke_answers, told_value
 from klack.terminal.tables import TextTable
 
 __all__ = [
@@ -242,7 +242,7 @@ def correlation_rows(shots: Variant) -> tuple[tuple[str, ...], tuple[tuple[str, 
     return heads, rows
 
 
-def ratio_rows(study: StrokeShotsStudy) -> tuple[tuple[str, ...], ...]:
+def ratio_rows(study: StrokeShotsStudy, told: Told = told_value) -> tuple[tuple[str, ...], ...]:
     """Rows of :data:`RATIO_COLUMNS`."""
     rows = []
     for wet, dry in wet_and_dry(study).values():
@@ -252,7 +252,7 @@ def ratio_rows(study: StrokeShotsStudy) -> tuple[tuple[str, ...], ...]:
             continue
         within = f"{found.low:.2f} to {found.high:.2f}" if np.isfinite(found.low) else "–"
         sizes = [float(np.std(item.values[known])) for item in (wet, dry)]
-        texts = [told_value(size, wet.measure.unit) for size in sizes]
+        texts = [told(size, wet.measure.unit, 4) for size in sizes]
         rows.append((wet.name, *texts, f"{found.ratio:.2f}", within))
     return tuple(rows)
 

@@ -9,11 +9,19 @@ from klack.analyses.stroke_shots.record import StrokeShotsStudy
 from klack.analyses.stroke_shots.scatter import Scattered, scatter_ratio, scattered, wet_and_dry
 from klack.units import format_si
 
-__all__ = ["stroke_answers", "told_value"]
+__all__ = [
+    "Told",
+    "highest_answers",
+    "ratio_answers",
+    "scatter_answers",
+    "stroke_answers",
+    "told_value",
+]
 
 Told = Callable[[float, str, int], str]
 
 _ANSWERED = ("peak_force", "rebound_height", "contact_time")
+_RATIOS = ("peak_force", "rebound_height", "injected_energy")
 
 
 def told_value(value: float, unit: str, digits: int = 4) -> str:
@@ -32,17 +40,31 @@ def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator
     told : callable
         Writes a value with its unit and so many digits.
     """
-    pairs = wet_and_dry(study)
+    yield from scatter_answers(study, told)
+    yield from ratio_answers(study)
+    yield from highest_answers(study, told)
+
+
+def scatter_answers(study: StrokeShotsStudy, told: Told) -> Iterator[str]:
+    """Mean and standard deviation of the first impact on each stop."""
     for name, shots in study.variants.items():
         for stop in shots.stops:
             text = _scatter(stop, scattered(shots), told)
             if text:
                 yield f"{name}, '{stop}': {text}"
-    for wet, dry in pairs.values():
-        if wet.measure.key in _ANSWERED or wet.measure.key == "injected_energy":
+
+
+def ratio_answers(study: StrokeShotsStudy) -> Iterator[str]:
+    """Standard deviations wet over dry, of the main measures."""
+    for wet, dry in wet_and_dry(study).values():
+        if wet.measure.key in _RATIOS:
             text = _ratio(wet, dry)
             if text:
                 yield text
+
+
+def highest_answers(study: StrokeShotsStudy, told: Told) -> Iterator[str]:
+    """Whether the highest rebound from each stop is that of the most centred stroke."""
     for name, shots in study.variants.items():
         for stop in shots.stops:
             found = highest_rebound(shots, stop)
