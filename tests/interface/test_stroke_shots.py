@@ -76,6 +76,15 @@ def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     for key in ("peak_force", "contact_time", "impulse", "restitution", "approach_speed"):
         assert outcome.stops["opening"][key] == pytest.approx(getattr(first, key), rel=1e-6)
     assert numbers["opening_time"] == pytest.approx(first.time, rel=1e-9)
+    # the axis at the seat is that of the recorded channels, straight between records of 1 us
+    result, touch = run.variant.result, run.variant.impacts("seat")[0].time
+    x, y = (
+        float(np.interp(touch, result.time, result.channels[f"needle {name}"].values))
+        for name in ("x", "y")
+    )
+    at = outcome.stops["seat"]
+    found = at["eccentricity"] * np.array([np.cos(at["direction"]), np.sin(at["direction"])])
+    assert found == pytest.approx([x, y], abs=2e-9)
 
 
 def test_placements_decide_where_the_needle_touches(alone):

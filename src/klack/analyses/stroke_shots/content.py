@@ -253,8 +253,8 @@ def _limits(study: StrokeShotsStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Chance",
-            "Off-axis strokes are chaotic: after three impacts on the seat, differences of round-off "
-            "decide. Distributions do not depend on it, single late bounces do.",
+            "Off-axis strokes are chaotic: after three impacts on the seat, differences of "
+            "round-off decide. Distributions do not depend on it, single late bounces do.",
         ),
     ]
     if study.carry:
