@@ -8,7 +8,7 @@ from shots_valve import GUIDE, valve_case, valve_text
 
 from klack.analyses.stroke_shots.starts import Starts, shots_of_valve
 from klack.case.distribution import Distribution
-from klack.case.valve_reader import read_valve_case
+from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.cli.main import main
 from klack.errors import InputError
 
@@ -154,3 +154,13 @@ def test_drops_have_no_variant(tmp_path, monkeypatch, capsys):
 
     assert main(["shots", "demo-shots", "--variant", "dry"]) == 2
     assert "--variant" in capsys.readouterr().err
+
+
+def test_the_case_of_the_page_is_the_one_quoted_there():
+    folder = Path(__file__).parents[2] / "docs" / "how-to"
+    page, file = (folder / "shots.md").read_text(), folder / "guided_stroke.yaml"
+    block = page.partition("```yaml-part\n")[2].partition("```")[0].splitlines()
+
+    assert set(block) <= set(file.read_text().splitlines())
+    case = load_valve_case(file)
+    assert (case.shots.count, case.run.variants) == (50, ("wet", "dry"))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from json_schema_check import require_documented
 
+import klack
 from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
 from klack.analyses.stroke_shots.highest import highest_rebound
 from klack.analyses.stroke_shots.record import (
@@ -17,6 +18,7 @@ from klack.analyses.stroke_shots.record import (
     StrokeShotsStudy,
     VariantShots,
 )
+from klack.analyses.stroke_shots.run import missing_notes
 from klack.analyses.stroke_shots.scatter import (
     correlations,
     median_interval,
@@ -265,3 +267,28 @@ def test_a_dataset_has_every_stroke_and_the_centred_one_last():
     assert found["lift"].shape == (COUNT + 1, 11)
     with pytest.raises(InputError, match="one of: wet, dry"):
         dataset_of(record, (), run="damp")
+
+
+def test_what_strokes_did_not_reach_is_told():
+    speed = np.full(COUNT, 0.7)
+    speed[5] = 0.05  # a mere touch
+    height = np.full(COUNT, 5e-5)
+    height[:3] = NAN
+    off = np.full(COUNT, 1e-6)
+    off[39] = NAN
+    seat = {"approach_speed": speed, "rebound_height": height, "eccentricity": off}
+    notes = list(missing_notes({"dry": variant("dry", 1.0, **seat)}))
+
+    assert len(notes) == 3
+    assert "1 of 40 strokes do not hit 'seat'" in notes[0]
+    assert "mere touch in 1 of 40 strokes, 50 mm/s in stroke 5 against a median of 700" in notes[1]
+    assert "3 of 40 strokes have no rebound height at 'seat'" in notes[2]
+    assert list(missing_notes({"dry": variant("dry", 1.0)})) == []
+    none = dict.fromkeys(stop(1).row(0), NAN)
+    notes = list(missing_notes({"dry": variant("dry", 1.0, **none)}))
+    assert len(notes) == 1
+
+
+def test_drops_have_no_variants_in_python():
+    with pytest.raises(InputError, match="drops of two bodies"):
+        klack.run_shots("demo-shots", variants=["dry"])

@@ -36,7 +36,7 @@ from klack.stages import StageClock, collected_warnings
 from klack.transient.spatial_run import SpatialValve
 from klack.units import format_si
 
-__all__ = ["compute_strokes", "run_stroke_shots", "stroke_setup"]
+__all__ = ["compute_strokes", "missing_notes", "run_stroke_shots", "stroke_setup"]
 
 _SLOW = 0.2
 """Share of the median speed below which an impact is of another kind than the others."""
@@ -118,7 +118,9 @@ def run_stroke_shots(
         mass=next(body.mass for body in setup.bodies if body.name == _body(case, roles)),
         points={name: b - a for name, a, b in setup.spatial.model.contacts},
         variants=found,
-        warnings=tuple(dict.fromkeys([*notes, *_missing(found), *_doubts(wanted, count, log)])),
+        warnings=tuple(
+            dict.fromkeys([*notes, *missing_notes(found), *_doubts(wanted, count, log)])
+        ),
     )
 
 
@@ -312,7 +314,7 @@ def _doubts(variants: Sequence[Variant], count: int, log: StrokeLog) -> Iterator
         yield from (f"'{name}': {text}" for text in grouped_doubts(failed, "strokes"))
 
 
-def _missing(found: Mapping[str, VariantShots]) -> Iterator[str]:
+def missing_notes(found: Mapping[str, VariantShots]) -> Iterator[str]:
     """What strokes did not reach, so that statistics and the highest rebound are without them."""
     for name, shots in found.items():
         count = shots.strokes.count
