@@ -188,6 +188,7 @@ def test_a_row_starts_where_it_has_ended(setup, starts):
     first = log.done["dry", 0]
     assert first.stroke["eccentricity"] == np.hypot(*starts.drawn(0).aside)
     assert any("not at rest on its seat" in doubt for doubt in first.doubts)
+    assert not any("at rest" in doubt for doubt in log.done["dry", CENTRED].doubts)
 
 
 def test_a_failed_stroke_costs_its_row_alone(setup, starts, monkeypatch):

@@ -209,6 +209,7 @@ def test_the_answers_are_those_of_the_numbers():
 
     ratio = next(text for text in texts if "peak force at 'seat' wet" in text)
     assert "is 40 % of dry (95 % interval 40 to 40 %), over 40 strokes" in ratio
+    assert any("over 40 strokes of each row" in text for text in stroke_answers(study(carry=True)))
     highest = next(text for text in texts if text.startswith("dry, 'seat': the highest"))
     assert f"the highest of 40 rebounds is stroke {int(np.argmin(OFF))}," in highest
     assert "the most centred one." in highest

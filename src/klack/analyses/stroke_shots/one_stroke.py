@@ -17,7 +17,7 @@ from klack.analyses.stroke.rest import rest_note
 from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
 from klack.analyses.stroke.summary import first_impact
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
-from klack.analyses.stroke_shots.starts import StrokeStart
+from klack.analyses.stroke_shots.starts import CENTRED, StrokeStart
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve
 from klack.case.valve_roles import ValveRoles
@@ -139,7 +139,7 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
     }
     begun = result.start.notes if result.start is not None else ()
     rest = rest_note(task.variant, result, setup.roles.seat)
-    unrest = _unrest(setup, result, path)
+    unrest = "" if start.index == CENTRED else _unrest(setup, result, path)
     return StrokeOutcome(
         variant=task.variant,
         label=run.variant.label,

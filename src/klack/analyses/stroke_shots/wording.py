@@ -58,7 +58,7 @@ def ratio_answers(study: StrokeShotsStudy) -> Iterator[str]:
     """Standard deviations wet over dry, of the main measures."""
     for wet, dry in wet_and_dry(study).values():
         if wet.measure.key in _RATIOS:
-            text = _ratio(wet, dry)
+            text = _ratio(wet, dry, carry=study.carry)
             if text:
                 yield text
 
@@ -87,7 +87,7 @@ def _scatter(stop: str, items: tuple[Scattered, ...], told: Told) -> str:
     return f"{'; '.join(parts)}." if parts else ""
 
 
-def _ratio(wet: Scattered, dry: Scattered) -> str:
+def _ratio(wet: Scattered, dry: Scattered, *, carry: bool) -> str:
     found = scatter_ratio(wet.values, dry.values)
     if not np.isfinite(found.ratio):
         return ""
@@ -97,7 +97,7 @@ def _ratio(wet: Scattered, dry: Scattered) -> str:
         within = f" (95 % interval {100.0 * found.low:.3g} to {100.0 * found.high:.3g} %)"
     return (
         f"The scatter of the {wet.measure.name}{at} wet is {100.0 * found.ratio:.3g} % of dry"
-        f"{within}, over {found.pairs} strokes with the same draws."
+        f"{within}, over {found.pairs} strokes {'of each row' if carry else 'with the same draws'}."
     )
 
 
