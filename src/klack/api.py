@@ -583,16 +583,43 @@ def run_shots(
     case: Given,
     count: int | None = None,
     *,
+    variants: Sequence[str] | None = None,
     seed: int | None = None,
     workers: int | None = None,
     progress: Progress = silent,
     threads: int | None = None,
 ) -> Result:
-    """Drop a valve many times; see :func:`klack.analyses.shots.run.run_shots`."""
+    """Drop or actuate a valve many times.
+
+    Drops of an impact case: :func:`klack.analyses.shots.run.run_shots`; strokes of a valve in three
+    dimensions: :func:`klack.analyses.stroke_shots.run.run_stroke_shots`, which has ``variants``.
+    """
+    given = case if isinstance(case, CaseOnHand) else load_case(case)
+    if isinstance(given.checked, ValveCase):
+        from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
+        from klack.analyses.stroke_shots.run import run_stroke_shots
+
+        strokes = run_stroke_shots(
+            given.checked,
+            variants=tuple(variants or ()),
+            count=count,
+            seed=seed,
+            workers=workers,
+            progress=progress,
+            threads=threads,
+        )
+        return Result(strokes, STROKE_SHOTS)
     from klack.analyses.shots.analysis import SHOTS
     from klack.analyses.shots.run import run_shots as run
 
-    checked = _of_kind(case, Case, "an impact")
+    checked = _of_kind(given, Case, "an impact")
+    if variants:
+        raise InputError(
+            "run_shots: variants",
+            got=f"'{variants[0]}' for drops of two bodies",
+            expected="none: variants are those of whole strokes",
+            hint="leave them out.",
+        )
     record = run(
         checked, count=count, seed=seed, workers=workers, progress=progress, threads=threads
     )

@@ -80,7 +80,8 @@ def test_the_terminal_shows_distributions_and_the_answer(run):
 def test_the_page_of_the_how_to_prints_what_comes_out(run):
     """Words alike, and the numbers too: but for the last digit with another mesher."""
     _, _, numbers = run
-    quoted = " ".join(re.findall(r"^> (.*)$", PAGE, re.MULTILINE))
+    first = re.search(r"(?:^> .*\n)+", PAGE, re.MULTILINE)
+    quoted = " ".join(line.removeprefix("> ") for line in first[0].splitlines())
     pattern = r"[+-]?\d+\.\d+|\d+"
     found, written = numbers["rule"]["sentence"], quoted
 

@@ -11,9 +11,10 @@ from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
 from klack.assembling.off_axis import off_axis_space, touch_height
+from klack.assembling.position_in_guide import axis_through, in_disc
 from klack.assembling.stops import StopContact
 from klack.assembling.tilting_land import tilting_film
-from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.guide import LinearGuideLaw
 from klack.case.motion_of_valve import ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
@@ -33,7 +34,7 @@ from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.units import format_si
 
-__all__ = ["build_spatial"]
+__all__ = ["build_spatial", "placement_of", "seat_height"]
 
 Vector = NDArray[np.float64]
 
@@ -83,8 +84,8 @@ def build_spatial(
         )
         for name in bodies
     }
-    height = _seat_height(contacts, needle)
-    placement = _placement(case, height)
+    height = seat_height(contacts, needle)
+    placement = placement_of(case, height)
     off_axis = _farthest(case, height, placement)
     about = _about(height, bodies[needle])
     meetings = [
@@ -170,7 +171,7 @@ def _about(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:
     return np.array([0.0, 0.0, height]), needle.centre_of_mass
 
 
-def _seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
+def seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
     """Height of first touch in the drawing of the needle: at its seat, else at its stop [m]."""
     below = [contact for contact in contacts.values() if contact.pair.upper.name == needle]
     contact = (below or list(contacts.values()))[0]
@@ -178,7 +179,7 @@ def _seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
     return height - contact.pair.shift if below else height
 
 
-def _placement(case: ValveCase, height: float) -> tuple[Vector, Vector]:
+def placement_of(case: ValveCase, height: float) -> tuple[Vector, Vector]:
     """Position of the axis at this height, and its slope.
 
     Raises
@@ -192,7 +193,7 @@ def _placement(case: ValveCase, height: float) -> tuple[Vector, Vector]:
     if at.seed is not None and guide is not None:
         shares = np.random.default_rng(at.seed).random(4)
         c = guide.clearance
-        return _axis(guide, height, _in_disc(shares[:2], c), _in_disc(shares[2:], c))
+        return axis_through(guide, height, in_disc(shares[:2], c), in_disc(shares[2:], c))
     aside = at.eccentricity * np.array([cos(at.direction), sin(at.direction)])
     lean = at.tilt * np.array([cos(at.tilt_direction), sin(at.tilt_direction)])
     for z in () if guide is None else guide.heights:
@@ -220,24 +221,12 @@ def _farthest(
     found = []
     for k in range(_DIRECTIONS):
         towards = guide.clearance * _turned(2.0 * pi * k / _DIRECTIONS)[:, 0]
-        found += [_axis(guide, height, towards, sign * towards) for sign in (1.0, -1.0)]
+        found += [axis_through(guide, height, towards, sign * towards) for sign in (1.0, -1.0)]
     return found
 
 
 def _turned(angle: float) -> NDArray[np.float64]:
     return np.array([[cos(angle), -sin(angle)], [sin(angle), cos(angle)]])
-
-
-def _axis(guide: CaseGuide, height: float, low: Vector, high: Vector) -> tuple[Vector, Vector]:
-    """Position at a height and slope of the axis through two points at the outer guide heights."""
-    slope = (high - low) / (guide.heights[-1] - guide.heights[0])
-    return low + slope * (height - guide.heights[0]), slope
-
-
-def _in_disc(shares: Vector, radius: float) -> Vector:
-    """Point of a disc, all places alike, from two numbers between 0 and 1."""
-    angle = 2.0 * pi * shares[1]
-    return np.asarray(radius * np.sqrt(shares[0]) * np.array([cos(angle), sin(angle)]))
 
 
 def _meeting(

@@ -1,4 +1,4 @@
-"""Quantities that vary between drops of the valve, for ``klack shots``."""
+"""Quantities that vary between drops or strokes of the valve, for ``klack shots``."""
 
 from typing import Annotated, Self
 
@@ -16,7 +16,7 @@ from klack.input.problem import CaseProblem
 from klack.input.section import Count, Section
 from klack.units import Time, format_si
 
-__all__ = ["Shots", "Waviness"]
+__all__ = ["Shots", "StrokeShots", "Waviness"]
 
 _MOST_STEPS = 20_000_000
 _HIGHEST_HARMONIC = 40
@@ -86,14 +86,7 @@ class Shots(Section):
     @field_validator("contact_friction", mode="after")
     @classmethod
     def _most_friction(cls, drawn: Distribution | None) -> Distribution | None:
-        if drawn is not None and drawn.largest > MOST_FRICTION:
-            raise CaseProblem(
-                (),
-                got=f"coefficients up to {drawn.largest:.3g}",
-                expected=f"at most {MOST_FRICTION:g} in every shot",
-                hint="dry clean metals reach 1; {uniform: [0.1, 0.2]} ends where it says.",
-            )
-        return drawn
+        return require_friction(drawn)
 
     @model_validator(mode="after")
     def _steps(self) -> Self:
@@ -105,3 +98,50 @@ class Shots(Section):
                 hint="some milliseconds in steps of 40 ns cover the bounces of a small valve.",
             )
         return self
+
+
+class StrokeShots(Section):
+    """Input of ``klack shots``: many strokes of one valve in three dimensions."""
+
+    count: Annotated[Count, Field(le=100_000)] = Field(default=50, description="Number of strokes.")
+    seed: Annotated[int, Strict()] = Field(
+        default=1, ge=0, description="Seed of the random numbers; another seed, other strokes."
+    )
+    carry: Annotated[bool, Strict()] = Field(
+        default=False,
+        description="false: every stroke starts from a position of its own, drawn in the guide; "
+        "true: from where the stroke before has left the needle across its axis.",
+    )
+    eccentricity: LengthDistribution | None = Field(
+        default=None,
+        description="Distance of the needle from the axis at the height of its seat, at the start; "
+        "default drawn from the guide.",
+    )
+    tilt: AngleDistribution | None = Field(
+        default=None, description="Its tilt; default drawn from the guide."
+    )
+    friction: RatioDistribution | None = Field(
+        default=None, description="Coulomb's coefficient in the guide; default that of 'guide'."
+    )
+
+    @field_validator("friction", mode="after")
+    @classmethod
+    def _most_friction(cls, drawn: Distribution | None) -> Distribution | None:
+        return require_friction(drawn)
+
+    @property
+    def draws_position(self) -> bool:
+        """True if eccentricity and tilt have distributions of their own."""
+        return self.eccentricity is not None or self.tilt is not None
+
+
+def require_friction(drawn: Distribution | None) -> Distribution | None:
+    """Refuse a distribution of coefficients of friction that no faces have."""
+    if drawn is not None and drawn.largest > MOST_FRICTION:
+        raise CaseProblem(
+            (),
+            got=f"coefficients up to {drawn.largest:.3g}",
+            expected=f"at most {MOST_FRICTION:g} in every shot",
+            hint="dry clean metals reach 1; {uniform: [0.1, 0.2]} ends where it says.",
+        )
+    return drawn

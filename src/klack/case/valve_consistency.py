@@ -2,6 +2,7 @@
 
 from klack.case.consistency import check_body, check_shifts, check_surface, require_known
 from klack.case.given_consistency import require_surfaces
+from klack.case.shots_of_valve import check_shots_of_valve
 from klack.case.spatial_consistency import check_motion
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
@@ -54,6 +55,7 @@ def check_valve(case: ValveSections) -> None:
                     hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the variant.",
                 )
     check_motion(case, meetings, find_roles(case, network))
+    check_shots_of_valve(case)
 
 
 def _check_ports(case: ValveSections, name: str) -> None:

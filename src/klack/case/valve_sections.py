@@ -15,6 +15,7 @@ from klack.case.impact_sections import CaseWorn, Lumped
 from klack.case.measurement import CaseMeasurement
 from klack.case.motion_of_valve import ValveGuide, ValveMotion, ValvePlacement
 from klack.case.noise import CaseNoise
+from klack.case.shots import StrokeShots
 from klack.case.study import CaseStudy
 from klack.case.variants import Variant
 from klack.contact.friction import MOST_FRICTION
@@ -173,6 +174,9 @@ class ValveSections(CaseFile):
     placement: ValvePlacement | None = Field(
         default=None,
         description="Position of the needle at the start in three dimensions; default centred.",
+    )
+    shots: StrokeShots | None = Field(
+        default=None, description="Many strokes in three dimensions: input of klack shots."
     )
     run: StrokeRun = Field(description="Duration, steps and variants.")
     lumped: Lumped | None = Field(default=None, description="Baseline of rigid masses.")

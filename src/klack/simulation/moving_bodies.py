@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_result import ChannelData, StaticStart
+from klack.simulation.spatial_path import SpatialPath
 
 __all__ = ["MovingBodies"]
 
@@ -17,6 +18,8 @@ Changing = NDArray[np.generic]
 
 class MovingBodies(Protocol):
     """Bodies of one run; the network holds their modes whenever a record ends."""
+
+    path: SpatialPath
 
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         """Place them, at rest under the forces of the network, which ``balance`` finds anew.

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError
+from klack.simulation.spatial_path import SpatialPath
 from klack.simulation.step_sizes import StepSizes
 
 __all__ = [
@@ -272,6 +273,8 @@ class NetworkResult:
         Why the run ended before its time, all else is the record up to there; empty if it did not.
     start : StaticStart or None
         The equilibrium from which it began; None for a continued or free start.
+    path : SpatialPath or None
+        Way of a needle in three dimensions; not stored with a result.
     faces : mapping of str to PressedFaces
         By component, where faces yield.
     """
@@ -287,6 +290,7 @@ class NetworkResult:
     state: Mapping[str, NDArray[np.generic]]
     failure: str = ""
     start: StaticStart | None = None
+    path: SpatialPath | None = None
     faces: Mapping[str, PressedFaces] = field(default_factory=dict)
 
     @property

@@ -216,6 +216,7 @@ def simulate_network(
             channels[f"{row.component} gap"].values[:] += added
         channels |= network.moving.channels(time.astype(float))
     result = NetworkResult(
+        path=None if network.moving is None else network.moving.path,
         time=time.astype(float),
         channels=channels,
         interfaces=recorder.interfaces(),

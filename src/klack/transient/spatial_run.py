@@ -40,6 +40,7 @@ from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_net
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import everything, put_back
 from klack.simulation.propagator import modal_propagator
+from klack.simulation.spatial_path import SpatialPath
 from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
 from klack.simulation.step_sizes import StepSizes
 from klack.simulation.step_status import (
@@ -66,7 +67,6 @@ from klack.transient.interface_arrays import (
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
-from klack.transient.spatial_path import SpatialPath
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import bend_faces, film_state, film_strain

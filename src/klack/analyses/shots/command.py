@@ -1,13 +1,16 @@
-"""``klack shots``: many drops of one valve, each a little different."""
+"""``klack shots``: many drops or strokes of one valve, each a little different."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.terminal.options import CaseArgument
+from klack.terminal.options import CaseArgument, Components, imported
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
+
+if TYPE_CHECKING:
+    from klack.case.valve import ValveCase
 
 __all__ = ["shots"]
 
@@ -32,6 +35,18 @@ _Workers = Annotated[
 ]
 
 
+_Variants = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--variant",
+        consume_multiple=True,
+        negative="",
+        help="Of whole strokes: wet, dry, or both (wet,dry) with the same draws. "
+        "[default: as in the case]",
+    ),
+]
+
+
 def shots(
     case: CaseArgument,
     /,
@@ -39,9 +54,11 @@ def shots(
     count: _Count = None,
     seed: _Seed = None,
     workers: _Workers = None,
+    variant: _Variants = None,
+    component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
-    """Drop the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
+    """Drop or actuate the valve many times: is the highest rebound the one of a centred impact?"""  # noqa: D400
     from klack.errors import require_nonnegative, require_positive
 
     if count is not None:
@@ -52,10 +69,14 @@ def shots(
         require_positive("--workers", workers, "processes")
 
     from klack.analyses.shots.draw import shots_of
-    from klack.case.reader import load_case
     from klack.case.shipped import find_case
+    from klack.case.valve import ValveCase
+    from klack.case.valve_reader import load_any_case
 
-    checked = load_case(find_case(case))
+    checked = load_any_case(find_case(case), imported(component))
+    if isinstance(checked, ValveCase):
+        return _strokes(checked, count, seed, workers, tuple(variant or ()), wanted)
+    _refuse_variants(variant)
     shots_of(checked)
     ending = Ending.of(wanted, checked.name)
 
@@ -75,3 +96,53 @@ def shots(
             threads=wanted.threads,
         )
     return ending.end(SHOTS, study, unfinished=SHOT_LOG)
+
+
+def _strokes(
+    case: "ValveCase",
+    count: int | None,
+    seed: int | None,
+    workers: int | None,
+    variants: tuple[str, ...],
+    wanted: WantedResult,
+) -> int:
+    """Many strokes of a whole valve."""
+    with show_progress(wanted.quiet):
+        from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
+        from klack.analyses.stroke_shots.log import STROKE_LOG
+        from klack.analyses.stroke_shots.run import run_stroke_shots
+        from klack.analyses.stroke_shots.starts import shots_of_valve
+        from klack.compiling.ahead import compiling_ahead
+
+    shots_of_valve(case)
+    # both "--variant a,b" and "--variant a --variant b"
+    asked = tuple(name for item in variants for name in item.split(",") if name)
+    chosen = case.require_variants(asked or case.run.variants)
+    ending = Ending.of(wanted, case.name)
+    with (
+        ending.resumable(STROKE_LOG) as progress,
+        compiling_ahead(("loop", "rest"), wanted.threads),
+    ):
+        study = run_stroke_shots(
+            case,
+            variants=chosen,
+            count=count,
+            seed=seed,
+            workers=workers,
+            folder=ending.folder,
+            progress=progress,
+            threads=wanted.threads,
+        )
+    return ending.end(STROKE_SHOTS, study, unfinished=STROKE_LOG)
+
+
+def _refuse_variants(variants: list[str] | None) -> None:
+    from klack.errors import InputError
+
+    if variants:
+        raise InputError(
+            "--variant",
+            got=f"'{variants[0]}' for drops of two bodies",
+            expected="no variant: they are those of whole strokes",
+            hint="leave it out, or give the case of a valve with motion: three-dimensional.",
+        )

@@ -14,15 +14,17 @@ Its eccentricity is ``|x|`` at the height of first touch, its tilt the slope of 
 """
 
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin, sqrt
+from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
+from klack.assembling.position_in_guide import axis_through, in_disc
+from klack.case.any_case import AnyCase
 from klack.case.distribution import Distribution
 from klack.case.schema import Case
-from klack.case.shots import Shots
+from klack.case.shots import Shots, StrokeShots
 from klack.errors import InputError
 
 __all__ = [
@@ -30,6 +32,8 @@ __all__ = [
     "centric_draw",
     "closing_force",
     "draw_shot",
+    "drawn_friction",
+    "drawn_position",
     "extreme_placements",
     "face_friction",
     "polar",
@@ -116,11 +120,8 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
     """
     shots = shots_of(case)
     stream = _stream(seed, index, 0)
-    aside, lean = _placement(case, shots, seed, index, height)
+    aside, lean = drawn_position(case, shots, seed, index, height)
     force = closing_force(case).quantile(stream[_FORCE])
-    friction = case.guide.friction if case.guide is not None else 0.0
-    if shots.friction is not None:
-        friction = shots.friction.quantile(stream[_FRICTION])
     waviness, low, high = 0.0, 2, 1
     if shots.waviness is not None:
         waviness = shots.waviness.rms.quantile(stream[_WAVINESS])
@@ -134,7 +135,7 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
         aside=aside,
         lean=lean,
         force=force,
-        friction=friction,
+        friction=drawn_friction(case, shots, seed, index),
         contact_friction=face_friction(case).quantile(stream[_FACES]),
         waviness=waviness,
         waves=waves * (waviness / scale) if scale > 0.0 else waves,
@@ -176,7 +177,7 @@ def extreme_placements(
         for sign in (1.0, -1.0):
             if shots.eccentricity is None and shots.tilt is None and case.guide is not None:
                 c = case.guide.clearance
-                extremes.append(_axis(case, height, c * towards, sign * c * towards))
+                extremes.append(axis_through(case.guide, height, c * towards, sign * c * towards))
                 continue
             aside = _largest(shots.eccentricity) * towards
             extremes.append((aside, sign * _largest(shots.tilt) * towards))
@@ -200,16 +201,31 @@ def _stream(seed: int, index: int, attempt: int) -> NDArray[np.float64]:
     return np.random.default_rng([seed, index, attempt]).random(_NUMBERS)
 
 
-def _placement(
-    case: Case, shots: Shots, seed: int, index: int, height: float
+def drawn_friction(case: AnyCase, shots: Shots | StrokeShots, seed: int, index: int) -> float:
+    """Coulomb's coefficient in the guide of one shot."""
+    if shots.friction is not None:
+        return shots.friction.quantile(_stream(seed, index, 0)[_FRICTION])
+    return case.guide.friction if case.guide is not None else 0.0
+
+
+def drawn_position(
+    case: AnyCase, shots: Shots | StrokeShots, seed: int, index: int, height: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Position of the axis at a height, and its slope, of one shot.
+
+    Raises
+    ------
+    InputError
+        When the guide leaves no room for the stated eccentricity and tilt.
+    """
     for attempt in range(_ATTEMPTS):
         stream = _stream(seed, index, attempt)
         if shots.eccentricity is None and shots.tilt is None:
             if case.guide is None:
                 return np.zeros(2), np.zeros(2)
             c = case.guide.clearance
-            return _axis(case, height, _in_disc(stream[_PLACE], c), _in_disc(stream[_TILT], c))
+            low, high = in_disc(stream[_PLACE], c), in_disc(stream[_TILT], c)
+            return axis_through(case.guide, height, low, high)
         aside = _vector(shots.eccentricity, stream[_PLACE])
         lean = _vector(shots.tilt, stream[_TILT])
         if _has_room(case, height, aside, lean):
@@ -222,21 +238,6 @@ def _placement(
     )
 
 
-def _axis(
-    case: Case, height: float, low: NDArray[np.float64], high: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Position at first touch and slope of the axis through two points at the outer heights."""
-    heights = case.guide.heights if case.guide is not None else (0.0, 1.0)
-    slope = (high - low) / (heights[-1] - heights[0])
-    return low + slope * (height - heights[0]), slope
-
-
-def _in_disc(shares: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-    """Point of a disc, all places alike, from two numbers between 0 and 1."""
-    distance, angle = radius * sqrt(shares[0]), 2.0 * pi * shares[1]
-    return distance * np.array([cos(angle), sin(angle)])
-
-
 def _vector(size: Distribution | None, shares: NDArray[np.float64]) -> NDArray[np.float64]:
     """Vector of a drawn length in any direction, all directions alike."""
     if size is None:
@@ -246,7 +247,7 @@ def _vector(size: Distribution | None, shares: NDArray[np.float64]) -> NDArray[n
 
 
 def _has_room(
-    case: Case, height: float, aside: NDArray[np.float64], lean: NDArray[np.float64]
+    case: AnyCase, height: float, aside: NDArray[np.float64], lean: NDArray[np.float64]
 ) -> bool:
     if case.guide is None:
         return True

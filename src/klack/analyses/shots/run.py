@@ -1,6 +1,5 @@
 """``klack shots``: many drops of one valve, each a little different, and the centred one."""
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -14,6 +13,7 @@ from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import PressureRecord
 from klack.analyses.logged_work import LoggedWork
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.shots.doubts import grouped_doubts
 from klack.analyses.shots.draw import (
     ShotDraw,
     centric_draw,
@@ -46,6 +46,7 @@ from klack.units import format_si
 __all__ = [
     "DroppedShots",
     "drop_shots",
+    "guide_in_words",
     "highest_of",
     "judge_rule",
     "run_shots",
@@ -57,7 +58,6 @@ Worn = NDArray[np.float64]
 
 _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
-_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
 def run_shots(
@@ -145,7 +145,7 @@ def run_shots(
         step=model.setup.step,
         distributions=_distributions(case),
         surfaces=f"{case.contact.moving} on {case.contact.stop}",
-        guide=_guide_in_words(case.guide),
+        guide=guide_in_words(case.guide),
         faces=_faces_in_words(case),
         layer="" if case.contact.roughness is None else case.contact.roughness.in_words,
         mass=model.setup.model.mass,
@@ -372,7 +372,8 @@ def _faces_in_words(case: Case) -> str:
     return text
 
 
-def _guide_in_words(guide: CaseGuide | None) -> str:
+def guide_in_words(guide: CaseGuide | None) -> str:
+    """Guide in words; empty without one."""
     if guide is None:
         return ""
     heights = " and ".join(format_si(height, "m") for height in guide.heights)
@@ -402,13 +403,7 @@ def _unfinished(shots: ShotColumns) -> tuple[str, ...]:
 def shot_doubts(dropped: DroppedShots) -> tuple[str, ...]:
     """Doubts of single shots, those that differ in numbers only as one; and energy from nowhere."""
     notes = [f"The centred shot: {doubt}" for doubt in dropped.alone.doubts]
-    alike: dict[str, list[tuple[int, str]]] = {}
-    for outcome in dropped.outcomes:
-        for doubt in outcome.doubts:
-            alike.setdefault(_NUMBER.sub("#", doubt), []).append((outcome.index, doubt))
-    for found in alike.values():
-        index, doubt = found[0]
-        notes.append(f"{len(found)} of {len(dropped.outcomes)} shots, first shot {index}: {doubt}")
+    notes += grouped_doubts(((item.index, item.doubts) for item in dropped.outcomes), "shots")
     residual = float(np.max(np.abs(dropped.shots.energy_residual)))
     if residual > _LARGE_RESIDUAL:
         notes.append(

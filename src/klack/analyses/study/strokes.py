@@ -43,7 +43,10 @@ __all__ = ["STROKES"]
 
 _AROUND = 50e6  # [byte] of a run beside its records
 _FINE, _MOST_FINE = 80.0, 1e6  # [byte] of a step with contact, and how many of them are kept
-_ASIDE = ("run", "lumped", "noise", "study", "measurement", "calibration", "title", "description")
+_ASIDE = (
+    *("run", "lumped", "shots", "noise", "study", "measurement", "calibration"),
+    *("title", "description"),
+)
 """Sections that bodies, contact laws and their stops do not depend on,"""
 _RADIATING = ("noise", "surfaces")
 """but for these surfaces of bodies."""

@@ -9,6 +9,7 @@ from klack.analyses.measures import json_of
 from klack.analyses.noise.record import NoiseStudy
 from klack.analyses.shots.record import ShotsStudy
 from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke_shots.record import StrokeShotsStudy
 from klack.analyses.study.record import StudyRecord
 from klack.errors import InputError, MissingExtraError
 from klack.exchange.results.about import about_study
@@ -16,6 +17,7 @@ from klack.exchange.results.naming import identifiers
 from klack.exchange.results.noise_dataset import noise_variables
 from klack.exchange.results.points_dataset import points_variables
 from klack.exchange.results.shots_dataset import shots_variables
+from klack.exchange.results.strokes_dataset import strokes_variables
 from klack.exchange.results.study_table import result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar
 from klack.exchange.results.variables import Variable, about_measure
@@ -33,7 +35,7 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
 
     Parameters
     ----------
-    record : ImpactStudy, StrokeStudy, ShotsStudy, StudyRecord or NoiseStudy
+    record : ImpactStudy, StrokeStudy, ShotsStudy, StrokeShotsStudy, StudyRecord or NoiseStudy
     measured : iterable of (name, part of the record, measures)
         Those of the record; the numbers of a noise study are read from them.
     run : str, optional
@@ -63,6 +65,10 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
         _named(run, "shots", ("shots",))
         variables, coordinates = shots_variables(record)
         about = about_study(record, {"surfaces": record.surfaces, "guide": record.guide})
+    elif isinstance(record, StrokeShotsStudy):
+        shots = record.variants[_named(run, next(iter(record.variants)), record.variants)]
+        variables, coordinates = strokes_variables(shots)
+        about = about_study(record, {"run": shots.name, "label": shots.label})
     elif isinstance(record, StudyRecord):
         _named(run, "points", ("points",))
         variables, coordinates = points_variables(record)

@@ -1,0 +1,1 @@
+"""``klack shots`` of a whole valve: many strokes in three dimensions."""

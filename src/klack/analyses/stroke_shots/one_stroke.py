@@ -1,0 +1,321 @@
+"""One stroke of many: from its start to its numbers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+from threadpoolctl import threadpool_limits
+
+from klack.analyses.noise.measures import DESIGN_MEASURES
+from klack.analyses.noise.run import noise_design
+from klack.analyses.noise.source import stroke_sources
+from klack.analyses.shots.draw import polar
+from klack.analyses.stroke.record import StopSummary, StrokeVariant
+from klack.analyses.stroke.rest import rest_note
+from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
+from klack.analyses.stroke.summary import first_impact
+from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
+from klack.analyses.stroke_shots.starts import CENTRED, StrokeStart
+from klack.assembling.body_summary import BodySummary
+from klack.assembling.valve import Valve
+from klack.case.valve_roles import ValveRoles
+from klack.case.variants import Variant
+from klack.errors import ConvergenceError, KlackError
+from klack.progress import silent
+from klack.simulation.network_result import ImpactEvent, NetworkResult
+from klack.simulation.spatial_path import SpatialPath
+from klack.stages import collected_warnings
+from klack.transient.spatial_run import SpatialValve
+
+__all__ = [
+    "StrokeOutcome",
+    "StrokeSetup",
+    "StrokeTask",
+    "rebound_height",
+    "run_one_stroke",
+    "stop_columns",
+]
+
+Vector = NDArray[np.float64]
+Numbers = dict[str, float]
+
+_TRACE_POINTS = 600
+_AT_REST = 0.01  # [m/s] of the centre of mass: a bounce of 5 um under 10 g
+_NAN = float("nan")
+_ENERGIES = {
+    measure.key: measure
+    for measure in DESIGN_MEASURES
+    if measure.key in ("injected_energy", "radiated_energy")
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StrokeSetup:
+    """What all strokes share; sent to each process once.
+
+    Parameters
+    ----------
+    valve : Valve
+        Without meshes and contacts.
+    spatial : SpatialValve
+        Of the valve.
+    roles : ValveRoles
+    bodies : tuple of BodySummary
+    stops : tuple of StopSummary
+    """
+
+    valve: Valve
+    spatial: SpatialValve
+    roles: ValveRoles
+    bodies: tuple[BodySummary, ...]
+    stops: tuple[StopSummary, ...]
+
+    @property
+    def trace_time(self) -> Vector:
+        """Times at which the lift is kept [s]."""
+        return np.linspace(0.0, self.valve.case.run.duration, _TRACE_POINTS + 1)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StrokeTask:
+    """One stroke to be computed: in which variant, and from where."""
+
+    variant: Variant
+    start: StrokeStart
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StrokeOutcome:
+    """Result of one stroke.
+
+    Parameters
+    ----------
+    variant : str
+    label : str
+        Of the variant in words.
+    index : int
+    stroke : mapping of str to float
+        One for each field of :class:`klack.analyses.stroke_shots.record.StrokeColumns`.
+    stops : mapping of str to mapping of str to float
+        By end stop, likewise of :class:`~klack.analyses.stroke_shots.record.StopColumns`.
+    lift : float32 array, shape (k,) [m]
+    end : array, shape (6,) [m], [rad]
+        Where it leaves the needle: translation of the centre of mass and rotation vector.
+    failure : str
+        Why it ended early; empty if it did not.
+    doubts : tuple of str
+        Of its run, in whichever process.
+    """
+
+    variant: str
+    label: str
+    index: int
+    stroke: Numbers
+    stops: dict[str, Numbers]
+    lift: NDArray[np.float32]
+    end: Vector
+    failure: str = ""
+    doubts: tuple[str, ...] = ()
+
+
+def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
+    """Compute one stroke, on one thread, and measure it."""
+    start, spatial = task.start, setup.spatial
+    guide = None if spatial.guide is None else spatial.guide.with_friction(start.friction)
+    spatial = replace(spatial, placement=start.placement, guide=guide)
+    valve = replace(setup.valve, spatial=spatial)
+    with collected_warnings() as doubts, threadpool_limits(limits=1, user_api="blas"):
+        try:
+            run = one_variant(valve, setup.roles, task.variant, None, silent)
+        except ConvergenceError as error:  # before the first record
+            return _nothing(setup, task, str(error))
+        energies, notes = _energies(valve, setup, task.variant, run)
+    result = run.variant.result
+    path = result.path or SpatialPath()
+    stops = {
+        stop: _stop_numbers(run.variant, stop, path, float(arm[2]), above=stop != _lower(spatial))
+        for stop, arm in zip(spatial.stops, spatial.arms, strict=True)
+    }
+    begun = result.start.notes if result.start is not None else ()
+    rest = rest_note(task.variant, result, setup.roles.seat)
+    unrest = "" if start.index == CENTRED else _unrest(setup, result, path)
+    return StrokeOutcome(
+        variant=task.variant,
+        label=run.variant.label,
+        index=start.index,
+        stroke=_stroke_numbers(start, run.variant, energies),
+        stops=stops,
+        lift=_lift(setup, result),
+        end=path.position[-1],
+        failure=" ".join(str(run.failure).split()) if run.failure is not None else "",
+        doubts=tuple(dict.fromkeys([*doubts, *notes, *begun, *filter(None, (rest, unrest))])),
+    )
+
+
+def stop_columns(rows: Sequence[Numbers]) -> StopColumns:
+    """First impacts of several strokes on one stop as columns."""
+    names = [item.name for item in fields(StopColumns)]
+    return StopColumns(**{name: np.array([row[name] for row in rows]) for name in names})
+
+
+def _nothing(setup: StrokeSetup, task: StrokeTask, failure: str) -> StrokeOutcome:
+    """Outcome of a stroke that could not begin."""
+    names = [item.name for item in fields(StrokeColumns)]
+    missing = dict.fromkeys([item.name for item in fields(StopColumns)], _NAN)
+    return StrokeOutcome(
+        variant=task.variant,
+        label=task.variant,
+        index=task.start.index,
+        stroke={**dict.fromkeys(names, _NAN), **_started(task.start)},
+        stops={stop: dict(missing) for stop in setup.spatial.stops},
+        lift=np.full(_TRACE_POINTS + 1, np.nan, dtype=np.float32),
+        end=np.full(6, np.nan),
+        failure=" ".join(failure.split()),
+    )
+
+
+# --------------------------------------------------------------------------- the whole of it
+
+
+def _started(start: StrokeStart) -> Numbers:
+    eccentricity, direction = polar(start.aside)
+    tilt, tilt_direction = polar(start.lean)
+    return {
+        "eccentricity": eccentricity,
+        "direction": direction,
+        "tilt": tilt,
+        "tilt_direction": tilt_direction,
+        "friction": start.friction,
+    }
+
+
+def _stroke_numbers(start: StrokeStart, variant: StrokeVariant, energies: Numbers) -> Numbers:
+    result, times = variant.result, (variant.opening_time, variant.closing_time)
+    opening, closing = (_NAN if time is None else float(time) for time in times)
+    lost = [event.energy_loss for event in result.events]
+    return {
+        **_started(start),
+        "opening_time": opening,
+        "closing_time": closing,
+        "impacts": float(len(result.events)),
+        "impact_loss": float(np.nansum(lost)) if lost else 0.0,
+        "guide_loss": float(result.books.losses.get("guide friction", 0.0)),
+        **energies,
+        "energy_residual": float(result.books.relative_residual),
+    }
+
+
+def _energies(
+    valve: Valve, setup: StrokeSetup, variant: Variant, run: VariantRun
+) -> tuple[Numbers, list[str]]:
+    """Energy into the held bodies and out of their surfaces, and why it is missing."""
+    found = dict.fromkeys(_ENERGIES, _NAN)
+    if run.failure is not None:
+        return found, []
+    try:
+        study = study_of_run(valve, setup.roles, variant, run, setup.bodies, setup.stops)
+        source = stroke_sources(study, case=valve.case)[0]
+        design = noise_design(source)
+    except KlackError as error:  # the other numbers stand
+        return found, [f"structure-borne energy: {error}"]
+    for key, measure in _ENERGIES.items():
+        value = measure.read(design)
+        if value is not None and (key != "radiated_energy" or valve.case.noise is not None):
+            found[key] = float(value)
+    return found, list(source.notes)
+
+
+def _lift(setup: StrokeSetup, result: NetworkResult) -> NDArray[np.float32]:
+    channel = result.channels[f"{setup.roles.needle}.{setup.roles.point} displacement"]
+    trace = np.interp(setup.trace_time, result.time, channel.values, right=np.nan)
+    return trace.astype(np.float32)
+
+
+def _unrest(setup: StrokeSetup, result: NetworkResult, path: SpatialPath) -> str:
+    """Doubt whether the next stroke may start where this one ends: only from rest on the seat."""
+    shots, seat = setup.valve.case.shots, setup.roles.seat
+    if shots is None or not shots.carry or result.failure:
+        return ""
+    pressed = result.channels.get(f"{seat} contact force")
+    speed = float(np.linalg.norm(path.velocity[-1][:3]))
+    if pressed is not None and pressed.values[-1] > 0.0 and speed < _AT_REST:
+        return ""
+    return (
+        f"the needle is not at rest on its seat at the end, it moves at {speed:.2g} m/s; the next "
+        "stroke starts at rest from its position. Try: a longer run.duration."
+    )
+
+
+# --------------------------------------------------------------------------- first impact
+
+
+def _lower(spatial: SpatialValve) -> str:
+    """Stop at the lower end of the needle; empty without one."""
+    side = [float(np.sum(spatial.model.axial[a:b])) for _, a, b in spatial.model.contacts]
+    return next((s for s, up in zip(spatial.stops, side, strict=True) if up > 0.0), "")
+
+
+def _stop_numbers(
+    variant: StrokeVariant, stop: str, path: SpatialPath, arm: float, *, above: bool
+) -> Numbers:
+    """First impact on one stop, ``arm`` [m] above the centre of mass of the needle."""
+    event, side = first_impact(variant, stop), -1.0 if above else 1.0
+    if event is None:
+        return {
+            **dict.fromkeys([item.name for item in fields(StopColumns)], _NAN),
+            "impacts": float(len(variant.impacts(stop))),
+        }
+    at = path.position_at(np.array([event.time]))[0]
+    lean = np.array([at[4], -at[3]])
+    eccentricity, direction = polar(at[:2] + arm * lean)
+    tilt, tilt_direction = polar(lean)
+    return {
+        "eccentricity": eccentricity,
+        "direction": direction,
+        "tilt": tilt,
+        "tilt_direction": tilt_direction,
+        "approach_speed": event.approach_speed,
+        "peak_force": event.peak_force,
+        "contact_time": event.contact_time,
+        "impulse": event.impulse,
+        "restitution": event.restitution,
+        "rebound_height": rebound_height(variant.result.events, event, path, side),
+        "energy_loss": event.energy_loss,
+        "impacts": float(sum(item.time >= event.time for item in variant.impacts(stop))),
+    }
+
+
+def rebound_height(
+    events: Sequence[ImpactEvent], event: ImpactEvent, path: SpatialPath, side: float
+) -> float:
+    """Farthest turn of the centre of mass from a stop after an impact, before another is touched.
+
+    Parameters
+    ----------
+    events : sequence of ImpactEvent
+        Of the whole stroke.
+    event : ImpactEvent
+    path : SpatialPath
+    side : float
+        1 for a stop below the needle, -1 for one above.
+
+    Returns
+    -------
+    float [m]
+        From the place at first touch; 0 where the needle comes to rest there, nan where it does
+        not turn, or still moves away at the end.
+    """
+    others = [e.time for e in events if e.time > event.time and e.stop != event.stop]
+    until = min(others, default=float(path.time[-1]))
+    z = CubicHermiteSpline(path.time, path.position[:, 2], path.velocity[:, 2])
+    turns = z.derivative().roots(extrapolate=False)
+    turns = turns[(turns > event.time) & (turns < until)]
+    away = side * (z(np.append(turns, until)) - z(event.time))
+    highest = float(np.max(away[:-1], initial=0.0))
+    if highest == 0.0:
+        return 0.0 if event.restitution == 0.0 else _NAN
+    if not others and away[-1] > highest:  # it still rises
+        return _NAN
+    return highest

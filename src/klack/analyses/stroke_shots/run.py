@@ -1,0 +1,347 @@
+"""``klack shots`` of a whole valve: many strokes in three dimensions, and the centred one."""
+
+import pickle
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from klack.analyses.logged_work import LoggedWork
+from klack.analyses.record import case_fields, run_fields
+from klack.analyses.shots.doubts import grouped_doubts
+from klack.analyses.shots.run import guide_in_words
+from klack.analyses.stroke.run import body_summaries, stop_summaries
+from klack.analyses.stroke_shots.log import STROKE_LOG, StrokeKey, StrokeLog, strokes_mark
+from klack.analyses.stroke_shots.one_stroke import (
+    StrokeOutcome,
+    StrokeSetup,
+    StrokeTask,
+    run_one_stroke,
+    stop_columns,
+)
+from klack.analyses.stroke_shots.record import StrokeColumns, StrokeShotsStudy, VariantShots
+from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve
+from klack.assembling.position_in_guide import largest_eccentricity
+from klack.assembling.valve import Valve, build_valve
+from klack.cache.setting import result_cache
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import ValveRoles, find_roles
+from klack.case.variants import Variant
+from klack.cores import available_cores
+from klack.errors import ConvergenceError, InputError, require_positive
+from klack.progress import Progress, silent
+from klack.stages import StageClock, collected_warnings
+from klack.transient.spatial_run import SpatialValve
+from klack.units import format_si
+
+__all__ = ["compute_strokes", "missing_notes", "run_stroke_shots", "stroke_setup"]
+
+_SLOW = 0.2
+"""Share of the median speed below which an impact is of another kind than the others."""
+
+
+def run_stroke_shots(
+    case: ValveCase,
+    *,
+    variants: Sequence[str] = (),
+    count: int | None = None,
+    seed: int | None = None,
+    workers: int | None = None,
+    folder: Path | None = None,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> StrokeShotsStudy:
+    """Compute many strokes of one valve, in several variants with the same draws.
+
+    Parameters
+    ----------
+    case : ValveCase
+        In three dimensions, with a guide and a section ``shots``.
+    variants : sequence of str
+        ``wet``, ``dry``; those of the case by default.
+    count, seed : int, optional
+        Instead of those of the case.
+    workers : int, optional
+        Processes; as many as there are cores without.
+    folder : Path, optional
+        Where finished strokes are kept until all are there: an interrupted run resumes from them.
+    progress : callable
+        Called with stage and fraction.
+    threads : int, optional
+        Of the factorisations.
+
+    Raises
+    ------
+    InputError
+        A case without strokes in three dimensions, numbers that cannot be.
+    ConvergenceError
+        Where no stroke of a variant can be computed, or one on which the next ones depend.
+    """
+    begin = perf_counter()
+    stated = shots_of_valve(case)
+    wanted = case.require_variants(tuple(variants) or case.run.variants)
+    count = stated.count if count is None else count
+    require_positive("shots: count", count, "strokes")
+    seed = stated.seed if seed is None else seed
+    workers = available_cores() if workers is None else workers
+    roles = find_roles(case)
+    clock = StageClock(progress, result_cache())
+    with STROKE_LOG.open(folder, strokes_mark(case, seed, threads)) as log:
+        with collected_warnings() as notes:
+            valve = build_valve(case, clock, threads=threads)
+            setup = stroke_setup(valve, roles)
+            starts = Starts.of(valve, _body(case, roles), seed)
+        resumed = sum(key in log.done for key in _keys(wanted, count))
+        compute_strokes(setup, starts, wanted, count, workers, log, clock)
+        found: dict[str, VariantShots] = {
+            name: _variant(setup, name, count, log) for name in wanted
+        }
+        _require_some(found)
+        clock("strokes", 1.0)
+    return StrokeShotsStudy(
+        **case_fields(case),
+        **run_fields(begin, clock, "mosqito"),
+        seed=seed,
+        workers=workers,
+        carry=stated.carry,
+        resumed=resumed,
+        stroke_time=clock.spent(("strokes",)),
+        duration=case.run.duration,
+        needle=roles.needle,
+        seat=roles.seat,
+        opening_stop=roles.opening_stop,
+        guide=guide_in_words(case.guide),
+        distributions=_distributions(case),
+        largest_eccentricity=_largest(case, setup.spatial, starts),
+        mass=next(body.mass for body in setup.bodies if body.name == _body(case, roles)),
+        points={name: b - a for name, a, b in setup.spatial.model.contacts},
+        variants=found,
+        warnings=tuple(
+            dict.fromkeys([*notes, *missing_notes(found), *_doubts(wanted, count, log)])
+        ),
+    )
+
+
+def _keys(variants: Sequence[Variant], count: int) -> Iterator[tuple[str, int]]:
+    for name in variants:
+        yield name, CENTRED
+        for index in range(count):
+            yield name, index
+
+
+def stroke_setup(valve: Valve, roles: ValveRoles) -> StrokeSetup:
+    """What strokes need of a valve, laid out as in any other process.
+
+    Arrays that have been sent lie in memory in another order than those of views: the same bits in
+    every process take the same layout.
+    """
+    if valve.spatial is None:
+        raise InputError(
+            "motion", got="axial", expected="three-dimensional", hint="set it in the case."
+        )
+    slim = Valve(
+        case=valve.case,
+        bodies={},
+        reduced={},
+        contacts={},
+        laws=valve.laws,
+        network=valve.network,
+        structures=valve.structures,
+    )
+    setup = StrokeSetup(
+        valve=slim,
+        spatial=valve.spatial,
+        roles=roles,
+        bodies=body_summaries(valve),
+        stops=stop_summaries(valve),
+    )
+    try:
+        sent: StrokeSetup = pickle.loads(pickle.dumps(setup))
+    except (pickle.PicklingError, AttributeError, TypeError) as error:
+        raise InputError(
+            "network.components",
+            got=f"a component that other processes cannot import ({error})",
+            expected="classes of a module",
+            hint="move the class of your own to a module that --component names.",
+        ) from error
+    return sent
+
+
+def _body(case: ValveCase, roles: ValveRoles) -> str:
+    return str(getattr(case.network.components[roles.needle], "body", ""))
+
+
+def compute_strokes(
+    setup: StrokeSetup,
+    starts: Starts,
+    variants: Sequence[Variant],
+    count: int,
+    workers: int,
+    log: StrokeLog,
+    progress: Progress,
+) -> None:
+    """Compute the strokes that the log does not have, the centred one first, and keep them there.
+
+    Raises
+    ------
+    InputError
+        For a position that the guide has no room for.
+    ConvergenceError
+        For a stroke that failed, where the next one would start from its end.
+    """
+    carry = shots_of_valve(starts.case).carry
+    total = len(variants) * (count + 1)
+    progress("strokes", 0.0)
+    first = [starts.centred()] + ([] if carry else [starts.drawn(i) for i in range(count)])
+    with LoggedWork(
+        run_one_stroke, setup, workers, log, lambda key: f"stroke {key[1]} ({key[0]})"
+    ) as work:
+        _complete(work, dict.fromkeys(variants, first), total, progress)
+        for index in range(count if carry else 0):
+            following = {name: [_next(starts, name, index, log)] for name in variants}
+            _complete(work, following, total, progress)
+
+
+def _next(starts: Starts, variant: Variant, index: int, log: StrokeLog) -> StrokeStart:
+    """Start where the stroke before has left the needle; the first one as drawn."""
+    if index == 0:
+        return starts.drawn(0)
+    before = log.done[variant, index - 1]
+    if before.failure:
+        raise ConvergenceError(
+            f"stroke {index - 1} ({variant}): {before.failure}\n"
+            "The next one would start where it ends. Try: fewer --shots, or shots.carry: false."
+        )
+    return starts.after(index, before.end)
+
+
+def _complete(
+    work: LoggedWork[StrokeKey, StrokeOutcome],
+    starts: Mapping[Variant, Sequence[StrokeStart]],
+    total: int,
+    progress: Progress,
+) -> None:
+    tasks: dict[StrokeKey, StrokeTask] = {
+        (name, start.index): StrokeTask(variant=name, start=start)
+        for name, items in starts.items()
+        for start in items
+    }
+    for _ in work.completed(tasks):
+        progress("strokes", min(len(work.log.done) / total, 1.0))
+
+
+def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> VariantShots:
+    outcomes = [log.done[name, index] for index in range(count)]
+    alone = log.done[name, CENTRED]
+    order = sorted(setup.spatial.stops, key=lambda stop: stop != setup.roles.seat)
+    begun = [item for item in (*outcomes, alone) if item.label != name]
+    return VariantShots(
+        name=name,
+        label=begun[0].label if begun else name,
+        strokes=_stroke_columns(outcomes),
+        stops={stop: stop_columns([item.stops[stop] for item in outcomes]) for stop in order},
+        centric=_stroke_columns([alone]),
+        centric_stops={stop: stop_columns([alone.stops[stop]]) for stop in order},
+        time=setup.trace_time,
+        lift=np.stack([item.lift for item in outcomes]),
+        centric_lift=alone.lift,
+        failures={str(item.index): item.failure for item in outcomes if item.failure},
+    )
+
+
+def _stroke_columns(outcomes: Sequence[StrokeOutcome]) -> StrokeColumns:
+    names = [item.name for item in fields(StrokeColumns)]
+    return StrokeColumns(
+        **{name: np.array([item.stroke[name] for item in outcomes]) for name in names}
+    )
+
+
+def _require_some(found: Mapping[str, VariantShots]) -> None:
+    """Raise the first failure of a variant of which no stroke has ended."""
+    for name, shots in found.items():
+        if len(shots.failures) == shots.strokes.count:
+            first, text = next(iter(shots.failures.items()))
+            raise ConvergenceError(
+                f"stroke {first} ({name}), and all others: {text}\n"
+                "Try: klack stroke with the same case, which tells more."
+            )
+
+
+def _largest(case: ValveCase, spatial: SpatialValve, starts: Starts) -> dict[str, float]:
+    """What the guide allows to the axis at the height of each stop [m]."""
+    if case.guide is None:
+        return {}
+    heights = {
+        stop: float(starts.centre[2] + arm[2])
+        for stop, arm in zip(spatial.stops, spatial.arms, strict=True)
+    }
+    return {stop: largest_eccentricity(case.guide, z) for stop, z in heights.items()}
+
+
+def _distributions(case: ValveCase) -> dict[str, str]:
+    shots, words = shots_of_valve(case), {}
+    if case.placement is not None:
+        words["eccentricity and tilt"] = "the placement of the case, for the first stroke"
+    elif shots.draws_position and shots.eccentricity is not None and shots.tilt is not None:
+        words["eccentricity"] = shots.eccentricity.text("m")
+        words["tilt"] = shots.tilt.text("rad")
+    elif case.guide is not None:
+        words["eccentricity and tilt"] = (
+            f"axis uniformly within the clearance of {format_si(case.guide.clearance, 'm')} at "
+            "the lowest and the highest guiding height"
+        )
+    if shots.carry:
+        words["later strokes"] = "start where the one before has left the needle across its axis"
+    if shots.friction is not None:
+        words["friction in the guide"] = shots.friction.text("")
+    elif case.guide is not None:
+        words["friction in the guide"] = format_si(case.guide.friction, "")
+    return words
+
+
+def _doubts(variants: Sequence[Variant], count: int, log: StrokeLog) -> Iterator[str]:
+    """Doubts and failures of single strokes."""
+    for name in variants:
+        alone = log.done[name, CENTRED]
+        for text in [*alone.doubts, *filter(None, [alone.failure])]:
+            yield f"'{name}': the centred stroke: {text}"
+        outcomes = [log.done[name, index] for index in range(count)]
+        doubts = [(item.index, item.doubts) for item in outcomes]
+        yield from (f"'{name}': {text}" for text in grouped_doubts(doubts, "strokes"))
+        failed = [(i.index, [f"it failed: {i.failure}"] if i.failure else []) for i in outcomes]
+        yield from (f"'{name}': {text}" for text in grouped_doubts(failed, "strokes"))
+
+
+def missing_notes(found: Mapping[str, VariantShots]) -> Iterator[str]:
+    """What strokes did not reach, so that statistics and the highest rebound are without them."""
+    for name, shots in found.items():
+        count = shots.strokes.count
+        for stop, columns in shots.stops.items():
+            touched = np.isfinite(columns.eccentricity)
+            if not np.all(touched):
+                yield (
+                    f"'{name}': {count - int(np.sum(touched))} of {count} strokes do not hit "
+                    f"'{stop}'. Try: a longer run.duration, if they should."
+                )
+            if not np.any(touched):
+                continue
+            speed = columns.approach_speed
+            slow = touched & (speed < _SLOW * float(np.median(speed[touched])))
+            if np.any(slow):
+                first = int(np.flatnonzero(slow)[0])
+                yield (
+                    f"'{name}': the first impact on '{stop}' is a mere touch in "
+                    f"{int(np.sum(slow))} of {count} strokes, {format_si(speed[first], 'm/s', 3)} "
+                    f"in stroke {first} against a median of "
+                    f"{format_si(float(np.median(speed[touched])), 'm/s', 3)}: statistics mix "
+                    "both. Look at the lift; another duration of the drive may avoid the touch."
+                )
+            unturned = touched & ~np.isfinite(columns.rebound_height)
+            if np.any(unturned):
+                yield (
+                    f"'{name}': {int(np.sum(unturned))} of {count} strokes have no rebound height "
+                    f"at '{stop}', and are not compared by it: the stroke ends, or another stop is "
+                    "touched, before the needle turns back. Try: a longer run.duration."
+                )
