@@ -69,7 +69,7 @@ def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     placement = rigid_placement(*given, about, starts.centre)
     assert placement == pytest.approx(start.placement, rel=1e-9, abs=1e-18)
 
-    spatial = replace(valve.spatial, placement=placement, path=SpatialPath())
+    spatial = replace(valve.spatial, placement=placement)
     run = one_variant(replace(valve, spatial=spatial), find_roles(CASE), "dry", None, silent)
     first = run.variant.impacts("opening")[0]
     # round-off of the placement grows about a thousandfold until the end of an impact

@@ -237,7 +237,7 @@ def _driven() -> list[Check]:
             reason=_ROUND_OFF,
         ),
         _check(
-            "force 0.8 mm off the axis: tilt after 100 us [rad]",
+            "force 0.8 mm from the axis: tilt after 100 us [rad]",
             expected=-2.0 * arm / INERTIA[1] * 0.5 * t**2,
             computed=float(free.channels["needle tilt x"].values[-1]),
             tolerance=1e-12,
@@ -291,7 +291,7 @@ def _rest() -> Check:
     )  # fmt: skip
     bed = STIFFNESS * 0.5 * (1.6e-3) ** 2  # of a rotation
     return _check(
-        "needle at rest, pressed 0.3 mm off the axis: tilt [rad]",
+        "needle at rest, pressed 0.3 mm from the axis: tilt [rad]",
         expected=push * arm / bed,
         computed=float(found.channels["needle tilt x"].values[-1]),
         tolerance=1e-8,
