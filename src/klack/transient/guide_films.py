@@ -77,9 +77,9 @@ def squeeze_guide(
         before[k] = shaft_place(bore, k, state.q)
         free[2 * k : 2 * k + 2] = shaft_place(bore, k, q)
     soft = (rows * modes.B1) @ rows.T
-    u = before.copy().reshape(n)
-    force, slopes = _bearings(films, bore, before, before, modes.step)
-    left = free - u
+    u = free + soft @ state.bearing[:, :2].copy().reshape(n)
+    force, slopes = _bearings(films, bore, before, u.reshape((heights, 2)), modes.step)
+    left = free + soft @ force - u
     size, least = np.max(np.abs(left)), np.min(films.room)
     rounds = 0
     while size > _FOUND * least and rounds < _ROUNDS:

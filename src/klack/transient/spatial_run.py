@@ -85,6 +85,7 @@ _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
 _BALANCED = 1e-12  # [m]
 _FILM_SHARE = 0.05  # of the height of a film that a step without contact may change
+_BEARING = 0.25  # as much as this counts a change in the guide, whose film damps motion out
 _SLOW = 0.5  # of the difference before: it does not vanish
 _NOT_AT_REST = 2e-9  # [m]
 _STEADY = 0.04  # change of the force of a contact at rest in a step
@@ -626,11 +627,11 @@ class _Moving:
     def _parts(self, steps: int, H: float, points: bool) -> tuple[int, Modes]:
         """Into how many steps a macro step is cut, and the modes over one of them.
 
-        Fine ones where points or the guide may act; for a film alone its heights change by little.
+        Fine ones where points or a dry guide may act; else heights of films change by little.
         """
         longest = 1
         films = self.films
-        if not points and films is not None and self._unguided(H):
+        if not points and films is not None and (len(films.room) or self._unguided(H)):
             changes = [0.0]  # of heights over the macro step, over what is left of them
             for k in range(len(self.squeezed)):
                 lift = max(film_state(films, k, self.q)[0], 0.0) + films.lowest[k]
@@ -640,7 +641,7 @@ class _Moving:
             for k in range(len(films.room)):
                 place = self.bore.offset[k] + self.bore.traces[k] @ self.q
                 way = float(np.hypot(*(self.bore.traces[k] @ self.v)))
-                changes.append(way * H / (films.room[k] - float(np.hypot(*place))))
+                changes.append(_BEARING * way * H / (films.room[k] - float(np.hypot(*place))))
             longest = steps
             while longest > 1 and max(changes) * longest > _FILM_SHARE * steps:
                 longest //= 2

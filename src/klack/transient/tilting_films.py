@@ -36,7 +36,6 @@ Matrix = NDArray[np.float64]
 
 _ROUNDS, _SEARCHES = 60, 12
 _ENOUGH = 0.2  # of the slope of the potential: found along a change
-_ASIDE = 1e-6  # of the way without the film
 _ROUND_OFF = 1e-16
 _FOUND = 1e-11  # heights that do not fit, over lift and the least height
 _NEARLY = 1e-4  # the same at a corner, where sectors take turns in opening and closing
@@ -188,8 +187,8 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
                 soft[c, d] += rows[c, i] * modes.B1[i] * rows[d, i]
     tiny = _FOUND * (films.lowest[k] + abs(before[0]) + abs(free[0] - before[0]))
     stiff = np.linalg.inv(soft)
-    # a corner lies between closing and opening: begin on the right side of it
-    u = before + _ASIDE * (free - before)
+    # as if it pressed as in the step before; at rest a corner lies between closing and opening
+    u = free + soft @ state.films[k, :3]
     f, slopes = _pressed(films, k, before, u, step)
     left = free + soft @ f - u
     size = _size(left, reach)
