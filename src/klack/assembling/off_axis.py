@@ -10,13 +10,14 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.bodies import BodyPair
+from klack.assembling.bodies import BodyPair, warn_far_touch
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.held_nodes import held_nodes
 from klack.assembling.problem import ContactProblem
 from klack.case.bodies import CaseFile
 from klack.case.placement import Placement
-from klack.contact.mortar import contact_space
+from klack.case.schema import Case
+from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingSpace
 from klack.elasticity.eigen import Modes
@@ -77,12 +78,25 @@ def ring_space(
         gap = gaps(moved)
         lift = wanted - float(np.min(gap[facing] / section.axial[facing, None]))
         if abs(lift) <= _TOUCHING:
+            _check_refinement(problem.case, section, gap)
             return RingSpace.within(section, gap, float(gap.min()) + reach)
         moved = moved + np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
     raise ConvergenceError(
         f"contact: placing '{pair.upper.name}' on '{pair.lower.name}' off-axis did not converge, "
         f"the last move was {lift * 1e6:.3g} um.\nTry: a smaller motion.placement."
     )
+
+
+def _check_refinement(case: Case, section: ContactSpace, gap: Floats) -> None:
+    """Warn when the placement carries the first touch away from where the meshes are fine."""
+    facing = np.flatnonzero(section.axial > 1e-6)
+    lift = gap[facing].min(axis=1) / section.axial[facing]
+    centred = section.gap[facing] / section.axial[facing]
+    now, before = section.points[facing[[np.argmin(lift), np.argmin(centred)]]]
+    for name in (case.contact.moving.body, case.contact.stop.body):
+        mesh = case.bodies[name].mesh
+        if mesh is not None and mesh.contact is not None:
+            warn_far_touch(name, float(np.linalg.norm(now - before)), mesh.contact.extent)
 
 
 def _centre(pair: BodyPair) -> Floats:
@@ -171,8 +185,6 @@ def off_axis_model(
         )
         for body in (pair.upper, pair.lower)
     ]
-    contact = RingContact(
-        name="contact", upper=pair.upper.name, lower=pair.lower.name, space=space
-    )
+    contact = RingContact(name="contact", upper=pair.upper.name, lower=pair.lower.name, space=space)
     cache = problem.flexibility_upper.cache
     return revolved_model(bodies, [contact], cache=cache)
