@@ -19,11 +19,11 @@ from klack.case.placement import Placement
 from klack.case.schema import Case
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.ring_gaps import RingGaps
-from klack.contact.rings import RingSpace
+from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody, fourier_body
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
-from klack.mesh.mesh import Mesh
+from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import Pose
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
@@ -67,7 +67,7 @@ def ring_space(
     moved, widest = _rigid_placement(pair, placement, about), problem.space.points[:, 0].max()
     # no gap changes by more than its point moves, there and along z
     more = 2.0 * (placement.eccentricity + placement.tilt * widest)
-    sides = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    sides = _sides(pair)
     section = contact_space(
         *sides, reach=reach + 2.0 * more, slave=problem.space.slave, form=pair.form
     )
@@ -97,6 +97,10 @@ def _check_refinement(case: Case, section: ContactSpace, gap: Floats) -> None:
         mesh = case.bodies[name].mesh
         if mesh is not None and mesh.contact is not None:
             warn_far_touch(name, float(np.linalg.norm(now - before)), mesh.contact.extent)
+
+
+def _sides(pair: BodyPair) -> tuple[Mesh, Surface, Mesh, Surface]:
+    return pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface
 
 
 def _centre(pair: BodyPair) -> Floats:
@@ -185,6 +189,13 @@ def off_axis_model(
         )
         for body in (pair.upper, pair.lower)
     ]
-    contact = RingContact(name="contact", upper=pair.upper.name, lower=pair.lower.name, space=space)
+    faces, sides = case.contact.faces, _sides(pair)
+    contact = RingContact(
+        name="contact",
+        upper=pair.upper.name,
+        lower=pair.lower.name,
+        space=space,
+        faces=None if faces.is_none else RingFriction.on(faces, space.section, *sides),
+    )
     cache = problem.flexibility_upper.cache
     return revolved_model(bodies, [contact], cache=cache)

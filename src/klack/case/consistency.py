@@ -281,7 +281,6 @@ def _check_off_axis(case: ImpactSections) -> None:
     if not case.leaves_axis:
         return
     asked: list[tuple[Key, bool, str]] = [
-        (("contact", "friction"), not case.contact.faces.is_none, "friction between the faces"),
         (("contact", "roughness"), case.contact.roughness is not None, "rough faces"),
         (("opposite",), case.opposite is not None, "an upper stop"),
         (("outputs",), bool(case.outputs), "sensors, whose angle is not known,"),

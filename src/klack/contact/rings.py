@@ -10,12 +10,15 @@ from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
-from klack.contact.mortar import ContactSpace
+from klack.contact.friction import Friction
+from klack.contact.mortar import ContactSpace, around_rows, tangent_rows
 from klack.errors import InputError
+from klack.mesh.mesh import Mesh, Surface
 from klack.units import format_si
 
-__all__ = ["RingSpace"]
+__all__ = ["RingFriction", "RingSpace"]
 
 Floats = NDArray[np.float64]
 
@@ -114,3 +117,46 @@ class RingSpace:
     def axial(self) -> Floats:
         """Change of the gaps per translation of the upper body along +z, shape (nc,)."""
         return np.asarray(self.section.axial[self.ring])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RingFriction:
+    """Coulomb friction at contact points on rings, along the meridian and round the ring.
+
+    Parameters
+    ----------
+    law : Friction
+    meridian : pair of csr_array, shape (hats, 2 n_nodes)
+        Displacement of a past b in the half section, rows on the upper and on the lower body.
+    around, turned : pairs of csr_array, shape (hats, n_nodes), (hats, 2 n_nodes)
+        The same round the ring (:func:`klack.contact.mortar.around_rows`).
+    """
+
+    law: Friction
+    meridian: tuple[csr_array, csr_array]
+    around: tuple[csr_array, csr_array]
+    turned: tuple[csr_array, csr_array]
+
+    @classmethod
+    def on(
+        cls,
+        law: Friction,
+        section: ContactSpace,
+        mesh_a: Mesh,
+        surface_a: Surface,
+        mesh_b: Mesh,
+        surface_b: Surface,
+    ) -> Self:
+        """Tangential rows of two surfaces, even without friction.
+
+        Parameters
+        ----------
+        law : Friction
+        section : ContactSpace
+            Of these half sections.
+        mesh_a, surface_a, mesh_b, surface_b
+            As given to :func:`klack.contact.mortar.contact_space`.
+        """
+        sides = (mesh_a, surface_a, mesh_b, surface_b)
+        around, turned = around_rows(section, *sides)
+        return cls(law=law, meridian=tangent_rows(section, *sides), around=around, turned=turned)

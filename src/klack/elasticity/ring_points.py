@@ -48,15 +48,19 @@ class RingRows:
         On u_r and u_z: they read in the plane of the section, with the cosine of the angle.
     around : csr_array, shape (k, n_nodes)
         On u_theta: they read along the ring, with the sine.
+    turned : csr_array, shape (k, 2 n_nodes)
+        What the latter read besides of u_r and u_z, times the order.
     """
 
     along: csr_array
     around: csr_array
+    turned: csr_array
 
     @classmethod
     def in_plane(cls, along: csr_array) -> "RingRows":
         """Rows in the plane of the section alone, such as gaps."""
-        return cls(along=along, around=csr_array((0, along.shape[1] // 2)))
+        nodes = along.shape[1] // 2
+        return cls(along=along, around=csr_array((0, nodes)), turned=csr_array((0, 2 * nodes)))
 
     @property
     def count(self) -> int:
@@ -70,10 +74,11 @@ class RingRows:
 
     def of_order(self, order: int) -> csr_array:
         """Rows on the degrees of freedom of a body in one order, shape (count, 3 n_nodes)."""
-        in_plane = rows_around(self.along, order, np.zeros(1))
-        nodes = self.around.shape[1]
-        turning = csr_array(self.around @ kron(eye_array(nodes), _AROUND))
-        return csr_array(vstack([in_plane, turning]))
+        in_plane, turned = (
+            rows_around(rows, order, np.zeros(1)) for rows in (self.along, self.turned)
+        )
+        around = self.around @ kron(eye_array(self.around.shape[1]), _AROUND)
+        return csr_array(vstack([in_plane, csr_array(around + order * turned)]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
 from klack.cache.result_cache import ResultCache
-from klack.contact.rings import RingSpace
+from klack.contact.face_friction import lifted_offset
+from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody
 from klack.elasticity.ring_points import RingPoints, RingRows
+from klack.errors import InputError
 from klack.transient.interface_model import (
     InterfaceModel,
     PointContact,
@@ -60,12 +62,20 @@ class RingContact:
     upper, lower : str
         Names of the bodies.
     space : RingSpace
+    faces : RingFriction or None
+        Their friction; None without tangential directions.
     """
 
     name: str
     upper: str
     lower: str
     space: RingSpace
+    faces: RingFriction | None = None
+
+    @property
+    def ways(self) -> int:
+        """Tangential directions of each point."""
+        return 0 if self.faces is None else 2
 
 
 def reduced_bodies(
@@ -85,8 +95,17 @@ def reduced_bodies(
     cache, threads
         As of :class:`klack.elasticity.statics.Flexibility`.
     """
+    ways = {contact.ways for contact in contacts}
+    if len(ways) > 1:
+        raise InputError(
+            "interface model: contacts on rings",
+            got="friction at one contact and none at another",
+            expected="faces at all contacts, or none",
+            hint="give every contact faces; their friction may be 0.",
+        )
     counts = [len(contact.space.gap) for contact in contacts]
-    places, total = row_places(counts, 0), sum(counts)
+    places = row_places(counts, ways.pop())
+    total = sum(len(place) for place in places)
     loads = uneven_loads(total)
     out = []
     for body in bodies:
@@ -96,7 +115,7 @@ def reduced_bodies(
             if body.name in (contact.upper, contact.lower)
         ]
         place = np.concatenate([where for _, where in own])
-        rows, points = _rings([(one.space, one.upper == body.name) for one, _ in own])
+        rows, points = _rings([(one, one.upper == body.name) for one, _ in own])
         reduced = reduce_revolved(
             body.in_order,
             rows,
@@ -137,29 +156,57 @@ def revolved_model(
     reduced, loads = reduced_bodies(bodies, contacts, cache=cache, threads=threads)
     return model_at_points(
         [item.body for item in reduced],
-        [_point_contact(contact) for contact in contacts],
+        [_point_contact(contact, bodies[0].name) for contact in contacts],
         np.sum([item.compliance for item in reduced], axis=0),
         loads,
         np.sum([item.answers for item in reduced], axis=0),
     )
 
 
-def _rings(spaces: Sequence[tuple[RingSpace, bool]]) -> tuple[RingRows, RingPoints]:
+def _rings(contacts: Sequence[tuple[RingContact, bool]]) -> tuple[RingRows, RingPoints]:
     """Rows and points of one body: its contacts, and whether it is the upper body of each."""
-    along = [space.section.G_a if is_upper else space.section.G_b for space, is_upper in spaces]
-    starts = np.cumsum([0, *(G.shape[0] for G in along)])
+    along, around, turned = [], [], []
+    row: list[list[NDArray[np.int64]]] = []
+    sections = [contact.space.section for contact, _ in contacts]
+    planes = sum(
+        (1 + min(contact.ways, 1)) * contact.space.section.count for contact, _ in contacts
+    )
+    at, beside = 0, planes
+    for (contact, is_upper), section in zip(contacts, sections, strict=True):
+        ring, faces = contact.space.ring, contact.faces
+        along.append(section.G_a if is_upper else section.G_b)
+        row.append([at + ring])
+        at += section.count
+        if faces is not None:
+            side = 0 if is_upper else 1
+            along.append(faces.meridian[side])
+            around.append(faces.around[side])
+            turned.append(faces.turned[side])
+            row[-1] += [at + ring, beside + ring]
+            at += section.count
+            beside += section.count
     rows = RingRows.in_plane(csr_array(vstack(along)))
-    pairs = list(zip(spaces, starts, strict=False))
+    if around:
+        rows = RingRows(
+            along=rows.along,
+            around=csr_array(vstack(around)),
+            turned=csr_array(vstack(turned)),
+        )
+    turns = [np.tile(contact.space.turn, 1 + contact.ways) for contact, _ in contacts]
     return rows, RingPoints(
-        row=np.concatenate([start + space.ring for (space, _), start in pairs]),
-        turn=np.concatenate([space.turn for space, _ in spaces]),
-        count=spaces[0][0].count,
+        row=np.concatenate([np.concatenate(part) for part in row]),
+        turn=np.concatenate(turns),
+        count=contacts[0][0].space.count,
         is_sine=rows.is_sine,
     )
 
 
-def _point_contact(contact: RingContact) -> PointContact:
-    space = contact.space
+def _point_contact(contact: RingContact, moving: str) -> PointContact:
+    space, across, law = contact.space, np.zeros(0), None
+    if contact.faces is not None:
+        meridian = contact.faces.meridian[0 if contact.upper == moving else 1]
+        lifted = lifted_offset(meridian, 2)[space.ring]
+        across, law = np.concatenate([lifted, np.zeros(len(lifted))]), contact.faces.law
     return PointContact(
         name=contact.name,
         upper=contact.upper,
@@ -169,4 +216,6 @@ def _point_contact(contact: RingContact) -> PointContact:
         points=space.points,
         rim=space.rim,
         beyond=space.beyond,
+        axial_across=across,
+        law=law,
     )

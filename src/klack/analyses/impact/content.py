@@ -54,8 +54,8 @@ _WITHOUT_FRICTION: tuple[tuple[str, Callable[[ImpactMeasures], str]], ...] = (
 
 
 _CENTRED = (
-    "Of the centred bodies, in the meridian plane. The interface level, which meets off-axis, has no "
-    "such law."
+    "Of the centred bodies, in the meridian plane. The interface level, which meets off-axis, has "
+    "no such law."
 )
 
 

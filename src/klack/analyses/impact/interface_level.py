@@ -14,7 +14,7 @@ from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
-from klack.assembling.modes import kept_modes, selection_of
+from klack.assembling.modes import selection_of
 from klack.assembling.off_axis import ANGLES, off_axis_model, ring_space
 from klack.assembling.problem import ContactProblem
 from klack.case.guide import CaseGuide, LinearGuideLaw
@@ -255,11 +255,16 @@ def off_axis_within_reach(
     """
     case, reach = problem.case, problem.space.reach
     count = ANGLES if case.contact.angles is None else case.contact.angles
-    kept = kept_modes(problem, pools, ports)
+    kept = {
+        body.name: _kept(problem, body, pools[body.name], ports, None)
+        for body, _ in _sides(problem)
+    }
+    smooth = case.contact.faces.is_none
     while True:
         space = ring_space(problem, case.motion.placement, count, reach)
+        model = off_axis_model(problem, kept, space)
         try:
-            return run(replace(off_axis_model(problem, kept, space), limit=limit))
+            return run(replace(model, limit=limit if smooth else None))
         except ReachError:
             if case.contact.reach is not None:
                 raise
