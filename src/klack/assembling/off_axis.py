@@ -5,7 +5,7 @@ which are those of the surfaces where the moving body is.
 """
 
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,11 +24,11 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody, fourier_body
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.rigid import Pose
+from klack.mesh.rigid import Pose, rotation_matrix
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
 
-__all__ = ["ANGLES", "off_axis_model", "ring_space", "turning_body"]
+__all__ = ["ANGLES", "off_axis_model", "ring_contacts", "turning_body"]
 
 Floats = NDArray[np.float64]
 
@@ -40,9 +40,9 @@ _MOVES = 30
 _TOUCHING = 1e-12  # [m]
 
 
-def ring_space(
+def ring_contacts(
     problem: ContactProblem, placement: Placement, count: int, reach: float
-) -> RingSpace:
+) -> list[RingContact]:
     """Contact points on rings with the moving body where the case places it.
 
     It leans about the point of its axis at the height of first touch, is shifted aside, and moved
@@ -58,33 +58,85 @@ def ring_space(
     reach : float [m]
         Largest gap of a contact point, counted from the smallest one.
 
+    Returns
+    -------
+    list of RingContact
+        ``contact``, and ``opposite`` where the case has an upper stop.
+
     Raises
     ------
     InputError
         For a contact around the axis.
     """
-    pair, about = problem.pair, np.array([0.0, 0.0, _touch_height(problem)])
-    moved, widest = _rigid_placement(pair, placement, about), problem.space.points[:, 0].max()
-    # no gap changes by more than its point moves, there and along z
-    more = 2.0 * (placement.eccentricity + placement.tilt * widest)
-    sides = _sides(pair)
+    pair, above, faces = problem.pair, problem.opposite, problem.case.contact.faces
+    space, moved = _on_seat(problem, placement, count, reach)
+    opposite = problem.case.opposite
+    stop_faces = faces if opposite is None else opposite.faces(faces)
+    smooth = faces.is_none and stop_faces.is_none
+    contacts = [
+        RingContact(
+            name="contact",
+            upper=pair.upper.name,
+            lower=pair.lower.name,
+            space=space,
+            faces=None if smooth else RingFriction.on(faces, space.section, *_sides(pair)),
+        )
+    ]
+    if above is not None:
+        sides = (above.body.mesh, above.surface, pair.upper.mesh, above.moving_surface)
+        more = _most_change(placement, above.space)
+        section = contact_space(
+            *sides, reach=above.space.reach + 2.0 * more, slave=above.space.slave
+        )
+        gaps = RingGaps.of(section, *sides, angle=space.angles, centre=_centre(pair))
+        shift, rotation = moved[:3], moved[3:]
+        # the moving body is body b here: body a is moved the opposite way
+        gap = gaps(np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation]))
+        there = RingSpace.within(section, gap, float(gap.min()) + above.space.reach + more)
+        contacts.append(
+            RingContact(
+                name="opposite",
+                upper=above.body.name,
+                lower=pair.upper.name,
+                space=there,
+                faces=None if smooth else RingFriction.on(stop_faces, section, *sides),
+            )
+        )
+    return contacts
+
+
+def _on_seat(
+    problem: ContactProblem, placement: Placement, count: int, reach: float
+) -> tuple[RingSpace, Floats]:
+    """Contact points of the seat, and the placement of the moving body from where it is now."""
+    pair, sides = problem.pair, _sides(problem.pair)
+    about = np.array([0.0, 0.0, _touch_height(problem)])
+    more = _most_change(placement, problem.space)
     section = contact_space(
         *sides, reach=reach + 2.0 * more, slave=problem.space.slave, form=pair.form
     )
     angle = 2.0 * np.pi * np.arange(count) / count
     gaps = RingGaps.of(section, *sides, angle=angle, centre=_centre(pair), form=pair.form)
     facing, wanted = section.axial > 1e-6, problem.case.contact.gap or 0.0
+    # from above: a line that starts deep inside the other body does not find its surface
+    moved = _rigid_placement(pair, placement, about) + np.array([0.0, 0.0, more, 0.0, 0.0, 0.0])
     for _ in range(_MOVES):  # points slide along the other surface
         gap = gaps(moved)
         lift = wanted - float(np.min(gap[facing] / section.axial[facing, None]))
         if abs(lift) <= _TOUCHING:
             _check_refinement(problem.case, section, gap)
-            return RingSpace.within(section, gap, float(gap.min()) + reach)
+            return RingSpace.within(section, gap, float(gap.min()) + reach), moved
         moved = moved + np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
     raise ConvergenceError(
         f"contact: placing '{pair.upper.name}' on '{pair.lower.name}' off-axis did not converge, "
         f"the last move was {lift * 1e6:.3g} um.\nTry: a smaller motion.placement."
     )
+
+
+def _most_change(placement: Placement, space: ContactSpace) -> float:
+    """What no gap changes by more than [m]: its point moves by less, there and along z."""
+    widest = float(space.points[:, 0].max())
+    return 2.0 * (placement.eccentricity + placement.tilt * widest)
 
 
 def _check_refinement(case: Case, section: ContactSpace, gap: Floats) -> None:
@@ -164,21 +216,21 @@ def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], Fouri
 
 
 def off_axis_model(
-    problem: ContactProblem, kept: Mapping[str, Modes], space: RingSpace
+    problem: ContactProblem, kept: Mapping[str, Modes], contacts: Sequence[RingContact]
 ) -> InterfaceModel:
-    """Interface model of both bodies of a case at points on rings.
+    """Interface model of the bodies of a case at points on rings.
 
     Beside the axial modes each body keeps as many others, the lowest of the orders above 0.
 
     Parameters
     ----------
     problem : ContactProblem
-        With its factorisations still there.
     kept : mapping of body name to Modes
         Axial modes that the centred case keeps.
-    space : RingSpace
+    contacts : sequence of RingContact
+        From :func:`ring_contacts`.
     """
-    case, pair = problem.case, problem.pair
+    case, pair, above = problem.case, problem.pair, problem.opposite
     bodies = [
         RevolvedBody(
             name=body.name,
@@ -187,15 +239,6 @@ def off_axis_model(
             others=len(kept[body.name].omega),
             damping=damping_of(case.bodies[body.name].damping).ratios,
         )
-        for body in (pair.upper, pair.lower)
+        for body in (pair.upper, pair.lower, *(() if above is None else (above.body,)))
     ]
-    faces, sides = case.contact.faces, _sides(pair)
-    contact = RingContact(
-        name="contact",
-        upper=pair.upper.name,
-        lower=pair.lower.name,
-        space=space,
-        faces=None if faces.is_none else RingFriction.on(faces, space.section, *sides),
-    )
-    cache = problem.flexibility_upper.cache
-    return revolved_model(bodies, [contact], cache=cache)
+    return revolved_model(bodies, contacts, cache=problem.flexibility_upper.cache)

@@ -282,7 +282,6 @@ def _check_off_axis(case: ImpactSections) -> None:
         return
     asked: list[tuple[Key, bool, str]] = [
         (("contact", "roughness"), case.contact.roughness is not None, "rough faces"),
-        (("opposite",), case.opposite is not None, "an upper stop"),
         (("outputs",), bool(case.outputs), "sensors, whose angle is not known,"),
     ]
     for key, is_there, what in asked:
@@ -290,7 +289,7 @@ def _check_off_axis(case: ImpactSections) -> None:
             raise CaseProblem(
                 key,
                 got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
-                expected="smooth faces of two bodies, without sensors",
+                expected="faces without roughness, and no sensors",
                 hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
                 on_key=True,
             )

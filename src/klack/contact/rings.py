@@ -102,9 +102,14 @@ class RingSpace:
         )
 
     @property
+    def angles(self) -> Floats:
+        """Angles of every ring from x towards y, shape (N,) [rad]."""
+        return 2.0 * np.pi * np.arange(self.count) / self.count
+
+    @property
     def points(self) -> Floats:
         """Places of the points at the centred body, shape (nc, 3) [m]."""
-        angle = 2.0 * np.pi * self.turn / self.count
+        angle = self.angles[self.turn]
         r, z = self.section.points[self.ring].T
         return np.column_stack([r * np.cos(angle), r * np.sin(angle), z])
 

@@ -15,7 +15,7 @@ from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
-from klack.assembling.off_axis import ANGLES, off_axis_model, ring_space
+from klack.assembling.off_axis import ANGLES, off_axis_model, ring_contacts
 from klack.assembling.problem import ContactProblem
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
@@ -261,12 +261,12 @@ def off_axis_within_reach(
     }
     smooth = case.contact.faces.is_none
     while True:
-        space = ring_space(problem, case.motion.placement, count, reach)
-        model = off_axis_model(problem, kept, space)
+        contacts = ring_contacts(problem, case.motion.placement, count, reach)
+        model = off_axis_model(problem, kept, contacts)
         try:
             return run(replace(model, limit=limit if smooth else None))
         except ReachError:
-            if case.contact.reach is not None:
+            if case.contact.reach is not None or problem.opposite is not None:
                 raise
             reach *= _REACH_GROWTH
 
@@ -545,7 +545,8 @@ def _angle_doubts(case: Case, model: InterfaceModel, result: InterfaceResult) ->
     force = result.impacts[0].point_force
     if not case.leaves_axis or not len(force):
         return
-    carrying = model.points[force[np.argmax(force.sum(axis=1))] > 0.0]
+    last = model.contacts[0][2]
+    carrying = model.points[:last][force[np.argmax(force.sum(axis=1)), :last] > 0.0]
     turn = np.arctan2(carrying[:, 1], carrying[:, 0]) / (2.0 * np.pi)
     count = ANGLES if case.contact.angles is None else case.contact.angles
     angles = len(np.unique(np.round(turn * count).astype(int) % count))
