@@ -83,7 +83,6 @@ def reduced_bodies(
     contacts: Sequence[RingContact],
     *,
     cache: ResultCache | None = None,
-    threads: int | None = None,
 ) -> tuple[list[RevolvedPoints], Floats]:
     """Every body at the points of all contacts, and the loads that it has answered.
 
@@ -92,7 +91,7 @@ def reduced_bodies(
     bodies : sequence of RevolvedBody
     contacts : sequence of RingContact
         All with the same number of angles.
-    cache, threads
+    cache : ResultCache, optional
         As of :class:`klack.elasticity.statics.Flexibility`.
     """
     ways = {contact.ways for contact in contacts}
@@ -125,7 +124,6 @@ def reduced_bodies(
             damping=body.damping,
             loads=loads[place],
             cache=cache,
-            threads=threads,
         )
         out.append(reduced.among(place, total))
     return out, loads
@@ -136,7 +134,6 @@ def revolved_model(
     contacts: Sequence[RingContact],
     *,
     cache: ResultCache | None = None,
-    threads: int | None = None,
 ) -> InterfaceModel:
     """Interface model of bodies of revolution; see :func:`reduced_bodies`.
 
@@ -153,7 +150,7 @@ def revolved_model(
     ConvergenceError
         As :func:`klack.transient.interface_model.model_at_points`.
     """
-    reduced, loads = reduced_bodies(bodies, contacts, cache=cache, threads=threads)
+    reduced, loads = reduced_bodies(bodies, contacts, cache=cache)
     return model_at_points(
         [item.body for item in reduced],
         [_point_contact(contact, bodies[0].name) for contact in contacts],

@@ -16,6 +16,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from threadpoolctl import threadpool_limits
 
 from klack.cache.result_cache import ResultCache
 from klack.elasticity.eigen import Modes, eigenmodes
@@ -80,7 +81,6 @@ def reduce_revolved(
     damping: Callable[[Floats], Floats],
     loads: Floats,
     cache: ResultCache | None = None,
-    threads: int | None = None,
 ) -> RevolvedPoints:
     """Modes and static compliance of a body of revolution at points on rings.
 
@@ -101,14 +101,17 @@ def reduce_revolved(
         Ratios of modes with these angular frequencies.
     loads : array, shape (p, k) [N]
         For ``answers``.
-    cache, threads
+    cache : ResultCache, optional
         As of :class:`klack.elasticity.statics.Flexibility`.
     """
     sums = _Orders(rows, points, loads)
     pairs = _Pairs(others // 2, (points.count - 1) // 2)
     for order in resolved_orders(points.count):
         body = in_order(order)
-        with Flexibility(body, threads=threads, cache=cache) as flexibility:
+        with (
+            threadpool_limits(limits=1, user_api="blas"),  # small matrices, many of them
+            Flexibility(body, threads=1, cache=cache) as flexibility,
+        ):
             sums.add(order, flexibility)
             if order < 2 and body.rigid_modes.shape[1]:
                 sums.add_rigid(body)
