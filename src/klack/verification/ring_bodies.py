@@ -3,24 +3,34 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingFriction, RingSpace
-from klack.elasticity.body import ElasticBody
+from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.elasticity.ring_points import RingRows
+from klack.elasticity.statics import Flexibility
 from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.swept import sweep
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
 from klack.verification.impacts import STEEL, needle_over_seat
 
-__all__ = ["NeedleOnRing", "impulse_on_needle", "momentum_of_needle"]
+__all__ = [
+    "NeedleOnRing",
+    "impulse_on_needle",
+    "momentum_of_needle",
+    "solid_over_ring_compliance",
+]
 
 Floats = NDArray[np.float64]
 
@@ -35,11 +45,14 @@ class NeedleOnRing:
         Elements at the ring and far away.
     reach : float [m]
         Largest gap of a contact point of the centred bodies.
+    slave : "a" or "b", optional
+        Side of the hats, needle or seat.
     """
 
     size: float = 30e-6
     bulk: float = 3e-3
     reach: float = 12e-6
+    slave: Literal["a", "b"] | None = None
 
     @cached_property
     def bodies(self) -> tuple[ElasticBody, ElasticBody]:
@@ -55,7 +68,7 @@ class NeedleOnRing:
     @cached_property
     def section(self) -> ContactSpace:
         """Hats of the half section."""
-        return contact_space(*self.sides, reach=self.reach)
+        return contact_space(*self.sides, reach=self.reach, slave=self.slave)
 
     def gaps(self, count: int) -> RingGaps:
         """Gaps at so many angles at a placement of the needle."""
@@ -131,3 +144,50 @@ def momentum_of_needle(pair: NeedleOnRing, velocity: Floats) -> Floats:
     """Momentum and angular momentum, shape (6,), of a needle of this rigid velocity."""
     needle = pair.bodies[0]
     return np.concatenate([needle.mass * velocity[:3], needle.inertia @ velocity[3:]])
+
+
+def solid_over_ring_compliance(
+    pair: NeedleOnRing, *, number: int, order: int, layers: int
+) -> tuple[float, float]:
+    r"""Compliance under a pressure wave, of a swept solid and of the half section in that order.
+
+    Work of the pressure :math:`\cos n \theta` on its own answer over the square of its force
+    all round.  The hats of the solid are linear round the ring: one that reaches two steps *d* wide
+    reads a wave by :math:`(\sin x / x)^2`, :math:`x = n d / 2`, when it is loaded and when it is
+    read, and the half section is given the same.
+
+    Parameters
+    ----------
+    pair : NeedleOnRing
+    number : int
+        Needle (0) or seat (1).
+    order : int
+    layers : int
+        Of the solid.
+    """
+    space, _ = pair.placed(2 * layers, np.zeros(6))
+    kept = np.unique(space.ring)
+    upper, lower = (sweep(body.mesh, layers) for body in pair.bodies)
+    whole = contact_space(
+        *(upper, upper.surface("tip"), lower, lower.surface("cone")),
+        reach=2.0 * pair.reach,
+        slave=pair.section.slave,
+    )
+    place = np.column_stack([np.hypot(*whole.points[:, :2].T), whole.points[:, 2]])
+    away, _ = cKDTree(pair.section.points[kept]).query(place)
+    solid = whole.restricted(np.asarray(away < 1e-9))
+    wave = np.cos(order * np.arctan2(solid.points[:, 1], solid.points[:, 0])) * solid.area
+    mesh, G = ((upper, solid.G_a), (lower, solid.G_b))[number]
+    (name,) = mesh.solids
+    held = mesh.surface("base").nodes if number else ()
+    body = elastic_body(name, mesh, {name: STEEL}, fixed_nodes=held)
+    with Flexibility(body) as flexibility:
+        found = float(wave @ (G @ flexibility.solve(G.T @ wave)))
+    rows = RingRows.in_plane((pair.section.G_a, pair.section.G_b)[number]).of_order(order)[kept]
+    with Flexibility(pair.in_order(number)(order)) as flexibility:
+        c = flexibility.condensed(rows)
+    # of unit pressure all round the load on a row is its area, of a wave half of it
+    load = pair.section.area[kept] * (1.0 if order == 0 else 0.5)
+    hat = np.sinc(order / (2.0 * layers)) ** 2
+    force = pair.section.area[kept].sum()
+    return found / force**2, float(hat**2 * load @ c @ load) / force**2
