@@ -45,7 +45,7 @@ def ring_contacts(
 ) -> list[RingContact]:
     """Contact points on rings with the moving body where the case places it.
 
-    It leans about the point of its axis at the height of first touch, is shifted aside, and moved
+    It is tilted about the point of its axis at the height of first touch, shifted aside, and moved
     along z until the first weighted gap is that of the case.
 
     Parameters
