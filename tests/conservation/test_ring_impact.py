@@ -13,6 +13,7 @@ from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
 from klack.transient.interface_run import simulate_interface
+from klack.transient.revolved_model import reduced_bodies
 from klack.verification.ring_bodies import NeedleOnRing, impulse_on_needle, momentum_of_needle
 
 STEP = 40e-9
@@ -55,6 +56,27 @@ def test_statics_are_reciprocal_and_those_of_every_order(pair):
         assert model.checks.static_limit < 1e-11
         assert model.checks.lowest_pivot > 0
         assert len(model.compliance) == (1 if friction is None else 3) * model.count
+
+
+def test_bodies_on_their_own_add_up_to_the_model(pair):
+    """What a model of a whole valve takes: rigid motions, modes, traces, residual compliance."""
+    space, _ = pair.placed(12, ASIDE)
+    model = pair.model(space, axial=3, others=4)
+    (needle, seat), _ = reduced_bodies(pair.revolved(3, 4), [pair.contact(space)])
+
+    # the mean of both triangles is what the model takes
+    residual = needle.residual + seat.residual
+    np.testing.assert_allclose(residual, model.compliance, atol=1e-12 * np.abs(residual).max())
+    assert list(needle.order[:6]) == [0, 0, 1, 1, 1, 1]
+    assert np.all(needle.body.omega[:6] == 0.0)
+    assert np.all(needle.body.omega[6:] > 0.0)
+    assert np.linalg.matrix_rank(needle.body.rigid) == 6
+    assert needle.body.traces.shape == (len(space.gap), 6 + 3 + 4)
+    assert not np.isfinite(seat.body.mass)
+    assert seat.body.traces.shape == (len(space.gap), 3 + 4)
+    pairs = needle.body.omega[9:].reshape(-1, 2)
+    np.testing.assert_array_equal(pairs[:, 0], pairs[:, 1])
+    assert np.all(np.diff(pairs[:, 0]) > 0)
 
 
 @pytest.mark.parametrize("count", [9, 10])

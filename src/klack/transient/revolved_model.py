@@ -14,6 +14,7 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody
 from klack.elasticity.ring_points import RingPoints, RingRows
 from klack.errors import InputError
+from klack.memory import require_memory
 from klack.transient.interface_model import (
     InterfaceModel,
     PointContact,
@@ -26,6 +27,8 @@ from klack.transient.revolved_points import RevolvedPoints, reduce_revolved
 __all__ = ["RevolvedBody", "RingContact", "reduced_bodies", "revolved_model"]
 
 Floats = NDArray[np.float64]
+
+_COPIES = 8  # of the compliance, for each body, their sum, and a factor of it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -105,6 +108,13 @@ def reduced_bodies(
     counts = [len(contact.space.gap) for contact in contacts]
     places = row_places(counts, ways.pop())
     total = sum(len(place) for place in places)
+    require_memory(
+        "contact points on rings",
+        _COPIES * 8.0 * float(total) ** 2,
+        what=f"full matrices of {total} rows of contact points",
+        hint="fewer contact.angles, larger elements on the two surfaces, or a smaller "
+        "contact.reach.",
+    )
     loads = uneven_loads(total)
     out = []
     for body in bodies:

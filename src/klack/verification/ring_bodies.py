@@ -97,11 +97,9 @@ class NeedleOnRing:
             body.name, body.mesh, {solid: STEEL}, order=order, fixed_nodes=held
         )
 
-    def model(
-        self, space: RingSpace, *, axial: int, others: int, friction: Friction | None = None
-    ) -> InterfaceModel:
-        """Interface model with so many modes of order 0 and of the orders above, of each body."""
-        bodies = [
+    def revolved(self, axial: int, others: int) -> list[RevolvedBody]:
+        """Both bodies with so many modes of order 0 and of the orders above."""
+        return [
             RevolvedBody(
                 name=body.name,
                 in_order=self.in_order(number),
@@ -111,11 +109,18 @@ class NeedleOnRing:
             )
             for number, body in enumerate(self.bodies)
         ]
+
+    def contact(self, space: RingSpace, friction: Friction | None = None) -> RingContact:
+        """Contact at these points."""
         faces = None if friction is None else RingFriction.on(friction, self.section, *self.sides)
-        contact = RingContact(
-            name="seat", upper=bodies[0].name, lower=bodies[1].name, space=space, faces=faces
-        )
-        return revolved_model(bodies, [contact])
+        upper, lower = (body.name for body in self.bodies)
+        return RingContact(name="seat", upper=upper, lower=lower, space=space, faces=faces)
+
+    def model(
+        self, space: RingSpace, *, axial: int, others: int, friction: Friction | None = None
+    ) -> InterfaceModel:
+        """Interface model with so many modes of order 0 and of the orders above, of each body."""
+        return revolved_model(self.revolved(axial, others), [self.contact(space, friction)])
 
 
 def impulse_on_needle(
