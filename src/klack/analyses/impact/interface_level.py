@@ -545,17 +545,20 @@ def _angle_doubts(case: Case, model: InterfaceModel, result: InterfaceResult) ->
     force = result.impacts[0].point_force
     if not case.leaves_axis or not len(force):
         return
-    last = model.contacts[0][2]
-    carrying = model.points[:last][force[np.argmax(force.sum(axis=1)), :last] > 0.0]
-    turn = np.arctan2(carrying[:, 1], carrying[:, 0]) / (2.0 * np.pi)
     count = ANGLES if case.contact.angles is None else case.contact.angles
-    angles = len(np.unique(np.round(turn * count).astype(int) % count))
-    if 0 < angles < _FEWEST_ANGLES:
-        yield (
-            f"the contact is so short that {angles} of {count} angles of the ring carry at peak "
-            f"force, {_FEWEST_ANGLES} or more are needed. Try: contact.angles: "
-            f"{ceil(count * _FEWEST_ANGLES / angles)}."
-        )
+    for name, first, last in model.contacts:
+        of_contact = force[:, first:last]
+        carrying = of_contact[np.argmax(of_contact.sum(axis=1))] > 0.0
+        x, y = model.points[first:last][carrying, :2].T
+        turn = np.round(np.arctan2(y, x) / (2.0 * np.pi) * count).astype(int) % count
+        angles = len(np.unique(turn))
+        if 0 < angles < _FEWEST_ANGLES:
+            stop = "" if name == CONTACT else " with the upper stop"
+            yield (
+                f"the contact{stop} is so short that {angles} of {count} angles of the ring carry "
+                f"at peak force, {_FEWEST_ANGLES} or more are needed. Try: contact.angles: "
+                f"{ceil(count * _FEWEST_ANGLES / angles)}."
+            )
 
 
 def set_doubts(model: InterfaceModel, result: InterfaceResult) -> Iterator[str]:
