@@ -9,11 +9,14 @@ import yaml
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
 from klack.analyses.reduction.run import run_reduce
-from klack.assembling.off_axis import turning_body
+from klack.assembling.off_axis import off_axis_model, ring_contacts, turning_body
+from klack.assembling.problem import build_problem
 from klack.case import load_case
 from klack.contact.mortar import contact_space
 from klack.contact.rings import RingSpace
+from klack.elasticity.eigen import eigenmodes
 from klack.errors import InputError
+from klack.progress import silent
 from klack.verification.ring_bodies import NeedleOnRing
 
 CASE = Path(__file__).parents[2] / "docs/how-to/guided_needle.yaml"
@@ -160,3 +163,42 @@ def test_points_at_the_border_are_marked():
 def test_a_touch_away_from_the_finest_mesh_is_told(tmp_path):
     study = interface(case_of(tmp_path, eccentricity="25 um"))
     assert any("away from its finest mesh" in text for text in study.warnings)
+
+
+def test_both_stops_stand_at_their_gap_from_the_tilted_body(tmp_path):
+    """The gap of the upper stop counts from the body where it starts, as for solids."""
+
+    def between_stops(case):
+        edges = [
+            {"arc": [1.2, 8.1], "centre": [1.0, 8.7], "name": "ridge"},
+            {"line": [1.4, 8.1], "name": "under"},
+            {"line": [1.4, 9.0], "name": "side"},
+            {"line": [0.8, 9.0], "name": "top"},
+            {"close": True, "name": "hole"},
+        ]
+        profile = {"unit": "mm", "parts": {"plate": {"start": [0.8, 8.1], "edges": edges}}}
+        case["bodies"]["plate"] = {
+            "geometry": {"model": "axisymmetric", "profile": profile},
+            "material": "steel",
+            "mesh": {"size": "0.5 mm", "contact": {"size": "0.03 mm", "extent": "0.1 mm"}},
+            "fixed": [{"surface": "top"}],
+        }
+        case["opposite"] = {"between": ["plate.ridge", "needle.top"], "gap": "3 um"}
+
+    case = case_of(tmp_path, between_stops, eccentricity="0.5 um", tilt="0.05 deg")
+    with build_problem(case, silent) as problem:
+        seat, stop = ring_contacts(problem, case.motion.placement, 16, problem.space.reach)
+        kept = {
+            body.name: eigenmodes(body, count=4)
+            for body in (problem.pair.upper, problem.pair.lower, problem.opposite.body)
+        }
+        model = off_axis_model(problem, kept, [seat, stop])
+    for contact, gap in ((seat, 1e-6), (stop, 3e-6)):
+        axial = contact.space.axial
+        assert np.min(contact.space.gap / axial) == pytest.approx(gap, abs=2e-12)
+        assert np.ptp(contact.space.gap[contact.space.ring == contact.space.ring[0]]) > 0.1e-6
+    assert [name for name, _, _ in model.contacts] == ["contact", "opposite"]
+    assert model.checks.static_limit < 1e-11
+    # a push at one end moves the gap at the other: both act on the needle
+    (_, a, b), (_, c, d) = model.contacts
+    assert np.abs(model.compliance[a:b, c:d]).max() > 0.0

@@ -48,7 +48,6 @@ def coarse_case(folder, model, friction=0.0, eccentricity="0.5 um", tilt="0.02 d
     return load_case(path)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.2])
 def test_an_off_axis_impact_is_that_of_the_swept_solid(tmp_path, friction):
     """The solid tends to the rings with its layers.

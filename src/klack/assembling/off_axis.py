@@ -90,8 +90,9 @@ def ring_contacts(
         )
         gaps = RingGaps.of(section, *sides, angle=space.angles, centre=_centre(pair))
         shift, rotation = moved[:3], moved[3:]
-        # the moving body is body b here: body a is moved the opposite way
-        gap = gaps(np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation]))
+        # the moving body is body b here: body a is moved the opposite way, and along z to its gap
+        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
+        gap, _ = _at_gap(gaps, section, back, 0.0 if opposite is None else opposite.gap)
         there = RingSpace.within(section, gap, float(gap.min()) + above.space.reach + more)
         contacts.append(
             RingContact(
@@ -117,19 +118,27 @@ def _on_seat(
     )
     angle = 2.0 * np.pi * np.arange(count) / count
     gaps = RingGaps.of(section, *sides, angle=angle, centre=_centre(pair), form=pair.form)
-    facing, wanted = section.axial > 1e-6, problem.case.contact.gap or 0.0
     # from above: a line that starts deep inside the other body does not find its surface
     moved = _rigid_placement(pair, placement, about) + np.array([0.0, 0.0, more, 0.0, 0.0, 0.0])
+    gap, moved = _at_gap(gaps, section, moved, problem.case.contact.gap or 0.0)
+    _check_refinement(problem.case, section, gap)
+    return RingSpace.within(section, gap, float(gap.min()) + reach), moved
+
+
+def _at_gap(
+    gaps: RingGaps, section: ContactSpace, placement: Floats, wanted: float
+) -> tuple[Floats, Floats]:
+    """Gaps, and placement of body a, moved along z until its first gap along z is ``wanted``."""
+    facing = section.axial > 1e-6
     for _ in range(_MOVES):  # points slide along the other surface
-        gap = gaps(moved)
+        gap = gaps(placement)
         lift = wanted - float(np.min(gap[facing] / section.axial[facing, None]))
         if abs(lift) <= _TOUCHING:
-            _check_refinement(problem.case, section, gap)
-            return RingSpace.within(section, gap, float(gap.min()) + reach), moved
-        moved = moved + np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
+            return gap, placement
+        placement = placement + np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
     raise ConvergenceError(
-        f"contact: placing '{pair.upper.name}' on '{pair.lower.name}' off-axis did not converge, "
-        f"the last move was {lift * 1e6:.3g} um.\nTry: a smaller motion.placement."
+        "contact: placing the moving body off-axis did not converge, the last move was "
+        f"{lift * 1e6:.3g} um.\nTry: a smaller motion.placement."
     )
 
 
