@@ -173,13 +173,10 @@ def test_mistakes_are_named_with_key_and_way_out(more, old, new, key, words):
     [
         (GUIDE, "guide"),
         ("shots: {force: {normal: [10 N, 1 N]}}\n", "shots"),
-        ("", "motion.placement"),
     ],
 )
-def test_half_sections_cannot_leave_their_axis(more, key):
+def test_half_sections_have_no_guide_and_no_shots(more, key):
     text = (TEXT + more).replace(*flat()).replace(", sectors: {count: 3, width: 40 deg}", "")
-    if not more:
-        text = text.replace("motion: {", "motion: {placement: {eccentricity: 1 um}, ")
     with pytest.raises(InputError) as caught:
         read_case(text, Path("valve.yaml"))
 

@@ -32,7 +32,14 @@ from klack.mesh.sizing import MeshSizing, Refinement
 from klack.progress import Progress
 from klack.units import format_si
 
-__all__ = ["BodyPair", "assemble_body", "build_bodies", "find_touch", "mesh_body"]
+__all__ = [
+    "BodyPair",
+    "assemble_body",
+    "build_bodies",
+    "find_touch",
+    "mesh_body",
+    "warn_far_touch",
+]
 
 _SAME_HEIGHT = 5e-4  # of the narrower surface; clearances that differ by less belong to one touch
 _SAFE_SHARE = 0.5  # of the extent of a refinement; the rest is for the width of the contact
@@ -257,11 +264,12 @@ def _pose(
 ) -> tuple[Pose, FaceForm | None]:
     """Tilt the upper body, shift it sideways, and move it along z to the gap of the case.
 
-    The form of its face goes with it.
+    The form of its face goes with it.  Axisymmetric bodies stay on the axis: off it, their gaps are
+    those of :mod:`klack.assembling.off_axis`.
     """
     placement = case.motion.placement
     about, aside, lean = np.zeros(3), np.zeros(3), np.zeros(3)
-    if not placement.is_centred:
+    if not placement.is_centred and upper.dimension == 3:
         about[2] = _touch_height(upper, surface, lower, other, touch)
         aside = placement.eccentricity * _towards(placement.direction)
         # z x d: the upper end leans towards d
@@ -302,6 +310,8 @@ def _check_refinement(
     """Warn when the placement carries the first touch away from where the meshes are fine."""
     if case.motion.placement.is_centred or touch is None or not touch.upper:
         return
+    if upper.dimension == 2:  # where they touch off-axis, the contact points on rings tell
+        return
     space = contact_space(upper, surface, lower, other, form=form)
     facing = space.axial > 1e-6
     at = space.points[facing][np.argmin(space.gap[facing] / space.axial[facing])]
@@ -317,12 +327,31 @@ def _check_refinement(
         first = _ring(tuple(point)) if turned else tuple(point)
         rings = [_ring(place) if turned else place for place in places]
         away = min(float(np.linalg.norm(np.subtract(first, ring))) for ring in rings)
-        if away > _SAFE_SHARE * extent:
-            warnings.warn(
-                f"'{name}' touches first {format_si(away, 'm', 2)} away from its finest "
-                f"mesh; the refinement reaches {format_si(extent, 'm', 2)}. Try: an extent of "
-                f"{format_si(1.2 * away / _SAFE_SHARE, 'm', 2)} in bodies.{name}.mesh.contact, or "
-                "a smaller placement.",
-                AccuracyWarning,
-                stacklevel=2,
-            )
+        warn_far_touch(name, away, extent)
+
+
+def warn_far_touch(name: str, away: float, extent: float) -> None:
+    """Warn where a body touches far from its finest mesh.
+
+    Parameters
+    ----------
+    name : str
+    away : float [m]
+        From the place of the refinement.
+    extent : float [m]
+        Of the refinement.
+
+    Warns
+    -----
+    AccuracyWarning
+        Where that is so.
+    """
+    if away > _SAFE_SHARE * extent:
+        warnings.warn(
+            f"'{name}' touches first {format_si(away, 'm', 2)} away from its finest "
+            f"mesh; the refinement reaches {format_si(extent, 'm', 2)}. Try: an extent of "
+            f"{format_si(1.2 * away / _SAFE_SHARE, 'm', 2)} in bodies.{name}.mesh.contact, or "
+            "a smaller placement.",
+            AccuracyWarning,
+            stacklevel=2,
+        )

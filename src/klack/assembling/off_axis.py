@@ -1,81 +1,253 @@
-"""Contact points of faces that meet off their axis."""
+"""Bodies of revolution that meet off their axis: contact points on rings, bodies in all orders.
 
-from collections.abc import Callable, Sequence
+The bodies of the case stay centred, in the meridian plane.  Its placement enters with the gaps,
+which are those of the surfaces where the moving body is.
+"""
+
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.bodies import BodyPair
-from klack.contact.gap_update import PlacedGaps, RigidGaps
+from klack.assembling.bodies import BodyPair, warn_far_touch
+from klack.assembling.damping_choice import damping_of
+from klack.assembling.held_nodes import held_nodes
+from klack.assembling.problem import ContactProblem
+from klack.case.bodies import CaseFile
+from klack.case.placement import Placement
+from klack.case.schema import Case
 from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.ring_gaps import RingGaps
+from klack.contact.rings import RingFriction, RingSpace
+from klack.elasticity.eigen import Modes
+from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.rigid import Pose, rotation_matrix
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
 
-__all__ = ["off_axis_space", "touch_height"]
+__all__ = ["ANGLES", "off_axis_model", "ring_contacts", "turning_body"]
 
-Vector = NDArray[np.float64]
+Floats = NDArray[np.float64]
 
-# An eccentric contact carries on a part of the ring only, and yields more.
-_SOFTER = 1.6
-_WIDER = 4.0
+ANGLES = 48
+"""Contact points round each ring without ``contact.angles``."""
+
 _FIRST = 0.02  # share of the reach: points with so small a gap touch first
+_MOVES = 30
+_TOUCHING = 1e-12  # [m]
 
 
-def touch_height(space: ContactSpace) -> float:
-    """Height z [m] at which the centred bodies touch first."""
-    facing = space.axial > 1e-6
-    lift = space.gap[facing] / space.axial[facing]
-    first = lift <= lift.min() + _FIRST * space.reach
-    return float(np.mean(space.points[facing][first, 2]))
+def ring_contacts(
+    problem: ContactProblem, placement: Placement, count: int, reach: float
+) -> list[RingContact]:
+    """Contact points on rings with the moving body where the case places it.
 
-
-def off_axis_space(
-    pair: BodyPair,
-    space: ContactSpace,
-    farthest: Sequence[Vector],
-    off_axis: float,
-    *,
-    centre: Vector,
-    upper_moves: bool = True,
-) -> ContactSpace:
-    """Contact points that close in a centred impact or in one from the farthest placements.
+    It is tilted about the point of its axis at the height of first touch, shifted aside, and moved
+    along z until the first weighted gap is that of the case.
 
     Parameters
     ----------
-    pair : BodyPair
-        In first touch.
-    space : ContactSpace
-        Points of the centred contact.
-    farthest : sequence of array, shape (6,) [m], [rad]
-        Rigid placements of the moving body: translation of ``centre`` and rotation vector.
-    off_axis : float [m]
-        Largest distance from the axis among them.
-    centre : array, shape (3,) [m]
-        Centre of mass of the moving body.
-    upper_moves : bool
-        Whether that is the upper one.
+    problem : ContactProblem
+        Of bodies of revolution, centred.
+    placement : Placement
+    count : int
+        Angles of every ring.
+    reach : float [m]
+        Largest gap of a contact point, counted from the smallest one.
+
+    Returns
+    -------
+    list of RingContact
+        ``contact``, and ``opposite`` where the case has an upper stop.
+
+    Raises
+    ------
+    InputError
+        For a contact around the axis.
     """
-    reach = space.reach
-    surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
-    wide = contact_space(
-        *surfaces, reach=_WIDER * reach + off_axis, slave=space.slave, form=pair.form
+    pair, above, faces = problem.pair, problem.opposite, problem.case.contact.faces
+    space, moved = _on_seat(problem, placement, count, reach)
+    opposite = problem.case.opposite
+    stop_faces = faces if opposite is None else opposite.faces(faces)
+    smooth = faces.is_none and stop_faces.is_none
+    contacts = [
+        RingContact(
+            name="contact",
+            upper=pair.upper.name,
+            lower=pair.lower.name,
+            space=space,
+            faces=None if smooth else RingFriction.on(faces, space.section, *_sides(pair)),
+        )
+    ]
+    if above is not None:
+        sides = (above.body.mesh, above.surface, pair.upper.mesh, above.moving_surface)
+        more = _most_change(placement, above.space)
+        section = contact_space(
+            *sides, reach=above.space.reach + 2.0 * more, slave=above.space.slave
+        )
+        gaps = RingGaps.of(section, *sides, angle=space.angles, centre=_centre(pair))
+        shift, rotation = moved[:3], moved[3:]
+        # the moving body is body b here: body a is moved the opposite way, and along z to its gap
+        back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
+        gap, _ = _at_gap(gaps, section, back, 0.0 if opposite is None else opposite.gap)
+        there = RingSpace.within(section, gap, float(gap.min()) + above.space.reach + more)
+        contacts.append(
+            RingContact(
+                name="opposite",
+                upper=above.body.name,
+                lower=pair.upper.name,
+                space=there,
+                faces=None if smooth else RingFriction.on(stop_faces, section, *sides),
+            )
+        )
+    return contacts
+
+
+def _on_seat(
+    problem: ContactProblem, placement: Placement, count: int, reach: float
+) -> tuple[RingSpace, Floats]:
+    """Contact points of the seat, and the placement of the moving body from where it is now."""
+    pair, sides = problem.pair, _sides(problem.pair)
+    about = np.array([0.0, 0.0, _touch_height(problem)])
+    more = _most_change(placement, problem.space)
+    section = contact_space(
+        *sides, reach=reach + 2.0 * more, slave=problem.space.slave, form=pair.form
     )
-    rigid = RigidGaps.of(wide, *surfaces, centre=centre, form=pair.form)
-    gaps = PlacedGaps((rigid,), (upper_moves,))
-    keep = wide.gap <= wide.gap.min() + _SOFTER * reach
-    for placement in farthest:
-        keep |= _gaps_in_touch(gaps, wide, placement, upper_moves) <= _SOFTER * reach
-    # and one row more: on coarse elements a contact is not much wider than a point
-    G = abs(wide.G_a if wide.slave == "a" else wide.G_b)
-    return wide.restricted(G @ (G.T @ keep.astype(float)) > 0)
+    angle = 2.0 * np.pi * np.arange(count) / count
+    gaps = RingGaps.of(section, *sides, angle=angle, centre=_centre(pair), form=pair.form)
+    # from above: a line that starts deep inside the other body does not find its surface
+    moved = _rigid_placement(pair, placement, about) + np.array([0.0, 0.0, more, 0.0, 0.0, 0.0])
+    gap, moved = _at_gap(gaps, section, moved, problem.case.contact.gap or 0.0)
+    _check_refinement(problem.case, section, gap)
+    return RingSpace.within(section, gap, float(gap.min()) + reach), moved
 
 
-def _gaps_in_touch(
-    gaps: Callable[[Vector], Vector], space: ContactSpace, placement: Vector, upper_moves: bool
-) -> Vector:
-    """Gaps [m] after the moving body has been moved along z to its first touch."""
-    facing = space.axial > 1e-6
-    side = 1.0 if upper_moves else -1.0
-    for _ in range(3):  # points slide along the other surface
+def _at_gap(
+    gaps: RingGaps, section: ContactSpace, placement: Floats, wanted: float
+) -> tuple[Floats, Floats]:
+    """Gaps, and placement of body a, moved along z until its first gap along z is ``wanted``."""
+    facing = section.axial > 1e-6
+    for _ in range(_MOVES):  # points slide along the other surface
         gap = gaps(placement)
-        lift = float(np.min(gap[facing] / space.axial[facing]))
-        placement = placement - side * np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
-    return np.asarray(gap - lift * space.axial)
+        lift = wanted - float(np.min(gap[facing] / section.axial[facing, None]))
+        if abs(lift) <= _TOUCHING:
+            return gap, placement
+        placement = placement + np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
+    raise ConvergenceError(
+        "contact: placing the moving body off-axis did not converge, the last move was "
+        f"{lift * 1e6:.3g} um.\nTry: a smaller motion.placement."
+    )
+
+
+def _most_change(placement: Placement, space: ContactSpace) -> float:
+    """What no gap changes by more than [m]: its point moves by less, there and along z."""
+    widest = float(space.points[:, 0].max())
+    return 2.0 * (placement.eccentricity + placement.tilt * widest)
+
+
+def _check_refinement(case: Case, section: ContactSpace, gap: Floats) -> None:
+    """Warn when the placement carries the first touch away from where the meshes are fine."""
+    facing = np.flatnonzero(section.axial > 1e-6)
+    lift = gap[facing].min(axis=1) / section.axial[facing]
+    centred = section.gap[facing] / section.axial[facing]
+    now, before = section.points[facing[[np.argmin(lift), np.argmin(centred)]]]
+    for name in (case.contact.moving.body, case.contact.stop.body):
+        mesh = case.bodies[name].mesh
+        if mesh is not None and mesh.contact is not None:
+            warn_far_touch(name, float(np.linalg.norm(now - before)), mesh.contact.extent)
+
+
+def _sides(pair: BodyPair) -> tuple[Mesh, Surface, Mesh, Surface]:
+    return pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface
+
+
+def _centre(pair: BodyPair) -> Floats:
+    return np.array([0.0, 0.0, float(pair.upper.centre_of_mass[1])])
+
+
+def _touch_height(problem: ContactProblem) -> float:
+    """Height z [m] of the moving body, where it is, at which it touches first when centred."""
+    space = problem.space
+    facing = space.axial > 1e-6
+    lift = space.gap[facing] / space.axial[facing]
+    first = lift <= lift.min() + _FIRST * space.reach
+    height = space.points[facing][first, 1] + (lift[first] if space.slave == "b" else 0.0)
+    return float(np.mean(height))
+
+
+def _rigid_placement(pair: BodyPair, placement: Placement, about: Floats) -> Floats:
+    """Translation of the centre of mass and rotation vector, shape (6,) [m], [rad]."""
+    towards, leaning = (
+        np.array([np.cos(angle), np.sin(angle), 0.0])
+        for angle in (placement.direction, placement.tilt_direction)
+    )
+    # z x d: the upper end leans towards d
+    rotation = placement.tilt * np.cross([0.0, 0.0, 1.0], leaning)
+    pose = Pose(rotation=rotation, about=about, shift=placement.eccentricity * towards)
+    centre = _centre(pair)
+    return np.concatenate([pose.of(centre) - centre, rotation])
+
+
+def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], FourierBody]:
+    """Body of the case in any Fourier order, held where the case holds it, all round.
+
+    Raises
+    ------
+    InputError
+        For a body from the matrices of another program, which are those of its axial motion alone.
+
+    Warns
+    -----
+    AccuracyWarning
+        For linear elements, which lock in bending.
+    """
+    body = case.bodies[name]
+    if body.matrices is not None:
+        raise InputError(
+            f"{case.path or 'case'}: bodies.{name}.matrices",
+            got="the axial motion of a body of revolution, off-axis",
+            expected="a body that klack assembles, which then moves in every way",
+            hint="remove 'matrices', or give those of a solid.",
+        )
+    linear = sorted({block.family for block in mesh.blocks if not block.topology.quadratic})
+    if linear:
+        warnings.warn(
+            f"'{name}' is too stiff off-axis: its mesh has linear elements ({', '.join(linear)}), "
+            "which lock in bending. Try: elements with mid-side nodes.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    materials, nodes = case.materials_of(name, mesh.solids), held_nodes(body, mesh)
+    return lambda order: fourier_body(name, mesh, materials, order=order, fixed_nodes=nodes)
+
+
+def off_axis_model(
+    problem: ContactProblem, kept: Mapping[str, Modes], contacts: Sequence[RingContact]
+) -> InterfaceModel:
+    """Interface model of the bodies of a case at points on rings.
+
+    Beside the axial modes each body keeps as many others, the lowest of the orders above 0.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    kept : mapping of body name to Modes
+        Axial modes that the centred case keeps.
+    contacts : sequence of RingContact
+        From :func:`ring_contacts`.
+    """
+    case, pair, above = problem.case, problem.pair, problem.opposite
+    bodies = [
+        RevolvedBody(
+            name=body.name,
+            in_order=turning_body(case, body.name, body.mesh),
+            axial=kept[body.name],
+            others=len(kept[body.name].omega),
+            damping=damping_of(case.bodies[body.name].damping).ratios,
+        )
+        for body in (pair.upper, pair.lower, *(() if above is None else (above.body,)))
+    ]
+    return revolved_model(bodies, contacts, cache=problem.flexibility_upper.cache)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
-from klack.assembling.off_axis import off_axis_space, touch_height
+from klack.assembling.off_axis_points import off_axis_space, touch_height
 from klack.assembling.position_in_guide import axis_through, in_disc
 from klack.assembling.stops import StopContact
 from klack.assembling.tilting_land import tilting_film

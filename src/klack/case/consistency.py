@@ -38,6 +38,7 @@ def check_consistency(case: ImpactSections) -> None:
     _check_opposite(case)
     _check_roughness(case)
     _check_solid_only(case)
+    _check_off_axis(case)
     _check_guide(case)
     _check_shots(case)
     _check_outputs(case)
@@ -248,8 +249,6 @@ def _check_solid_only(case: ImpactSections) -> None:
     if case.dimension == 3:
         return
     asked: list[tuple[Key, str]] = []
-    if not case.motion.placement.is_centred:
-        asked.append((("motion", "placement"), "an off-axis placement"))
     if case.guide is not None:
         asked.append((("guide",), "a guide"))
     if case.shots is not None:
@@ -267,6 +266,33 @@ def _check_solid_only(case: ImpactSections) -> None:
             hint="take 'model: swept' with 'layers: 18' for both of them.",
             on_key=True,
         )
+
+
+def _check_off_axis(case: ImpactSections) -> None:
+    """Refuse what axisymmetric bodies do not have off their axis; worn faces are refused anyway."""
+    if case.contact.angles is not None and case.dimension == 3:
+        raise CaseProblem(
+            ("contact", "angles"),
+            got="angles of bodies of three dimensions",
+            expected="axisymmetric bodies: the mesh of a solid has its own points round the ring",
+            hint="remove 'angles'; more 'layers' make a swept mesh finer round the ring.",
+            on_key=True,
+        )
+    if not case.leaves_axis:
+        return
+    asked: list[tuple[Key, bool, str]] = [
+        (("contact", "roughness"), case.contact.roughness is not None, "rough faces"),
+        (("outputs",), bool(case.outputs), "sensors, whose angle is not known,"),
+    ]
+    for key, is_there, what in asked:
+        if is_there:
+            raise CaseProblem(
+                key,
+                got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
+                expected="faces without roughness, and no sensors",
+                hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
+                on_key=True,
+            )
 
 
 def _check_ends(case: ImpactSections) -> None:

@@ -164,6 +164,13 @@ class CaseContact(Section):
     reach: Length | None = Field(
         default=None, gt=0, description="Largest gap of points that may come into contact."
     )
+    angles: Count | None = Field(
+        default=None,
+        ge=8,
+        le=512,
+        description="Contact points round each ring of axisymmetric bodies that meet off-axis; "
+        "default 48.",
+    )
     worn: CaseWorn | None = Field(
         default=None, description="Set of both faces after earlier impacts; default as made."
     )
@@ -406,6 +413,11 @@ class ImpactSections(CaseFile):
     def dimension(self) -> int:
         """2 if both bodies are axisymmetric, else 3."""
         return self.moving_body.geometry.dimension
+
+    @property
+    def leaves_axis(self) -> bool:
+        """Whether axisymmetric bodies meet off their axis."""
+        return self.dimension == 2 and not self.motion.placement.is_centred
 
     def without_friction(self) -> Self:
         """The same with smooth faces."""

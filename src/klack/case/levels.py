@@ -2,7 +2,7 @@
 
 from typing import Literal, get_args
 
-__all__ = ["LEVELS", "ROUGH_LEVELS", "Level"]
+__all__ = ["LEVELS", "OFF_AXIS_LEVELS", "ROUGH_LEVELS", "Level"]
 
 Level = Literal[
     "lumped",
@@ -23,3 +23,6 @@ ROUGH_LEVELS: tuple[Level, ...] = (
     "full",
 )
 """Levels that take faces with a layer of asperities."""
+
+OFF_AXIS_LEVELS: tuple[Level, ...] = ("lumped", "interface")
+"""Levels of axisymmetric bodies that meet off their axis."""

@@ -10,7 +10,7 @@ from pydantic import model_validator
 
 from klack.case.consistency import check_consistency
 from klack.case.impact_sections import ImpactSections
-from klack.case.levels import LEVELS, ROUGH_LEVELS, Level
+from klack.case.levels import LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
 from klack.case.noise_consistency import check_noise
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
@@ -55,7 +55,23 @@ class Case(ImpactSections):
                 expected=f"levels that have a layer of asperities: {one_of(ROUGH_LEVELS)}",
                 hint="leave the level out, or the roughness.",
             )
+        on_axis = [level for level in wanted if level not in OFF_AXIS_LEVELS]
+        if self.leaves_axis and on_axis:
+            raise self._off_axis(f"the level '{on_axis[0]}'")
         return tuple(level for level in LEVELS if level in wanted)
+
+    def require_on_axis(self, what: str) -> None:
+        """Raise for axisymmetric bodies off-axis, which have the interface level alone."""
+        if self.leaves_axis:
+            raise self._off_axis(what)
+
+    def _off_axis(self, what: str) -> InputError:
+        return InputError(
+            f"{self._path or 'case'}: motion.placement",
+            got=f"{what} of axisymmetric bodies off-axis",
+            expected="klack impact with --level interface, which moves them in every way",
+            hint="take that level, or 'model: swept' with 'layers: 18' for both bodies.",
+        )
 
     def require_ends(self, what: str) -> None:
         """Raise for a non-reflecting end, which modes, exported models and decks leave out."""

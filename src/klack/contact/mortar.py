@@ -50,6 +50,7 @@ __all__ = [
     "COVERED",
     "ContactSpace",
     "HatQuadrature",
+    "around_rows",
     "contact_space",
     "hat_quadrature",
     "tangent_rows",
@@ -544,6 +545,80 @@ def tangent_rows(
         still = diags_array((space.points[:, 0] > _ON_AXIS * space.size).astype(float))
         T_a, T_b = csr_array(still @ T_a), csr_array(still @ T_b)
     return T_a, T_b
+
+
+def around_rows(
+    space: ContactSpace, mesh_a: Mesh, surface_a: Surface, mesh_b: Mesh, surface_b: Surface
+) -> tuple[tuple[csr_array, csr_array], tuple[csr_array, csr_array]]:
+    r"""Displacement of a past b round the ring, of bodies of revolution in a Fourier order.
+
+    What :func:`tangent_rows` has for solids as the second direction, in the same sense.  With the
+    slave side *s* in the order *n*, and the normal in the half section,
+
+    .. math:: n \cdot \frac{1}{r} \frac{\partial u_s}{\partial \theta}
+        = - \frac{1}{r} \big[ n_r V + n\, (n_r U + n_z W) \big] \sin n \theta ,
+
+    so a row reads V, and *n* times a row on U and W.
+
+    Parameters
+    ----------
+    space : ContactSpace
+        Of these meshes, axisymmetric.
+    mesh_a, surface_a, mesh_b, surface_b
+        As given to :func:`contact_space`.
+
+    Returns
+    -------
+    around, turned : pairs of sparse array, shape (nc, nodes), (nc, 2 nodes) [-]
+        Rows on V, and rows on U and W that count n times, each of a and of b.
+    """
+    sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
+    other = "b" if space.slave == "a" else "a"
+    mesh, surface = sides[space.slave]
+    other_mesh, other_surface = sides[other]
+    sign = 1.0 if space.slave == "a" else -1.0
+    number = np.full(mesh.node_count, -1)
+    number[space.nodes] = np.arange(space.count)
+    around: dict[str, list[_Entries]] = {space.slave: [], other: []}
+    turned: list[_Entries] = []
+    for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
+        for piece in _pieces(block.family):
+            at, hats, share = _shares(mesh, block, piece)
+            f, q, d = at.position.shape
+            normal = at.normal.reshape(f * q, d)
+            met = project_to_surface(
+                at.position.reshape(f * q, d), normal, other_mesh, other_surface
+            )
+            share = np.where(met.met.reshape(f, q, 1), share, 0.0)
+            N, _ = shape_functions(block.family, piece.xi)
+            radius = np.maximum(at.position[..., 0], np.finfo(float).tiny)
+            bend = np.where(met.met, met.gap, 0.0).reshape(f, q) / radius
+            away = np.broadcast_to(np.eye(d)[0], at.normal.shape)
+            (first,) = _tangents(at.normal, away)
+            # normal x first, as of a solid: along +theta or against it
+            sense = at.normal[..., 1] * first[..., 0] - at.normal[..., 0] * first[..., 1]
+            share = sign * sense[..., None] * share
+            own = share * (1.0 + bend * at.normal[..., 0])[..., None]
+            rows = number[hats][:, :, None]
+            nodes = block.connectivity[:, None]
+            value = np.einsum("fqk,qn->fkn", own, N)[..., None]
+            _store(around[space.slave], 1, rows, nodes, value)
+            value = np.einsum("fqk,fq,qn,fqd->fknd", share, bend, N, at.normal)
+            _store(turned, d, rows, nodes, value)
+            _store_master(
+                around[other],
+                np.repeat(number[hats], q, axis=0),
+                -share.reshape(f * q, -1),
+                np.ones((f * q, share.shape[2], 1)),
+                met,
+                other_surface,
+            )
+    V = {side: _scaled(around[side], space.area, sides[side][0].node_count) for side in sides}
+    UW = {
+        space.slave: _scaled(turned, space.area, mesh.dof_count),
+        other: csr_array((space.count, other_mesh.dof_count)),
+    }
+    return (V["a"], V["b"]), (UW["a"], UW["b"])
 
 
 def _dual_tangents(mesh: Mesh, block: FaceBlock, dN: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -79,6 +79,7 @@ def case_models(
     if not case.has_surfaces:
         return _of_given(case, progress, threads)
     case.require_ends("an exported model")
+    case.require_on_axis("an exported model")
     case = _frictionless(case).without_outputs()
     problem = build_problem(case, progress, threads=threads)
     pools = mode_pools(problem, at_least=1, progress=progress)

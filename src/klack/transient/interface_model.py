@@ -45,9 +45,14 @@ __all__ = [
     "InterfaceBody",
     "InterfaceContact",
     "InterfaceModel",
+    "PointBody",
+    "PointContact",
     "StaticChecks",
     "interface_model",
+    "model_at_points",
     "rigid_motion",
+    "row_places",
+    "uneven_loads",
 ]
 
 _RECIPROCITY = 1e-6
@@ -260,6 +265,70 @@ class InterfaceModel:
         return self.masses[0]
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PointBody:
+    """What an interface model takes of a body: its modes, as its contact points see them.
+
+    Parameters
+    ----------
+    name : str
+    mass : float [kg]
+        ``inf`` for a supported body.
+    centre : array, shape (3,) [m]
+        Centre of mass.
+    rigid : array, shape (6, r) [1/sqrt(kg)]
+        Translation of the centre of mass and rotation vector per unit rigid mode, the first modes.
+    omega, damping : array, shape (m,) [rad/s], [-]
+        Of all modes; 0 for rigid ones.
+    traces : array, shape (n, m) [1/sqrt(kg)]
+        Change of the gaps of all contact points per unit modal coordinate, and after them of the
+        offsets in each tangential direction.
+    observed : array, shape (k, m) [1/sqrt(kg)]
+        What the observers read per unit modal coordinate.
+    observed_static : array, shape (k, n) [m/N]
+        What they read per unit contact force, of the whole body.
+    """
+
+    name: str
+    mass: float
+    centre: NDArray[np.float64]
+    rigid: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    traces: NDArray[np.float64]
+    observed: NDArray[np.float64]
+    observed_static: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PointContact:
+    """What an interface model takes of two surfaces that may meet.
+
+    Parameters
+    ----------
+    name, upper : str
+        Of the contact, and of its upper body.
+    gap, axial, area, points, rim : array, shape (nc, ...)
+        As of :class:`klack.contact.mortar.ContactSpace`; ``axial`` per motion of the upper body.
+    beyond : float [m]
+        No point that was left out has a smaller gap.
+    axial_across : array, shape (ways nc,) [-]
+        Change of the tangential offsets per translation of the moving body along +z.
+    law : Friction or None
+    """
+
+    name: str
+    upper: str
+    gap: NDArray[np.float64]
+    axial: NDArray[np.float64]
+    area: NDArray[np.float64]
+    points: NDArray[np.float64]
+    rim: NDArray[np.bool_]
+    beyond: float
+    axial_across: NDArray[np.float64] = field(default_factory=lambda: np.zeros(0))
+    law: Friction | None = None
+
+
 def interface_model(
     bodies: Sequence[InterfaceBody], contacts: Sequence[InterfaceContact]
 ) -> InterfaceModel:
@@ -281,32 +350,82 @@ def interface_model(
         is missed.
     """
     names = [item.body.name for item in bodies]
-    moving = bodies[0].body
-    if moving.is_fixed:
+    ways = _common_ways(contacts)
+    places = row_places([len(contact.space.gap) for contact in contacts], ways)
+    loads = uneven_loads(sum(len(place) for place in places))
+    for contact, place in zip(contacts, places, strict=True):
+        upper = contact.rows(contact.upper)
+        if upper is not None and contact.ways:  # directions in which a point cannot move
+            loads[place[np.diff(upper.indptr) == 0]] = 0.0
+    return model_at_points(
+        [_point_body(item, contacts, places) for item in bodies],
+        [_point_contact(contact, names[0]) for contact in contacts],
+        _static_compliance(bodies, contacts, names, places),
+        loads,
+        np.sum([_answers(item, contacts, places, loads) for item in bodies], axis=0),
+    )
+
+
+def row_places(counts: Sequence[int], ways: int) -> list[NDArray[np.int64]]:
+    """Rows of each contact among those of all: the gaps of all first, then each direction."""
+    last = np.cumsum(counts).astype(np.int64)
+    return [
+        (last[-1] * np.arange(1 + ways)[:, None] + np.arange(b - n, b)).ravel()
+        for b, n in zip(last, counts, strict=True)
+    ]
+
+
+def uneven_loads(rows: int) -> NDArray[np.float64]:
+    """Two loads on all rows, shape (rows, 2) [N], by which a model is checked."""
+    return np.random.default_rng(5).uniform(0.0, 1.0, (rows, 2))
+
+
+def model_at_points(
+    bodies: Sequence[PointBody],
+    contacts: Sequence[PointContact],
+    whole: NDArray[np.float64],
+    loads: NDArray[np.float64],
+    answers: NDArray[np.float64],
+) -> InterfaceModel:
+    """Put bodies and contacts together that are known at their contact points.
+
+    Parameters
+    ----------
+    bodies : sequence of PointBody
+        The moving one first.
+    contacts : sequence of PointContact
+        In the order of the rows of ``traces``.
+    whole : array, shape (n, n) [m/N]
+        Static compliance of all bodies at these rows.
+    loads, answers : array, shape (n, 2) [N], [m]
+        :func:`uneven_loads`, and what they open, from static solutions of their own.
+
+    Raises
+    ------
+    InputError
+        For a moving body that is held.
+    ConvergenceError
+        When the residual compliance is not positive definite, not reciprocal, or the static limit
+        is missed.
+    """
+    moving = bodies[0]
+    if not moving.mass < inf:
         raise InputError(
             f"interface model: body '{moving.name}'",
             got="a supported moving body",
             expected="a body that is free along z",
             hint="give the needle first and remove its supports.",
         )
-    ways = _common_ways(contacts)
-    rows = [len(contact.space.gap) for contact in contacts]
-    last = np.cumsum(rows).astype(np.int64)
-    first = np.asarray(last - rows, dtype=np.int64)
+    rows = [len(contact.gap) for contact in contacts]
+    last = np.cumsum(rows)
     count = int(last[-1])
-    places = [
-        (count * np.arange(1 + ways)[:, None] + np.arange(a, b)).ravel()
-        for a, b in zip(first, last, strict=True)
-    ]
-    whole = _static_compliance(bodies, contacts, names, places)
-    blocks = [_traces(item, contacts, places) for item in bodies]
-    traces = np.hstack(blocks)
-    omega = np.concatenate([_with_rigid(item, item.modes.omega) for item in bodies])
+    traces = np.hstack([body.traces for body in bodies])
+    omega = np.concatenate([body.omega for body in bodies])
     elastic = omega > 0
     modal = (traces[:, elastic] / omega[elastic]) @ (traces[:, elastic] / omega[elastic]).T
     compliance = whole - modal
     compliance = 0.5 * (compliance + compliance.T)
-    reciprocity, static_limit = _fresh_statics(bodies, contacts, places, compliance + modal)
+    reciprocity, static_limit = _against(loads, answers, compliance + modal)
     checks = StaticChecks(
         lowest_pivot=_lowest_pivot(compliance),
         reciprocity=reciprocity,
@@ -314,44 +433,84 @@ def interface_model(
         modal_share=float(np.trace(modal) / np.trace(whole)),
     )
     _require_sound(checks)
-    periods = 2.0 * np.pi / bodies[0].modes.omega
-    counts = [block.shape[1] for block in blocks]
-    observed = block_diag(*(_observed(item) for item in bodies))
+    own = moving.omega[moving.omega > 0]
+    counts = [len(body.omega) for body in bodies]
+    observed = block_diag(*(body.observed for body in bodies))
     flexible = observed[:, elastic] / omega[elastic] ** 2
-    static = np.vstack([_observed_static(item, contacts, places) for item in bodies])
+    static = np.vstack([body.observed_static for body in bodies])
+    rigid = np.zeros((6, sum(counts)))
+    rigid[:, : moving.rigid.shape[1]] = moving.rigid
     return InterfaceModel(
-        bodies=tuple(names),
-        masses=tuple(inf if item.body.is_fixed else item.body.mass for item in bodies),
+        bodies=tuple(body.name for body in bodies),
+        masses=tuple(body.mass for body in bodies),
         omega=omega,
-        damping=np.concatenate([_with_rigid(item, item.damping) for item in bodies]),
+        damping=np.concatenate([body.damping for body in bodies]),
         owner=np.repeat(np.arange(len(bodies)), counts),
         traces=np.ascontiguousarray(traces[:count]),
         compliance=compliance,
-        gap=np.concatenate([contact.space.gap for contact in contacts]),
+        gap=np.concatenate([contact.gap for contact in contacts]),
         axial=np.concatenate(
             [
-                contact.space.axial * (1.0 if contact.upper == names[0] else -1.0)
+                contact.axial * (1.0 if contact.upper == moving.name else -1.0)
                 for contact in contacts
             ]
         ),
-        area=np.concatenate([contact.space.area for contact in contacts]),
-        points=np.concatenate([contact.space.points for contact in contacts]),
+        area=np.concatenate([contact.area for contact in contacts]),
+        points=np.concatenate([contact.points for contact in contacts]),
         contacts=tuple(
-            (contact.name, int(a), int(b))
-            for contact, a, b in zip(contacts, first, last, strict=True)
+            (contact.name, int(b) - n, int(b))
+            for contact, n, b in zip(contacts, rows, last, strict=True)
         ),
-        rim=np.concatenate([contact.space.rim for contact in contacts]),
-        beyond=np.repeat([contact.space.beyond for contact in contacts], rows),
-        rigid=np.hstack([rigid_motion(moving), np.zeros((6, sum(counts) - _rigid_count(moving)))]),
+        rim=np.concatenate([contact.rim for contact in contacts]),
+        beyond=np.repeat([contact.beyond for contact in contacts], rows),
+        rigid=rigid,
         drift=_drift(bodies, counts),
-        centre=_in_space(moving.centre_of_mass),
-        longest_period=float(np.max(periods, initial=0.0)),
+        centre=moving.centre,
+        longest_period=float(np.max(2.0 * np.pi / own, initial=0.0)),
         checks=checks,
         tangents=np.ascontiguousarray(traces[count:]),
-        axial_across=_axial_across(contacts, names[0], places, count),
-        friction=tuple(contact.faces.law for contact in contacts if contact.faces is not None),
+        axial_across=_axial_across(contacts, len(traces)),
+        friction=tuple(contact.law for contact in contacts if contact.law is not None),
         observed=observed,
         observed_residual=static - flexible @ traces[:, elastic].T,
+    )
+
+
+def _point_body(
+    item: InterfaceBody,
+    contacts: Sequence[InterfaceContact],
+    places: Sequence[NDArray[np.int64]],
+) -> PointBody:
+    body = item.body
+    return PointBody(
+        name=body.name,
+        mass=inf if body.is_fixed else body.mass,
+        centre=_in_space(body.centre_of_mass),
+        rigid=rigid_motion(body),
+        omega=_with_rigid(item, item.modes.omega),
+        damping=_with_rigid(item, item.damping),
+        traces=_traces(item, contacts, places),
+        observed=_observed(item),
+        observed_static=_observed_static(item, contacts, places),
+    )
+
+
+def _point_contact(contact: InterfaceContact, moving: str) -> PointContact:
+    space, across = contact.space, np.zeros(0)
+    if contact.faces is not None:
+        rows = contact.faces.T_a if contact.upper == moving else contact.faces.T_b
+        across = lifted_offset(rows, space.dimension)
+    return PointContact(
+        name=contact.name,
+        upper=contact.upper,
+        gap=space.gap,
+        axial=space.axial,
+        area=space.area,
+        points=space.points,
+        rim=space.rim,
+        beyond=space.beyond,
+        axial_across=across,
+        law=None if contact.faces is None else contact.faces.law,
     )
 
 
@@ -391,26 +550,22 @@ def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
     return ways.pop()
 
 
-def _axial_across(
-    contacts: Sequence[InterfaceContact],
-    moving: str,
-    places: Sequence[NDArray[np.int64]],
-    count: int,
-) -> NDArray[np.float64]:
-    """Change of the tangential offsets per translation of the moving body along +z."""
-    out = np.zeros(sum(len(place) for place in places))
-    for contact, place in zip(contacts, places, strict=True):
-        if contact.faces is not None:
-            rows = contact.faces.T_a if contact.upper == moving else contact.faces.T_b
-            lifted = lifted_offset(rows, contact.space.dimension)
-            out[place[len(contact.space.gap) :]] = lifted
-    return out[count:]
+def _axial_across(contacts: Sequence[PointContact], rows: int) -> NDArray[np.float64]:
+    """Change of the tangential offsets of all points, direction by direction."""
+    counts = [len(contact.gap) for contact in contacts]
+    ways = rows // sum(counts) - 1
+    out = np.zeros(rows)
+    for contact, place in zip(contacts, row_places(counts, ways), strict=True):
+        out[place[len(contact.gap) :]] = contact.axial_across
+    return out[sum(counts) :]
 
 
 def rigid_motion(body: ElasticBody) -> NDArray[np.float64]:
     """Translation of the centre of mass and rotation vector per unit rigid mode, shape (6, r)."""
     R, d = body.rigid_modes, body.dimension
     out = np.zeros((6, R.shape[1]))
+    if not R.shape[1]:
+        return out
     if d == 2:
         out[2] = R[1::2].T @ body.nodal_mass / body.mass
         return out
@@ -451,13 +606,11 @@ def _traces(
     return out
 
 
-def _drift(bodies: Sequence[InterfaceBody], counts: Sequence[int]) -> NDArray[np.float64]:
+def _drift(bodies: Sequence[PointBody], counts: Sequence[int]) -> NDArray[np.float64]:
     out = np.zeros((len(bodies), sum(counts)))
     start = 0
-    for number, (item, count) in enumerate(zip(bodies, counts, strict=True)):
-        if not item.body.is_fixed:
-            rigid = rigid_motion(item.body)[2]
-            out[number, start : start + len(rigid)] = rigid
+    for number, (body, count) in enumerate(zip(bodies, counts, strict=True)):
+        out[number, start : start + body.rigid.shape[1]] = body.rigid[2]
         start += count
     return out
 
@@ -508,29 +661,30 @@ def _lowest_pivot(compliance: NDArray[np.float64]) -> float:
     return float(np.min(np.diag(factor)) ** 2 / scale)
 
 
-def _fresh_statics(
-    bodies: Sequence[InterfaceBody],
+def _answers(
+    item: InterfaceBody,
     contacts: Sequence[InterfaceContact],
     places: Sequence[NDArray[np.int64]],
-    whole: NDArray[np.float64],
-) -> tuple[float, float]:
-    """Two uneven loads on the whole bodies, solved anew: reciprocity, deviation of ``whole``."""
-    loads = np.random.default_rng(5).uniform(0.0, 1.0, (len(whole), 2))
-    for contact, place in zip(contacts, places, strict=True):
-        upper = contact.rows(contact.upper)
-        if upper is not None and contact.ways:  # directions in which a point cannot move
-            loads[place[np.diff(upper.indptr) == 0]] = 0.0
+    loads: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """What loads open by the deflection of one body, solved anew."""
+    parts = [
+        (G, place)
+        for contact, place in zip(contacts, places, strict=True)
+        if (G := contact.rows(item.body.name)) is not None
+    ]
     answers = np.zeros(loads.shape)
-    for item in bodies:
-        parts = [
-            (G, place)
-            for contact, place in zip(contacts, places, strict=True)
-            if (G := contact.rows(item.body.name)) is not None
-        ]
-        forces = sum(G.T @ loads[rows] for G, rows in parts)
-        u = item.flexibility.deflections(np.asarray(forces))
-        for G, rows in parts:
-            answers[rows] += G @ u
+    forces = sum(G.T @ loads[rows] for G, rows in parts)
+    u = item.flexibility.deflections(np.asarray(forces))
+    for G, rows in parts:
+        answers[rows] += G @ u
+    return answers
+
+
+def _against(
+    loads: NDArray[np.float64], answers: NDArray[np.float64], whole: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Reciprocity of two answers, and the largest deviation of ``whole`` from them."""
     works = loads.T @ answers
     reciprocity = abs(works[0, 1] - works[1, 0]) / abs(works[0, 1])
     limit = np.max(np.abs(whole @ loads - answers)) / np.max(np.abs(answers))

@@ -46,6 +46,7 @@ from klack.verification.interface_impacts import (
     hertz_impact,
     two_spheres,
 )
+from klack.verification.ring_impacts import ring_checks
 from klack.verification.rough_point import rough_checks
 
 __all__ = ["checks"]
@@ -73,6 +74,7 @@ def checks() -> list[Check]:
         *_guide(),
         *_two_stops(),
         *_many_impacts(),
+        *ring_checks(),
     ]
 
 

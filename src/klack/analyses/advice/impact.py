@@ -161,6 +161,7 @@ def advise_impact(
     chosen = _level(case, level)
     _require_surfaces(case)
     case.require_ends("advice")
+    case.require_on_axis("advice")
     log = _Log()
     with collected_warnings() as warned:
         tell_elastic(case, "advice is measured on")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from klack.analyses.impact.record import LevelResult
+from klack.analyses.impact.record import LevelResult, PressureRecord
 from klack.analyses.impact.yield_check import check_yield
 from klack.assembling.bodies import BodyPair
 from klack.case.bodies import CaseFile
@@ -38,7 +38,14 @@ from klack.mesh.mesh import FaceBlock, Mesh, Surface, solid_at
 from klack.stages import warnings_of
 from klack.units import format_si
 
-__all__ = ["FEWEST_POINTS", "ContactCheck", "check_contact", "ends_reached", "expected_half_width"]
+__all__ = [
+    "FEWEST_POINTS",
+    "ContactCheck",
+    "check_contact",
+    "ends_reached",
+    "expected_half_width",
+    "force_all_round",
+]
 
 FEWEST_POINTS = 5
 """Contact points across a contact below which no error of a model is judged."""
@@ -199,12 +206,41 @@ def ends_reached(
         if result.pressure is None:
             continue
         record = result.pressure
-        _, nearest = cKDTree(space.points).query(record.points)
+        points = _as_drawn(record.points, space.dimension)
+        _, nearest = cKDTree(space.points).query(points)
         force = np.max(record.point_force, axis=0)
         with warnings_of(f"level '{name}'"):
-            if _tell_ends(_edges(pair), record.points, space.size[nearest], force, surfaces):
+            if _tell_ends(_edges(pair), points, space.size[nearest], force, surfaces):
                 return replace(check, doubts=(*check.doubts, _OVER_THE_END))
     return check
+
+
+def _as_drawn(points: NDArray[np.float64], dimension: int) -> NDArray[np.float64]:
+    """Points on rings of axisymmetric bodies as (r, z) in their half section."""
+    if points.shape[1] == dimension:
+        return points
+    return np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]])
+
+
+def force_all_round(record: PressureRecord, peak: float) -> float:
+    """Axial force [N] of a centred contact as heavily loaded as the worst part of this ring.
+
+    Parameters
+    ----------
+    record : PressureRecord
+        Of points at equal angles of a ring.
+    peak : float [N]
+        Peak axial force of that impact.
+    """
+    turn = np.round(np.arctan2(record.points[:, 1], record.points[:, 0]), 9) + 0.0
+    angles, number = np.unique(turn, return_inverse=True)
+    force = record.point_force.astype(float)
+    load = np.zeros((len(force), len(angles)))
+    np.add.at(load.T, number, force.T)
+    total = load.sum(axis=1).max()
+    steps = np.diff(angles, append=angles[0] + 2.0 * pi)
+    count = round(2.0 * pi / float(steps.min()))
+    return peak * count * float(load.max()) / total if total > 0.0 else peak
 
 
 def expected_half_width(

@@ -24,7 +24,7 @@ from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.impact.section_figure import section_figure
 from klack.analyses.impact.summary import GAUGE_COLUMNS, gauge_rows, no_estimate
-from klack.analyses.impact.wording import answer
+from klack.analyses.impact.wording import answer, leaves_axis
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
 from klack.assembling.body_summary import BodySummary
@@ -53,6 +53,12 @@ _WITHOUT_FRICTION: tuple[tuple[str, Callable[[ImpactMeasures], str]], ...] = (
 )
 
 
+_CENTRED = (
+    "Of the centred bodies, in the meridian plane. The interface level, which meets off-axis, has "
+    "no such law."
+)
+
+
 def report_content(study: ImpactStudy) -> Content:
     """Texts, tables and figures of a study."""
     found = charts(study)
@@ -71,7 +77,9 @@ def report_content(study: ImpactStudy) -> Content:
     sections.append(Section(title="Spectrum of the force", charts=named("spectrum")))
     if transfer:
         sections.append(Section(title="Transfer functions of the bodies", charts=transfer))
-    sections.append(Section(title="Local contact law", charts=named("law", "approach")))
+    law = named("law", "approach")
+    centred = (_CENTRED,) if leaves_axis(study) and law else ()
+    sections.append(Section(title="Local contact law", charts=law, paragraphs=centred))
     sections.append(
         Section(title="Energy", charts=named("energy", "modes"), tables=(_energy_table(study),))
     )
@@ -97,6 +105,8 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
     text = "No picture: the displacement of the whole bodies is only available at level 'full', "
     if "full" in study.failures:
         text += "which failed; see the warnings."
+    elif leaves_axis(study):
+        text += "which axisymmetric bodies do not have off-axis."
     else:
         text += (
             "which was not computed. 'klack impact CASE --level reduced,full' adds it, for bodies "
@@ -160,9 +170,19 @@ def _computed(study: ImpactStudy) -> Section:
         ("gap at the start", quantity(study.gap, "m", 3)),
     ]
     if contact.points:  # none where bodies meet at ports
+        width = "half width at peak force"
+        if leaves_axis(study):
+            facts.append(
+                (
+                    "off-axis",
+                    "the rows below: a centred contact, as loaded as the worst\n"
+                    "part of the ring, in the meridian plane",
+                )
+            )
+            width = "half width"
         facts += [
             ("contact points", count(contact.points)),
-            ("half width at peak force", quantity(contact.half_width, "m", 3)),
+            (width, quantity(contact.half_width, "m", 3)),
             (
                 "element size over half width",
                 f"{contact.size_ratio:.2f} ({size_verdict(contact.size_ratio)})",

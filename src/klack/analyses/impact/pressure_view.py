@@ -117,11 +117,23 @@ def _window(views: Sequence[PressureView], places: Sequence[Floats]) -> tuple[fl
 def common_cells(views: Sequence[PressureView]) -> tuple[Cells, ...]:
     """Cells of every view, rings or spots, in one common window."""
     along, across = (0.0, 360.0), across_window(views)
+    columns = _columns(views[0].places)
     if views[0].places.shape == "spot":
         sideways = _window(views, [view.places.along for view in views])
         reach = max(abs(value) for value in (*across, *sideways))
         along = across = (-reach, reach)
-    return tuple(map_cells(view.places, along, across, (_COLUMNS, _ROWS)) for view in views)
+    return tuple(map_cells(view.places, along, across, (columns, _ROWS)) for view in views)
+
+
+def _columns(places: ContactMap) -> int:
+    """Columns of the picture: of a regular ring as many for every angle, half on either side."""
+    angles = np.unique(np.round(places.along, 6) % 360.0)
+    if places.shape != "ring" or len(angles) > _COLUMNS // 2 or len(angles) < 2:
+        return _COLUMNS
+    steps = np.diff(angles, append=angles[0] + 360.0)
+    if np.ptp(steps) > 1e-3 * steps.mean():
+        return _COLUMNS
+    return 2 * len(angles) * round(_COLUMNS / (2 * len(angles)))
 
 
 # --------------------------------------------------------------------------- fields

@@ -8,7 +8,12 @@ from time import perf_counter
 import numpy as np
 
 from klack.acoustics.comparison import compare_histories
-from klack.analyses.impact.contact_check import ContactCheck, check_contact, ends_reached
+from klack.analyses.impact.contact_check import (
+    ContactCheck,
+    check_contact,
+    ends_reached,
+    force_all_round,
+)
 from klack.analyses.impact.flat_faces import (
     doubt_modal_levels,
     flat_for_modes,
@@ -20,6 +25,7 @@ from klack.analyses.impact.given_models import run_given_impact
 from klack.analyses.impact.interface_level import (
     build_guide,
     certificate_modes,
+    off_axis_within_reach,
     run_interface,
     simulate_case,
     within_reach,
@@ -81,6 +87,7 @@ from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import Deviation
+from klack.contact.statics import ReachError, StaticContact, static_contact
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
@@ -345,11 +352,12 @@ def _study(
             )
             transfer = found or ()
         worn = case.contact.worn
+        static, loaded = _as_loaded(problem, results, peak)
         check = check_contact(
             case,
             problem.pair,
-            problem.static,
-            peak,
+            static,
+            loaded,
             _surfaces(case),
             worn_by=0.0 if worn is None else worn.force,
             has_yield=limit is not None or loops is not None,
@@ -447,7 +455,10 @@ def _run_interface(
             return result, points_running_in(problem.case, model, guide)
         return result, None
 
-    result = within_reach(problem, pools, run, ports=own.ports, limit=limit)
+    if problem.case.leaves_axis:
+        result = off_axis_within_reach(problem, pools, run, ports=own.ports, limit=limit)
+    else:
+        result = within_reach(problem, pools, run, ports=own.ports, limit=limit)
     clock("interface", 1.0)
     return result
 
@@ -593,6 +604,27 @@ def _summaries(problem: ContactProblem, own: ReducedPair) -> tuple[BodySummary, 
             (problem.pair.lower, own.lower),
         )
     )
+
+
+def _as_loaded(
+    problem: ContactProblem, results: Mapping[str, LevelResult], peak: float
+) -> tuple[StaticContact, float]:
+    """Static contact that is judged, and its force.
+
+    Axisymmetric bodies off-axis load a part of their ring: it is judged as a centred contact that
+    is loaded as much all round, as far as that stays within the candidates.
+    """
+    level = results.get("interface")
+    if not problem.case.leaves_axis or level is None or level.pressure is None:
+        return problem.static, peak
+    force = force_all_round(level.pressure, float(level.measures.peak_force))
+    if force <= problem.static.max_force:
+        return problem.static, force
+    try:
+        heavier = static_contact(problem.space, problem.static.compliance, force)
+    except ReachError:
+        return problem.static, problem.static.max_force
+    return heavier, force
 
 
 def _surfaces(case: Case) -> str:

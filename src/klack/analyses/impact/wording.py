@@ -5,7 +5,7 @@ from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.report.wording import count, quantity, share, signed, signed_share
 
-__all__ = ["answer", "verdict", "which_contact"]
+__all__ = ["answer", "leaves_axis", "verdict", "which_contact"]
 
 _SAME_SPEED = 5e-4
 """Relative change of the approach speed that three digits do not show."""
@@ -51,6 +51,15 @@ def answer(study: ImpactStudy) -> str:
     elif study.reference == "reduced" and "reduced" in study.estimates and study.estimates_settled:
         text += f" {_estimated(study.estimates['reduced'])}"
     return text
+
+
+def leaves_axis(study: ImpactStudy) -> bool:
+    """Whether axisymmetric bodies of this study met off their axis, at points on rings."""
+    level = study.levels.get("interface")
+    in_plane = all(body.model == "axisymmetric" for body in study.bodies)
+    if level is None or level.pressure is None or not in_plane:
+        return False
+    return bool(level.pressure.points.shape[1] == 3)
 
 
 def which_contact(numbers: ImpactMeasures, number: int) -> str:

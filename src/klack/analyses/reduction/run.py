@@ -101,6 +101,7 @@ def run_reduce(
             case=case.name, title=case.title, bodies=(given.upper, given.lower), transfer=()
         )
     case.require_ends("a reduction")
+    case.require_on_axis("a reduction")
     problem = build_problem(case.without_outputs(), progress, threads=threads)
     pools = mode_pools(problem, at_least=TRANSFER_MODES, progress=progress)
     progress("reduced", 0.0)

@@ -75,6 +75,7 @@ def write_impact_series(
             hint="50 give a smooth animation.",
         )
     case.require_levels([level])
+    case.require_on_axis("a series of fields")
     problem = build_problem(case, progress, threads=threads)
     bodies = (problem.pair.upper, problem.pair.lower)
     stems = file_stems([body.name for body in bodies])

@@ -1,0 +1,244 @@
+r"""Bodies of revolution at the points of rings: modes and statics of all Fourier orders.
+
+A body that is hit on one side of its seat moves in every order.  Its orders do not couple
+(:mod:`klack.elasticity.fourier_body`), so it is taken apart: rigid motions and modes of the lowest
+frequencies, whatever their order, and of every order that the points resolve the static compliance.
+Orders without a mode are there with their statics alone.
+
+What comes out, :class:`RevolvedPoints`, is what the interface level takes of a solid body, without
+a mesh of it: :func:`klack.transient.interface_model.model_at_points` puts two or three together.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from math import inf
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from threadpoolctl import threadpool_limits
+
+from klack.cache.result_cache import ResultCache
+from klack.elasticity.eigen import Modes, eigenmodes
+from klack.elasticity.fourier_body import FourierBody
+from klack.elasticity.ring_points import RingPoints, RingRows, resolved_orders, share_of_order
+from klack.elasticity.statics import Flexibility
+from klack.transient.interface_model import PointBody
+
+__all__ = ["RevolvedPoints", "reduce_revolved"]
+
+Floats = NDArray[np.float64]
+
+_AT_ONCE = 6  # pairs of modes of an order that are looked for first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RevolvedPoints:
+    """A body of revolution at points on rings.
+
+    Parameters
+    ----------
+    body : PointBody
+        Modes: rigid ones, those of order 0, then pairs of the orders above, lowest frequency first.
+    order : int array, shape (m,)
+        Of each mode.
+    compliance : array, shape (p, p) [m/N]
+        Static compliance of the whole body, of a free one with inertia relief.
+    answers : array, shape (p, k) [m]
+        What the loads move the points by, solved apart from ``compliance``.
+    """
+
+    body: PointBody
+    order: NDArray[np.int64]
+    compliance: Floats
+    answers: Floats
+
+    @property
+    def residual(self) -> Floats:
+        """Static compliance without that of the elastic modes, shape (p, p) [m/N]."""
+        elastic = self.body.omega > 0
+        shares = self.body.traces[:, elastic] / self.body.omega[elastic]
+        return self.compliance - shares @ shares.T
+
+    def among(self, place: NDArray[np.int64], rows: int) -> "RevolvedPoints":
+        """The same body among ``rows`` rows of a model, of which it acts on those at ``place``."""
+        traces = np.zeros((rows, self.body.traces.shape[1]))
+        compliance, answers = np.zeros((rows, rows)), np.zeros((rows, self.answers.shape[1]))
+        traces[place], answers[place] = self.body.traces, self.answers
+        compliance[np.ix_(place, place)] = self.compliance
+        static = np.zeros((len(self.body.observed), rows))
+        body = replace(self.body, traces=traces, observed_static=static)
+        return replace(self, body=body, compliance=compliance, answers=answers)
+
+
+def reduce_revolved(
+    in_order: Callable[[int], FourierBody],
+    rows: RingRows,
+    points: RingPoints,
+    *,
+    axial: Modes,
+    others: int,
+    damping: Callable[[Floats], Floats],
+    loads: Floats,
+    cache: ResultCache | None = None,
+) -> RevolvedPoints:
+    """Modes and static compliance of a body of revolution at points on rings.
+
+    Parameters
+    ----------
+    in_order : callable
+        Body in an order.
+    rows : RingRows
+        Of all its contacts.
+    points : RingPoints
+        Points of all its contacts, and the rows that read them.
+    axial : Modes
+        Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
+    others : int
+        Modes of the orders above that are kept, both motions of an order counted: those with the
+        lowest frequencies.
+    damping : callable
+        Ratios of modes with these angular frequencies.
+    loads : array, shape (p, k) [N]
+        For ``answers``.
+    cache : ResultCache, optional
+        As of :class:`klack.elasticity.statics.Flexibility`.
+    """
+    sums = _Orders(rows, points, loads)
+    pairs = _Pairs(others // 2, (points.count - 1) // 2)
+    for order in resolved_orders(points.count):
+        body = in_order(order)
+        with (
+            threadpool_limits(limits=1, user_api="blas"),  # small matrices, many of them
+            Flexibility(body, threads=1, cache=cache) as flexibility,
+        ):
+            sums.add(order, flexibility)
+            if order < 2 and body.rigid_modes.shape[1]:
+                sums.add_rigid(body)
+            pairs.look(order, body, flexibility, sums.section[order])
+        if order == 0:
+            first = body
+    shapes = np.repeat(axial.shapes[::2] / 2.0, 3, axis=0)  # a = b = U / 2
+    shapes[2::3] = axial.shapes[1::2]
+    blocks = [(0, omega, trace) for omega, trace in _columns(axial.omega, sums.section[0] @ shapes)]
+    blocks += pairs.lowest()
+    orders, omega, traces = sums.modes(blocks)
+    return RevolvedPoints(
+        body=PointBody(
+            name=first.name,
+            mass=first.mass if sums.rigid else inf,
+            centre=np.array([0.0, 0.0, first.centre_of_mass]),
+            rigid=np.array(sums.rigid).reshape(-1, 6).T,
+            omega=omega,
+            damping=np.concatenate([np.zeros(len(sums.rigid)), damping(omega[len(sums.rigid) :])]),
+            traces=traces,
+            observed=np.zeros((0, len(omega))),
+            observed_static=np.zeros((0, len(points.row))),
+        ),
+        order=orders,
+        compliance=points.compliance(np.array(sums.spectrum)),
+        answers=sums.answers,
+    )
+
+
+def _columns(omega: Floats, traces: Floats) -> Iterator[tuple[float, Floats]]:
+    return zip((float(w) for w in omega), traces.T, strict=True)
+
+
+class _Orders:
+    """Statics and rigid modes, order by order."""
+
+    def __init__(self, rows: RingRows, points: RingPoints, loads: Floats) -> None:
+        self.rows, self.points, self.loads = rows, points, loads
+        self.section: dict[int, csr_array] = {}
+        self.spectrum: list[Floats] = []
+        self.answers = np.zeros(loads.shape)
+        self.rigid: list[Floats] = []
+        self._rigid_traces: list[Floats] = []
+        self._rigid_order: list[int] = []
+
+    def add(self, order: int, flexibility: Flexibility) -> None:
+        """Static compliance of the rows, and the answer to the loads."""
+        S = self.section[order] = self.rows.of_order(order)
+        self.spectrum.append(flexibility.condensed(S))
+        share = share_of_order(order, self.points.count)
+        forces = self.points.forces(order, self.loads)
+        moved = S @ flexibility.solve(S.T @ np.hstack(forces))
+        for factor, part in zip(self.points.factors(order), np.hsplit(moved, 2), strict=True):
+            self.answers += share * factor[:, None] * part[self.points.row]
+
+    def add_rigid(self, body: FourierBody) -> None:
+        """Rigid modes of order 0 or 1, as motions of the centre of mass."""
+        R, r = body.rigid_modes, body.mesh.points[:, 0]
+        shapes = body.amplitudes(R)
+        traces = self.section[body.order] @ R
+        for k in range(R.shape[1]):
+            u, v, w = shapes[:, :, k].T
+            for way in range(min(body.order, 1) + 1):
+                motion = np.zeros(6)
+                if body.order == 0:
+                    motion[2], motion[5] = body.nodal_mass @ w / body.mass, (v @ r) / (r @ r)
+                else:
+                    # about +y where the body bends towards x, about -x towards y
+                    motion[way] = body.nodal_mass @ (u - v) / (2.0 * body.mass)
+                    motion[4 - way] = (-1.0) ** way * -(w @ r) / (r @ r)
+                self.rigid.append(motion)
+                factor = self.points.factors(body.order)[way]
+                self._rigid_traces.append(factor * traces[self.points.row, k])
+                self._rigid_order.append(body.order)
+
+    def modes(
+        self, elastic: list[tuple[int, float, Floats]]
+    ) -> tuple[NDArray[np.int64], Floats, Floats]:
+        """Orders, angular frequencies and traces of rigid and elastic modes at the points."""
+        order, omega = list(self._rigid_order), [0.0] * len(self.rigid)
+        traces = list(self._rigid_traces)
+        for n, frequency, trace in elastic:
+            for factor in self.points.factors(n)[: 1 if n == 0 else 2]:
+                order.append(n)
+                omega.append(frequency)
+                traces.append(factor * trace[self.points.row])
+        columns = np.array(traces).reshape(-1, len(self.points.row)).T
+        return np.array(order, dtype=np.int64), np.array(omega), np.ascontiguousarray(columns)
+
+
+class _Pairs:
+    """The lowest pairs of modes of the orders above 0, found order by order."""
+
+    def __init__(self, count: int, highest: int) -> None:
+        self.count, self.highest = count, highest
+        self.found: list[tuple[int, float, Floats]] = []
+        self.lowest_before = inf
+        self.is_complete = count == 0
+
+    def look(
+        self, order: int, body: FourierBody, flexibility: Flexibility, rows: csr_array
+    ) -> None:
+        """Add the modes of an order that belong to the lowest ones.
+
+        Complete when the lowest mode of an order is above them and frequencies rise with the
+        order: the lowest of a thin shell may belong to order 4 or so.
+        """
+        if order == 0 or order > self.highest or self.is_complete:
+            return
+        most = min(self.count, len(body.free) - body.rigid_modes.shape[1])
+        number = min(_AT_ONCE, most)
+        while True:
+            modes = eigenmodes(body, count=number, flexibility=flexibility)
+            if number == most or modes.omega[-1] > self._cut(modes.omega):
+                break
+            number = min(2 * number, most)
+        if modes.omega[0] > self._cut([]) and modes.omega[0] > self.lowest_before:
+            self.is_complete = True
+            return
+        self.lowest_before = float(modes.omega[0])
+        self.found += [(order, *one) for one in _columns(modes.omega, rows @ modes.shapes)]
+
+    def lowest(self) -> list[tuple[int, float, Floats]]:
+        """The pairs that are kept, lowest first."""
+        return sorted(self.found, key=lambda one: one[:2][::-1])[: self.count]
+
+    def _cut(self, more: "Floats | list[float]") -> float:
+        """Angular frequency of the last pair that is kept, with the modes found so far."""
+        known = sorted([*(omega for _, omega, _ in self.found), *more])
+        return float(known[self.count - 1]) if len(known) >= self.count else inf

@@ -1,0 +1,198 @@
+"""A needle with a spherical tip on a conical seat, at points on rings and as solids."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from klack.contact.friction import Friction
+from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.ring_gaps import RingGaps
+from klack.contact.rings import RingFriction, RingSpace
+from klack.elasticity.body import ElasticBody, elastic_body
+from klack.elasticity.eigen import eigenmodes
+from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.elasticity.ring_points import RingRows
+from klack.elasticity.statics import Flexibility
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.swept import sweep
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.interface_result import InterfaceResult
+from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
+from klack.verification.impacts import STEEL, needle_over_seat
+
+__all__ = [
+    "NeedleOnRing",
+    "impulse_on_needle",
+    "momentum_of_needle",
+    "solid_over_ring_compliance",
+]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class NeedleOnRing:
+    """Free needle D4 over a held seat, in the meridian plane (:func:`needle_over_seat`).
+
+    Parameters
+    ----------
+    size, bulk : float [m]
+        Elements at the ring and far away.
+    reach : float [m]
+        Largest gap of a contact point of the centred bodies.
+    slave : "a" or "b", optional
+        Side of the hats, needle or seat.
+    """
+
+    size: float = 30e-6
+    bulk: float = 3e-3
+    reach: float = 12e-6
+    slave: Literal["a", "b"] | None = None
+
+    @cached_property
+    def bodies(self) -> tuple[ElasticBody, ElasticBody]:
+        """Needle and seat, centred and in first touch, with their axial motion alone."""
+        return needle_over_seat(size=self.size, bulk=self.bulk)[:2]
+
+    @property
+    def sides(self) -> tuple[Mesh, Surface, Mesh, Surface]:
+        """Mesh and surface of both, as contact spaces take them."""
+        upper, lower = (body.mesh for body in self.bodies)
+        return upper, upper.surface("tip"), lower, lower.surface("cone")
+
+    @cached_property
+    def section(self) -> ContactSpace:
+        """Hats of the half section."""
+        return contact_space(*self.sides, reach=self.reach, slave=self.slave)
+
+    def gaps(self, count: int) -> RingGaps:
+        """Gaps at so many angles at a placement of the needle."""
+        z = float(self.bodies[0].centre_of_mass[1])
+        angle = 2.0 * np.pi * np.arange(count) / count
+        return RingGaps.of(self.section, *self.sides, angle=angle, centre=np.array([0.0, 0.0, z]))
+
+    def placed(self, count: int, placement: Floats) -> tuple[RingSpace, Floats]:
+        """Contact points after a placement, shape (6,), and a shift along z to first touch.
+
+        Returns the placement with that shift as well.
+        """
+        gaps, moved = self.gaps(count), np.array(placement, dtype=float)
+        for _ in range(6):
+            gap = gaps(moved)
+            moved[2] -= float(np.min(gap / self.section.axial[:, None]))
+        gap = gaps(moved)
+        return RingSpace.within(self.section, gap, float(gap.min()) + 0.7 * self.reach), moved
+
+    def in_order(self, number: int) -> Callable[[int], FourierBody]:
+        """Needle (0) or seat (1) in any Fourier order."""
+        body = self.bodies[number]
+        (solid,) = body.mesh.solids
+        held = body.mesh.surface("base").nodes if number else ()
+        return lambda order: fourier_body(
+            body.name, body.mesh, {solid: STEEL}, order=order, fixed_nodes=held
+        )
+
+    def revolved(self, axial: int, others: int) -> list[RevolvedBody]:
+        """Both bodies with so many modes of order 0 and of the orders above."""
+        return [
+            RevolvedBody(
+                name=body.name,
+                in_order=self.in_order(number),
+                axial=eigenmodes(body, count=axial),
+                others=others,
+                damping=lambda omega: np.zeros(len(omega)),
+            )
+            for number, body in enumerate(self.bodies)
+        ]
+
+    def contact(self, space: RingSpace, friction: Friction | None = None) -> RingContact:
+        """Contact at these points."""
+        faces = None if friction is None else RingFriction.on(friction, self.section, *self.sides)
+        upper, lower = (body.name for body in self.bodies)
+        return RingContact(name="seat", upper=upper, lower=lower, space=space, faces=faces)
+
+    def model(
+        self, space: RingSpace, *, axial: int, others: int, friction: Friction | None = None
+    ) -> InterfaceModel:
+        """Interface model with so many modes of order 0 and of the orders above, of each body."""
+        return revolved_model(self.revolved(axial, others), [self.contact(space, friction)])
+
+
+def impulse_on_needle(
+    pair: NeedleOnRing, space: RingSpace, result: InterfaceResult, step: float
+) -> Floats:
+    """Impulse and its moment about the centre of mass, shape (6,), from forces at the hats.
+
+    Without Fourier orders: the forces of the half section on a needle that is rigid.
+    """
+    needle = pair.bodies[0]
+    points = needle.mesh.points
+    arm = points[:, 1] - needle.centre_of_mass[1]
+    rigid = np.zeros((3, needle.mesh.node_count, 2))  # in the plane of the section
+    rigid[0, :, 0] = 1.0  # outwards
+    rigid[1, :, 1] = 1.0
+    rigid[2] = np.column_stack([arm, -points[:, 0]])  # turns z into r
+    outwards, along, turning = (space.section.G_a @ field.ravel() for field in rigid)
+    pushed = result.impacts[0].point_force.astype(float).sum(axis=0) * step
+    angle = space.angles[space.turn]
+    away, up, turn = (values[space.ring] * pushed for values in (outwards, along, turning))
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([away @ c, away @ s, up.sum(), -(turn @ s), turn @ c, 0.0])
+
+
+def momentum_of_needle(pair: NeedleOnRing, velocity: Floats) -> Floats:
+    """Momentum and angular momentum, shape (6,), of a needle of this rigid velocity."""
+    needle = pair.bodies[0]
+    return np.concatenate([needle.mass * velocity[:3], needle.inertia @ velocity[3:]])
+
+
+def solid_over_ring_compliance(
+    pair: NeedleOnRing, *, number: int, order: int, layers: int
+) -> tuple[float, float]:
+    r"""Compliance under a pressure wave, of a swept solid and of the half section in that order.
+
+    Work of the pressure :math:`\cos n \theta` on its own answer over the square of its force
+    all round.  The hats of the solid are linear round the ring: one that reaches two steps *d* wide
+    reads a wave by :math:`(\sin x / x)^2`, :math:`x = n d / 2`, when it is loaded and when it is
+    read, and the half section is given the same.
+
+    Parameters
+    ----------
+    pair : NeedleOnRing
+    number : int
+        Needle (0) or seat (1).
+    order : int
+    layers : int
+        Of the solid.
+    """
+    space, _ = pair.placed(2 * layers, np.zeros(6))
+    kept = np.unique(space.ring)
+    upper, lower = (sweep(body.mesh, layers) for body in pair.bodies)
+    whole = contact_space(
+        *(upper, upper.surface("tip"), lower, lower.surface("cone")),
+        reach=2.0 * pair.reach,
+        slave=pair.section.slave,
+    )
+    place = np.column_stack([np.hypot(*whole.points[:, :2].T), whole.points[:, 2]])
+    away, _ = cKDTree(pair.section.points[kept]).query(place)
+    solid = whole.restricted(np.asarray(away < 1e-9))
+    wave = np.cos(order * np.arctan2(solid.points[:, 1], solid.points[:, 0])) * solid.area
+    mesh, G = ((upper, solid.G_a), (lower, solid.G_b))[number]
+    (name,) = mesh.solids
+    held = mesh.surface("base").nodes if number else ()
+    body = elastic_body(name, mesh, {name: STEEL}, fixed_nodes=held)
+    with Flexibility(body) as flexibility:
+        found = float(wave @ (G @ flexibility.solve(G.T @ wave)))
+    rows = RingRows.in_plane((pair.section.G_a, pair.section.G_b)[number]).of_order(order)[kept]
+    with Flexibility(pair.in_order(number)(order)) as flexibility:
+        c = flexibility.condensed(rows)
+    # of unit pressure all round the load on a row is its area, of a wave half of it
+    load = pair.section.area[kept] * (1.0 if order == 0 else 0.5)
+    hat = np.sinc(order / (2.0 * layers)) ** 2
+    force = pair.section.area[kept].sum()
+    return found / force**2, float(hat**2 * load @ c @ load) / force**2
