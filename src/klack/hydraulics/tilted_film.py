@@ -37,7 +37,7 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_POINTS, _FEWER = 12, 6  # Gauss points between two circles
+_POINTS, _FEWER = 12, 8  # Gauss points between two circles
 _FEWEST_SECTORS = 4
 _ACTIVE_SETS = 60  # before relaxation takes over
 

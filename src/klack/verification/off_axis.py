@@ -294,7 +294,7 @@ def _rest() -> Check:
         "needle at rest, pressed 0.3 mm from the axis: tilt [rad]",
         expected=push * arm / bed,
         computed=float(found.channels["needle tilt x"].values[-1]),
-        tolerance=1e-8,
+        tolerance=1e-11,
         source="M/(k r^2/2): ring of springs, all of them closed",
     )
 

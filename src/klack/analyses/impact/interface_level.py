@@ -1,7 +1,7 @@
 """The interface level of a case: both bodies as modes, the contact point by point."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import ceil
 from typing import TypeVar
 
