@@ -63,11 +63,12 @@ def _bearings(
 @njit
 def squeeze_guide(
     films: Films, modes: Modes, bore: Bore, state: State, q: Vector, kick: Vector
-) -> bool:
-    """Modal force of the films at all heights over the step that leads to ``q`` without them.
+) -> float:
+    """Change of the modal force of the films at all heights over the step that leads to ``q``.
 
-    Newton's method on the places at the end of the step, halved where it goes too far; False if
-    they are not found.
+    Returns by how much the shaft moves by that [m]; below zero if no forces are found.
+
+    Newton's method on the places at the end of the step, halved where it goes too far.
     """
     heights, M = len(films.room), len(q)
     n = 2 * heights
@@ -77,7 +78,9 @@ def squeeze_guide(
         before[k] = shaft_place(bore, k, state.q)
         free[2 * k : 2 * k + 2] = shaft_place(bore, k, q)
     soft = (rows * modes.B1) @ rows.T
-    u = free + soft @ state.bearing[:, :2].copy().reshape(n)
+    old = state.bearing[:, :2].copy().reshape(n)
+    free -= soft @ old
+    u = free + soft @ old
     force, slopes = _bearings(films, bore, before, u.reshape((heights, 2)), modes.step)
     left = free + soft @ force - u
     size, least = np.max(np.abs(left)), np.min(films.room)
@@ -99,11 +102,12 @@ def squeeze_guide(
             break
         size = now
     if not size < _NEARLY * least:
-        return False
-    kick[:] = rows.T @ force
+        return -1.0
     for k in range(heights):
         state.bearing[k, 0], state.bearing[k, 1] = force[2 * k], force[2 * k + 1]
-    return True
+    force -= old
+    kick[:] = rows.T @ force
+    return float(np.max(np.abs(soft @ force)))
 
 
 @njit

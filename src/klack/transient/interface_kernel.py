@@ -83,7 +83,7 @@ from klack.transient.interface_friction import (
     tell_friction,
 )
 from klack.transient.rough_points import layer_energy, solve_rough
-from klack.transient.tilting_films import bend_faces, bulk_work, count_squeeze, squeeze
+from klack.transient.tilting_films import begin_films, bend_faces, bulk_work, count_squeeze, squeeze
 from klack.transient.yielding_points import let_yield, solve_yielding
 
 __all__ = [
@@ -105,6 +105,10 @@ FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
 All steps done; open for long enough; no active set found; a contact would begin that pushes the
 other way (the other stop), and that step is not taken.
 """
+
+_SWEEPS, _SETTLED = 20, 1e-6
+"""Rounds over all films of a step, which move each other, and the change of their heights, over the
+least ones, that ends them."""
 
 _PAY_FROM = 1e-10
 """Smallest work of a step over the energy of the contact that pays debts.
@@ -167,6 +171,19 @@ def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
     for i in range(len(push)):
         yields += push[i] * push[i] * B1[i]
     return 0.5 * spring / (1.0 + 0.5 * spring * yields)
+
+
+@phase
+def _push_by_films(films: Films, bore: Bore, state: State, step: _Step) -> None:
+    """Modal force of all films as in the step before."""
+    for i in range(len(step.kick)):
+        step.kick[i] = 0.0
+        for k in range(len(films.lowest)):
+            for c in range(3):
+                step.kick[i] += films.rows[k, c, i] * state.films[k, c]
+        for k in range(len(films.room)):
+            for c in range(2):
+                step.kick[i] += bore.traces[k, c, i] * state.bearing[k, c]
 
 
 @phase
@@ -697,15 +714,29 @@ def march(
         if rubs_guide:
             axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
         if films is not None:
+            begin_films(state)
+            _push_by_films(films, bore, state, step)
+            _add(step, modes, 1.0)
+            for sweep in range(_SWEEPS):
+                moved = 0.0
+                for k in range(len(films.lowest)):
+                    change = squeeze(films, k, modes, state, step.q, step.kick)
+                    if change < 0.0:
+                        return taken, FAILED
+                    _add(step, modes, 1.0)
+                    moved = max(moved, change / films.lowest[k])
+                if len(films.room):
+                    change = squeeze_guide(films, modes, bore, state, step.q, step.kick)
+                    if change < 0.0:
+                        return taken, FAILED
+                    _add(step, modes, 1.0)
+                    moved = max(moved, change / np.min(films.room))
+                if len(films.lowest) + (len(films.room) > 0) == 1:
+                    break
+                if sweep > 0 and moved <= _SETTLED:
+                    break
             for k in range(len(films.lowest)):
-                if not squeeze(films, k, modes, state, step.q, step.kick):
-                    return taken, FAILED
-                _add(step, modes, 1.0)
                 bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
-            if len(films.room):
-                if not squeeze_guide(films, modes, bore, state, step.q, step.kick):
-                    return taken, FAILED
-                _add(step, modes, 1.0)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact
         taken_up = 0.0  # by what yields, or by layers beyond the potential

@@ -23,6 +23,7 @@ from klack.hydraulics.tilted_film import Land, film_pressure
 from klack.transient.interface_arrays import Films, Modes, State
 
 __all__ = [
+    "begin_films",
     "bend_faces",
     "bulk_work",
     "count_squeeze",
@@ -166,8 +167,16 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
 
 
 @njit
-def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> bool:
-    """Modal force of a film over the step that leads to ``q`` without it; False if none is found.
+def begin_films(state: State) -> None:
+    """Remember the forces of the step before."""
+    state.films[:, 3:6] = state.films[:, :3]
+
+
+@njit
+def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> float:
+    """Change of the modal force of a film over the step that leads to ``q`` with its present force.
+
+    Returns by how much its heights change by that [m]; below zero if no force is found.
 
     Newton's method on lift and tilts.  They minimise a convex potential, that of ``soft`` and that
     of the film; along a change its slope is brought near zero where Newton's step goes too far.
@@ -177,18 +186,19 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
     soft, before = np.zeros((3, 3)), film_state(films, k, state.q)
     free = film_state(films, k, q)
     held = contact_resultant(films, k, state.lam)
+    now = state.films[k, :3].copy()
     for c in range(3):
-        state.films[k, c + 3] = state.films[k, c]
         for d in range(3):
-            soft[c, d] = D[c, d]
-            before[c] += D[c, d] * (state.films[k, d] + held[d])
+            before[c] += D[c, d] * (state.films[k, 3 + d] + held[d])
             free[c] += D[c, d] * held[d]
             for i in range(len(q)):
                 soft[c, d] += rows[c, i] * modes.B1[i] * rows[d, i]
+    free -= soft @ now
+    soft += D
     tiny = _FOUND * (films.lowest[k] + abs(before[0]) + abs(free[0] - before[0]))
     stiff = np.linalg.inv(soft)
     # as if it pressed as in the step before; at rest a corner lies between closing and opening
-    u = free + soft @ state.films[k, :3]
+    u = free + soft @ now
     f, slopes = _pressed(films, k, before, u, step)
     left = free + soft @ f - u
     size = _size(left, reach)
@@ -208,13 +218,13 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
             tried = u + share * change
             f, slopes = _pressed(films, k, before, tried, step)
             left = free + soft @ f - tried
-            now = along @ left
-            if (share == 1.0 and now >= 0.0) or abs(now) <= _ENOUGH * abs(first):
+            slope = along @ left
+            if (share == 1.0 and slope >= 0.0) or abs(slope) <= _ENOUGH * abs(first):
                 break
-            if now > 0.0:
-                low, at_low, at_high = share, now, 0.5 * at_high
+            if slope > 0.0:
+                low, at_low, at_high = share, slope, 0.5 * at_high
             else:
-                high, at_high, at_low = share, now, at_low if share == 1.0 else 0.5 * at_low
+                high, at_high, at_low = share, slope, at_low if share == 1.0 else 0.5 * at_low
             share = low + (high - low) * at_low / (at_low - at_high)
         u = tried
         size = _size(left, reach)
@@ -224,15 +234,14 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
         if _size(share * change, reach) <= _ROUND_OFF * _size(u, reach):
             break
     if not least < _NEARLY / _FOUND * tiny:
-        return False
-    f = best
+        return -1.0
+    state.films[k, :3] = best
+    best -= now
     for i in range(len(q)):
         kick[i] = 0.0
         for c in range(3):
-            kick[i] += rows[c, i] * f[c]
-    for c in range(3):
-        state.films[k, c] = f[c]
-    return True
+            kick[i] += rows[c, i] * best[c]
+    return float(_size(soft @ best, reach))
 
 
 @njit
