@@ -84,13 +84,19 @@ def test_a_film_rights_a_needle_that_leans():
     assert ends[0].v[3] < 0.0  # against the lean
 
 
-def valve(*, placement=None, guide=False):
+def valve(*, placement=None, guide=False, curved=0.0):
+    """Needle over its stop; the gaps grow with the square of its shift, times ``curved`` [1/m]."""
     model = needle_on_ring(20e-6)
+
+    def gaps(at):
+        return model.gap + model.traces @ coordinates(*at) + curved * at[0] ** 2
+
     return SpatialValve(
         model=model,
         components=("needle",),
         stops=("contact",),
         films=(film_of(model),),
+        gaps=gaps if curved else None,
         guide=guide_of(model, friction=0.1) if guide else None,
         placement=np.zeros(6) if placement is None else placement,
         arms=np.array([[0.0, 0.0, -6e-3]]),
@@ -124,3 +130,21 @@ def test_energy_of_a_wet_eccentric_run():
     assert abs(found.books.relative_residual) < 1e-10
     assert found.books.losses["contact film"] > 1e-5
     assert found.events
+
+
+@pytest.mark.parametrize("first", [30e-6, 46e-6, 100e-6])
+def test_a_wet_run_in_two_parts_is_the_same(first):
+    """Exact: cut in flight, in the contact and after it."""
+    placement = np.array([0.5e-6, 0.0, 0.0, 0.0, 3e-4, 0.0])
+    kind = {"gap": 20e-6, "speed": -0.5, "wet": True}
+    needle = valve(placement=placement, curved=1e5)
+    whole = fly_in_network(needle, {}, duration=160e-6, **kind)
+    begun = fly_in_network(needle, {}, duration=first, **kind)
+    rest = fly_in_network(needle, {}, duration=160e-6 - first, state=begun.state, **kind)
+    both = np.isin(np.round(rest.time * 1e9), np.round(whole.time * 1e9))
+    again = np.isin(np.round(whole.time * 1e9), np.round(rest.time * 1e9))
+    assert np.sum(both) > 20
+    for name in ("needle x", "needle tilt x", "needle.tip displacement"):
+        true, same = whole.channels[name].values, rest.channels[name].values
+        moved = np.abs(true - true[0]).max()
+        np.testing.assert_allclose(same[both], true[again], rtol=0.0, atol=1e-9 * moved)

@@ -343,7 +343,8 @@ class _Moving:
 
     def changing(self) -> dict[str, NDArray[np.generic]]:
         """All arrays that a step changes and the next one begins with."""
-        return {
+        lifts = {} if self.films is None else {"lifts": self.films.offset}
+        return lifts | {
             "forces": self.state.lam,
             "guide": self.state.guide_force,
             "films": self.state.films,

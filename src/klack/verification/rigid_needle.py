@@ -19,6 +19,7 @@ from klack.network.network import Network
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import State as NetworkState
 from klack.simulation.network_run import simulate_network
 from klack.transient.guide import Guide
 from klack.transient.interface_arrays import DEBT, Films, Outside, Record, State
@@ -163,6 +164,7 @@ def fly_in_network(
     speed: float = 0.0,
     wet: bool = False,
     start: Literal["rest", "free"] = "free",
+    state: NetworkState | None = None,
     duration: float,
 ) -> NetworkResult:
     """A needle over its stop in a network: in space, or along its axis without ``valve``.
@@ -199,5 +201,11 @@ def fly_in_network(
         fluid=library_fluid("n-heptane").at(293.15) if wet else None,
     )
     return simulate_network(
-        network.rows(), duration=duration, step=20e-9, record=1e-6, start=start, spatial=valve
+        network.rows(),
+        duration=duration,
+        step=20e-9,
+        record=1e-6,
+        start=start,
+        state=state,
+        spatial=valve,
     )
