@@ -50,7 +50,7 @@ PARTS = {
     "case and network": "klack.analyses.study.strokes._valve_at",
     "rows": "klack.network.network.Network.rows",
     "layout": "klack.simulation.network_run.compile_network",
-    "static start": "klack.simulation.network_run.start_at_rest",
+    "static start": "klack.simulation.network_run.begin_at_rest",
     "time loop": "klack.simulation.network_run.run_network",
     "impact finder": "klack.simulation.impact_events.ImpactFinder.feed",
     "times of the lift": "klack.analyses.stroke.run.all_lift_times",

@@ -64,7 +64,7 @@ from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si
 
-__all__ = ["RestState", "begin_at_rest", "start_at_rest"]
+__all__ = ["RestState", "begin_at_rest"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -120,18 +120,27 @@ class _RunawayError(Exception):
         super().__init__()
 
 
-def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
+def begin_at_rest(
+    network: CompiledNetwork,
+    step: float,
+    near: RestState | None = None,
+    shift: Vector | None = None,
+) -> tuple[StaticStart, RestState]:
     """Find the static equilibrium and put the network there, in place.
 
     Bodies with a speed at the start do not rest: they stay where they are.  So do those without an
-    equilibrium whose friction holds them there.  Volumes with a stated
-    pressure keep it; where nothing flows in or out, so do those without, at ambient pressure.
+    equilibrium whose friction holds them there.  Volumes with a stated pressure keep it; where
+    nothing flows in or out, so do those without, at ambient pressure.
 
     Parameters
     ----------
     network : CompiledNetwork
     step : float [s]
         Fine step of the run.
+    near : RestState, optional
+        Equilibrium of a network of the same parts that hardly differs; it has warned already.
+    shift : array, shape (ports,), optional [m]
+        By which the ports are elsewhere than bodies that move along the axis have them.
 
     Raises
     ------
@@ -144,26 +153,6 @@ def start_at_rest(network: CompiledNetwork, step: float) -> StaticStart:
     -----
     AccuracyWarning
         For a volume whose pressure has no steady state; it starts from ambient pressure.
-    """
-    return begin_at_rest(network, step)[0]
-
-
-def begin_at_rest(
-    network: CompiledNetwork,
-    step: float,
-    near: RestState | None = None,
-    shift: Vector | None = None,
-) -> tuple[StaticStart, RestState]:
-    """:func:`start_at_rest`, from the equilibrium of a network that hardly differs.
-
-    Parameters
-    ----------
-    network, step
-        As of :func:`start_at_rest`.
-    near : RestState, optional
-        Of a network of the same parts; it has warned already.
-    shift : array, shape (ports,), optional [m]
-        By which the ports are elsewhere than bodies that move along the axis have them.
     """
     held = set(near._held) if near is not None else set[int]()
     stuck = set(near._stuck) if near is not None else set[int]()
@@ -185,7 +174,7 @@ def begin_at_rest(
             else:
                 raise _unheld(network, away.bodies) from None
     for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=4)
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
     notes += problem.held_by_friction()
     found = RestState(state, frozenset(held), frozenset(stuck), enclosed)
     return problem.put(state, tuple(notes)), found
