@@ -5,6 +5,7 @@ from math import log, pi, sqrt
 import numpy as np
 import pytest
 from scipy.integrate import solve_bvp
+from scipy.optimize import nnls
 from scipy.sparse import coo_array
 from scipy.sparse.linalg import spsolve
 
@@ -12,7 +13,6 @@ from klack.errors import InputError
 from klack.hydraulics.film import DiscFilm, RingFilm
 from klack.hydraulics.tilted_film import (
     SectorFilm,
-    _obstacle,
     sector_film,
     sector_forces,
     sector_step,
@@ -281,19 +281,60 @@ def test_damping_is_symmetric_and_positive(inner, outer):
     assert least > -1e-13 * largest
 
 
-def test_obstacles_of_any_stiffness_are_solved():
-    """Truth: ``lift >= 0``, ``gap >= 0``, ``lift gap = 0``; also where active sets turn round."""
-    random = np.random.default_rng(0)
-    for _ in range(200):
-        A = random.normal(size=(8, 5))
-        W = A @ A.T + 1e-2 * np.eye(8)
-        room = random.normal(size=8)
-        lift, held = _obstacle(W, room)
-        gap = room + W @ lift
-        assert lift.min() >= 0.0
-        assert gap.min() >= -1e-9
-        np.testing.assert_allclose(lift * gap, 0.0, atol=1e-9 * max(1.0, lift.max()))
-        np.testing.assert_array_equal(held, lift > 0.0)
+@pytest.mark.parametrize(("inner", "outer"), SHAPES[:3], ids=NAMES[:3])
+def test_sectors_at_the_limit_of_tension_are_an_obstacle_problem(inner, outer):
+    """Truth: the same quadratic programme, dense, by non-negative least squares (SciPy).
+
+    ``K P = L V + mean lift`` with ``lift >= 0`` and a mean pressure of every sector above ``-T``,
+    one of both at its limit: heights and rates of any kind, and where they vary a thousandfold.
+    """
+    random = np.random.default_rng(3)
+    film = sector_film(inner, outer, sectors=9, circles=2)
+    reached = 0
+    for spread in np.repeat([0.1, 1.0, 3.5], 12):
+        heights = 2e-6 * np.exp(spread * random.normal(size=(9, 2)))
+        closing = 0.3 * random.normal(size=(9, 2))
+        tension = 2e4
+        K, drive, mean = dense(film, heights, closing)
+        U = np.linalg.inv(np.linalg.cholesky(K)) @ mean
+        W, room = U.T @ U, tension * film.area.sum() + mean.T @ np.linalg.solve(K, drive)
+        scale = np.sqrt(np.diag(W))
+        # min |U lift + c|^2 / 2 with U^T c = room, lift >= 0
+        c = np.linalg.lstsq(U.T / scale[:, None], room / scale, rcond=None)[0]
+        lift = nnls(U / scale, -c, maxiter=10_000)[0] / scale
+        pressures = np.linalg.solve(K, drive + mean @ lift)
+        exact = mean.T @ pressures
+        reached += bool(np.any(lift > 0.0))
+
+        forces = sector_forces(film, heights, closing, MU, tension=tension).sum(axis=1)
+
+        np.testing.assert_allclose(forces, exact, atol=1e-7 * np.abs(exact).max())
+    assert reached > 20
+
+
+def dense(film: SectorFilm, heights, closing):
+    """Stiffness of the amplitudes of all sectors, what drives them, and their mean pressures."""
+    sectors, functions, shared = film.sectors, film.load.shape[1], film.shared
+    own = functions - shared
+    place = np.empty((sectors, functions), dtype=int)
+    place[:, :shared] = sectors * own + np.arange(shared)
+    place[:, shared:] = np.arange(sectors * own).reshape(sectors, own)
+    size = sectors * own + shared
+    K, drive, mean = np.zeros((size, size)), np.zeros(size), np.zeros((size, sectors))
+    x = (heights @ film.between.T) ** 3 / (12.0 * MU)
+    loads = film.between.T @ film.load
+    for k in range(sectors):
+        here, after = place[k], place[(k + 1) % sectors]
+        K[np.ix_(here, here)] += np.einsum("p,pab->ab", x[k], film.along)
+        m = x[(k + 1) % sectors]
+        flow = np.einsum("p,pab->ab", 2.0 * x[k] * m / (x[k] + m), film.around)
+        for rows, columns, sign in ((here, here, 1), (after, after, 1), (here, after, -1)):
+            K[np.ix_(rows[shared:], columns[shared:])] += sign * flow[shared:, shared:]
+            if sign < 0:
+                K[np.ix_(columns[shared:], rows[shared:])] += sign * flow[shared:, shared:]
+        drive[here] += loads.T @ closing[k]
+        mean[here, k] += loads.sum(axis=0)
+    return K, drive, mean
 
 
 def test_all_sectors_cavitate_as_the_present_film_does():

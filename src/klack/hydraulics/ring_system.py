@@ -5,6 +5,14 @@ r"""Symmetric positive definite systems of cells in a ring, each coupled to its 
 K has a block for every cell and one for each pair of neighbours, the last and the first among them;
 a few unknowns C are shared by all.  The last cell and the shared unknowns are taken as a border of
 the open chain of the others, so that the effort grows with the number of cells.
+
+Some cells may be **held**: their unknowns move only across a given direction ``n``.  Their block is
+then inverted in that plane,
+
+.. math:: X - \frac{X n\, n^T X}{n^T X n}, \qquad X = L^{-1},
+
+which leaves the rest of the elimination as it is: what is left of the block of the next cell stays
+positive definite.
 """
 
 import numpy as np
@@ -16,9 +24,10 @@ __all__ = ["eliminate_ring", "solve_ring"]
 
 Cube = NDArray[np.float64]
 Matrix = NDArray[np.float64]
+Vector = NDArray[np.float64]
 
 
-@njit
+@njit(error_model="numpy")
 def _inverse(A: Matrix, X: Matrix) -> None:
     """Inverse of a small positive definite matrix, which is destroyed."""
     n = A.shape[0]
@@ -38,11 +47,33 @@ def _inverse(A: Matrix, X: Matrix) -> None:
                     X[k, j] -= factor * X[i, j]
 
 
-@njit
+@njit(error_model="numpy")
+def _keep_across(X: Matrix, normal: Vector) -> None:
+    """Leave of a symmetric inverse what moves its first unknowns across ``normal`` only."""
+    n, along = X.shape[0], np.zeros(X.shape[0])
+    square = 0.0
+    for i in range(n):
+        for j in range(len(normal)):
+            along[i] += X[i, j] * normal[j]
+    for j in range(len(normal)):
+        square += normal[j] * along[j]
+    for i in range(n):
+        for j in range(n):
+            X[i, j] -= along[i] * along[j] / square
+
+
+@njit(error_model="numpy")
 def eliminate_ring(
-    blocks: Cube, links: Cube, shared: Cube, corner: Matrix
+    blocks: Cube,
+    links: Cube,
+    shared: Cube,
+    corner: Matrix,
+    held: NDArray[np.bool_],
+    normal: Vector,
+    x: Cube,
+    y: Matrix,
 ) -> tuple[Cube, Cube, Cube, Cube, Matrix]:
-    """Eliminate the chain of all cells but the last one.
+    """Eliminate the chain of all cells but the last one, and solve for a first right-hand side.
 
     Parameters
     ----------
@@ -53,94 +84,118 @@ def eliminate_ring(
     shared : array (S, o, s)
         Of a cell with what all share.
     corner : array (s, s)
+    held : bool array (S,)
+        Cells whose unknowns move only across ``normal``.
+    normal : array (o,)
+    x, y : array (S, o, 1), (s, 1)
+        In place, as of :func:`solve_ring`.
 
     Returns
     -------
     inverses, passed : array (S - 1, o, o)
         Of the blocks left of each cell, and the same times the links.
-    border, reduced : array (S - 1, o, o + s)
-        Coupling of the chain with the border, and the solution of the chain for it.
+    shared : array (S, o, s)
+    reduced : array (S - 1, o, o + s)
+        Solution of the chain for its coupling with the border.
     closing : array (o + s, o + s)
         Inverse of what is left of the border.
     """
     S, o = blocks.shape[0], blocks.shape[1]
     s = corner.shape[0]
     m, b = S - 1, o + s
-    inverses, passed = np.empty((m, o, o)), np.zeros((m, o, o))
-    border, left = np.zeros((m, o, b)), np.empty((o, o))
+    inverses, passed = np.empty((m, o, o)), np.empty((m, o, o))
+    reduced, left = np.zeros((m, o, b + 1)), np.empty((o, o))
     for k in range(m):
         for i in range(o):
             for j in range(s):
-                border[k, i, o + j] = shared[k, i, j]
+                reduced[k, i, o + j] = shared[k, i, j]
+            reduced[k, i, b] = x[k, i, 0]
     for i in range(o):
         for j in range(o):
-            border[0, i, j] += links[m, j, i]
-            border[m - 1, i, j] += links[m - 1, i, j]
+            reduced[0, i, j] += links[m, j, i]
+            reduced[m - 1, i, j] += links[m - 1, i, j]
     for k in range(m):
         for i in range(o):
             for j in range(o):
-                value = blocks[k, i, j]
-                if k > 0:
-                    for c in range(o):
-                        value -= links[k - 1, c, i] * passed[k - 1, c, j]
-                left[i, j] = value
+                left[i, j] = blocks[k, i, j]
+        if k > 0:
+            for c in range(o):
+                for i in range(o):
+                    factor = links[k - 1, c, i]
+                    for j in range(o):
+                        left[i, j] -= factor * passed[k - 1, c, j]
         _inverse(left, inverses[k])
-        if k < m - 1:
-            for i in range(o):
+        if held[k]:
+            _keep_across(inverses[k], normal)
+        for i in range(o):
+            for j in range(o):
+                passed[k, i, j] = 0.0
+            for c in range(o):
+                factor = inverses[k, i, c]
                 for j in range(o):
-                    for c in range(o):
-                        passed[k, i, j] += inverses[k, i, c] * links[k, c, j]
-    reduced = border.copy()
-    _chain(inverses, passed, links, reduced)
-    rest, closing = np.zeros((b, b)), np.empty((b, b))
+                    passed[k, i, j] += factor * links[k, c, j]
+    _chain(inverses, passed, reduced)
+    rest, closing = np.empty((b, b)), np.empty((b, b))
     for i in range(o):
         for j in range(o):
-            rest[i, j] = blocks[m, i, j]
-        for j in range(s):
-            rest[i, o + j] = shared[m, i, j]
-            rest[o + j, i] = shared[m, i, j]
+            value = blocks[m, i, j]
+            for c in range(o):
+                value -= links[m, i, c] * reduced[0, c, j]
+                value -= links[m - 1, c, i] * reduced[m - 1, c, j]
+            rest[i, j] = value
     for i in range(s):
         for j in range(s):
             rest[o + i, o + j] = corner[i, j]
-    for k in range(m):
-        for c in range(o):
-            for i in range(b):
-                for j in range(b):
-                    rest[i, j] -= border[k, c, i] * reduced[k, c, j]
+            for k in range(m):
+                for c in range(o):
+                    rest[o + i, o + j] -= shared[k, c, i] * reduced[k, c, o + j]
+        for j in range(o):
+            value = shared[m, j, i]
+            for k in range(m):
+                for c in range(o):
+                    value -= shared[k, c, i] * reduced[k, c, j]
+            rest[j, o + i] = rest[o + i, j] = value
     _inverse(rest, closing)
-    return inverses, passed, border, reduced, closing
+    if held[m]:
+        _keep_across(closing, normal)
+    for k in range(m):
+        for i in range(o):
+            x[k, i, 0] = reduced[k, i, b]
+    ring = inverses, passed, shared, reduced, closing
+    _close(ring, links, x, y)
+    return ring
 
 
-@njit
-def _chain(inverses: Cube, passed: Cube, links: Cube, x: Cube) -> None:
+@njit(error_model="numpy")
+def _chain(inverses: Cube, passed: Cube, x: Cube) -> None:
     """Solve for the open chain, in place; ``x`` has a column for each right-hand side."""
     m, o = inverses.shape[0], inverses.shape[1]
     columns = x.shape[2]
-    hold = np.empty(o)
+    hold = np.empty((o, columns))
     for k in range(1, m):
-        for j in range(columns):
+        for c in range(o):
             for i in range(o):
-                value = x[k, i, j]
-                for c in range(o):
-                    value -= passed[k - 1, c, i] * x[k - 1, c, j]
-                hold[i] = value
-            for i in range(o):
-                x[k, i, j] = hold[i]
+                factor = passed[k - 1, c, i]
+                for j in range(columns):
+                    x[k, i, j] -= factor * x[k - 1, c, j]
     for k in range(m - 1, -1, -1):
-        for j in range(columns):
-            for i in range(o):
-                value = 0.0
+        for i in range(o):
+            for j in range(columns):
+                hold[i, j] = x[k, i, j]
+                x[k, i, j] = 0.0
+        for i in range(o):
+            for c in range(o):
+                factor = inverses[k, i, c]
+                for j in range(columns):
+                    x[k, i, j] += factor * hold[c, j]
+            if k < m - 1:
                 for c in range(o):
-                    value += inverses[k, i, c] * x[k, c, j]
-                if k < m - 1:
-                    for c in range(o):
-                        value -= passed[k, i, c] * x[k + 1, c, j]
-                hold[i] = value
-            for i in range(o):
-                x[k, i, j] = hold[i]
+                    factor = passed[k, i, c]
+                    for j in range(columns):
+                        x[k, i, j] -= factor * x[k + 1, c, j]
 
 
-@njit
+@njit(error_model="numpy")
 def solve_ring(
     ring: tuple[Cube, Cube, Cube, Cube, Matrix], links: Cube, x: Cube, y: Matrix
 ) -> None:
@@ -156,28 +211,39 @@ def solve_ring(
     y : array (s, n)
         Of what all share.
     """
-    inverses, passed, border, reduced, closing = ring
-    m, o = inverses.shape[0], inverses.shape[1]
-    columns, b = x.shape[2], closing.shape[0]
-    _chain(inverses, passed, links, x[:m])
-    left, found = np.empty(b), np.empty(b)
+    _chain(ring[0], ring[1], x[: len(ring[0])])
+    _close(ring, links, x, y)
+
+
+@njit(error_model="numpy")
+def _close(ring: tuple[Cube, Cube, Cube, Cube, Matrix], links: Cube, x: Cube, y: Matrix) -> None:
+    """Close the ring of the solution of the open chain."""
+    inverses, _, shared, reduced, closing = ring
+    m, o, s = inverses.shape[0], inverses.shape[1], shared.shape[2]
+    columns, b = x.shape[2], o + s
+    left, found = np.empty((b, columns)), np.zeros((b, columns))
     for j in range(columns):
-        for i in range(b):
-            left[i] = x[m, i, j] if i < o else y[i - o, j]
+        for i in range(o):
+            left[i, j] = x[m, i, j]
+            for c in range(o):
+                left[i, j] -= links[m, i, c] * x[0, c, j] + links[m - 1, c, i] * x[m - 1, c, j]
+        for i in range(s):
+            left[o + i, j] = y[i, j]
+            for k in range(m):
+                for c in range(o):
+                    left[o + i, j] -= shared[k, c, i] * x[k, c, j]
+    for i in range(b):
+        for c in range(b):
+            for j in range(columns):
+                found[i, j] += closing[i, c] * left[c, j]
+    for j in range(columns):
         for k in range(m):
             for c in range(o):
+                value = x[k, c, j]
                 for i in range(b):
-                    left[i] -= border[k, c, i] * x[k, c, j]
-        for i in range(b):
-            found[i] = 0.0
-            for c in range(b):
-                found[i] += closing[i, c] * left[c]
-        for k in range(m):
-            for c in range(o):
-                for i in range(b):
-                    x[k, c, j] -= reduced[k, c, i] * found[i]
-        for i in range(b):
-            if i < o:
-                x[m, i, j] = found[i]
-            else:
-                y[i - o, j] = found[i]
+                    value -= reduced[k, c, i] * found[i, j]
+                x[k, c, j] = value
+        for i in range(o):
+            x[m, i, j] = found[i, j]
+        for i in range(s):
+            y[i, j] = found[o + i, j]

@@ -27,8 +27,10 @@ from klack.hydraulics.ring_system import eliminate_ring, solve_ring
 
 __all__ = [
     "Land",
+    "Pressed",
     "SectorFilm",
     "film_pressure",
+    "film_slopes",
     "land_of",
     "sector_film",
     "sector_forces",
@@ -37,9 +39,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-_POINTS, _FEWER = 12, 8  # Gauss points between two circles
+_POINTS, _FEWER = 12, 8  # Gauss points between two circles: faces that touch have kinks there
 _FEWEST_SECTORS = 4
-_ACTIVE_SETS = 60  # before relaxation takes over
+_ACTIVE_SETS = 60  # before sectors change one at a time
+_TINY = 1e-12  # of the largest tension: round-off
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -295,10 +298,10 @@ def _solved(
 ) -> tuple[Array, Array]:
     heights = film.sectors * film.circles
     ways = np.eye(heights) if rate else np.zeros((heights, 0))
-    force, slopes = film_pressure(
-        land_of(film), mobility, np.ascontiguousarray(closing, dtype=float), change, *edges,
-        tension, rate, ways,
-    )  # fmt: skip
+    land, head, still = land_of(film), *edges
+    closing = np.ascontiguousarray(closing, dtype=float)
+    force, pressed = film_pressure(land, mobility, closing, head, still, tension)
+    slopes = film_slopes(land, pressed, mobility, change, head, rate, ways)
     return np.asarray(force), np.asarray(slopes)
 
 
@@ -326,254 +329,340 @@ class Land(NamedTuple):
 
 def land_of(film: SectorFilm) -> Land:
     """Return the arrays of a film."""
-    return Land(film.between, film.along, film.around, film.load, film.area, film.shared)
+    along, around = np.ascontiguousarray(film.along), np.ascontiguousarray(film.around)
+    return Land(film.between, along, around, film.load, film.area, film.shared)
 
 
-@njit
+class Pressed(NamedTuple):
+    """Pressure over a land: what its change with the heights is made of.
+
+    ``amplitudes`` (S, Q) [Pa]; ``ring`` and ``links`` of
+    :func:`~klack.hydraulics.ring_system.eliminate_ring`; ``held``: sectors at the limit of tension;
+    ``raised`` (S, own): amplitudes that make a unit of force on them.
+    """
+
+    amplitudes: Array
+    ring: tuple[Array, Array, Array, Array, Array]
+    links: Array
+    held: NDArray[np.bool_]
+    raised: Array
+
+
+@njit(error_model="numpy")
 def film_pressure(
     land: Land,
     mobility: Array,
     closing: Array,
-    change: Array,
     head: Array,
     still: Array,
     tension: float,
-    rate: float,
-    ways: Array,
-) -> tuple[Array, Array]:
-    """Forces on the circles, and how they change along some ways of the heights.
+) -> tuple[Array, Pressed]:
+    """Forces on the circles, shape (S, N) [N], and the pressure that makes them.
 
     Parameters
     ----------
     land : Land
-    mobility, change : array (S, G) [m^3/(Pa s)]
-        ``h^3/12 mu`` at the points of all sectors, and its slope with the height there.
+    mobility : array (S, G) [m^3/(Pa s)]
+        ``h^3/12 mu`` at the points of all sectors.
     closing : array (S, N) [m/s]
     head, still : array (G, Q) [Pa m^2], (N,) [N]
         Of the pressures at the edges.
     tension : float [Pa]
-    rate : float [1/s]
-        How the closing falls with the heights: 1 over a step.
-    ways : array (S N, w)
-
-    Returns
-    -------
-    forces : array (S, N) [N]
-    slopes : array (S N, w)
     """
-    between, along, around, load, area, shared = land
-    S, G = mobility.shape
-    N, Q = between.shape[1], load.shape[1]
+    shared = land.shared
+    S, N = closing.shape
+    Q = land.load.shape[1]
     own = Q - shared
-    L = np.zeros((N, Q))
-    for p in range(G):
-        for j in range(N):
-            for a in range(Q):
-                L[j, a] += between[p, j] * load[p, a]
-    blocks, links = np.zeros((S, own, own)), np.zeros((S, own, own))
-    border, corner = np.zeros((S, own, shared)), np.zeros((shared, shared))
+    L = _loads(land)
+    blocks, links, border, corner = _stiffness(land, mobility)
     x, y = np.zeros((S, own, 1)), np.zeros((shared, 1))
     for k in range(S):
-        after = (k + 1) % S
-        for p in range(G):
-            m, m_after = mobility[k, p], mobility[after, p]
-            across = 2.0 * m * m_after / (m + m_after)  # half a sector of each, in series
-            for a in range(Q):
-                for b in range(Q):
-                    value = m * along[p, a, b]
-                    if a >= shared and b >= shared:
-                        flow = across * around[p, a, b]
-                        blocks[k, a - shared, b - shared] += value + flow
-                        blocks[after, a - shared, b - shared] += flow
-                        links[k, a - shared, b - shared] -= flow
-                    elif a >= shared:
-                        border[k, a - shared, b] += value
-                    elif b < shared:
-                        corner[a, b] += value
-                drive = -m * head[p, a]
-                if a >= shared:
-                    x[k, a - shared, 0] += drive
-                else:
-                    y[a, 0] += drive
         for a in range(Q):
             drive = 0.0
             for j in range(N):
                 drive += L[j, a] * closing[k, j]
+            for p in range(mobility.shape[1]):
+                drive -= mobility[k, p] * head[p, a]
             if a >= shared:
-                x[k, a - shared, 0] += drive
+                x[k, a - shared, 0] = drive
             else:
                 y[a, 0] += drive
-    ring = eliminate_ring(blocks, links, border, corner)
-    solve_ring(ring, links, x, y)
-    held = np.zeros(S, dtype=np.bool_)
-    mean = np.zeros(Q)  # of the amplitudes in the force on a sector
+    mean, base = np.zeros(Q), tension * np.sum(land.area) + np.sum(still)
     for j in range(N):
         for a in range(Q):
             mean[a] += L[j, a]
-    if tension < np.inf:
-        room = np.empty(S)
-        base = tension * np.sum(area) + np.sum(still)
+    normal, common = mean[shared:], mean[:shared]
+    held, raised = np.zeros(S, dtype=np.bool_), np.zeros((S, own))
+    X, Y = x.copy(), y.copy()
+    ring = eliminate_ring(blocks, links, border, corner, held, normal, X, Y)
+    tries = 0
+    while tension < np.inf and tries < _ACTIVE_SETS + S * S:
+        one = tries >= _ACTIVE_SETS  # by one at a time, the first one: it never turns in a circle
+        if not _regroup(blocks, links, border, x, X, Y, mean, base, held, one):
+            break
+        tries += 1
+        square = normal @ normal
         for k in range(S):
-            room[k] = base
-            for a in range(Q):
-                room[k] += mean[a] * (x[k, a - shared, 0] if a >= shared else y[a, 0])
-        if np.min(room) < 0.0:
-            every = np.arange(S)
-            X, Y = _lifted(ring, links, mean, shared, every)
-            W = np.zeros((S, S))
-            for k in range(S):
-                for i in range(S):
-                    for a in range(Q):
-                        W[k, i] += mean[a] * (X[k, a - shared, i] if a >= shared else Y[a, i])
-            lift, held = _obstacle(W, room)
-            for i in range(S):
-                if lift[i] != 0.0:
-                    for k in range(S):
-                        for a in range(own):
-                            x[k, a, 0] += X[k, a, i] * lift[i]
-                    for a in range(shared):
-                        y[a, 0] += Y[a, i] * lift[i]
-    P = np.empty((S, Q))
-    force = np.empty((S, N))
+            for a in range(own):
+                raised[k, a] = normal[a] / square if held[k] else 0.0
+        X[:] = x
+        Y[:] = y
+        ring = _hold(blocks, links, border, corner, held, normal, common, raised, base, X, Y)
+    P, force = np.empty((S, Q)), np.empty((S, N))
     for k in range(S):
         for a in range(Q):
-            P[k, a] = x[k, a - shared, 0] if a >= shared else y[a, 0]
+            P[k, a] = X[k, a - shared, 0] if a >= shared else Y[a, 0]
         for j in range(N):
             force[k, j] = still[j]
             for a in range(Q):
                 force[k, j] += L[j, a] * P[k, a]
-    count = ways.shape[1]
-    slopes = np.zeros((S * N, count))
-    if count == 0:
-        return force, slopes
+    return force, Pressed(P, ring, links, held, raised)
+
+
+@njit(error_model="numpy")
+def film_slopes(
+    land: Land,
+    pressed: Pressed,
+    mobility: Array,
+    change: Array,
+    head: Array,
+    rate: float,
+    ways: Array,
+) -> Array:
+    """How the forces change along some ways of the heights, shape (S N, w) [N per unit].
+
+    Parameters
+    ----------
+    land, mobility, head
+        As of :func:`film_pressure`.
+    pressed : Pressed
+        Its pressure.
+    change : array (S, G) [m^2/(Pa s)]
+        Slope of the mobility with the height.
+    rate : float [1/s]
+        How the closing falls with the heights: 1 over a step.
+    ways : array (S N, w)
+    """
+    between, along, around, shared = land.between, land.along, land.around, land.shared
+    S, G = mobility.shape
+    N, Q, count = between.shape[1], land.load.shape[1], ways.shape[1]
+    own, P, L = Q - shared, pressed.amplitudes, _loads(land)
     X, Y = np.zeros((S, own, count)), np.zeros((shared, count))
-    moved = np.empty(count)
+    moved, drive, gone = np.zeros((S, G, count)), np.empty((Q, count)), np.empty((own, count))
     for k in range(S):
-        for d in range(count):
-            for a in range(Q):
-                drive = 0.0
-                for j in range(N):
-                    drive -= rate * L[j, a] * ways[k * N + j, d]
-                if a >= shared:
-                    X[k, a - shared, d] += drive
-                else:
-                    Y[a, d] += drive
         for p in range(G):
-            m = mobility[k, p]
-            for d in range(count):
-                moved[d] = 0.0
-                for j in range(N):
-                    moved[d] += change[k, p] * between[p, j] * ways[k * N + j, d]
-            for a in range(Q):
-                drive = head[p, a]
+            for j in range(N):
+                part = change[k, p] * between[p, j]
+                for d in range(count):
+                    moved[k, p, d] += part * ways[k * N + j, d]
+    for k in range(S):
+        drive[:] = 0.0
+        for a in range(Q):
+            for j in range(N):
+                for d in range(count):
+                    drive[a, d] -= rate * L[j, a] * ways[k * N + j, d]
+            for p in range(G):
+                load = head[p, a]
                 for b in range(Q):
-                    drive += along[p, a, b] * P[k, b]
+                    load += along[p, a, b] * P[k, b]
                 for d in range(count):
-                    if a >= shared:
-                        X[k, a - shared, d] -= moved[d] * drive
-                    else:
-                        Y[a, d] -= moved[d] * drive
-            for side in range(2):
-                other = (k - 1) % S if side == 0 else (k + 1) % S
-                o = mobility[other, p]
-                share = 2.0 * (o / (m + o)) ** 2
-                for a in range(shared, Q):
-                    drive = 0.0
-                    for b in range(shared, Q):
-                        drive += around[p, a, b] * (P[k, b] - P[other, b])
-                    for d in range(count):
-                        X[k, a - shared, d] -= share * moved[d] * drive
-                        X[other, a - shared, d] += share * moved[d] * drive
-    solve_ring(ring, links, X, Y)
-    kept = np.flatnonzero(held)
-    if kept.size > 0:
-        raised, raised_shared = _lifted(ring, links, mean, shared, kept)
-        n = kept.size
-        A, right = np.zeros((n, n)), np.zeros((n, count))
-        for row in range(n):
-            k = kept[row]
-            for a in range(Q):
-                for column in range(n):
-                    A[row, column] += mean[a] * (
-                        raised[k, a - shared, column] if a >= shared else raised_shared[a, column]
-                    )
+                    drive[a, d] -= load * moved[k, p, d]
+        after = k + 1 if k < S - 1 else 0
+        gone[:] = 0.0
+        for p in range(G):
+            m, o = mobility[k, p], mobility[after, p]
+            here, there = 2.0 * (o / (m + o)) ** 2, 2.0 * (m / (m + o)) ** 2
+            for a in range(own):
+                load = 0.0
+                for b in range(shared, Q):
+                    load += around[p, a + shared, b] * (P[k, b] - P[after, b])
                 for d in range(count):
-                    right[row, d] += mean[a] * (X[k, a - shared, d] if a >= shared else Y[a, d])
-        taken = np.linalg.solve(A, right)
-        for row in range(n):
-            for d in range(count):
-                for k in range(S):
-                    for a in range(own):
-                        X[k, a, d] -= raised[k, a, row] * taken[row, d]
-                for a in range(shared):
-                    Y[a, d] -= raised_shared[a, row] * taken[row, d]
+                    gone[a, d] += load * (here * moved[k, p, d] + there * moved[after, p, d])
+        for d in range(count):
+            for a in range(shared):
+                Y[a, d] += drive[a, d]
+            for a in range(own):
+                X[k, a, d] += drive[a + shared, d] - gone[a, d]
+                X[after, a, d] += gone[a, d]
+    if shared and np.any(pressed.held):
+        common = np.zeros(shared)
+        for a in range(shared):
+            for j in range(N):
+                common[a] += L[j, a]
+        for d in range(count):
+            along_raised = 0.0
+            for k in range(S):
+                for a in range(own):
+                    along_raised += pressed.raised[k, a] * X[k, a, d]
+            for a in range(shared):
+                Y[a, d] -= common[a] * along_raised
+        solve_ring(pressed.ring, pressed.links, X, Y)
+        for d in range(count):
+            part = 0.0
+            for a in range(shared):
+                part += common[a] * Y[a, d]
+            for k in range(S):
+                for a in range(own):
+                    X[k, a, d] -= pressed.raised[k, a] * part
+    else:
+        solve_ring(pressed.ring, pressed.links, X, Y)
+    slopes = np.zeros((S * N, count))
     for k in range(S):
         for j in range(N):
-            for d in range(count):
-                for a in range(Q):
+            for a in range(Q):
+                for d in range(count):
                     slopes[k * N + j, d] += L[j, a] * (
                         X[k, a - shared, d] if a >= shared else Y[a, d]
                     )
-    return force, slopes
+    return slopes
 
 
-@njit
-def _lifted(
-    ring: tuple[Array, Array, Array, Array, Array],
-    links: Array,
-    mean: Array,
-    shared: int,
-    sectors: NDArray[np.int64],
-) -> tuple[Array, Array]:
-    """Amplitudes by a unit of lift in each of these sectors."""
-    S, own = links.shape[0], links.shape[1]
-    X, Y = np.zeros((S, own, sectors.size)), np.zeros((shared, sectors.size))
-    for column in range(sectors.size):
+@njit(error_model="numpy")
+def _loads(land: Land) -> Array:
+    """Forces on the circles per unit of each function of the radius, shape (N, Q) [m^2]."""
+    G, N = land.between.shape
+    L = np.zeros((N, land.load.shape[1]))
+    for p in range(G):
+        for j in range(N):
+            for a in range(L.shape[1]):
+                L[j, a] += land.between[p, j] * land.load[p, a]
+    return L
+
+
+@njit(error_model="numpy")
+def _stiffness(land: Land, mobility: Array) -> tuple[Array, Array, Array, Array]:
+    """Blocks and links of the ring, its coupling with what all share, and that itself."""
+    along, around, shared = land.along, land.around, land.shared
+    S, G = mobility.shape
+    Q = land.load.shape[1]
+    own = Q - shared
+    square, flow = np.zeros((S, Q * Q)), np.zeros((S, Q * Q))
+    stiff, weak = along.reshape((G, Q * Q)), around.reshape((G, Q * Q))
+    for k in range(S):
+        after = k + 1 if k < S - 1 else 0
+        for p in range(G):
+            m, m_after = mobility[k, p], mobility[after, p]
+            across = 2.0 * m * m_after / (m + m_after)  # half a sector of each, in series
+            for c in range(Q * Q):
+                square[k, c] += m * stiff[p, c]
+                flow[k, c] += across * weak[p, c]
+    blocks, links = np.empty((S, own, own)), np.empty((S, own, own))
+    border, corner = np.empty((S, own, shared)), np.zeros((shared, shared))
+    for k in range(S):
         for a in range(own):
-            X[sectors[column], a, column] = mean[a + shared]
+            row = (a + shared) * Q + shared
+            for b in range(own):
+                links[k, a, b] = -flow[k, row + b]
+                blocks[k, a, b] = square[k, row + b] + flow[k, row + b] + flow[k - 1, row + b]
+            for b in range(shared):
+                border[k, a, b] = square[k, (a + shared) * Q + b]
         for a in range(shared):
-            Y[a, column] = mean[a]
-    solve_ring(ring, links, X, Y)
-    return X, Y
+            for b in range(shared):
+                corner[a, b] += square[k, a * Q + b]
+    return blocks, links, border, corner
 
 
-@njit
-def _obstacle(W: Array, room: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """``lift >= 0`` with ``room + W lift >= 0``, one of them zero for each sector.
+@njit(error_model="numpy")
+def _regroup(
+    blocks: Array,
+    links: Array,
+    border: Array,
+    drive: Array,
+    x: Array,
+    y: Array,
+    mean: Array,
+    base: float,
+    held: NDArray[np.bool_],
+    one: bool,
+) -> bool:
+    """Hold sectors whose tension is beyond its limit, release those that are pulled at.
 
-    Primal-dual active set; where it turns in a circle, projected relaxation to round-off.
+    ``base + mean P >= 0`` with ``K P = drive + mean lift``, ``lift >= 0``, one of them zero: a
+    primal-dual active set (Hintermueller, Ito and Kunisch 2003), or with ``one`` the least-index
+    rule (Murty 1974), which ends for every positive definite K.  Returns whether any changed.
     """
-    S = room.size
-    held = room < 0.0
-    lift = np.zeros(S)
-    tiny = 1e-13 * np.max(np.abs(room))
-    for _ in range(_ACTIVE_SETS):
-        kept = np.flatnonzero(held)
-        A, b = np.empty((kept.size, kept.size)), np.empty(kept.size)
-        for row in range(kept.size):
-            b[row] = -room[kept[row]]
-            for column in range(kept.size):
-                A[row, column] = W[kept[row], kept[column]]
-        found = np.linalg.solve(A, b)
-        lift[:] = 0.0
-        for row in range(kept.size):
-            lift[kept[row]] = found[row]
-        left = room + W @ lift
-        same = True
+    S, own = drive.shape[0], drive.shape[1]
+    shared, changed = len(mean) - own, False
+    common = base
+    for a in range(shared):
+        common += mean[a] * y[a, 0]
+    largest = abs(base)
+    for k in range(S):
+        if held[k]:
+            before, after, lift = (k - 1) % S, (k + 1) % S, 0.0
+            for a in range(own):
+                force = -drive[k, a, 0]
+                for b in range(own):
+                    force += blocks[k, a, b] * x[k, b, 0] + links[k, a, b] * x[after, b, 0]
+                    force += links[before, b, a] * x[before, b, 0]
+                for b in range(shared):
+                    force += border[k, a, b] * y[b, 0]
+                lift += mean[a + shared] * force
+            other = lift < 0.0
+        else:
+            room = common
+            for a in range(own):
+                room += mean[a + shared] * x[k, a, 0]
+            largest = max(largest, abs(room))
+            other = room < -_TINY * largest
+        if other:
+            held[k] = not held[k]
+            if one:
+                return True
+            changed = True
+    return changed
+
+
+@njit(error_model="numpy")
+def _hold(
+    blocks: Array,
+    links: Array,
+    border: Array,
+    corner: Array,
+    held: NDArray[np.bool_],
+    normal: Array,
+    common: Array,
+    raised: Array,
+    base: float,
+    x: Array,
+    y: Array,
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Solve with held sectors at the limit, in place; returns the eliminated ring.
+
+    The amplitudes are ``w - raised (base + common y)``, where w of a held sector does not change
+    its mean pressure.
+    """
+    S, own, shared = raised.shape[0], raised.shape[1], len(common)
+    pulled, square, load = np.zeros((S, own)), 0.0, 0.0
+    for k in range(S):
+        before, after = (k - 1) % S, (k + 1) % S
+        for a in range(own):
+            for b in range(own):
+                pulled[k, a] += blocks[k, a, b] * raised[k, b] + links[k, a, b] * raised[after, b]
+                pulled[k, a] += links[before, b, a] * raised[before, b]
+            square += raised[k, a] * pulled[k, a]
+            load += raised[k, a] * x[k, a, 0]
+    side, middle = border, corner
+    if shared:
+        side, middle, cross = border.copy(), corner.copy(), np.zeros(shared)
         for k in range(S):
-            now = lift[k] > 0.0 if held[k] else left[k] < -tiny
-            if now != held[k]:
-                held[k] = now
-                same = False
-        if same:
-            return lift, held
-    lift[:] = np.maximum(lift, 0.0)
-    for _ in range(100_000):
-        moved = 0.0
-        for k in range(S):
-            new = max(0.0, lift[k] - (room[k] + W[k] @ lift) / W[k, k])
-            moved = max(moved, abs(new - lift[k]) * W[k, k])
-            lift[k] = new
-        if moved <= tiny:
-            break
-    return lift, lift > 0.0
+            for a in range(own):
+                for b in range(shared):
+                    cross[b] += raised[k, a] * border[k, a, b]
+                    side[k, a, b] -= pulled[k, a] * common[b]
+        for a in range(shared):
+            for b in range(shared):
+                middle[a, b] += square * common[a] * common[b]
+                middle[a, b] -= cross[a] * common[b] + common[a] * cross[b]
+            y[a, 0] += base * cross[a] - (square * base + load) * common[a]
+    for k in range(S):
+        for a in range(own):
+            x[k, a, 0] += base * pulled[k, a]
+    ring = eliminate_ring(blocks, links, side, middle, held, normal, x, y)
+    part = base
+    for a in range(shared):
+        part += common[a] * y[a, 0]
+    for k in range(S):
+        for a in range(own):
+            x[k, a, 0] -= raised[k, a] * part
+    return ring

@@ -66,7 +66,8 @@ def squeeze_guide(
 ) -> float:
     """Change of the modal force of the films at all heights over the step that leads to ``q``.
 
-    Returns by how much the shaft moves by that [m]; below zero if no forces are found.
+    Returns by how much the shaft moves by that, over its way in this step; below zero if no forces
+    are found.
 
     Newton's method on the places at the end of the step, halved where it goes too far.
     """
@@ -107,7 +108,8 @@ def squeeze_guide(
         state.bearing[k, 0], state.bearing[k, 1] = force[2 * k], force[2 * k + 1]
     force -= old
     kick[:] = rows.T @ force
-    return float(np.max(np.abs(soft @ force)))
+    way = np.max(np.abs(u - before.reshape(n))) + _FOUND * least
+    return float(np.max(np.abs(soft @ force)) / way)
 
 
 @njit

@@ -314,7 +314,9 @@ class State(NamedTuple):
     pressed: Pressed
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
-    films: Matrix  # (f, 7) force and moments of the last step, of the one before, energy lost
+    films: (
+        Matrix  # (f, 21) force and moments of the last step, see ``klack.transient.tilting_films``
+    )
     bearing: Matrix  # (g, 3) [N] force of the film in the guide in the last step, energy lost [J]
     books: Vector  # sums, see ``DAMPING`` and the following names
 
@@ -341,7 +343,7 @@ class State(NamedTuple):
             Pressed.none(points if rough else 0),
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
-            np.zeros((films, 7)),
+            np.zeros((films, 21)),
             np.zeros((heights, 3)),
             np.zeros(_BOOKS),
         )

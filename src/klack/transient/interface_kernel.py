@@ -106,9 +106,9 @@ All steps done; open for long enough; no active set found; a contact would begin
 other way (the other stop), and that step is not taken.
 """
 
-_SWEEPS, _SETTLED = 20, 1e-6
-"""Rounds over all films of a step, which move each other, and the change of their heights, over the
-least ones, that ends them."""
+_SWEEPS, _SETTLED = 20, 1e-4
+"""Rounds over all films of a step, which move each other, and the change of their heights that ends
+them, over their way in the step."""
 
 _PAY_FROM = 1e-10
 """Smallest work of a step over the energy of the contact that pays debts.
@@ -714,26 +714,26 @@ def march(
         if rubs_guide:
             axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
         if films is not None:
-            begin_films(state)
+            begin_films(state, modes.step)
             _push_by_films(films, bore, state, step)
             _add(step, modes, 1.0)
-            for sweep in range(_SWEEPS):
+            for _ in range(_SWEEPS):
                 moved = 0.0
                 for k in range(len(films.lowest)):
                     change = squeeze(films, k, modes, state, step.q, step.kick)
                     if change < 0.0:
                         return taken, FAILED
                     _add(step, modes, 1.0)
-                    moved = max(moved, change / films.lowest[k])
+                    moved = max(moved, change)
                 if len(films.room):
                     change = squeeze_guide(films, modes, bore, state, step.q, step.kick)
                     if change < 0.0:
                         return taken, FAILED
                     _add(step, modes, 1.0)
-                    moved = max(moved, change / np.min(films.room))
+                    moved = max(moved, change)
                 if len(films.lowest) + (len(films.room) > 0) == 1:
                     break
-                if sweep > 0 and moved <= _SETTLED:
+                if moved <= _SETTLED:
                     break
             for k in range(len(films.lowest)):
                 bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
@@ -844,7 +844,7 @@ def march(
         _count(modes, outside, bore, state, step, axial)
         if films is not None:
             for k in range(len(films.lowest)):
-                count_squeeze(films, k, state, step.q, step.lam)
+                count_squeeze(films, k, state, step.q, step.lam, modes.step)
                 record.film[taken, k] = films.axial[k] * state.films[k, 0]
             for k in range(len(films.room)):
                 count_bearing(k, bore, state, step.q)

@@ -69,7 +69,7 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
-from klack.transient.tilting_films import bend_faces, film_state, film_strain
+from klack.transient.tilting_films import LOST, bend_faces, film_state, film_strain
 from klack.units import format_si
 
 __all__ = ["SpatialValve"]
@@ -383,14 +383,14 @@ class _Moving:
         if self.films is not None and len(self.films.room):
             lost["guide film"] = float(np.sum(self.state.bearing[:, 2]))
         for k, film in enumerate(self.squeezed):
-            lost[f"{film.stop} film"] = float(self.state.films[k, 6])
+            lost[f"{film.stop} film"] = float(self.state.films[k, LOST])
         return lost
 
     def forget_losses(self) -> None:
         """Begin a new energy balance."""
         self.books[[DAMPING, GUIDE, FRICTION]] = 0.0
         self.flags[_LOST] = 0.0
-        self.state.films[:, 6] = 0.0
+        self.state.films[:, LOST] = 0.0
         self.state.bearing[:, 2] = 0.0
 
     # ------------------------------------------------------------------ motion

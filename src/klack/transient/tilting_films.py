@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import njit
-from klack.hydraulics.tilted_film import Land, film_pressure
+from klack.hydraulics.tilted_film import Land, film_pressure, film_slopes
 from klack.transient.interface_arrays import Films, Modes, State
 
 __all__ = [
+    "LOST",
     "begin_films",
     "bend_faces",
     "bulk_work",
@@ -40,6 +41,13 @@ _ENOUGH = 0.2  # of the slope of the potential: found along a change
 _ROUND_OFF = 1e-16
 _FOUND = 1e-11  # heights that do not fit, over lift and the least height
 _NEARLY = 1e-4  # the same at a corner, where sectors take turns in opening and closing
+_LINEAR = 1e-4  # of the force: a change by so little follows the slopes
+_ALONG = 1e-3  # of the way of a step: slopes of an earlier one serve for so little
+
+BEFORE, LOST, RATE, LENGTH, KNOWN, SLOPES = 3, 6, 7, 10, 11, 12
+"""Columns of the state of a film, behind force and moments: those of the step before, the energy
+lost, what the forces change by [1/s], the length of the last step [s], that of the step whose
+slopes are known [s] and these nine slopes."""
 
 
 @njit
@@ -111,8 +119,10 @@ def _raw_heights(films: Films, k: int, u: Vector) -> Matrix:
 
 
 @njit
-def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple[Vector, Matrix]:
-    """Mean force and moments over a step, and their slopes with its end."""
+def _pressed(
+    films: Films, k: int, u0: Vector, u1: Vector, step: float, steeply: bool
+) -> tuple[Vector, Matrix]:
+    """Mean force and moments over a step, and ``steeply`` their slopes with its end."""
     f, slopes = np.zeros(3), np.zeros((3, 3))
     lowest = films.lowest[k]
     if films.sizes[k, 0]:
@@ -137,22 +147,27 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
                 if open_now:
                     change[s, p] = a * a * b * (2.0 * a + b) / (viscous * (a + b) ** 2)
         head, still = np.zeros(land.load.shape), np.zeros(N)
-        closing, ways = np.empty((S, N)), spread.copy()
+        closing = np.empty((S, N))
         for s in range(S):
             for j in range(N):
                 closing[s, j] = (max(x0[s, j], 0.0) - max(x1[s, j], 0.0)) / step
-                if x1[s, j] <= 0.0:
-                    for c in range(3):
-                        ways[s * N + j, c] = 0.0
-        force, along = film_pressure(
-            land, mobility, closing, change, head, still, films.tension[k], 1.0 / step, ways
-        )
+        force, pressed = film_pressure(land, mobility, closing, head, still, films.tension[k])
         for s in range(S):
             for j in range(N):
                 for c in range(3):
                     f[c] += spread[s * N + j, c] * force[s, j]
+        if steeply:
+            ways = spread.copy()
+            for s in range(S):
+                for j in range(N):
+                    if x1[s, j] <= 0.0:
+                        for c in range(3):
+                            ways[s * N + j, c] = 0.0
+            along = film_slopes(land, pressed, mobility, change, head, 1.0 / step, ways)
+            for i in range(S * N):
+                for c in range(3):
                     for d in range(3):
-                        slopes[c, d] += spread[s * N + j, c] * along[s * N + j, d]
+                        slopes[c, d] += spread[i, c] * along[i, d]
     if films.shear[k] > 0.0:
         a, b = max(u0[0], 0.0) + lowest, max(u1[0], 0.0) + lowest
         # mean of 1/h over the way
@@ -167,19 +182,25 @@ def _pressed(films: Films, k: int, u0: Vector, u1: Vector, step: float) -> tuple
 
 
 @njit
-def begin_films(state: State) -> None:
-    """Remember the forces of the step before."""
-    state.films[:, 3:6] = state.films[:, :3]
+def begin_films(state: State, step: float) -> None:
+    """Remember the forces of the step before, and guess those of this one on a straight line."""
+    films = state.films
+    for k in range(len(films)):
+        for c in range(3):
+            films[k, BEFORE + c] = films[k, c]
+            films[k, c] += films[k, RATE + c] * 0.5 * (films[k, LENGTH] + step)
 
 
 @njit
 def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> float:
     """Change of the modal force of a film over the step that leads to ``q`` with its present force.
 
-    Returns by how much its heights change by that [m]; below zero if no force is found.
+    Returns by how much its heights change by that, over their way in this step; below zero if no
+    force is found.
 
-    Newton's method on lift and tilts.  They minimise a convex potential, that of ``soft`` and that
-    of the film; along a change its slope is brought near zero where Newton's step goes too far.
+    Newton's method on lift and tilts, first with the slopes of an earlier step.  They minimise a
+    convex potential, that of ``soft`` and that of the film; along a change its slope is brought
+    near zero where Newton's step goes too far.  A small last change of the forces is linear.
     """
     step, reach = modes.step, films.reach[k]
     rows, D = films.rows[k], films.compliance[k]
@@ -189,59 +210,85 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
     now = state.films[k, :3].copy()
     for c in range(3):
         for d in range(3):
-            before[c] += D[c, d] * (state.films[k, 3 + d] + held[d])
+            before[c] += D[c, d] * (state.films[k, BEFORE + d] + held[d])
             free[c] += D[c, d] * held[d]
             for i in range(len(q)):
                 soft[c, d] += rows[c, i] * modes.B1[i] * rows[d, i]
     free -= soft @ now
     soft += D
     tiny = _FOUND * (films.lowest[k] + abs(before[0]) + abs(free[0] - before[0]))
-    stiff = np.linalg.inv(soft)
-    # as if it pressed as in the step before; at rest a corner lies between closing and opening
     u = free + soft @ now
-    f, slopes = _pressed(films, k, before, u, step)
+    f, slopes = _pressed(films, k, before, u, step, False)
     left = free + soft @ f - u
-    size = _size(left, reach)
-    best, least = f.copy(), size
-    rounds = 0
-    while size > tiny and rounds < _ROUNDS:
-        rounds += 1
-        change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
-        along = stiff @ change
-        first = along @ left  # of the slope of the potential along the change, with its sign turned
-        if not first > 0.0:
-            change = np.linalg.solve(np.eye(3) + soft @ _resisting(slopes, reach), left)
+    least = _size(left, reach)
+    best = f.copy()
+    known = state.films[k, KNOWN]
+    found = least <= tiny
+    if not found and known > 0.0 and least <= _ALONG * _size(u - before, reach):
+        for c in range(3):
+            for d in range(3):
+                slopes[c, d] = state.films[k, SLOPES + 3 * c + d] * known / step
+        more = slopes @ np.linalg.solve(np.eye(3) - soft @ slopes, left)
+        if _weight(more, reach) <= _LINEAR * _weight(f, reach):
+            best += more
+            found = True
+    if not found:
+        stiff = np.linalg.inv(soft)
+        rounds = 0
+        while rounds < _ROUNDS:
+            rounds += 1
+            f, slopes = _pressed(films, k, before, u, step, True)
+            change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
             along = stiff @ change
-            first = along @ left
-        low, high, at_low, at_high, share = 0.0, 1.0, first, 0.0, 1.0
-        for _ in range(_SEARCHES):
-            tried = u + share * change
-            f, slopes = _pressed(films, k, before, tried, step)
-            left = free + soft @ f - tried
-            slope = along @ left
-            if (share == 1.0 and slope >= 0.0) or abs(slope) <= _ENOUGH * abs(first):
+            first = along @ left  # slope of the potential along the change, its sign turned
+            more = slopes @ change
+            if first > 0.0 and _weight(more, reach) <= _LINEAR * _weight(f, reach):
+                best[:] = f + more
+                least = 0.0
                 break
-            if slope > 0.0:
-                low, at_low, at_high = share, slope, 0.5 * at_high
-            else:
-                high, at_high, at_low = share, slope, at_low if share == 1.0 else 0.5 * at_low
-            share = low + (high - low) * at_low / (at_low - at_high)
-        u = tried
-        size = _size(left, reach)
-        if size < least:
-            least = size
-            best[:] = f
-        if _size(share * change, reach) <= _ROUND_OFF * _size(u, reach):
-            break
-    if not least < _NEARLY / _FOUND * tiny:
-        return -1.0
+            if not first > 0.0:
+                change = np.linalg.solve(np.eye(3) + soft @ _resisting(slopes, reach), left)
+                along = stiff @ change
+                first = along @ left
+            low, high, at_low, at_high, share = 0.0, 1.0, first, 0.0, 1.0
+            for _ in range(_SEARCHES):
+                tried = u + share * change
+                f, _ = _pressed(films, k, before, tried, step, False)
+                left = free + soft @ f - tried
+                slope = along @ left
+                if (share == 1.0 and slope >= 0.0) or abs(slope) <= _ENOUGH * abs(first):
+                    break
+                if slope > 0.0:
+                    low, at_low, at_high = share, slope, 0.5 * at_high
+                else:
+                    high, at_high, at_low = share, slope, at_low if share == 1.0 else 0.5 * at_low
+                share = low + (high - low) * at_low / (at_low - at_high)
+            u = tried
+            size = _size(left, reach)
+            if size < least:
+                least = size
+                best[:] = f
+            if size <= tiny or _size(share * change, reach) <= _ROUND_OFF * _size(u, reach):
+                break
+        if not least < _NEARLY / _FOUND * tiny:
+            return -1.0
+        for c in range(3):
+            for d in range(3):
+                state.films[k, SLOPES + 3 * c + d] = slopes[c, d]
+        state.films[k, KNOWN] = step
     state.films[k, :3] = best
     best -= now
     for i in range(len(q)):
         kick[i] = 0.0
         for c in range(3):
             kick[i] += rows[c, i] * best[c]
-    return float(_size(soft @ best, reach))
+    return float(_size(soft @ best, reach) / (tiny + _size(u - before, reach)))
+
+
+@njit
+def _weight(f: Vector, reach: float) -> float:
+    """Force and moments as one force [N]."""
+    return abs(f[0]) + (abs(f[1]) + abs(f[2])) / reach
 
 
 @njit
@@ -286,7 +333,7 @@ def bulk_energy(films: Films, k: int, force: Vector, held: Vector) -> float:
 
 
 @njit
-def count_squeeze(films: Films, k: int, state: State, q: Vector, lam: Vector) -> None:
+def count_squeeze(films: Films, k: int, state: State, q: Vector, lam: Vector, step: float) -> None:
     """Add the loss of a film over the step that leads to ``q`` and the contact forces ``lam``."""
     f = state.films[k]
     lost = bulk_work(films, k, state, lam)
@@ -295,7 +342,11 @@ def count_squeeze(films: Films, k: int, state: State, q: Vector, lam: Vector) ->
     for c in range(3):
         for i in range(len(q)):
             lost -= f[c] * films.rows[k, c, i] * (q[i] - state.q[i])
-    state.films[k, 6] += lost
+    f[LOST] += lost
+    for c in range(3):
+        change = f[c] - f[BEFORE + c] if f[LENGTH] > 0.0 else 0.0
+        f[RATE + c] = change / (0.5 * (f[LENGTH] + step))
+    f[LENGTH] = step
 
 
 @njit

@@ -28,7 +28,7 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import bore_arrays, contact_points, modes_of_step
 from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import TiltingFilm, film_arrays
-from klack.transient.tilting_films import bend_faces, film_strain
+from klack.transient.tilting_films import LOST, bend_faces, film_strain
 from klack.verification.interface_bodies import lateral_guide, rigid_body
 
 __all__ = [
@@ -145,7 +145,7 @@ def fly_in_films(
     return Ended(
         q=state.q,
         v=state.v,
-        lost=float(np.sum(state.films[:, 6]) + np.sum(state.bearing[:, 2])),
+        lost=float(np.sum(state.films[:, LOST]) + np.sum(state.bearing[:, 2])),
         held=held - 0.5 * float(state.lam @ (bent + model.traces @ state.q)),
         owed=float(state.books[DEBT]),
         force=record.force,
