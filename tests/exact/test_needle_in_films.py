@@ -1,8 +1,11 @@
 """A rigid needle that lands in a film, eccentric; truth: energy, convergence, the axial stroke."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from klack.transient.gap_course import gap_course
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.rigid_needle import (
     FACE,
@@ -101,6 +104,67 @@ def valve(*, placement=None, guide=False, curved=0.0):
         placement=np.zeros(6) if placement is None else placement,
         arms=np.array([[0.0, 0.0, -6e-3]]),
     )
+
+
+def test_points_without_a_face_do_not_tilt_a_film():
+    """Exact: where nothing faces a point its gap is some millimetres, which is no height of a film.
+
+    The needle moves aside, a point at the edge has no face any more; it would never touch.
+    """
+    kind = {"gap": 20e-6, "speed": -0.5, "duration": 34e-6, "wet": True}
+    needle = valve(placement=np.array([1e-6, 0.0, 0.0, 0.0, 0.0, 0.0]), curved=1e-9)
+
+    def lost(at):
+        gaps = needle.gaps(at)
+        gaps[3] = 5e-3
+        return gaps
+
+    results = [fly_in_network(each, {}, **kind) for each in (needle, replace(needle, gaps=lost))]
+
+    for name in ("needle tilt x", "needle tilt y"):
+        np.testing.assert_allclose(results[1].channels[name].values, 0.0, atol=1e-9)
+    forces = [each.channels["contact film force"].values for each in results]
+    assert np.max(forces[0]) > 1.0
+    np.testing.assert_allclose(forces[1], forces[0], rtol=1e-6)
+
+
+def test_gaps_follow_the_placement_along_their_slopes():
+    """Exact: lines that meet an inclined face; the needle drifts aside, 0.05 and 0.5 m/s."""
+    needle = valve(placement=np.zeros(6), curved=1e-9)
+
+    def inclined(at):
+        return needle.gaps(at) + 0.05 * at[0]
+
+    drifting = replace(
+        needle, films=(), gaps=inclined, velocity=np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0])
+    )
+    found = fly_in_network(drifting, {}, gap=20e-6, speed=-0.5, duration=60e-6)
+
+    # gaps are as of the last record: by 0.04 um, 0.08 us
+    assert found.events[0].time == pytest.approx(20e-6 / (0.5 - 0.05 * 0.2), abs=0.08e-6)
+
+
+def test_slopes_of_gaps_are_those_of_the_function():
+    """Exact: quadratic gaps; a gap that jumps has none."""
+    random = np.random.default_rng(0)
+    scale = np.repeat([1.0, 0.01], 3)
+    slopes, bends = (
+        random.normal(size=(4, 6)) * scale,
+        1e3 * random.uniform(0.5, 1.0, (4, 6)) * scale**2,
+    )
+
+    def gaps(at):
+        told = 1e-5 + slopes @ at + 0.5 * bends @ at**2
+        told[3] = 1e-2 if at[1] > 0.0 else 1e-5
+        return told
+
+    course = gap_course(gaps, 0.01)
+
+    np.testing.assert_allclose(course.slopes[:3], slopes[:3], rtol=1e-6)
+    np.testing.assert_allclose(course.bends[:3], bends[:3], rtol=1e-3)
+    np.testing.assert_array_equal(course.slopes[3], 0.0)
+    moved = np.array([3e-6, 0.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(course.left(moved)[:3], 9e-12 * bends[:3, 0], rtol=1e-3)
 
 
 def test_centred_and_wet_as_along_the_axis():

@@ -28,6 +28,7 @@ from klack.errors import InputError
 from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
+from klack.transient.gap_course import gap_course
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
 from klack.transient.spatial_run import SpatialValve
@@ -140,16 +141,19 @@ def build_spatial(
             friction=case.guide.friction,
             viscous=case.guide.viscous,
         )
+    arms = np.array([meeting.space.points.mean(axis=0) - meeting.centre for meeting in meetings])
+    gaps = PlacedGaps(
+        tuple(_gaps(meeting) for meeting in meetings),
+        tuple(meeting.upper_moves for meeting in meetings),
+    )
     return SpatialValve(
         model=model,
         components=tuple(component[name] for name in model.bodies),
         stops=tuple(meeting.name for meeting in meetings),
-        arms=np.array([meeting.space.points.mean(axis=0) - meeting.centre for meeting in meetings]),
+        arms=arms,
         guide=guide,
-        gaps=PlacedGaps(
-            tuple(_gaps(meeting) for meeting in meetings),
-            tuple(meeting.upper_moves for meeting in meetings),
-        ),
+        gaps=gaps,
+        course=gap_course(gaps, float(np.max(np.linalg.norm(arms, axis=1)))),
         placement=rigid_placement(*placement, *about),
         bearing=_bearing(case.guide),
         films=tuple(

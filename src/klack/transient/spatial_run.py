@@ -49,6 +49,7 @@ from klack.simulation.step_status import (
     STATUS_REFUSED,
     STATUS_REPEAT,
 )
+from klack.transient.gap_course import GapCourse, gap_course
 from klack.transient.guide import Guide
 from klack.transient.interface_arrays import (
     DAMPING,
@@ -79,7 +80,7 @@ Index = NDArray[np.int64]
 
 _AWAY = 1.0  # [m] added to the gaps of the axial interfaces, which then never act
 _FRESH = 0.04e-6  # gaps as good as new [m]
-_STALE_SHARE = 0.25  # of the way since the gaps were taken: what they may be wrong by
+_CLOSING = 1e-6  # gaps that count where others are asked for anew [m]
 _SURE = 0.5  # share of the time in which no gap can close, since forces may change meanwhile
 _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
@@ -92,6 +93,7 @@ _STEADY = 0.04  # change of the force of a contact at rest in a step
 _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
+_NO_FACE = 0.2e-3  # [m] no gap changes by so much with the placement: nothing faces the point
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
 
@@ -113,6 +115,8 @@ class SpatialValve:
     guide : Guide, optional
     gaps : callable, optional
         Exact gaps at a rigid placement of the needle; without it they stay linear.
+    course : GapCourse, optional
+        Of these gaps; made of them if not given.
     placement : array, shape (6,) [m], [rad]
         Of the needle at the start: translation of its centre of mass and rotation vector, beside
         the displacement along the axis that the network has.
@@ -130,6 +134,7 @@ class SpatialValve:
     arms: Vector = field(default_factory=lambda: np.zeros((1, 3)))
     guide: Guide | None = None
     gaps: Gaps | None = None
+    course: GapCourse | None = None
     placement: Vector = field(default_factory=lambda: np.zeros(6))
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
@@ -212,7 +217,10 @@ class _Moving:
         )
         self.gap0 = np.array(model.gap)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
-        self.taken_at = np.zeros(6)
+        self.taken_at, self.followed_to = np.zeros(6), np.zeros(6)
+        self.course = valve.course
+        if self.course is None and valve.gaps is not None:
+            self.course = gap_course(valve.gaps, float(np.max(np.linalg.norm(valve.arms, axis=1))))
         # closed since [fine steps], nan while open; axial force of the last step
         self.closed = np.full(len(model.contacts), np.nan)
         self.force = np.zeros(len(model.contacts))
@@ -353,6 +361,7 @@ class _Moving:
             "books": self.books,
             "gaps": self.gap0,
             "placement": self.taken_at,
+            "followed": self.followed_to,
             "closed": self.closed,
             "force": self.force,
             "flags": self.flags,
@@ -455,9 +464,11 @@ class _Moving:
         if self.state.contact.counts[0]:
             return 0, True
         horizon = min(most, _LONGEST) * span / _SURE
+        self._follow()
         stale = self._stale()
         safe = self._safe(horizon, stale)
-        if safe * _SURE < 2.0 * span and stale > _FRESH:
+        closing = self.gap0 + self.model.traces @ self.q < _CLOSING
+        if safe * _SURE < 2.0 * span and np.max(stale[closing], initial=0.0) > _FRESH:
             self.take_gaps(careful=True)
             safe = self._safe(horizon, self._stale())
         fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
@@ -829,7 +840,22 @@ class _Moving:
         fresh = self.valve.gaps(at) - self.model.traces[:, :r] @ self.q[:r]
         if careful and np.min(fresh + self.model.traces @ self.q) <= 0.0:
             return
-        self.gap0[:], self.taken_at[:] = fresh, at
+        self.gap0[:], self.taken_at[:], self.followed_to[:] = fresh, at, at
+        self._lift_films()
+
+    def _follow(self) -> None:
+        """Let gaps follow the placement along their slopes, unless a point is closed by it."""
+        if self.course is None:
+            return
+        r = self.rigid_count
+        at, here = self.model.rigid @ self.q, self.model.traces @ self.q
+        moved = at - self.followed_to
+        q, *_ = np.linalg.lstsq(self.model.rigid[:, :r], moved, rcond=1e-12)
+        change = self.course.slopes @ moved - self.model.traces[:, :r] @ q
+        if np.min(self.gap0 + change + here) <= 0.0:
+            return
+        self.gap0 += change
+        self.followed_to[:] = at
         self._lift_films()
 
     def _lift_films(self) -> None:
@@ -837,19 +863,19 @@ class _Moving:
         if self.films is None:
             return
         at = {name: slice(first, last) for name, first, last in self.model.contacts}
+        # a point that has slid over the edge of the other face has no gap: its linear one
+        faced = self.gap0 - self.model.gap < _NO_FACE
+        gap0 = np.where(faced, self.gap0, self.model.gap)
         for k, film in enumerate(self.squeezed):
-            self.films.offset[k] = film.fit @ self.gap0[at[film.stop]] - film.base
+            self.films.offset[k] = film.fit @ gap0[at[film.stop]] - film.base
 
-    def _stale(self) -> float:
-        """Largest possible difference of the gaps from those of the geometry [m]."""
-        if self.valve.gaps is None:
-            return 0.0
-        moved = self.model.rigid @ self.q - self.taken_at
-        ways = moved[:3] + np.cross(moved[3:], self.valve.arms)
-        # along the axis gaps of faces of revolution stay linear but for their curvature
-        return _STALE_SHARE * float(np.max(np.linalg.norm(ways, axis=1))) + 0.5 * _FRESH
+    def _stale(self) -> Vector:
+        """What each gap may be wrong by [m]."""
+        if self.course is None:
+            return np.zeros(len(self.gap0))
+        return self.course.left(self.model.rigid @ self.q - self.taken_at) + 0.5 * _FRESH
 
-    def _safe(self, horizon: float, stale: float) -> float:
+    def _safe(self, horizon: float, stale: Vector) -> float:
         model = self.model
         force = self.P @ self.at[LAST : LAST + self.ports]
         args = (model.traces, model.omega, self.q, self.v, force, horizon)
