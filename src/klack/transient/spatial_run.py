@@ -86,6 +86,9 @@ _LONGEST = 16  # records of a flight at once
 _BALANCES = 6  # of elements and fluid with the points at the start
 _BALANCED = 1e-12  # [m]
 _FILM_SHARE = 0.01  # of the height of a film that a step without contact may change
+_LITTLE = 0.1  # of that counts where a film has no force yet
+_AT_THE_WALL = 8  # fine steps where a shaft with a film touches its guide
+_ROOM = 1.0  # of the clearance
 _BEARING = 0.25  # as much as this counts a change in the guide, whose film damps motion out
 _SLOW = 0.5  # of the difference before: it does not vanish
 _NOT_AT_REST = 2e-9  # [m]
@@ -179,6 +182,7 @@ class _Moving:
 
     def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
         self.valve, self.network, self.sizes = valve, network, sizes
+        self.arrays = network.arrays
         self.path = SpatialPath()
         model = valve.model
         self.model, self.ports = model, len(network.ports)
@@ -207,6 +211,8 @@ class _Moving:
         self.films = None
         if self.squeezed or len(bearing):
             self.films = film_arrays(model, self.squeezed, wet, series, bearing, room)
+            rigid = self.films.rows[:, 0, self.model.omega == 0]
+            self.inertia = np.sum(rigid**2, axis=1)  # of the lift, inverse [1/kg]
         self.state = State.still(
             model.mode_count, model.count, len(self.bore.clearance), films=len(self.squeezed)
         )
@@ -221,6 +227,10 @@ class _Moving:
         self.course = valve.course
         if self.course is None and valve.gaps is not None:
             self.course = gap_course(valve.gaps, float(np.max(np.linalg.norm(valve.arms, axis=1))))
+        if self.course is not None:  # what slopes have beside the linear gaps of the modes
+            r = self.rigid_count
+            q = np.linalg.pinv(model.rigid[:, :r], rcond=1e-12)
+            self.turning = self.course.slopes - model.traces[:, :r] @ q
         # closed since [fine steps], nan while open; axial force of the last step
         self.closed = np.full(len(model.contacts), np.nan)
         self.force = np.zeros(len(model.contacts))
@@ -228,6 +238,8 @@ class _Moving:
         self.order = [
             [row.component for row in network.rows.interfaces].index(stop) for stop in valve.stops
         ]
+        at = [self.order[valve.stops.index(film.stop)] for film in self.squeezed]
+        self.film_at = {row: k for k, row in enumerate(at)}  # by row of the interfaces
         self.rest = network.interfaces.rest[self.order] / h
         self.side = np.array([np.sign(np.sum(model.axial[a:b])) for _, a, b in model.contacts])
         self.fresh = True
@@ -528,7 +540,7 @@ class _Moving:
                 0.0,
                 sizes.step,
                 sizes.coarse > 1,
-                self.network.arrays,
+                self.arrays,
                 part,
                 scratch,
                 report,
@@ -549,10 +561,10 @@ class _Moving:
         """One record in which contact points or the guide are looked at."""
         left = look * block
         time = left * self.sizes.step
-        before = self.force.copy()
+        before, flies = self.force.copy(), True
         while left:
             level = NEAR if self.sizes.coarse > 1 else FINE
-            if points and self._rests(clock) and left >= self.steps[COARSE]:
+            if left >= self.steps[COARSE] > 1 and (self._rests(clock) if points else flies):
                 level = COARSE
             taken = self.steps[level]
             status = self._step(
@@ -560,8 +572,10 @@ class _Moving:
             )
             if status == STATUS_REFUSED:
                 if level == COARSE:
-                    self._rest_on(rest=False)
-                    self.closed[~np.isnan(self.closed)] = float(clock[0])
+                    flies = False
+                    if points:
+                        self._rest_on(rest=False)
+                        self.closed[~np.isnan(self.closed)] = float(clock[0])
                     continue
                 for _ in range(taken):
                     left -= 1
@@ -576,7 +590,7 @@ class _Moving:
             left -= taken
         self._steady(before)
         self.write()
-        record_moment(row, self.network.arrays, recording)
+        record_moment(row, self.arrays, recording)
         return STATUS_DONE
 
     def _step(
@@ -591,12 +605,12 @@ class _Moving:
         report: Vector,
     ) -> int:
         """One macro step, with bodies in fine steps; at rest in one."""
-        h, steps, arrays = self.sizes.step, self.steps[level], self.network.arrays
+        h, steps, arrays = self.sizes.step, self.steps[level], self.arrays
         t, H = float(clock[0]) * h, steps * h
         last = self._length(int(clock[1]), steps)
         begin_step(steps, steps / last, t, H, self.fresh, arrays, scratch)
         self.fresh = False
-        rest = level == COARSE
+        rest = points and level == COARSE
         count, modes = (1, self.whole) if rest else self._parts(steps, H, points)
         kept = self._keep()
         at, here = self.at, self.ports
@@ -608,7 +622,18 @@ class _Moving:
                 at[GUESS + here] = 0.0
                 clock[7] += 1
             push = self.P @ at[GUESS : GUESS + here]
-            record_ = self._march(modes._replace(push=push), count, points, rest, t, report)
+            found = self._march(modes._replace(push=push), count, points, rest)
+            while not rest and self._too_long(found, steps, count):
+                self._put_back(kept)
+                count, modes = self._cut(steps, 2 * count)
+                found = self._march(modes._replace(push=push), count, points, rest)
+            if found is None:
+                report[2] = t
+                raise ConvergenceError(
+                    f"needle: no contact forces found at {1e6 * t:.4g} us.\n"
+                    "Try: a shorter step, or fewer kept modes."
+                )
+            record_ = found
             if rest and not self._still(record_):
                 self._put_back(kept)
                 clock[1] = level
@@ -629,7 +654,7 @@ class _Moving:
         self._tell(record_, t, H / count, recording, scratch, points)
         clock[0] += steps
         clock[1] = level
-        clock[2 if level == FINE else 3 if rest else 4] += 1
+        clock[2 if level == FINE else 3 if level == COARSE else 4] += 1
         if level == NEAR:
             clock[5] += steps
             clock[6] += steps
@@ -643,31 +668,54 @@ class _Moving:
         """
         longest = 1
         films = self.films
-        if not points and films is not None and (len(films.room) or self._unguided(H)):
+        wet = films is not None and len(films.room) > 0
+        clear = points or (self._off_the_wall(H) if wet else self._unguided(H))
+        if not points and films is not None and (wet or clear):
             changes = [0.0]  # of heights over the macro step, over what is left of them
             for k in range(len(self.squeezed)):
                 lift = max(film_state(films, k, self.q)[0], 0.0) + films.lowest[k]
                 rise, *tilts = films.rows[k] @ self.v
                 way = abs(rise) + films.reach[k] * float(np.hypot(*tilts))
-                changes.append(way * H / lift)
+                # work of the film over its height, of the kinetic energy: errors of the force,
+                # second order in the change of height, act on so much of the motion
+                work = 2.0 * abs(self.state.films[k, 0]) * lift * self.inertia[k]
+                felt = min(1.0, max(work / way**2, _LITTLE**2)) if way > 0.0 else 1.0
+                changes.append(np.sqrt(felt) * way * H / lift)
             for k in range(len(films.room)):
                 place = self.bore.offset[k] + self.bore.traces[k] @ self.q
                 way = float(np.hypot(*(self.bore.traces[k] @ self.v)))
                 changes.append(_BEARING * way * H / (films.room[k] - float(np.hypot(*place))))
-            longest = steps
+            longest = steps if clear else min(steps, _AT_THE_WALL)
             while longest > 1 and max(changes) * longest > _FILM_SHARE * steps:
                 longest //= 2
-        if longest not in self.coarser:
-            self.coarser[longest] = modes_of_step(self.model, longest * self.sizes.step)
-        return steps // longest, self.coarser[longest]
+        return self._cut(steps, steps // longest)
+
+    def _too_long(self, record: Record | None, steps: int, count: int) -> bool:
+        """Whether shorter steps may find forces of films, or what a guide did."""
+        if record is None:
+            return count < steps
+        return count * _AT_THE_WALL < steps and bool(np.any(self.state.guide_force))
+
+    def _off_the_wall(self, time: float) -> bool:
+        """Whether the shaft will hardly meet its guide within this time."""
+        if np.any(self.state.guide_force):
+            return False
+        place = np.linalg.norm(self.bore.offset + self.bore.traces @ self.q, axis=1)
+        way = np.linalg.norm(self.bore.traces @ self.v, axis=1) * time
+        return bool(np.all(place + way < _ROOM * self.bore.clearance))
+
+    def _cut(self, steps: int, count: int) -> tuple[int, Modes]:
+        """So many parts of a macro step, and the modes over one of them."""
+        length = steps // count
+        if length not in self.coarser:
+            self.coarser[length] = modes_of_step(self.model, length * self.sizes.step)
+        return count, self.coarser[length]
 
     def _length(self, level: int, default: int) -> int:
         return self.steps.get(level, default) if level >= 0 else default
 
-    def _march(
-        self, modes: Modes, count: int, points: bool, rest: bool, t: float, report: Vector
-    ) -> Record:
-        """Fine steps under a constant modal force, that of ``modes.push``."""
+    def _march(self, modes: Modes, count: int, points: bool, rest: bool) -> Record | None:
+        """Fine steps under a constant modal force, that of ``modes.push``; None where they fail."""
         n = self.model.count if points else 0
         record = Record.empty(
             count, len(self.model.bodies), n, keep_points=False, films=len(self.squeezed)
@@ -677,13 +725,8 @@ class _Moving:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
         _, status = march(count, 0, modes, _NONE, touching, self.bore, self.films, state, record)
-        if status == FAILED or not np.all(np.isfinite(self.q)):
-            report[2] = t
-            raise ConvergenceError(
-                f"needle: no contact forces found at {1e6 * t:.4g} us.\n"
-                "Try: a shorter step, or fewer kept modes."
-            )
-        return record
+        failed = status == FAILED or not np.all(np.isfinite(self.q))
+        return None if failed else record
 
     def _repair(self, level: int) -> float:
         """Let what was missed act; the energy that bodies got beyond what was given to them [J]."""
@@ -768,14 +811,13 @@ class _Moving:
         first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
         now = round(t / self.sizes.step)
         faces, y = network.interfaces, np.append(self.P.T @ self.q, 0.0)
-        stops = self.valve.stops
-        films = {self.order[stops.index(f.stop)]: k for k, f in enumerate(self.squeezed)}
         for c, row in enumerate(self.order):
             a, b = self.model.contacts[c][1:]
             smallest = float(np.min(self.gap0[a:b] + self.model.traces[a:b] @ self.q))
             lam = self.state.lam[a:b]
             state.gap[row] = faces.gap0[row] + y[faces.upper[row]] - y[faces.lower[row]]
-            pressed = record.film[:, films[row]] if row in films else np.zeros(len(record.force))
+            film = self.film_at.get(row)
+            pressed = np.zeros(len(record.force)) if film is None else record.film[:, film]
             scratch.sums[first + 2 * row + 1] += h * float(np.sum(pressed))
             force = np.where(self.side[c] * record.force > 0.0, np.abs(record.force), 0.0)
             acted = np.append(force > 0.0, False)
@@ -847,12 +889,9 @@ class _Moving:
         """Let gaps follow the placement along their slopes, unless a point is closed by it."""
         if self.course is None:
             return
-        r = self.rigid_count
-        at, here = self.model.rigid @ self.q, self.model.traces @ self.q
-        moved = at - self.followed_to
-        q, *_ = np.linalg.lstsq(self.model.rigid[:, :r], moved, rcond=1e-12)
-        change = self.course.slopes @ moved - self.model.traces[:, :r] @ q
-        if np.min(self.gap0 + change + here) <= 0.0:
+        at = self.model.rigid @ self.q
+        change = self.turning @ (at - self.followed_to)
+        if np.min(self.gap0 + change + self.model.traces @ self.q) <= 0.0:
             return
         self.gap0 += change
         self.followed_to[:] = at
