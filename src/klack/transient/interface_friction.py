@@ -164,12 +164,16 @@ def remember(state: State, bent: Vector, moved: Vector, lost: float) -> None:
     ways = len(moved) // n
     state.books[FRICTION] += lost
     for k in range(n):
-        way = 0.0
-        if rubbing.doing[k] == SLIP:
-            for c in range(ways):
-                i = c * n + k
-                way += (moved[i] + bent[i] - rubbing.bent[i]) ** 2
+        way, taken = 0.0, 0.0
+        for c in range(ways):
+            i = c * n + k
+            slid = moved[i] + bent[i] - rubbing.bent[i]
+            if rubbing.doing[k] == SLIP:
+                way += slid**2
+            taken -= 0.5 * (rubbing.across[i] + rubbing.forces[n + i]) * slid
         rubbing.slip[k] = np.sqrt(way)
+        if taken > 0.0:
+            rubbing.lost[k] += taken
     for i in range(len(moved)):
         rubbing.across[i] = rubbing.forces[n + i]
         rubbing.bent[i] = bent[i]
