@@ -80,4 +80,6 @@ def across_energy(model: InterfaceModel, rubbing: Rubbing, first: int, last: int
     """Part of the potential of some points that their forces across the normals hold [J]."""
     shape = (model.ways, model.count)
     part = np.s_[:, first:last]
-    return float(0.5 * np.sum(rubbing.across.reshape(shape)[part] * rubbing.bent.reshape(shape)[part]))
+    return float(
+        0.5 * np.sum(rubbing.across.reshape(shape)[part] * rubbing.bent.reshape(shape)[part])
+    )

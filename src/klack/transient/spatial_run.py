@@ -361,19 +361,23 @@ class _Moving:
         """All arrays that a step changes and the next one begins with."""
         lifts = {} if self.films is None else {"lifts": self.films.offset}
         rubs = rubbing_arrays(self.state.rubbing) if self.model.ways else {}
-        return lifts | rubs | {
-            "forces": self.state.lam,
-            "guide": self.state.guide_force,
-            "films": self.state.films,
-            "bearing": self.state.bearing,
-            "carried": self.state.carried,
-            "books": self.books,
-            "gaps": self.gap0,
-            "placement": self.taken_at,
-            "closed": self.closed,
-            "force": self.force,
-            "flags": self.flags,
-        }
+        return (
+            lifts
+            | rubs
+            | {
+                "forces": self.state.lam,
+                "guide": self.state.guide_force,
+                "films": self.state.films,
+                "bearing": self.state.bearing,
+                "carried": self.state.carried,
+                "books": self.books,
+                "gaps": self.gap0,
+                "placement": self.taken_at,
+                "closed": self.closed,
+                "force": self.force,
+                "flags": self.flags,
+            }
+        )
 
     def stores(self) -> dict[str, float]:
         """Energies [J] that contacts and guide hold."""
