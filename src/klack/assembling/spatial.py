@@ -69,8 +69,8 @@ def build_spatial(
     """Bodies of a valve with all their freedoms, contact points of its stops, and its guide.
 
     Modes are those that the network has.  Contact points are all that can close in any position
-    which the guide allows; without a guide, in that of the start.  Where one stop has friction, the
-    points of all have tangential directions.
+    which the guide allows; without a guide, in that of the start.  Where one stop has friction, or
+    shots draw it, the points of all have tangential directions.
 
     Raises
     ------
@@ -92,7 +92,8 @@ def build_spatial(
     placement = placement_of(case, height)
     off_axis = _farthest(case, height, placement)
     about = _about(height, bodies[needle])
-    rubs = any(stop.friction > 0.0 for stop in case.stops.values())
+    drawn = case.shots is not None and case.shots.contact_friction is not None
+    rubs = drawn or any(stop.friction > 0.0 for stop in case.stops.values())
     meetings = [
         _meeting(
             contact,
