@@ -85,7 +85,7 @@ def needle_on_cone(
         flat,
         traces=rows(s * up - c * out),
         tangents=np.vstack([rows(c * up + s * out), rows(round_it)]),
-        compliance=np.kron(own, flat.compliance),
+        compliance=np.asarray(np.kron(own, flat.compliance), dtype=np.float64),
         gap=np.full(_POINTS, s * gap),
         axial=np.full(_POINTS, s),
         axial_across=np.concatenate([np.full(_POINTS, c), nothing]),
