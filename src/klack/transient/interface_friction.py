@@ -27,7 +27,16 @@ from klack.simulation.phase import phase
 from klack.transient.interface_arrays import FRICTION, ContactPoints, Record, Rubbing, State
 from klack.transient.rubbing import SLIP, solve_rubbing
 
-__all__ = ["friction_work", "offset_change", "push_across", "remember", "rub", "tell_friction"]
+__all__ = [
+    "friction_work",
+    "held_across",
+    "hold_offsets",
+    "offset_change",
+    "push_across",
+    "remember",
+    "rub",
+    "tell_friction",
+]
 
 Vector = NDArray[np.float64]
 
@@ -46,6 +55,38 @@ def offset_change(
     for i in range(len(way)):
         way[i] = q[i] - before[i]
     np.dot(points.tangents, way, moved)
+
+
+@inner
+def hold_offsets(
+    points: ContactPoints,
+    rubbing: Rubbing,
+    before: Vector,
+    q: Vector,
+    motion: Vector,
+    way: Vector,
+    moved: Vector,
+    bent: Vector,
+) -> None:
+    """Let closed points slip as their law has found, wherever the modes are moved besides.
+
+    What moves them after that, the payment of a debt or the guide, joins their offsets, as it does
+    the gaps.
+    """
+    n = len(rubbing.slip)
+    offset_change(points, before, q, way, moved)
+    for i in range(len(moved)):
+        if rubbing.forces[i % n] > 0.0:
+            bent[i] = rubbing.bent[i] + motion[n + i] - moved[i]
+
+
+@phase
+def held_across(rubbing: Rubbing, bent: Vector) -> float:
+    """Energy of the contact across the normals at the end of the step [J]."""
+    n, held = len(rubbing.slip), 0.0
+    for i in range(len(bent)):
+        held += 0.5 * rubbing.forces[n + i] * bent[i]
+    return held
 
 
 @phase
