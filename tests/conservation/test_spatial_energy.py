@@ -63,6 +63,24 @@ def test_energy_of_faces_that_rub_closes(mu, step, coarse):
         assert books.losses[f"{stop} friction"] > 1e-3 * books.scale
 
 
+def test_a_needle_that_comes_to_rest_sticks_without_loss():
+    """Its modes still ring: what pays the debts of the contact must not count as slip."""
+    needle = Needle(
+        seat=ring(8, 0.6e-3, BELOW), stop=ring(8, 2e-3, ABOVE), friction=(0.2, 0.2), half_angle=1.05
+    ).with_modes()
+    joints = {
+        "tip": Spring(stiffness=200e3, preload=12.0, damping=60.0),
+        "land": ForceOverTime(time=(0.0, 1e-6, 200e-6, 201e-6), force=(0.0, 45.0, 45.0, 0.0)),
+    }
+    placed = np.array([1e-7, 0.0, 0.0, 2e-5, 0.0, 0.0])
+
+    run = move(needle.rows(joints), needle.valve(placement=placed), 2.4e-3)
+
+    assert abs(run.books.residual) < 1e-10 * run.books.scale  # 1e-7 where payments slip
+    assert run.channels["seat contact force"].values[-1] > 10.0
+    assert run.books.losses["seat friction"] > 1e-3 * run.books.scale
+
+
 def test_a_run_in_two_parts_of_faces_that_rub():
     """The first part ends while the needle leaves its seat; then within its impact there."""
     for parts in ((1, 40), (200, 25)):

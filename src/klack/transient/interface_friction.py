@@ -16,7 +16,8 @@ step and the part :math:`\tfrac12 \lambda_t^T e` of the potential of the contact
 
 The first term is what friction takes.  It has the right sign wherever the slip turns by less than
 a right angle within a step; the rest joins the debt of the contact, as the second term does (of
-points that close or open), and is paid by normal forces: friction never pays.
+points that close or open), and is paid by normal forces: friction never pays.  What a payment moves
+closed points by is no slip, but part of their offset *e* from then on.
 """
 
 import numpy as np
