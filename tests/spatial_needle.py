@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.friction import Friction
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.network.component import Component
@@ -51,6 +52,11 @@ class Needle:
     damping: float = 0.0
     shapes: NDArray[np.float64] | None = None
     across: NDArray[np.float64] | None = None  # (heights, 2, elastic) at the guide
+    friction: tuple[float, float] | None = None  # of seat and stop; without: no tangents
+    half_angle: float = 0.5 * np.pi  # of the cone of the seat
+    stiffer: float = 0.8  # springs across the normals, over those along them
+    coupling: float = 0.0  # of both, over the mean compliance
+    sliding: NDArray[np.float64] | None = None  # (2 points, elastic) of the tangents
 
     @property
     def arms(self) -> dict[str, NDArray[np.float64]]:
@@ -87,18 +93,62 @@ class Needle:
             self.along(self.seat, self.elastic[0]),
             self.along(self.stop, self.elastic[1]),
         )
-        return modal_model(
+        lean = self.half_angle
+        if lean < 0.5 * np.pi:
+            below = self.moved(self.seat, np.sin(lean), -np.cos(lean), self.elastic[0])
+        model = modal_model(
             masses=(MASS, np.inf),
             omega=np.concatenate([np.zeros(6), self.omega]),
             damping=np.concatenate([np.zeros(6), np.full(len(self.omega), self.damping)]),
             traces=np.vstack([below, -above]),
             compliance=np.eye(n + m) / self.stiffness,
             gap=np.concatenate([np.zeros(n), np.full(m, LIFT)]),
-            axial=np.concatenate([np.ones(n), -np.ones(m)]),
+            axial=np.concatenate([np.full(n, np.sin(lean)), -np.ones(m)]),
             contacts=(("seat", 0, n), ("opening", n, n + m)),
             points=np.vstack([self.seat, self.stop]),
             rigid=self.rigid,
         )
+        return model if self.friction is None else self._rubbing(model, n, m)
+
+    def moved(
+        self, points: NDArray[np.float64], z: float, r: float, elastic: object = 0.0
+    ) -> NDArray[np.float64]:
+        """Displacement of points in the direction (r, 0, z) of their meridians."""
+        out = points[:, :2] / np.linalg.norm(points[:, :2], axis=1)[:, None]
+        return self._towards(points, np.column_stack([r * out, np.full(len(points), z)]), elastic)
+
+    def _towards(
+        self, points: NDArray[np.float64], way: NDArray[np.float64], elastic: object
+    ) -> NDArray[np.float64]:
+        rows = way @ self.rigid[:3] + np.cross(points, way) @ self.rigid[3:]
+        rows[:, 6:] += elastic
+        return rows
+
+    def _rubbing(self, model: InterfaceModel, n: int, m: int) -> InterfaceModel:
+        """Tangents along the meridian and round it, with springs of their own."""
+        c, s = np.cos(self.half_angle), np.sin(self.half_angle)
+        free = np.zeros((2 * (n + m), len(self.omega))) if self.sliding is None else self.sliding
+        ends, rows = np.split(free, [n, n + m, 2 * n + m]), []
+        for points, sign, part in ((self.seat, 1.0, ends[0]), (self.stop, -1.0, ends[1])):
+            slope = (c, s) if sign > 0.0 else (0.0, 1.0)
+            rows.append(sign * self.moved(points, *slope) + self._padded(part))
+        for points, sign, part in ((self.seat, 1.0, ends[2]), (self.stop, -1.0, ends[3])):
+            out = points[:, :2] / np.linalg.norm(points[:, :2], axis=1)[:, None]
+            round_it = np.column_stack([-out[:, 1], out[:, 0], np.zeros(len(points))])
+            rows.append(sign * self._towards(points, round_it, 0.0) + self._padded(part))
+        own, one = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]), self.coupling
+        own[1, 1] = own[2, 2] = 1.0 / self.stiffer
+        own[0, 1] = own[1, 0] = one
+        return replace(
+            model,
+            compliance=np.kron(own, np.eye(n + m)) / self.stiffness,
+            tangents=np.vstack(rows),
+            axial_across=np.concatenate([np.full(n, c), np.zeros(n + 2 * m)]),
+            friction=tuple(Friction.coulomb(mu) for mu in self.friction or ()),
+        )
+
+    def _padded(self, elastic: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.hstack([np.zeros((len(elastic), 6)), elastic])
 
     @cached_property
     def reduced(self) -> ReducedBody:
@@ -170,6 +220,7 @@ class Needle:
             damping=0.01,
             shapes=MASS**-0.5 * random.normal(size=(4, count)),
             across=0.5 * MASS**-0.5 * random.normal(size=(2, 2, 4)),
+            sliding=MASS**-0.5 * random.normal(size=(2 * (count - len(self.arms)), 4)),
         )
 
 

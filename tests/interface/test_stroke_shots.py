@@ -104,6 +104,7 @@ def test_placements_decide_where_the_needle_touches(alone):
 def test_strokes_keep_the_energy_balance(alone):
     for outcome in alone:
         assert abs(outcome.stroke["energy_residual"]) < 1e-9
+        assert np.isnan(outcome.stroke["faces_loss"])  # faces without friction
         assert outcome.stroke["injected_energy"] > 0.0
         assert np.isnan(outcome.stroke["radiated_energy"])  # no section noise
         assert not outcome.failure
@@ -118,6 +119,28 @@ def test_friction_of_the_guide_is_that_of_the_draw(setup, starts):
     assert smooth.stroke["friction"] == 0.05
     # the side force is the same at first, and friction turns the needle besides
     assert 1.5 < rough.stroke["guide_loss"] / smooth.stroke["guide_loss"] < 8.0
+
+
+@pytest.mark.slow
+def test_drawn_friction_of_the_faces_is_that_of_the_stops(starts):
+    """Truth: the same stroke of a case whose stops have that coefficient."""
+    drawn = valve_case("shots: {count: 3, contact_friction: {uniform: [0.1, 0.3]}}")
+    rubs = {n: stop.model_copy(update={"friction": 0.2}) for n, stop in CASE.stops.items()}
+    given = CASE.model_copy(update={"stops": rubs})
+    start = starts.drawn(1)
+    found = [
+        run_one_stroke(
+            stroke_setup(build_valve(case, threads=1), find_roles(case)),
+            StrokeTask(variant="dry", start=replace(start, contact_friction=mu)),
+        )
+        for case, mu in ((drawn, 0.2), (given, np.nan))
+    ]
+
+    assert found[0].stops["opening"] == pytest.approx(found[1].stops["opening"], nan_ok=True)
+    for outcome in found:
+        assert outcome.stroke["faces_loss"] > 1e-3 * outcome.stroke["impact_loss"]
+        assert abs(outcome.stroke["energy_residual"]) < 1e-9
+    assert found[0].stroke["contact_friction"] == 0.2
 
 
 def test_the_rebound_height_is_that_of_a_throw():

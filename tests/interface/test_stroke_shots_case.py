@@ -66,6 +66,22 @@ def test_the_next_stroke_of_a_row_starts_where_the_last_one_ended():
     assert start.index == 3
 
 
+def test_friction_of_the_faces_is_drawn_beside_all_else():
+    """In its range, with its mean in the centred stroke; other draws stay, and none is nan."""
+    text = "shots: {count: 3, contact_friction: {uniform: [0.1, 0.3]}}"
+    plain, drawn = ([starts(t).drawn(k) for k in range(200)] for t in (SHOTS, text))
+
+    found = np.array([start.contact_friction for start in drawn])
+    assert np.all((found >= 0.1) & (found <= 0.3))
+    assert found.mean() == pytest.approx(0.2, abs=0.2 / np.sqrt(12 * 200) * 3)  # 3 sigma
+    assert starts(text).centred().contact_friction == pytest.approx(0.2)
+    for one, other in zip(plain, drawn, strict=True):
+        assert np.isnan(one.contact_friction)
+        assert np.array_equal(one.placement, other.placement)
+    with pytest.raises(InputError, match="at most 2 in every shot"):
+        starts("shots: {contact_friction: {uniform: [1, 3]}}")
+
+
 def test_friction_and_position_can_be_drawn():
     text = "shots: {eccentricity: 1 um, tilt: 0.001 deg, friction: {uniform: [0.1, 0.2]}}"
     drawn = [starts(text).drawn(index) for index in range(20)]

@@ -18,9 +18,11 @@ from klack.case.guide import LinearGuideLaw
 from klack.case.motion_of_valve import ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
 from klack.contact.gap_update import PlacedGaps, RigidGaps
 from klack.contact.mortar import ContactSpace
-from klack.contact.statics import extended_compliance
+from klack.contact.statics import contact_compliance, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -53,6 +55,7 @@ class _Meeting:
     compliance: NDArray[np.float64]
     upper_moves: bool
     centre: Vector
+    faces: FaceFriction | None
 
 
 def build_spatial(
@@ -67,7 +70,8 @@ def build_spatial(
     """Bodies of a valve with all their freedoms, contact points of its stops, and its guide.
 
     Modes are those that the network has.  Contact points are all that can close in any position
-    which the guide allows; without a guide, in that of the start.
+    which the guide allows; without a guide, in that of the start.  Where one stop has friction, or
+    shots draw it, the points of all have tangential directions.
 
     Raises
     ------
@@ -89,6 +93,8 @@ def build_spatial(
     placement = placement_of(case, height)
     off_axis = _farthest(case, height, placement)
     about = _about(height, bodies[needle])
+    drawn = case.shots is not None and case.shots.contact_friction is not None
+    rubs = drawn or any(stop.friction > 0.0 for stop in case.stops.values())
     meetings = [
         _meeting(
             contact,
@@ -101,6 +107,7 @@ def build_spatial(
             ],
             max(hypot(*aside) for aside, _ in off_axis),
             float(getattr(parts[name], "gap", 0.0)),
+            Friction.coulomb(case.stops[name].friction) if rubs else None,
         )
         for name, contact in contacts.items()
     ]
@@ -121,6 +128,7 @@ def build_spatial(
                 lower=meeting.pair.lower.name,
                 space=meeting.space,
                 compliance=meeting.compliance,
+                faces=meeting.faces,
             )
             for meeting in meetings
         ],
@@ -241,6 +249,7 @@ def _meeting(
     farthest: Sequence[Vector],
     off_axis: float,
     gap: float,
+    friction: Friction | None,
 ) -> _Meeting:
     pair, static = contact.pair, contact.static
     upper_moves = pair.upper.name == needle
@@ -248,9 +257,14 @@ def _meeting(
     space = off_axis_space(
         pair, static.space, farthest, off_axis, centre=centre, upper_moves=upper_moves
     )
-    compliance = extended_compliance(
-        space, static, flexibilities[pair.upper.name], flexibilities[pair.lower.name]
-    )
+    both = flexibilities[pair.upper.name], flexibilities[pair.lower.name]
+    faces = None
+    if friction is None:
+        compliance = extended_compliance(space, static, *both)
+    else:
+        surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+        faces = FaceFriction.on(friction, space, *surfaces)
+        compliance = contact_compliance(space, *both, faces=faces)
     up = np.array([0.0, 0.0, gap])
     raised = replace(pair, upper=replace(pair.upper, mesh=pair.upper.mesh.moved(up)))
     return _Meeting(
@@ -260,6 +274,7 @@ def _meeting(
         compliance=compliance,
         upper_moves=upper_moves,
         centre=centre + up if upper_moves else centre,
+        faces=faces,
     )
 
 

@@ -106,11 +106,13 @@ def _built(
         progress("factorise", i / len(bodies))
         flexibilities[name] = Flexibility(body, threads=threads, cache=result_cache())
     pools = _mode_pools(case, bodies, flexibilities, progress)
+    in_space, reduced = case.motion == "three-dimensional", {}
+    with_law = case.without_friction() if in_space else case  # there the contact points rub
     contacts = {
-        name: build_stop(case, name, bodies, flexibilities, pools, progress) for name in case.stops
+        name: build_stop(with_law, name, bodies, flexibilities, pools, progress)
+        for name in case.stops
     }
     ports = {name: _ports(case, body, contacts) for name, body in bodies.items()}
-    in_space, reduced = case.motion == "three-dimensional", {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("reduced", i / len(bodies))
         whole = reduce_body(

@@ -123,8 +123,13 @@ class StrokeShots(Section):
     friction: RatioDistribution | None = Field(
         default=None, description="Coulomb's coefficient in the guide; default that of 'guide'."
     )
+    contact_friction: RatioDistribution | None = Field(
+        default=None,
+        description="Coulomb's coefficient between the faces of all stops; default those of "
+        "'stops'.",
+    )
 
-    @field_validator("friction", mode="after")
+    @field_validator("friction", "contact_friction", mode="after")
     @classmethod
     def _most_friction(cls, drawn: Distribution | None) -> Distribution | None:
         return require_friction(drawn)

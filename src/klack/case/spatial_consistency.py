@@ -96,12 +96,11 @@ def _check_stop(case: ValveSections, name: str, part: Component) -> None:
             hint="write it, or use motion: axial.",
         )
     stop = case.stops[name]
-    if stop.friction > 0.0 or stop.worn is not None:
-        what = "friction" if stop.friction > 0.0 else "worn"
+    if stop.worn is not None:
         raise CaseProblem(
-            ("stops", name, what),
-            got=f"'{what}' with motion: three-dimensional",
-            expected="smooth faces as made",
+            ("stops", name, "worn"),
+            got="'worn' with motion: three-dimensional",
+            expected="faces as made",
             hint="leave it out, or use motion: axial.",
             on_key=True,
         )

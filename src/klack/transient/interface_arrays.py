@@ -253,6 +253,7 @@ class Rubbing(NamedTuple):
     bent: Vector  # (ways n,) [m] tangential offset less that of the modes: residual compliance
     doing: NDArray[np.int64]  # (n,) see :mod:`klack.transient.rubbing`
     slip: Vector  # (n,) [m] within the last step, 0 where the point stuck or was open
+    lost: Vector  # (n,) [J] what friction has taken at each point
 
     @classmethod
     def none(cls, points: int, ways: int) -> Self:
@@ -265,6 +266,7 @@ class Rubbing(NamedTuple):
             np.zeros(ways * n),
             np.zeros(ways * n),
             np.zeros(n, dtype=np.int64),
+            np.zeros(n),
             np.zeros(n),
         )
 

@@ -16,7 +16,8 @@ step and the part :math:`\tfrac12 \lambda_t^T e` of the potential of the contact
 
 The first term is what friction takes.  It has the right sign wherever the slip turns by less than
 a right angle within a step; the rest joins the debt of the contact, as the second term does (of
-points that close or open), and is paid by normal forces: friction never pays.
+points that close or open), and is paid by normal forces: friction never pays.  What a payment moves
+closed points by is no slip, but part of their offset *e* from then on.
 """
 
 import numpy as np
@@ -27,7 +28,16 @@ from klack.simulation.phase import phase
 from klack.transient.interface_arrays import FRICTION, ContactPoints, Record, Rubbing, State
 from klack.transient.rubbing import SLIP, solve_rubbing
 
-__all__ = ["friction_work", "offset_change", "push_across", "remember", "rub", "tell_friction"]
+__all__ = [
+    "friction_work",
+    "held_across",
+    "hold_offsets",
+    "offset_change",
+    "push_across",
+    "remember",
+    "rub",
+    "tell_friction",
+]
 
 Vector = NDArray[np.float64]
 
@@ -46,6 +56,38 @@ def offset_change(
     for i in range(len(way)):
         way[i] = q[i] - before[i]
     np.dot(points.tangents, way, moved)
+
+
+@inner
+def hold_offsets(
+    points: ContactPoints,
+    rubbing: Rubbing,
+    before: Vector,
+    q: Vector,
+    motion: Vector,
+    way: Vector,
+    moved: Vector,
+    bent: Vector,
+) -> None:
+    """Let closed points slip as their law has found, wherever the modes are moved besides.
+
+    What moves them after that, the payment of a debt or the guide, joins their offsets, as it does
+    the gaps.
+    """
+    n = len(rubbing.slip)
+    offset_change(points, before, q, way, moved)
+    for i in range(len(moved)):
+        if rubbing.forces[i % n] > 0.0:
+            bent[i] = rubbing.bent[i] + motion[n + i] - moved[i]
+
+
+@phase
+def held_across(rubbing: Rubbing, bent: Vector) -> float:
+    """Energy of the contact across the normals at the end of the step [J]."""
+    n, held = len(rubbing.slip), 0.0
+    for i in range(len(bent)):
+        held += 0.5 * rubbing.forces[n + i] * bent[i]
+    return held
 
 
 @phase
@@ -164,12 +206,16 @@ def remember(state: State, bent: Vector, moved: Vector, lost: float) -> None:
     ways = len(moved) // n
     state.books[FRICTION] += lost
     for k in range(n):
-        way = 0.0
-        if rubbing.doing[k] == SLIP:
-            for c in range(ways):
-                i = c * n + k
-                way += (moved[i] + bent[i] - rubbing.bent[i]) ** 2
+        way, taken = 0.0, 0.0
+        for c in range(ways):
+            i = c * n + k
+            slid = moved[i] + bent[i] - rubbing.bent[i]
+            if rubbing.doing[k] == SLIP:
+                way += slid**2
+            taken -= 0.5 * (rubbing.across[i] + rubbing.forces[n + i]) * slid
         rubbing.slip[k] = np.sqrt(way)
+        if taken > 0.0:
+            rubbing.lost[k] += taken
     for i in range(len(moved)):
         rubbing.across[i] = rubbing.forces[n + i]
         rubbing.bent[i] = bent[i]

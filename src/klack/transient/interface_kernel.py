@@ -76,6 +76,8 @@ from klack.transient.interface_arrays import (
 )
 from klack.transient.interface_friction import (
     friction_work,
+    held_across,
+    hold_offsets,
     offset_change,
     push_across,
     remember,
@@ -462,6 +464,15 @@ def _close(points: ContactPoints, state: State, step: _Step) -> float:
 
 
 @phase
+def _across(points: ContactPoints, state: State, step: _Step) -> float:
+    """Work of tangential forces, energy that they hold, and what friction takes, in all [J]."""
+    rubbing = state.rubbing
+    hold_offsets(points, rubbing, state.q, step.q, step.motion, step.way, step.moved, step.bent)
+    given, lost = friction_work(rubbing, step.bent, step.moved)
+    return given + held_across(rubbing, step.bent) + lost
+
+
+@phase
 def _pay(
     modes: Modes,
     points: ContactPoints,
@@ -485,13 +496,10 @@ def _pay(
     whole_step = potential > 0.0 and stored > 0.0
     owed = state.books[DEBT] + work + stored - potential + yielded
     rubs = len(points.tangents) > 0 and work != 0.0
-    held = 0.0  # energy of the contact across the normals
+    across = 0.0
     if rubs:
-        n = len(points.gap)
-        for i in range(len(step.bent)):
-            held += 0.5 * state.rubbing.forces[n + i] * step.bent[i]
-        given, lost = friction_work(state.rubbing, step.bent, step.moved)
-        owed += held + given + lost
+        across = _across(points, state, step)
+        owed += across
     pay = 0.0
     if owed != 0.0 and abs(work) > _PAY_FROM * (potential + stored):
         limit = 1.0
@@ -503,12 +511,16 @@ def _pay(
         answer += back
         _add(step, modes, 1.0)
         first, kept = _work(points, state.q, step)
+        change = 0.0
+        if rubs:
+            change = _across(points, state, step) - across
         if whole_step or pay == 0.0:
             work, stored = first, kept  # what is left of the debt comes next
         else:
             # the last chance: both are linear in the payment, the balance is quadratic
             work_slope, stored_slope = (first - work) / pay, (kept - stored) / pay
-            exact = _payment(owed, work + work_slope + stored_slope, work_slope)
+            slope = work + work_slope + stored_slope + change / pay
+            exact = _payment(owed, slope, work_slope)
             exact = min(max(exact, -limit), limit)
             more = exact / pay - 1.0
             answer += more * back
@@ -518,10 +530,8 @@ def _pay(
             stored += pay * stored_slope
     state.books[DEBT] += (1.0 + pay) * work + stored - potential + yielded
     if rubs:
-        offset_change(points, state.q, step.q, step.way, step.moved)
-        given, lost = friction_work(state.rubbing, step.bent, step.moved)
-        state.books[DEBT] += held + given + lost
-        stored += held
+        state.books[DEBT] += _across(points, state, step)
+        stored += held_across(state.rubbing, step.bent)
     return pay, stored, answer
 
 
@@ -825,8 +835,6 @@ def march(
                     axial += rub_guide(
                         modes, share, guide, state.q, step.known, step.whole, step.q, step.v
                     )
-                    if rubs:
-                        offset_change(points, state.q, step.q, step.way, step.moved)
             if rubs and state.contact.counts[0] == 0:
                 for i in range(len(step.bent)):
                     step.bent[i] = 0.0

@@ -53,8 +53,9 @@ def settle_at_rest(
     Parameters
     ----------
     model : InterfaceModel
+        Without friction between the faces.
     state : State
-        In: where they are; out: at rest.
+        In: where they are; out: at rest, but for the set of points that carry.
     gaps : callable
         Gaps at q = 0, shape (nc,) [m], where ``state.q`` is now.
     bore : Bore
@@ -106,11 +107,7 @@ def settle_at_rest(
             break
     state.v[:] = 0.0
     state.lam[:] = lam[:points]
-    carrying = np.flatnonzero(state.lam > 0.0)
-    state.contact.active[:] = state.lam > 0.0
-    state.contact.points[: len(carrying)] = carrying
-    state.contact.counts[:] = len(carrying), 0
-    state.carried[carrying] = True
+    state.carried[state.lam > 0.0] = True
     if left > _DOUBT:
         warnings.warn(
             f"the needle is not at rest at the start: {left:.1e} of the force on it is left. "

@@ -69,6 +69,13 @@ from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
+from klack.transient.spatial_rubbing import (
+    across_energy,
+    forget_inverse,
+    lie_without_friction,
+    repair_offsets,
+    rubbing_arrays,
+)
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import LOST, bend_faces, film_state, film_strain
 from klack.units import format_si
@@ -108,7 +115,8 @@ class SpatialValve:
     ----------
     model : InterfaceModel
         Of all bodies of the network, the needle first, at the placement of the meshes (q = 0 is
-        where the network has its displacements 0).  Without friction between the faces.
+        where the network has its displacements 0).  Faces stay elastic and have no layer of
+        asperities.
     components : tuple of str
         Component of each of ``model.bodies`` in the network.
     stops : tuple of str
@@ -158,7 +166,7 @@ class SpatialValve:
 class _Kept(NamedTuple):
     """What a repeated step begins with."""
 
-    vectors: tuple[Vector, ...]
+    vectors: tuple[NDArray[np.generic], ...]
     active: NDArray[np.bool_]
     points: Index
     counts: Index
@@ -213,8 +221,12 @@ class _Moving:
             self.films = film_arrays(model, self.squeezed, wet, series, bearing, room)
             rigid = self.films.rows[:, 0, self.model.omega == 0]
             self.inertia = np.sum(rigid**2, axis=1)  # of the lift, inverse [1/kg]
-        self.state = State.still(
-            model.mode_count, model.count, len(self.bore.clearance), films=len(self.squeezed)
+        heights, films = len(self.bore.clearance), len(self.squeezed)
+        self.state = State.still(model.mode_count, model.count, heights, model.ways, films=films)
+        self.kept = (
+            *(self.state.q, self.state.v, self.state.lam, self.state.guide_force),
+            *(self.state.books, self.state.films, self.state.bearing),
+            *rubbing_arrays(self.state.rubbing).values(),
         )
         self.coarser = {1: self.fine}  # modes over so many fine steps
         self.q, self.v, self.books = self.state.q, self.state.v, self.state.books
@@ -278,10 +290,11 @@ class _Moving:
         """
         begun, here, faces = None, slice(0, self.ports), self.network.interfaces
         gap0, shift = faces.gap0.copy(), np.zeros(self.ports)
+        smooth = self.model.without_friction() if self.model.ways else self.model
         left = np.inf
         for balanced in range(_BALANCES):
             force, kept = self.P @ self.at[LAST:][here], self._keep()
-            settle_at_rest(self.model, self.state, self._gaps_now, self.bore, force)
+            settle_at_rest(smooth, self.state, self._gaps_now, self.bore, force)
             moved = self.P.T @ self.q - self.at[Y0:][here]
             before, left = left, float(np.max(np.abs(moved), initial=0.0))
             if left < _BALANCED:
@@ -330,9 +343,12 @@ class _Moving:
 
     def _begin_closed(self) -> None:
         for c, (_, a, b) in enumerate(self.model.contacts):
-            self.force[c] = float(self.model.axial[a:b] @ self.state.lam[a:b])
+            self.force[c] = abs(float(self.model.axial[a:b] @ self.state.lam[a:b]))
             self.closed[c] = -np.inf if np.any(self.state.lam[a:b] > 0.0) else np.nan
-        self._rest_on(rest=not bool(np.all(np.isnan(self.closed))))
+        self.flags[_AT_REST] = float(not bool(np.all(np.isnan(self.closed))))
+        if self.model.ways:
+            lie_without_friction(self.model, self.state.rubbing, self.state.lam)
+        self._take_carrying()
 
     # ------------------------------------------------------------------ what others ask
 
@@ -364,20 +380,25 @@ class _Moving:
     def changing(self) -> dict[str, NDArray[np.generic]]:
         """All arrays that a step changes and the next one begins with."""
         lifts = {} if self.films is None else {"lifts": self.films.offset}
-        return lifts | {
-            "forces": self.state.lam,
-            "guide": self.state.guide_force,
-            "films": self.state.films,
-            "bearing": self.state.bearing,
-            "carried": self.state.carried,
-            "books": self.books,
-            "gaps": self.gap0,
-            "placement": self.taken_at,
-            "followed": self.followed_to,
-            "closed": self.closed,
-            "force": self.force,
-            "flags": self.flags,
-        }
+        rubs = rubbing_arrays(self.state.rubbing) if self.model.ways else {}
+        return (
+            lifts
+            | rubs
+            | {
+                "forces": self.state.lam,
+                "guide": self.state.guide_force,
+                "films": self.state.films,
+                "bearing": self.state.bearing,
+                "carried": self.state.carried,
+                "books": self.books,
+                "gaps": self.gap0,
+                "placement": self.taken_at,
+                "followed": self.followed_to,
+                "closed": self.closed,
+                "force": self.force,
+                "flags": self.flags,
+            }
+        )
 
     def stores(self) -> dict[str, float]:
         """Energies [J] that contacts and guide hold."""
@@ -388,6 +409,8 @@ class _Moving:
         for stop, (_, a, b) in zip(self.valve.stops, self.model.contacts, strict=True):
             depth = bent[a:b] + self.model.traces[a:b] @ self.q
             held[f"{stop} contact"] = float(-0.5 * self.state.lam[a:b] @ depth)
+            if self.model.ways:
+                held[f"{stop} contact"] += across_energy(self.model, self.state.rubbing, a, b)
         if len(self.bore.clearance):
             held["guide strain"] = float(self.books[GUIDE_STRAIN])
         for k, film in enumerate(self.squeezed):
@@ -405,6 +428,11 @@ class _Moving:
             lost["guide film"] = float(np.sum(self.state.bearing[:, 2]))
         for k, film in enumerate(self.squeezed):
             lost[f"{film.stop} film"] = float(self.state.films[k, LOST])
+        for law, stop, (_, a, b) in zip(
+            self.model.friction, self.valve.stops, self.model.contacts, strict=False
+        ):
+            if not law.is_none:
+                lost[f"{stop} friction"] = float(np.sum(self.state.rubbing.lost[a:b]))
         return lost
 
     def forget_losses(self) -> None:
@@ -413,6 +441,7 @@ class _Moving:
         self.flags[_LOST] = 0.0
         self.state.films[:, LOST] = 0.0
         self.state.bearing[:, 2] = 0.0
+        self.state.rubbing.lost[:] = 0.0
 
     # ------------------------------------------------------------------ motion
 
@@ -716,10 +745,9 @@ class _Moving:
 
     def _march(self, modes: Modes, count: int, points: bool, rest: bool) -> Record | None:
         """Fine steps under a constant modal force, that of ``modes.push``; None where they fail."""
-        n = self.model.count if points else 0
-        record = Record.empty(
-            count, len(self.model.bodies), n, keep_points=False, films=len(self.squeezed)
-        )
+        n, ways, films = self.model.count, self.model.ways, len(self.squeezed)
+        room = (count, len(self.model.bodies), *((n, ways) if points else (0, 0)))
+        record = Record.empty(*room, keep_points=False, films=films)
         touching = self.nothing
         if points:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
@@ -740,6 +768,8 @@ class _Moving:
         contact, guided = 0.0, 0.0
         if self.state.contact.counts[0]:
             contact = float(self.state.lam @ (self.model.traces @ dq))
+            if self.model.ways:
+                contact += repair_offsets(self.model, self.state.rubbing, dq)
         if np.any(self.state.guide_force):
             guided = float(np.sum(self.state.guide_force * (self.bore.traces @ dq)))
         self.q += dq
@@ -768,16 +798,16 @@ class _Moving:
 
     def _still(self, record: Record) -> bool:
         """Whether a long step met nothing that it cannot see."""
-        total = float(record.force[0])
-        before = float(np.sum(self.force))
+        total, before = abs(float(record.force[0])), float(np.sum(self.force))
         steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
         return steady and bool(self.state.contact.counts[0] > 0)
 
     def _take_carrying(self) -> None:
         """Let the points carry that have a force, as in a stored state."""
         contact, carrying = self.state.contact, np.flatnonzero(self.state.lam > 0.0)
-        contact.active[:] = self.state.lam > 0.0
-        contact.points[: len(carrying)] = carrying
+        if not self.model.ways:
+            contact.active[:] = self.state.lam > 0.0
+            contact.points[: len(carrying)] = carrying
         contact.counts[0] = len(carrying)
         self._renew(self.resting.A if self.flags[_AT_REST] else self.points.A)
 
@@ -788,6 +818,9 @@ class _Moving:
 
     def _renew(self, A: NDArray[np.float64]) -> None:
         """Inverse over the points that carry, of another matrix."""
+        if self.model.ways:
+            forget_inverse(self.state.rubbing)
+            return
         carrying = self.state.contact
         m = int(carrying.counts[0])
         index = carrying.points[:m]
@@ -811,6 +844,7 @@ class _Moving:
         first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
         now = round(t / self.sizes.step)
         faces, y = network.interfaces, np.append(self.P.T @ self.q, 0.0)
+        of_pressure = record.pressed if len(record.pressed) else record.force
         for c, row in enumerate(self.order):
             a, b = self.model.contacts[c][1:]
             smallest = float(np.min(self.gap0[a:b] + self.model.traces[a:b] @ self.q))
@@ -819,7 +853,7 @@ class _Moving:
             film = self.film_at.get(row)
             pressed = np.zeros(len(record.force)) if film is None else record.film[:, film]
             scratch.sums[first + 2 * row + 1] += h * float(np.sum(pressed))
-            force = np.where(self.side[c] * record.force > 0.0, np.abs(record.force), 0.0)
+            force = np.where(self.side[c] * of_pressure > 0.0, self.side[c] * record.force, 0.0)
             acted = np.append(force > 0.0, False)
             told = acted.copy()
             told[1:] |= acted[:-1]  # a step without force ends a contact
@@ -949,12 +983,8 @@ class _Moving:
     def _keep(self) -> _Kept:
         contact = self.state.contact
         m = int(contact.counts[0])
-        vectors = (
-            *(self.q, self.v, self.state.lam, self.state.guide_force, self.books),
-            *(self.state.films, self.state.bearing),
-        )
         return _Kept(
-            tuple(values.copy() for values in vectors),
+            tuple(values.copy() for values in self.kept),
             contact.active.copy(),
             contact.points.copy(),
             contact.counts.copy(),
@@ -963,11 +993,7 @@ class _Moving:
 
     def _put_back(self, kept: _Kept) -> None:
         contact = self.state.contact
-        vectors = (
-            *(self.q, self.v, self.state.lam, self.state.guide_force, self.books),
-            *(self.state.films, self.state.bearing),
-        )
-        for values, old in zip(vectors, kept.vectors, strict=True):
+        for values, old in zip(self.kept, kept.vectors, strict=True):
             values[...] = old
         m = int(kept.counts[0])
         contact.active[:], contact.points[:], contact.counts[:] = kept[1:4]
@@ -1011,8 +1037,8 @@ def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
         film.stop for film in valve.films
     }:
         problem = f"a film at '{min(lands)}' that has no land"
-    elif model.ways:
-        problem = "friction between faces"
+    elif model.limit is not None or model.layer is not None:
+        problem = "faces that yield, or with a layer of asperities"
     if problem:
         raise InputError(
             "motion in three dimensions",

@@ -1,7 +1,7 @@
 """Checks of a needle in space: its films, its guide, and the network that drives it."""
 
 from functools import partial
-from math import pi
+from math import cos, pi, sin, sqrt, tan
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -10,6 +10,7 @@ from klack.hydraulics.guide_film import guide_film_damping
 from klack.hydraulics.tilted_film import sector_film, sector_forces
 from klack.mechanics.force import ConstantForce
 from klack.mechanics.spring import Spring
+from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.check import Check, ComparedCurve, compare
@@ -22,6 +23,7 @@ from klack.verification.rigid_needle import (
     fly_in_films,
     fly_in_network,
     guide_of,
+    needle_on_cone,
     needle_on_ring,
 )
 
@@ -37,8 +39,8 @@ _LEAN = np.array([0.0, 0.0, 0.0, 4e-4, 6e-4, 0.0])  # [rad]
 
 
 def checks() -> list[Check]:
-    """Films that tilt, films in a guide, drops and starts in a network."""
-    return [*_films(), *_bearing(), *_driven(), *_centred(), _rest(), _energy()]
+    """Films that tilt, films in a guide, drops and starts in a network, faces that rub."""
+    return [*_films(), *_bearing(), *_driven(), *_centred(), _rest(), _energy(), *_rubbing()]
 
 
 # ---------------------------------------------------------------------- films
@@ -319,3 +321,54 @@ def _energy() -> Check:
         source="energy",
         reason=_ROUND_OFF,
     )
+
+
+def _rubbing() -> list[Check]:
+    """A needle in a cone whose faces rub: centred, and off its axis in a network."""
+    half_angle, mu, stiffer = 0.25 * pi, 0.1, 0.8
+    arms = np.array([[0.0, 0.0, -6e-3]])
+
+    def valve(model: InterfaceModel, **more: object) -> SpatialValve:
+        given = {"model": model, "components": ("needle",), "stops": ("contact",), "arms": arms}
+        return SpatialValve(**(given | more))  # type: ignore[arg-type]
+
+    model = needle_on_cone(half_angle, mu, stiffer=stiffer, gap=5e-6)
+    drop = {"gap": 5e-6, "speed": -0.5, "duration": 80e-6}
+    centred = fly_in_network(valve(model), {}, **drop)  # type: ignore[arg-type]
+    ratio = stiffer / tan(half_angle) / mu
+    share = 2.0 * mu * cos(half_angle) / (sin(half_angle) + mu * cos(half_angle))
+    lean, turn = np.array([0.0, 0.0, 0.0, 2e-4, 3e-4, 0.0]), np.array([0.1, 0, 0, 0, 2.0, 50.0])
+    alone = simulate_interface(
+        model, speed=0.5, duration=80e-6, step=_STEP, offset=lean, velocity=turn, flight=False
+    )
+    driven = fly_in_network(valve(model, placement=lean, velocity=turn), {}, **drop)  # type: ignore[arg-type]
+    held = fly_in_network(
+        valve(model, placement=lean, guide=guide_of(model, friction=0.1)),
+        {"spring": Spring(stiffness=2e4, preload=10.0)}, at_tip=("spring.end",),
+        gap=5e-6, speed=-0.4, duration=2e-3,
+    )  # fmt: skip
+    return [
+        _check(
+            "needle on a cone with friction 0.1 in a network: restitution [-]",
+            expected=sqrt(1.0 - share * (ratio - 1.0) / (ratio + 1.0)),
+            computed=centred.events[0].restitution,
+            tolerance=2e-5,
+            source="springs and sliders at the ring, closed form",
+        ),
+        _check(
+            "the same, tilted and spinning: energy that friction takes [J]",
+            expected=alone.energy.friction,
+            computed=driven.books.losses["contact friction"],
+            tolerance=1e-11,
+            source="the same drop at the interface level",
+            reason=_ROUND_OFF,
+        ),
+        _check(
+            "the same with guide and spring over 2 ms, energy residual [-]",
+            expected=0.0,
+            computed=held.books.relative_residual,
+            tolerance=1e-11,
+            source="energy",
+            reason=_ROUND_OFF,
+        ),
+    ]

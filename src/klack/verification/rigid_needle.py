@@ -1,12 +1,14 @@
 """A rigid needle in space whose motion is known: alone in its films, or in a network."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from math import cos, sin
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.contact.friction import Friction
 from klack.errors import ConvergenceError
 from klack.hydraulics.film import RingFilm
 from klack.hydraulics.fluid_library import library_fluid
@@ -41,6 +43,7 @@ __all__ = [
     "fly_in_films",
     "fly_in_network",
     "guide_of",
+    "needle_on_cone",
     "needle_on_ring",
 ]
 
@@ -59,6 +62,34 @@ def needle_on_ring(gap: float = 0.0) -> InterfaceModel:
     points = np.column_stack([ring, np.full(_POINTS, -_BELOW)])
     return rigid_body(
         mass=MASS, inertia=INERTIA, points=points, stiffness=STIFFNESS / _POINTS, gap=gap
+    )
+
+
+def needle_on_cone(
+    half_angle: float, friction: float, *, stiffer: float, gap: float = 0.0
+) -> InterfaceModel:
+    """The same in a cone whose faces rub: ``stiffer`` springs across the normals, over those along.
+
+    Tangents are those along the meridian, upwards, and round the axis; ``gap`` is along it [m].
+    """
+    flat, s, c = needle_on_ring(), sin(half_angle), cos(half_angle)
+    angle, nothing = 2.0 * np.pi * np.arange(_POINTS) / _POINTS, np.zeros(_POINTS)
+    out, up = np.column_stack([np.cos(angle), np.sin(angle), nothing]), np.array([0.0, 0.0, 1.0])
+    round_it = np.column_stack([-np.sin(angle), np.cos(angle), nothing])
+
+    def rows(way: Array) -> Array:
+        return way @ flat.rigid[:3] + np.cross(flat.points, way) @ flat.rigid[3:]
+
+    own = np.diag([1.0, 1.0 / stiffer, 1.0 / stiffer])
+    return replace(
+        flat,
+        traces=rows(s * up - c * out),
+        tangents=np.vstack([rows(c * up + s * out), rows(round_it)]),
+        compliance=np.asarray(np.kron(own, flat.compliance), dtype=np.float64),
+        gap=np.full(_POINTS, s * gap),
+        axial=np.full(_POINTS, s),
+        axial_across=np.concatenate([np.full(_POINTS, c), nothing]),
+        friction=(Friction.coulomb(friction),),
     )
 
 

@@ -32,6 +32,7 @@ __all__ = [
     "centric_draw",
     "closing_force",
     "draw_shot",
+    "drawn_face_friction",
     "drawn_friction",
     "drawn_position",
     "extreme_placements",
@@ -206,6 +207,12 @@ def drawn_friction(case: AnyCase, shots: Shots | StrokeShots, seed: int, index: 
     if shots.friction is not None:
         return shots.friction.quantile(_stream(seed, index, 0)[_FRICTION])
     return case.guide.friction if case.guide is not None else 0.0
+
+
+def drawn_face_friction(shots: StrokeShots, seed: int, index: int) -> float:
+    """Coulomb's coefficient between all faces in one stroke; nan where it is not drawn."""
+    drawn = shots.contact_friction
+    return float("nan") if drawn is None else drawn.quantile(_stream(seed, index, 0)[_FACES])
 
 
 def drawn_position(

@@ -45,6 +45,7 @@ _ROUND_OFF = 1e-12
 
 def stroke_content(study: StrokeStudy) -> Content:
     """Texts, tables and figures of a study."""
+    space = moves_in_space(study, study.reference)
     sections = [
         Section(
             title="The actuation",
@@ -68,7 +69,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         _computed(study),
         Section(
             title="Local laws of the stops",
-            charts=_named(*(stop_law_chart(stop) for stop in study.stops)),
+            charts=_named(*(stop_law_chart(stop, in_space=space) for stop in study.stops)),
         ),
     ]
     return page_of(
@@ -198,7 +199,7 @@ _OF_FIRST = ("approach_speed", "peak_force", "contact_time", "restitution")
 def _computed(study: StrokeStudy) -> Section:
     tables = [body_table(study.bodies)] if study.bodies else []
     if study.stops:
-        tables.append(_stop_table(study.stops))
+        tables.append(_stop_table(study.stops, moves_in_space(study, study.reference)))
     if study.fluid is not None:
         tables.append(_fluid_table(study.fluid))
     if study.lines:
@@ -219,7 +220,7 @@ def _computed(study: StrokeStudy) -> Section:
     return Section(title="Input", tables=tuple(tables))
 
 
-def _stop_table(stops: tuple[StopSummary, ...]) -> Table:
+def _stop_table(stops: tuple[StopSummary, ...], in_space: bool) -> Table:
     rows: tuple[tuple[str, Callable[[StopSummary], str]], ...] = (
         ("surfaces", lambda stop: stop.surfaces or "none"),
         ("local law", lambda stop: stop.kind),
@@ -228,7 +229,7 @@ def _stop_table(stops: tuple[StopSummary, ...]) -> Table:
             lambda stop: (
                 (
                     f"{stop.friction:g}"
-                    if stop.returning.size
+                    if stop.returning.size or in_space
                     else f"{stop.friction:g}, no loss in the law"
                 )
                 if stop.friction

@@ -412,8 +412,11 @@ def _staggered(marks: Sequence[Mark]) -> tuple[Mark, ...]:
 # --------------------------------------------------------------------------- laws
 
 
-def stop_law_chart(stop: StopSummary) -> Chart | None:
-    """Static approach of the two bodies at a stop and its share in the local law; None without."""
+def stop_law_chart(stop: StopSummary, *, in_space: bool = False) -> Chart | None:
+    """Static approach of the two bodies at a stop and its share in the local law; None without.
+
+    ``in_space`` the law is without the friction of the faces, which contact points have.
+    """
     if not stop.force.size:
         return None
     curves = []
@@ -430,7 +433,8 @@ def stop_law_chart(stop: StopSummary) -> Chart | None:
             width=2.0,
         )
     )
-    kind = f"with friction {stop.friction:g}" if stop.friction else "without friction"
+    rubs = stop.friction and not in_space
+    kind = f"with friction {stop.friction:g}" if rubs else "without friction"
     note = (
         f"Static contact of the two complete bodies {kind}, counted from first touch, and the "
         "part of it that the local law carries; the kept modes carry the rest."
@@ -485,6 +489,8 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
     coils = tuple(name.removesuffix("current") for name in study.channels.current)
     if not coils:
         return None
+    rubbing = {f"{stop.name} friction": "friction between the faces" for stop in study.stops}
+    rubbing["guide friction"] = "friction in the guide"
 
     def flows(books: EnergyBooks) -> dict[str, float]:
         everything = _flows(books)
@@ -493,7 +499,7 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
         grouped = {"work of the magnet": work}
         for key, value in everything.items():
             if key not in circuit:
-                kind = _KINDS.get(key.rsplit(" ", 1)[-1], key)
+                kind = rubbing.get(key) or _KINDS.get(key.rsplit(" ", 1)[-1], key)
                 grouped[kind] = grouped.get(kind, 0.0) + value
         return grouped
 

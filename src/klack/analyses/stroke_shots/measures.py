@@ -53,6 +53,14 @@ STARTED: tuple[Measure[Row], ...] = described_in(
         form="fixed",
         digits=3,
     ),
+    Measure(
+        key="contact_friction",
+        name="friction between the faces",
+        symbol="mu_c",
+        definition="Coulomb's coefficient between the faces of all stops, where it is drawn.",
+        form="fixed",
+        digits=3,
+    ),
 )
 """What differs from stroke to stroke."""
 
@@ -86,6 +94,14 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         symbol="W_g",
         unit="J",
         definition="Energy that friction in the guide takes in the whole stroke.",
+    ),
+    Measure(
+        key="faces_loss",
+        name="lost between the faces",
+        symbol="W_f",
+        unit="J",
+        definition="Energy that friction between the faces of all stops takes in the whole stroke; "
+        "missing without friction there.",
     ),
     Measure(
         key="injected_energy",

@@ -22,11 +22,13 @@ from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve
 from klack.case.valve_roles import ValveRoles
 from klack.case.variants import Variant
+from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, KlackError
 from klack.progress import silent
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.spatial_path import SpatialPath
 from klack.stages import collected_warnings
+from klack.transient.interface_model import InterfaceModel
 from klack.transient.spatial_run import SpatialValve
 
 __all__ = [
@@ -124,7 +126,7 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
     """Compute one stroke, on one thread, and measure it."""
     start, spatial = task.start, setup.spatial
     guide = None if spatial.guide is None else spatial.guide.with_friction(start.friction)
-    spatial = replace(spatial, placement=start.placement, guide=guide)
+    spatial = replace(spatial, placement=start.placement, guide=guide, model=_faces(spatial, start))
     valve = replace(setup.valve, spatial=spatial)
     with collected_warnings() as doubts, threadpool_limits(limits=1, user_api="blas"):
         try:
@@ -145,13 +147,21 @@ def run_one_stroke(setup: StrokeSetup, task: StrokeTask) -> StrokeOutcome:
         variant=task.variant,
         label=run.variant.label,
         index=start.index,
-        stroke=_stroke_numbers(start, run.variant, energies),
+        stroke=_stroke_numbers(start, run.variant, energies, spatial.stops),
         stops=stops,
         lift=_lift(setup, result),
         end=path.position[-1],
         failure=" ".join(str(run.failure).split()) if run.failure is not None else "",
         doubts=tuple(dict.fromkeys([*doubts, *notes, *begun, *filter(None, (rest, unrest))])),
     )
+
+
+def _faces(spatial: SpatialValve, start: StrokeStart) -> InterfaceModel:
+    """Model with the friction of the draw between all faces."""
+    model = spatial.model
+    if np.isnan(start.contact_friction):
+        return model
+    return replace(model, friction=(Friction.coulomb(start.contact_friction),) * len(spatial.stops))
 
 
 def stop_columns(rows: Sequence[Numbers]) -> StopColumns:
@@ -188,13 +198,18 @@ def _started(start: StrokeStart) -> Numbers:
         "tilt": tilt,
         "tilt_direction": tilt_direction,
         "friction": start.friction,
+        "contact_friction": start.contact_friction,
     }
 
 
-def _stroke_numbers(start: StrokeStart, variant: StrokeVariant, energies: Numbers) -> Numbers:
+def _stroke_numbers(
+    start: StrokeStart, variant: StrokeVariant, energies: Numbers, stops: Sequence[str]
+) -> Numbers:
     result, times = variant.result, (variant.opening_time, variant.closing_time)
     opening, closing = (_NAN if time is None else float(time) for time in times)
     lost = [event.energy_loss for event in result.events]
+    losses = result.books.losses
+    rubbed = [losses[f"{stop} friction"] for stop in stops if f"{stop} friction" in losses]
     return {
         **_started(start),
         "opening_time": opening,
@@ -202,6 +217,7 @@ def _stroke_numbers(start: StrokeStart, variant: StrokeVariant, energies: Number
         "impacts": float(len(result.events)),
         "impact_loss": float(np.nansum(lost)) if lost else 0.0,
         "guide_loss": float(result.books.losses.get("guide friction", 0.0)),
+        "faces_loss": float(sum(rubbed)) if rubbed else _NAN,
         **energies,
         "energy_residual": float(result.books.relative_residual),
     }

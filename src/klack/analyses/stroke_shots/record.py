@@ -5,7 +5,7 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ from klack.analyses.record import CaseRecord
 __all__ = ["StopColumns", "StrokeColumns", "StrokeShotsStudy", "VariantShots"]
 
 Column = NDArray[np.float64]
+
+
+def _not_kept() -> Column:
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,6 +36,8 @@ class StrokeColumns:
         Angle between the axes, and direction in which the upper end is tilted.
     friction : array [-]
         Coulomb's coefficient in the guide.
+    contact_friction : array [-]
+        The same between the faces of all stops, where it is drawn.
     opening_time, closing_time : array [s]
     impacts : array [-]
         On all stops.
@@ -39,6 +45,8 @@ class StrokeColumns:
         Kinetic energy of the centre of mass that all impacts take.
     guide_loss : array [J]
         Energy that friction in the guide takes.
+    faces_loss : array [J]
+        Energy that friction between the faces of all stops takes; nan where they have none.
     injected_energy : array [J]
         Work of the stops on the modes of the held bodies.
     radiated_energy : array [J]
@@ -52,14 +60,22 @@ class StrokeColumns:
     tilt: Column
     tilt_direction: Column
     friction: Column
+    contact_friction: Column = field(default_factory=_not_kept)
     opening_time: Column
     closing_time: Column
     impacts: Column
     impact_loss: Column
     guide_loss: Column
+    faces_loss: Column = field(default_factory=_not_kept)
     injected_energy: Column
     radiated_energy: Column
     energy_residual: Column
+
+    def __post_init__(self) -> None:
+        """Fill in what the first results of many strokes do not have: faces without friction."""
+        for name in ("contact_friction", "faces_loss"):
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full(self.count, np.nan))
 
     @property
     def count(self) -> int:

@@ -298,6 +298,12 @@ def _distributions(case: ValveCase) -> dict[str, str]:
         words["friction in the guide"] = shots.friction.text("")
     elif case.guide is not None:
         words["friction in the guide"] = format_si(case.guide.friction, "")
+    given = {name: stop.friction for name, stop in case.stops.items() if stop.friction > 0.0}
+    if shots.contact_friction is not None:
+        words["friction between the faces"] = shots.contact_friction.text("")
+    elif given:
+        each = (f"{format_si(mu, '')} at '{name}'" for name, mu in given.items())
+        words["friction between the faces"] = ", ".join(each)
     return words
 
 

@@ -144,6 +144,8 @@ def correlations(shots: VariantShots, item: Scattered) -> dict[str, float]:
     stop = item.stop or next(iter(shots.stops))
     columns = shots.stops[stop]
     against = {"eccentricity": columns.eccentricity, "tilt": columns.tilt}
-    if float(np.ptp(shots.strokes.friction)) > 0.0:
-        against["friction"] = shots.strokes.friction
+    for key in ("friction", "contact_friction"):
+        values = getattr(shots.strokes, key)
+        if float(np.ptp(values)) > 0.0:
+            against[key] = values
     return {name: rank_correlation(item.values, values) for name, values in against.items()}

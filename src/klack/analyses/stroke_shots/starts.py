@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.shots.draw import drawn_friction, drawn_position
+from klack.analyses.shots.draw import drawn_face_friction, drawn_friction, drawn_position
 from klack.assembling.spatial import placement_of, seat_height
 from klack.assembling.valve import Valve
 from klack.case.shots import StrokeShots
@@ -37,6 +37,8 @@ class StrokeStart:
         the axis, which guides with friction leave behind.
     friction : float [-]
         Coulomb's coefficient in the guide.
+    contact_friction : float [-]
+        That between the faces of all stops; nan: each has that of the case.
     """
 
     index: int
@@ -44,6 +46,7 @@ class StrokeStart:
     lean: Vector
     placement: Vector
     friction: float
+    contact_friction: float
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -97,6 +100,13 @@ class Starts:
         """Centred and upright, without Coulomb friction in the guide, which it does not touch."""
         return self._at(CENTRED, np.zeros(2), np.zeros(2), 0.0)
 
+    def contact_friction(self, index: int) -> float:
+        """Coefficient of friction between the faces, the mean one in the centred stroke."""
+        shots = shots_of_valve(self.case)
+        if index == CENTRED and shots.contact_friction is not None:
+            return shots.contact_friction.mean
+        return drawn_face_friction(shots, self.seed, max(index, 0))
+
     def after(self, index: int, end: Vector) -> StrokeStart:
         """Start of a stroke where the one before has left the needle across its axis.
 
@@ -121,7 +131,12 @@ class Starts:
         placement = rigid_placement(aside, lean, about, self.centre)
         placement[5] = turn
         return StrokeStart(
-            index=index, aside=aside, lean=lean, placement=placement, friction=friction
+            index=index,
+            aside=aside,
+            lean=lean,
+            placement=placement,
+            friction=friction,
+            contact_friction=self.contact_friction(index),
         )
 
 

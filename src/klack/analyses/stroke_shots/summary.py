@@ -102,7 +102,7 @@ class StrokeVariantJson(TypedDict):
         dict[str, dict[str, float]],
         Field(
             description="By measure: rank correlation with eccentricity and tilt at touch, and "
-            "with the friction in the guide where it is drawn."
+            "with the friction in the guide and between the faces where they are drawn."
         ),
     ]
     highest: Annotated[
@@ -233,6 +233,7 @@ def correlation_rows(shots: Variant) -> tuple[tuple[str, ...], tuple[tuple[str, 
         "eccentricity": "eccentricity at touch",
         "tilt": "tilt at touch",
         "friction": "friction in the guide",
+        "contact_friction": "friction between the faces",
     }
     heads = ("measure", *(names[key] for key in found[0])) if found else ("measure",)
     rows = tuple(
