@@ -160,6 +160,7 @@ def fly_in_network(
     at_tip: tuple[str, ...] = (),
     aside: tuple[str, ...] = (),
     arm: float = 0.0,
+    joints: tuple[tuple[str, ...], ...] = (),
     gap: float = 0.0,
     speed: float = 0.0,
     wet: bool = False,
@@ -169,7 +170,8 @@ def fly_in_network(
 ) -> NetworkResult:
     """A needle over its stop in a network: in space, or along its axis without ``valve``.
 
-    Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x from there.
+    Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x from there; ``joints`` are
+    further connections.
     """
     rigid = np.diag([MASS**-0.5] * 3 + [J**-0.5 for J in INERTIA])
     tip = rigid[2]
@@ -197,6 +199,7 @@ def fly_in_network(
             ["needle.tip", "contact.upper", *at_tip],
             ["contact.lower", "ground"],
             *([["needle.side", *aside]] if aside else []),
+            *(list(joint) for joint in joints),
         ],
         fluid=library_fluid("n-heptane").at(293.15) if wet else None,
     )
