@@ -84,6 +84,7 @@ def build_spatial(
         )
         for name in bodies
     }
+    _check_heights(case, needle, bodies[needle])
     height = seat_height(contacts, needle)
     placement = placement_of(case, height)
     off_axis = _farthest(case, height, placement)
@@ -158,6 +159,23 @@ def build_spatial(
             if (film := getattr(parts[meeting.name], "film", None)) is not None
         ),
     )
+
+
+def _check_heights(case: ValveCase, needle: str, body: ElasticBody) -> None:
+    """Raise :class:`InputError` for a force across the axis beside the needle."""
+    low, high = (float(f(body.mesh.points[:, 2])) for f in (np.min, np.max))
+    for name, component in case.network.components.items():
+        for part in component.off_axis_parts():
+            outside = [z for z in part.heights if not low <= z <= high]
+            if outside:
+                keys = ".".join(str(key) for key in ("network", "components", name, *part.key))
+                raise InputError(
+                    f"{case.path or 'case'}: {keys}",
+                    got=f"a force across the axis at z = {format_si(outside[0], 'm')}",
+                    expected=f"a height of '{needle}' as drawn, {format_si(low, 'm')} to "
+                    f"{format_si(high, 'm')}",
+                    hint="height counts along z in the drawing of the needle, as guide.heights.",
+                )
 
 
 def _bearing(guide: ValveGuide | None) -> BearingFilm | None:

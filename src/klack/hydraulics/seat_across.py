@@ -70,6 +70,10 @@ class SeatAcross:
         moments = self.height * push[:2] + np.array([turn[1], -turn[0]])
         return np.asarray(drop * np.concatenate((push[:2], moments)))
 
+    def left_out(self, now: SideInputs) -> float:
+        """Nothing: the flow is that of the position."""
+        return 0.0
+
     def room(self, now: SideInputs) -> float:
         """No end: faces that overlap let nothing through there."""
         return np.inf

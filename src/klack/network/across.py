@@ -54,6 +54,10 @@ class SideLaw(Protocol):
         """Distance [m] that is left until the faces meet, where the law ends."""
         ...
 
+    def left_out(self, now: SideInputs) -> float:
+        """Share of what acts along the axis that the position changes and the row does not [-]."""
+        ...
+
     def placement(self, axis: Vector) -> Vector:
         """Numbers that the step function of the row takes of the position of the axis."""
         ...

@@ -7,10 +7,12 @@ they act in the step.  So its work is :math:`f^T A\,\Delta q`, to round-off, wit
 repair in it.
 """
 
+import warnings
+
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import ConvergenceError
+from klack.errors import AccuracyWarning, ConvergenceError
 from klack.network.across import SideInputs
 from klack.network.rows import SideRow
 from klack.simulation.network_arrays import StepRows
@@ -21,6 +23,8 @@ from klack.units import format_si
 __all__ = ["SideForces"]
 
 Vector = NDArray[np.float64]
+
+_LEFT_OUT = 0.02  # of the reluctance of these gaps: about as much of the axial force
 
 
 class SideForces:
@@ -45,6 +49,7 @@ class SideForces:
         self.force = np.zeros((len(self.rows), 4))
         self.work = np.zeros(len(self.rows))
         self.push = np.zeros(model.mode_count)
+        self.left_out = np.zeros(len(self.rows))
 
     @property
     def acts(self) -> bool:
@@ -91,9 +96,24 @@ class SideForces:
         """Forces and moments about the centre of mass at this moment, shape (n, 4)."""
         told = np.zeros((len(self.rows), 4))
         for k, row in enumerate(self.rows):
-            told[k] = row.law.force(self._inputs(row, q, 0.0, self.network.node_state.p))
+            now = self._inputs(row, q, 0.0, self.network.node_state.p)
+            told[k] = row.law.force(now)
             told[k, 2:] -= self.height * told[k, :2]
+            self.left_out[k] = max(self.left_out[k], row.law.left_out(now))
         return told
+
+    def warn(self) -> None:
+        """Warn of reluctances that the position changes, and flux and axial force do not follow."""
+        for row, share in zip(self.rows, self.left_out, strict=True):
+            if share > _LEFT_OUT:
+                warnings.warn(
+                    f"'{row.component}': where the needle is, the air gaps that act across its "
+                    f"axis have up to {100 * share:.2g} % less reluctance than on it. Flux and "
+                    "axial force are computed without that. Give more clearance, or less play in "
+                    "the guide.",
+                    AccuracyWarning,
+                    stacklevel=2,
+                )
 
     def supplies(self) -> dict[str, float]:
         """Energies [J] that they gave since the start of the run."""

@@ -347,7 +347,9 @@ class _Moving:
         return told | self._side_channels(time)
 
     def _side_channels(self, time: Vector) -> dict[str, ChannelData]:
+        """Forces and moments of magnets and seats, these about the centre of mass."""
         told = {}
+        self.sides.warn()
         for k, row in enumerate(self.sides.rows):
             for i, name in enumerate(("force x", "force y", "moment x", "moment y")):
                 values = np.interp(time, self.path.time, self.path.side_force[:, k, i])
@@ -624,7 +626,7 @@ class _Moving:
                 clock[7] += 1
             push = self.P @ at[GUESS : GUESS + here] + self.sides.push
             record_ = self._march(modes._replace(push=push), count, points, rest, t, report)
-            if rest and not self._still(record_):
+            if record_ is None or (rest and not self._still(record_)):
                 self._put_back(kept)
                 clock[1] = level
                 return STATUS_REFUSED
@@ -685,8 +687,11 @@ class _Moving:
 
     def _march(
         self, modes: Modes, count: int, points: bool, rest: bool, t: float, report: Vector
-    ) -> Record:
-        """Fine steps under a constant modal force, that of ``modes.push``."""
+    ) -> Record | None:
+        """Fine steps under a constant modal force, that of ``modes.push``.
+
+        None where a long step at rest finds no forces: fine ones may.
+        """
         n = self.model.count if points else 0
         record = Record.empty(
             count, len(self.model.bodies), n, keep_points=False, films=len(self.squeezed)
@@ -697,6 +702,8 @@ class _Moving:
         state = self.state if points else self.apart
         _, status = march(count, 0, modes, _NONE, touching, self.bore, self.films, state, record)
         if status == FAILED or not np.all(np.isfinite(self.q)):
+            if rest:
+                return None
             report[2] = t
             raise ConvergenceError(
                 f"needle: no contact forces found at {1e6 * t:.4g} us.\n"

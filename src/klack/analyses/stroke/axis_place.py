@@ -8,7 +8,7 @@ from ruamel.yaml import YAML
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.case.guide import CaseGuide
 
-__all__ = ["AxisPlace", "axis_place", "guide_of", "moves_in_space"]
+__all__ = ["AxisPlace", "acts_across", "axis_place", "guide_of", "moves_in_space"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +52,12 @@ def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisP
             return None
         found.append(float(np.interp(time, variant.result.time, channel.values)))
     return AxisPlace(x=found[0], y=found[1], tilt_x=found[2], tilt_y=found[3])
+
+
+def acts_across(variant: StrokeVariant) -> tuple[str, ...]:
+    """Magnets and seats that act across the axis in a variant."""
+    end = " side force x"
+    return tuple(name.removesuffix(end) for name in variant.result.channels if name.endswith(end))
 
 
 def guide_of(study: StrokeStudy) -> CaseGuide | None:
