@@ -234,6 +234,7 @@ class _Moving:
         self.q[: self.rigid_count] += self.coordinates(self.valve.placement)
         self.v[: self.rigid_count] += self.coordinates(self.valve.velocity)
         self.take_gaps()
+        self.sides.place(self.q)
         rests = balance is not None and not np.any(self.v)
         begun = None
         if balance is not None and rests:
@@ -301,6 +302,8 @@ class _Moving:
     def resume(self) -> None:
         """Continue from a stored state."""
         self._silence_interfaces()
+        self.read()
+        self.sides.place(self.q)
         self.path.clear()
 
     def _silence_interfaces(self) -> None:
@@ -625,11 +628,12 @@ class _Moving:
                 at[GUESS + here] = 0.0
                 clock[7] += 1
             push = self.P @ at[GUESS : GUESS + here] + self.sides.push
-            record_ = self._march(modes._replace(push=push), count, points, rest, t, report)
-            if record_ is None or (rest and not self._still(record_)):
+            marched = self._march(modes._replace(push=push), count, points, rest, t, report)
+            if marched is None or (rest and not self._still(marched)):
                 self._put_back(kept)
                 clock[1] = level
                 return STATUS_REFUSED
+            record_ = marched
             at[Y1 : Y1 + here] = self.P.T @ self.q
             self.sides.place(0.5 * (begun + self.q))
             status = answer_step(level, steps, attempt, t, H, arrays, scratch, report)

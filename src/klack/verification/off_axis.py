@@ -13,6 +13,7 @@ from klack.mechanics.spring import Spring
 from klack.transient.interface_run import simulate_interface
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.pulled_needle import pulls
 from klack.verification.rigid_needle import (
     FACE,
     INERTIA,
@@ -38,7 +39,15 @@ _LEAN = np.array([0.0, 0.0, 0.0, 4e-4, 6e-4, 0.0])  # [rad]
 
 def checks() -> list[Check]:
     """Films that tilt, films in a guide, drops and starts in a network."""
-    return [*_films(), *_bearing(), *_driven(), *_centred(), _rest(), _energy()]
+    return [
+        *_films(),
+        *_bearing(),
+        *_driven(),
+        *_centred(),
+        _rest(),
+        _energy(),
+        *pulls(),
+    ]
 
 
 # ---------------------------------------------------------------------- films

@@ -164,6 +164,7 @@ def fly_in_network(
     gap: float = 0.0,
     speed: float = 0.0,
     wet: bool = False,
+    film: bool = True,
     start: Literal["rest", "free"] = "free",
     state: NetworkState | None = None,
     duration: float,
@@ -171,7 +172,7 @@ def fly_in_network(
     """A needle over its stop in a network: in space, or along its axis without ``valve``.
 
     Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x from there; ``joints`` are
-    further connections.
+    further connections.  ``wet`` has a fluid, and with ``film`` one at the contact.
     """
     rigid = np.diag([MASS**-0.5] * 3 + [J**-0.5 for J in INERTIA])
     tip = rigid[2]
@@ -193,7 +194,10 @@ def fly_in_network(
     law = LinearStopLaw(kind="linear", stiffness=STIFFNESS)
     needle = FlexibleBody.of(body if valve is not None else body.along_axis(), speed=speed)
     network = Network(
-        {"needle": needle, "contact": EndStop(gap=gap, law=law, film=FACE if wet else None)}
+        {
+            "needle": needle,
+            "contact": EndStop(gap=gap, law=law, film=FACE if wet and film else None),
+        }
         | dict(parts),
         [
             ["needle.tip", "contact.upper", *at_tip],
