@@ -69,12 +69,7 @@ class SideForces:
         middle = q + 0.5 * H * v
         for k, row in enumerate(self.rows):
             now = self._inputs(row, middle, 0.5 * H, pressures)
-            if not row.law.room(now) > 0.0:
-                raise ConvergenceError(
-                    f"{row.component}: the needle is so far off-axis that the armature touches the "
-                    f"iron around it at {format_si(t, 's', 4)}.\nTry: a larger clearance of its "
-                    "magnetic gaps, or a guide that holds it."
-                )
+            _require_room(row, now, t)
             self.force[k] = row.law.force(now)
         self.push[:] = self.A.T @ self.force.sum(axis=0)
 
@@ -92,11 +87,18 @@ class SideForces:
                 begin = int(steps.parameter0[k]) + row.placement
                 steps.parameters[begin : begin + len(at)] = at
 
-    def now(self, q: Vector) -> Vector:
-        """Forces and moments about the centre of mass at this moment, shape (n, 4)."""
+    def now(self, q: Vector, t: float) -> Vector:
+        """Forces and moments about the centre of mass at this moment, shape (n, 4).
+
+        Raises
+        ------
+        ConvergenceError
+            Where faces meet.
+        """
         told = np.zeros((len(self.rows), 4))
         for k, row in enumerate(self.rows):
             now = self._inputs(row, q, 0.0, self.network.node_state.p)
+            _require_room(row, now, t)
             told[k] = row.law.force(now)
             told[k, 2:] -= self.height * told[k, :2]
             self.left_out[k] = max(self.left_out[k], row.law.left_out(now))
@@ -143,3 +145,13 @@ class SideForces:
             ahead=ahead,
             pressures=p,
         )
+
+
+def _require_room(row: SideRow, now: SideInputs, t: float) -> None:
+    if row.law.room(now) > 0.0:
+        return
+    raise ConvergenceError(
+        f"{row.component}: the needle is so far off-axis that the armature touches the iron around "
+        f"it at {format_si(t, 's', 4)}.\nTry: a larger clearance of its magnetic gaps, or a guide "
+        "that holds it."
+    )

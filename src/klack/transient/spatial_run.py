@@ -841,7 +841,7 @@ class _Moving:
             rigid @ self.q,
             rigid @ self.v,
             self.state.guide_force,
-            self.sides.now(self.q),
+            self.sides.now(self.q, steps * self.sizes.step),
         )
 
     # ------------------------------------------------------------------ state
