@@ -281,7 +281,7 @@ class LineRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SideRow:
-    """Force across the axis of the needle; without motion in three dimensions nobody asks for it.
+    """Force across the axis of the needle, for motions in three dimensions alone.
 
     Parameters
     ----------
