@@ -139,6 +139,16 @@ def test_a_guided_needle_goes_to_the_wall_that_it_is_nearer_to():
     assert abs(energy.relative_residual) < 1e-12
 
 
+def test_the_balance_closes_where_the_coil_pulls_along_the_axis_too():
+    """Guessed forces are repaired then, and the side force works on that as well."""
+    coil = held_coil(ArmatureBore(height=2e-3, eccentricity=20e-6), tilts=True, current=10.0)
+    run = pulled_needle(coil, (0, 0, 0, 0, 1e-3, 0), 40e-6, held=False)
+
+    assert values(run, "needle.tip displacement")[-1] > 10e-6
+    assert abs(run.books.supplies["coil side force"]) > 1e-6 * run.books.scale
+    assert abs(run.books.relative_residual) < 1e-13
+
+
 def test_an_armature_that_reaches_the_iron_ends_the_run():
     coil = held_coil(MIDDLE)
     with (
@@ -187,6 +197,18 @@ def test_a_seat_in_a_run_has_the_area_and_the_force_of_its_placement():
     v = run.path.velocity[-1]
     across = 0.5 * MASS * v[:2] @ v[:2] + 0.5 * INERTIA[0] * v[3:5] @ v[3:5]
     assert work == pytest.approx(across, rel=1e-9)
+
+
+def test_a_seat_opens_where_the_needle_is_in_the_middle_of_a_step():
+    """A needle that passes at 0.3 m/s: 0.1 um in half a step change these digits."""
+    speed = 0.3
+    run = seat_off_axis((20e-6, 0, 0, 0, 0, 0), velocity=(speed, 0, 0, 0, 0, 0))
+
+    half = 0.5 * speed * run.sizes.step * run.sizes.near
+    x = run.path.position[-1, 0] - half
+    area = values(run, "restriction area")[-1]
+    assert area == pytest.approx(flow_area(FACE, [60e-6, x, 0, 0, 0]), rel=1e-7)
+    assert area != pytest.approx(flow_area(FACE, [60e-6, x - half, 0, 0, 0]), rel=1e-6)
 
 
 def test_a_centred_seat_has_the_flow_of_the_lift_alone():

@@ -3,8 +3,8 @@ r"""Forces of magnets and seats across the axis of a needle, in its rigid freedo
 Each law gives force and moments :math:`f` on the four numbers :math:`u = A q` of the axis
 (:mod:`klack.network.across`); the modes feel :math:`A^T f`.  It is constant over a macro step, that
 of its middle: places that move at the speed of the start, fluxes that change at their rate,
-pressures as they act in the step.  So its work is :math:`f^T A\,\Delta q`, to round-off, with the way of a
-repair in it.
+pressures as they act in the step.  So its work is :math:`f^T A\,\Delta q`, to round-off, with the
+way of a repair in it.
 """
 
 import warnings

@@ -56,12 +56,15 @@ def pulled_needle(
     duration: float,
     *,
     guided: bool = False,
+    held: bool = True,
 ) -> NetworkResult:
-    """A needle in the field of a coil whose armature port is held: its flux is constant.
+    """A needle in the field of a coil whose armature port is ``held``: its flux is constant.
 
-    ``guided`` by a guide with a film; else it is free.
+    Else the coil pulls along z as well, 2 mm from the axis.  ``guided`` by a guide with a film; else
+    it is free.
     """
-    model = needle_on_ring(1e-2)
+    below = 1e-2 if held else 1e-3  # to the stop
+    model = needle_on_ring(below)
     valve = SpatialValve(
         model=model, components=("needle",), stops=("contact",), arms=_ARMS,
         placement=np.array(placement),
@@ -72,8 +75,13 @@ def pulled_needle(
     return fly_in_network(
         valve,
         {"coil": coil, "driver": driver},
-        joints=(("coil.armature", "ground"), ("coil.terminals", "driver.terminals")),
-        gap=1e-2,
+        aside=() if held else ("coil.armature",),
+        arm=2e-3,
+        joints=(
+            *((("coil.armature", "ground"),) if held else ()),
+            ("coil.terminals", "driver.terminals"),
+        ),
+        gap=below,
         wet=guided,
         film=False,
         duration=duration,
@@ -84,6 +92,7 @@ def seat_off_axis(
     placement: tuple[float, ...],
     *,
     follows: bool = True,
+    velocity: tuple[float, ...] = (0.0,) * 6,
     duration: float = 20e-6,
     state: NetworkState | None = None,
 ) -> NetworkResult:
@@ -94,7 +103,7 @@ def seat_off_axis(
     )  # fmt: skip
     valve = SpatialValve(
         model=needle_on_ring(1e-2), components=("needle",), stops=("contact",), arms=_ARMS,
-        placement=np.array(placement),
+        placement=np.array(placement), velocity=np.array(velocity),
     )  # fmt: skip
     return fly_in_network(
         valve,
