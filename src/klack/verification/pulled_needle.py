@@ -60,8 +60,8 @@ def pulled_needle(
 ) -> NetworkResult:
     """A needle in the field of a coil whose armature port is ``held``: its flux is constant.
 
-    Else the coil pulls along z as well, 2 mm from the axis.  ``guided`` by a guide with a film; else
-    it is free.
+    Else the coil pulls along z as well, 2 mm from the axis.  ``guided`` by a guide with a film;
+    else it is free.
     """
     below = 1e-2 if held else 1e-3  # to the stop
     model = needle_on_ring(below)

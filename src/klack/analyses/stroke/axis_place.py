@@ -6,7 +6,7 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
-from klack.case.guide import CaseGuide
+from klack.case.motion_of_valve import ValveGuide
 
 __all__ = ["AxisPlace", "acts_across", "axis_place", "guide_of", "moves_in_space"]
 
@@ -60,7 +60,7 @@ def acts_across(variant: StrokeVariant) -> tuple[str, ...]:
     return tuple(name.removesuffix(end) for name in variant.result.channels if name.endswith(end))
 
 
-def guide_of(study: StrokeStudy) -> CaseGuide | None:
+def guide_of(study: StrokeStudy) -> ValveGuide | None:
     """Section ``guide`` of the case, which was checked when it was run; None without."""
     given = YAML(typ="safe").load(study.case_text).get("guide")
-    return None if given is None else CaseGuide.model_validate(given)
+    return None if given is None else ValveGuide.model_validate(given)
