@@ -34,7 +34,7 @@ from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.units import format_si
 
-__all__ = ["build_spatial", "placement_of", "seat_height"]
+__all__ = ["build_spatial", "check_heights", "placement_of", "seat_height"]
 
 Vector = NDArray[np.float64]
 
@@ -84,7 +84,6 @@ def build_spatial(
         )
         for name in bodies
     }
-    _check_heights(case, needle, bodies[needle])
     height = seat_height(contacts, needle)
     placement = placement_of(case, height)
     off_axis = _farthest(case, height, placement)
@@ -161,9 +160,10 @@ def build_spatial(
     )
 
 
-def _check_heights(case: ValveCase, needle: str, body: ElasticBody) -> None:
+def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, ElasticBody]) -> None:
     """Raise :class:`InputError` for a force across the axis beside the needle."""
-    low, high = (float(f(body.mesh.points[:, 2])) for f in (np.min, np.max))
+    needle = str(getattr(case.network.components[roles.needle], "body", ""))
+    low, high = (float(f(bodies[needle].mesh.points[:, 2])) for f in (np.min, np.max))
     for name, component in case.network.components.items():
         for part in component.off_axis_parts():
             outside = [z for z in part.heights if not low <= z <= high]
