@@ -1,12 +1,18 @@
 """A rigid needle that lands in a film, eccentric; truth: energy, convergence, the axial stroke."""
 
 from dataclasses import replace
+from math import pi
 
 import numpy as np
 import pytest
 
+from klack.magnetics.solenoid_parts import ArmatureBore
+from klack.magnetics.voltage_step import VoltageStep
 from klack.transient.gap_course import gap_course
 from klack.transient.spatial_run import SpatialValve
+from klack.transient.tilting_film import BearingFilm
+from klack.verification.interface_bodies import lateral_guide
+from klack.verification.pulled_needle import held_coil
 from klack.verification.rigid_needle import (
     FACE,
     INERTIA,
@@ -213,3 +219,46 @@ def test_a_wet_run_in_two_parts_is_the_same(first):
         true, same = whole.channels[name].values, rest.channels[name].values
         moved = np.abs(true - true[0]).max()
         np.testing.assert_allclose(same[both], true[again], rtol=0.0, atol=1e-9 * moved)
+
+
+def test_a_shaft_that_is_pressed_into_the_wall_keeps_the_film_of_its_guide():
+    """A magnet presses harder than the roughness: the film is squeezed along the wall alone.
+
+    A search with the slopes of a shaft that goes on outwards found no forces at 10 us.
+    """
+    model, current = needle_on_ring(1e-2), 60.0
+    bore = ArmatureBore(height=5e-3, eccentricity=40e-6, direction=pi)
+    coil = held_coil(bore, current=current)
+    guide = lateral_guide(
+        model,
+        clearance=4e-6,
+        stiffness=1e7,
+        heights=(-2e-3, 5e-3),
+        offset=((0.0, 0.0), (0.0, 0.0)),
+        friction=0.0,
+        radius=1.5e-3,
+    )
+    valve = SpatialValve(
+        model=model,
+        components=("needle",),
+        stops=("contact",),
+        arms=np.array([[0.0, 0.0, -6e-3]]),
+        placement=np.array([3e-6, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        guide=guide,
+        bearing=BearingFilm(length=1.5e-3, cut_off=0.3e-6),
+    )
+
+    run = fly_in_network(
+        valve,
+        {"coil": coil, "driver": VoltageStep(voltage=coil.resistance * current, end=1.0)},
+        joints=(("coil.armature", "ground"), ("coil.terminals", "driver.terminals")),
+        gap=1e-2,
+        wet=True,
+        film=False,
+        duration=15e-6,
+    )
+
+    aside = run.channels["guide 2 x"].values[-1]
+    assert aside > 4.3e-6  # clearance and roughness
+    assert run.channels["guide 2 force"].values[-1] == pytest.approx(1e7 * (aside - 4e-6), rel=0.02)
+    assert abs(run.books.relative_residual) < 1e-12

@@ -1,13 +1,13 @@
 """Positions that a guide leaves to the axis of its shaft."""
 
-from math import cos, hypot, pi, sin, sqrt
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.case.guide import CaseGuide
 
-__all__ = ["axis_through", "in_disc", "largest_eccentricity"]
+__all__ = ["axis_through", "in_disc"]
 
 Vector = NDArray[np.float64]
 
@@ -24,11 +24,3 @@ def in_disc(shares: Vector, radius: float) -> Vector:
     """Point of a disc, all places alike, from two numbers between 0 and 1."""
     distance, angle = radius * sqrt(shares[0]), 2.0 * pi * shares[1]
     return distance * np.array([cos(angle), sin(angle)])
-
-
-def largest_eccentricity(guide: CaseGuide, height: float) -> float:
-    """How far off its bore the axis of a rigid shaft can be at a height [m]."""
-    towards = guide.clearance * np.array([1.0, 0.0])
-    return max(
-        hypot(*axis_through(guide, height, towards, sign * towards)[0]) for sign in (1.0, -1.0)
-    )

@@ -37,7 +37,7 @@ from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.units import format_si
 
-__all__ = ["build_spatial", "placement_of", "seat_height"]
+__all__ = ["build_spatial", "check_heights", "placement_of", "seat_height"]
 
 Vector = NDArray[np.float64]
 
@@ -170,6 +170,24 @@ def build_spatial(
             if (film := getattr(parts[meeting.name], "film", None)) is not None
         ),
     )
+
+
+def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, ElasticBody]) -> None:
+    """Raise :class:`InputError` for a force across the axis beside the needle."""
+    needle = str(getattr(case.network.components[roles.needle], "body", ""))
+    low, high = (float(f(bodies[needle].mesh.points[:, 2])) for f in (np.min, np.max))
+    for name, component in case.network.components.items():
+        for part in component.off_axis_parts():
+            outside = [z for z in part.heights if not low <= z <= high]
+            if outside:
+                keys = ".".join(str(key) for key in ("network", "components", name, *part.key))
+                raise InputError(
+                    f"{case.path or 'case'}: {keys}",
+                    got=f"a force across the axis at z = {format_si(outside[0], 'm')}",
+                    expected=f"a height of '{needle}' as drawn, {format_si(low, 'm')} to "
+                    f"{format_si(high, 'm')}",
+                    hint="height counts along z in the drawing of the needle, as guide.heights.",
+                )
 
 
 def _bearing(guide: ValveGuide | None) -> BearingFilm | None:

@@ -11,7 +11,7 @@ from klack.assembling.bodies import assemble_body, find_touch, mesh_body
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes
 from klack.assembling.modes import mode_pool, selection_of
-from klack.assembling.spatial import build_spatial
+from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
 from klack.cache.setting import result_cache
@@ -92,6 +92,8 @@ def build_valve(
         For geometry, surfaces, supports or connections that cannot be used.
     """
     bodies = build_valve_bodies(case, progress)
+    if case.motion == "three-dimensional":
+        check_heights(case, find_roles(case), bodies)
     if sum(body.dof_count for body in bodies.values()) <= _FEW:
         threads = 1
     with threadpool_limits(limits=threads, user_api="blas"):

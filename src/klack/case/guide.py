@@ -64,3 +64,8 @@ class CaseGuide(Section):
                     hint="name each guiding edge once, lowest first.",
                 )
         return self
+
+    def largest_eccentricity(self, height: float) -> float:
+        """How far off its bore the axis of a rigid shaft can be at a height [m]."""
+        share = (height - self.heights[0]) / (self.heights[-1] - self.heights[0])
+        return self.clearance * (abs(1.0 - share) + abs(share))

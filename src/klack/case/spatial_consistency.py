@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from klack.case.off_axis_consistency import check_off_axis, refuse_off_axis
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError
@@ -27,6 +28,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
                     "{type: guide-friction}.",
                     on_key=True,
                 )
+        refuse_off_axis(case)
         return
     _check_bodies(case)
     parts = case.network.components
@@ -51,6 +53,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
             _check_stop(case, name, part)
     _check_ends(case, meetings, roles)
     _check_placement(case)
+    check_off_axis(case, roles.needle)
     if case.reduction.correction != "consistent":
         raise CaseProblem(
             ("reduction", "correction"),

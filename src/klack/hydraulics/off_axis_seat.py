@@ -29,16 +29,16 @@ Source: elementary geometry.
 
 from dataclasses import dataclass
 from math import cos, pi, sin
-from typing import Any, Self
+from typing import Any, Literal, Protocol, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, require_positive
-from klack.hydraulics.seat import Seat, SeatShape
 
 __all__ = [
     "SeatFace",
+    "SeatShape",
     "edge_gap",
     "flow_area",
     "flow_area_slopes",
@@ -47,9 +47,21 @@ __all__ = [
 ]
 
 Vector = NDArray[np.float64]
+SeatShape = Literal["flat", "cone", "ball"]
 
 _FEWEST_ANGLES = 8
 _COMPLEX_STEP = 1e-30  # of the placement: exact slopes, nothing is subtracted
+
+
+class _Seat(Protocol):
+    """What a face takes of a :class:`~klack.hydraulics.seat.Seat`."""
+
+    @property
+    def shape(self) -> SeatShape: ...
+    @property
+    def diameter(self) -> float: ...
+    @property
+    def surface_angle(self) -> float: ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +94,7 @@ class SeatFace:
             )
 
     @classmethod
-    def of(cls, seat: Seat) -> Self:
+    def of(cls, seat: _Seat) -> Self:
         """Take shape, edge and angle of a seat."""
         return cls(shape=seat.shape, radius=0.5 * seat.diameter, angle=seat.surface_angle)
 

@@ -1,25 +1,28 @@
 r"""Seat: the restriction that a needle opens and closes."""
 
 from collections.abc import Mapping
-from math import acos, cos, pi, sin, sqrt
-from typing import Any, ClassVar, Literal, Self
+from math import acos, cos, inf, pi, sin, sqrt
+from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.off_axis_opening import off_axis_opening
+from klack.hydraulics.off_axis_seat import SeatFace, SeatShape
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow, orifice_flow
+from klack.hydraulics.seat_across import SeatAcross, SeatPlace
 from klack.input.problem import CaseProblem
+from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Angle, Area, Length, Ratio
 
-__all__ = ["Seat", "SeatShape", "ball_opening", "cone_opening", "flat_opening", "gap_flow"]
+__all__ = ["Seat", "ball_opening", "cone_opening", "flat_opening", "gap_flow"]
 
-SeatShape = Literal["flat", "cone", "ball"]
 _FLAT, _CONE, _BALL = 0.0, 1.0, 2.0
 _KINDS = {"flat": _FLAT, "cone": _CONE, "ball": _BALL}
 
@@ -80,25 +83,22 @@ def _opening(kind: float, x: float, r: float, g1: float, g2: float) -> tuple[flo
     return flat_opening(x, r)
 
 
-@step_function
-def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Flow at the mean lift of the step, and the forces of the flow.
+@inner(error_model="numpy")
+def _pass(
+    par: Any, state: Any, inp: Any, out: Any, x: float, area: float, gap: float, cube: float
+) -> None:
+    """Flow through an opening at the lift ``x``, and the forces of the flow.
 
-    ``par``: 0 kind, 1 radius, 2-3 shape, 4 lift at the start, 5 largest area, 6 ``C_q``, 7
-    ``12 mu w/(pi d)``, 8 ``lambda_c mu/8``, 9 contraction, 10 vapour pressure, 11-13 leak
-    (conductance, number, throat), 14 ``C_v cos(theta)``, 15 damping length.
-    ``state``: lift, area, jet force, mass flow, 1 once that flow is known.
+    ``area`` of the mantle, ``gap`` of its edge, ``cube`` that of the land to the third power.
     """
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
-    x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
-    area, gap = _opening(par[0], x, par[1], par[2], par[3])
     area = min(area, par[5])
     flow = up = down = 0.0
     forward = p_a >= p_b
     density = rho_a if forward else rho_b
     if area > 0.0 and gap > 1e-12:
         conductance = par[6] * area
-        linear = par[7] / (gap * gap * gap) + par[8] / (conductance * gap)
+        linear = par[7] / cube + par[8] / (conductance * gap)
         square = 0.5 * density / (conductance * conductance)
         volume, slope = gap_flow(abs(p_a - p_b), linear, square)
         slope *= density
@@ -126,6 +126,35 @@ def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
         out[0] += flow
         out[1] += up
         out[2] += down
+
+
+@step_function
+def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Flow at the mean lift of the step, and the forces of the flow.
+
+    ``par``: 0 kind, 1 radius, 2-3 shape, 4 lift at the start, 5 largest area, 6 ``C_q``, 7
+    ``12 mu w/(pi d)``, 8 ``lambda_c mu/8``, 9 contraction, 10 vapour pressure, 11-13 leak
+    (conductance, number, throat), 14 ``C_v cos(theta)``, 15 damping length.
+    ``state``: lift, area, jet force, mass flow, 1 once that flow is known.
+    """
+    x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
+    area, gap = _opening(par[0], x, par[1], par[2], par[3])
+    _pass(par, state, inp, out, x, area, gap, gap * gap * gap)
+    return 0
+
+
+@step_function
+def off_axis_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of a seat whose needle is off-axis or tilted; centred that of :func:`seat_step`.
+
+    ``par``, behind that of :func:`seat_step`: 16-17 sine and cosine of the angle of the face, 18-19
+    offset, 20-21 slopes of the face.
+    """
+    x = par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9])
+    area, gap, cube = off_axis_opening(
+        par[0], par[1], par[16], par[17], x, par[18], par[19], par[20], par[21]
+    )
+    _pass(par, state, inp, out, max(x, 0.0), area, gap, cube)
     return 0
 
 
@@ -154,7 +183,11 @@ class Seat(Component):
     leak area is left, an orifice in parallel.  Positive flow runs from a to b; the cavitation limit
     is that of an orifice.
 
-    Limits: concentric (:mod:`~klack.hydraulics.off_axis_seat` is not), quasi-steady (no inertia of
+    With a section ``off_axis``, of a needle that moves in three dimensions, area and gap are those
+    between edge and face where the needle is (:mod:`~klack.hydraulics.off_axis_seat`), and the
+    pressure pushes it across the axis.
+
+    Limits: concentric without that section, quasi-steady (no inertia of
     the fluid in the gap), both surfaces rigid.
     Sources: Merritt 1967, ch. 3 and 5; areas by elementary geometry.
     """
@@ -190,6 +223,11 @@ class Seat(Component):
         description="Contraction of the cavitating jet; null: no cavitation limit.",
     )
     flow_force: FlowForce | None = Field(default=None, description="Of the jet on the needle.")
+    off_axis: SeatPlace | None = Field(
+        default=None,
+        description="With motion: three-dimensional: opening and side force where the needle is. "
+        "Without it those of its lift alone.",
+    )
 
     @model_validator(mode="after")
     def _shape_has_its_numbers(self) -> Self:
@@ -265,12 +303,17 @@ class Seat(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
         fluid, viscosity = ambient_viscosity(rows)
+        parameters, step = self.parameters(viscosity, fluid.vapour_pressure), seat_step
+        if self.off_axis is not None:
+            beta = self.surface_angle
+            parameters = (*parameters, sin(beta), cos(beta), 0.0, 0.0, 0.0, 0.0)
+            step = off_axis_seat_step
         rows.branch(
-            seat_step,
+            step,
             a=rows.port("a"),
             b=rows.port("b"),
             ports=(rows.port("needle"), rows.port("body")),
-            parameters=self.parameters(viscosity, fluid.vapour_pressure),
+            parameters=parameters,
             state=(self.lift, 0.0, 0.0, 0.0, 0.0),
             channels=(
                 Channel("lift", "m", 0, derived=True),
@@ -278,3 +321,20 @@ class Seat(Component):
                 Channel("jet force", "N", 2, derived=True),
             ),
         )
+        if self.off_axis is not None:
+            rows.side_of_branch(
+                SeatAcross(
+                    face=SeatFace.of(self),
+                    height=self.off_axis.height,
+                    lift=self.lift,
+                    inside="ab".index(self.off_axis.inside),
+                ),
+                len(parameters) - 4,
+            )
+
+    def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
+        """Return the edge, if it is told where it meets the needle."""
+        if self.off_axis is None:
+            return ()
+        heights = (self.off_axis.height,)
+        return (OffAxisPart(key=("off_axis",), port="needle", heights=heights, room=inf),)

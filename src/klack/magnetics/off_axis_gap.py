@@ -15,6 +15,7 @@ Sources: Smythe, *Static and Dynamic Electricity* (eccentric cylinders); Woodson
 ch. 3 (forces from co-energy).
 """
 
+from functools import cache
 from math import pi
 
 import numpy as np
@@ -92,7 +93,7 @@ def guide_ring(
     slopes : array, shape (4,) [H/m], [H/m], [H], [H]
     """
     q = np.asarray(place, dtype=float)
-    nodes, weights = np.polynomial.legendre.leggauss(stations)
+    nodes, weights = _gauss(stations)
     z = 0.5 * length * nodes
     way = q[:2] - z[:, None] * q[2:]
     ends = q[:2] + 0.5 * length * np.array([[1.0], [-1.0]]) * q[2:]
@@ -104,6 +105,11 @@ def guide_ring(
     along = np.divide(way, e[:, None], out=np.zeros_like(way), where=e[:, None] > 0.0)
     pull = (share * slope)[:, None] * along
     return float(share @ P), np.concatenate((pull.sum(axis=0), -(z[:, None] * pull).sum(axis=0)))
+
+
+@cache
+def _gauss(stations: int) -> tuple[Vector, Vector]:
+    return np.polynomial.legendre.leggauss(stations)
 
 
 def tilted_ring_face(

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
+from math import cos, inf, sin
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -14,9 +15,11 @@ from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
+from klack.magnetics.side_pull import ArmaturePull, ArmatureRing
 from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
 from klack.magnetics.tabulation import hermite_grid
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
 from klack.network.rows import Rows
@@ -53,6 +56,9 @@ class Solenoid(Component):
     The stops have to end the stroke before the working gap is closed: a case in which they let the
     armature pass through its pole is refused, and a run stops where contacts give way by half of
     the residual gap.
+
+    A ring of ``parasitic`` with a section ``off_axis`` and a pole with ``tilts`` act across the
+    axis of a needle that moves in three dimensions: :mod:`klack.magnetics.side_pull`.
 
     Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes)
     is a matter of a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as
@@ -120,6 +126,53 @@ class Solenoid(Component):
             base=rows.port("base"),
             current=self.start_current,
             gap_range=self.gap_range(),
+        )
+        if self.off_axis_parts():
+            rows.side_of_element(self._side_pull(circuit.loops.shape[1]))
+
+    def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
+        """Return the rings and working gaps that act across the axis."""
+        parts = []
+        for k, ring in enumerate(self.parasitic):
+            if ring.off_axis is not None and ring.length is not None:
+                middle, half = ring.off_axis.height, 0.5 * ring.length
+                room = (ring.clearance or 0.0) - ring.off_axis.eccentricity
+                parts.append(
+                    OffAxisPart(
+                        key=("parasitic", k, "off_axis"),
+                        port="armature",
+                        heights=(middle - half, middle + half),
+                        room=room,
+                    )
+                )
+        for k, pole in enumerate(self.poles):
+            if pole.tilts:
+                key = ("poles", k, "tilts")
+                parts.append(OffAxisPart(key=key, port="armature", heights=(), room=inf))
+        return tuple(parts)
+
+    def _side_pull(self, loops: int) -> ArmaturePull:
+        """Return the force across the axis, for a circuit of so many loops."""
+        rings = []
+        for gap in self.parasitic:
+            if gap.off_axis is None or gap.radius is None:
+                continue
+            at, turn = gap.off_axis, gap.off_axis.direction
+            rings.append(
+                ArmatureRing(
+                    inner=gap.radius,
+                    outer=gap.radius + (gap.clearance or 0.0),
+                    length=gap.length or 0.0,
+                    height=at.height,
+                    centre=(at.eccentricity * cos(turn), at.eccentricity * sin(turn)),
+                )
+            )
+        return ArmaturePull(
+            rings=tuple(rings),
+            faces=tuple(pole for pole in self.poles if pole.tilts),
+            loops=loops,
+            gap=self.gap + self.residual_gap,
+            way=-1.0 if self.closes == "upward" else 1.0,
         )
 
     def gap_range(self) -> GapRange:

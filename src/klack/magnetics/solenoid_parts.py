@@ -19,9 +19,10 @@ from klack.magnetics.air_gap import (
 from klack.magnetics.eddy import MOST_TERMS, EddyLadder, cylinder_ladder, sheet_ladder
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 from klack.magnetics.iron_choice import IronChoice
-from klack.units import Area, Conductivity, Length, Permeance, Ratio
+from klack.magnetics.off_axis_gap import eccentric_ring
+from klack.units import Angle, Area, Conductivity, Length, Permeance, Ratio, format_si
 
-__all__ = ["EddyPart", "IronPart", "ParasiticGap", "PoleGap"]
+__all__ = ["ArmatureBore", "EddyPart", "IronPart", "ParasiticGap", "PoleGap"]
 
 Vector = NDArray[np.float64]
 
@@ -46,6 +47,11 @@ class PoleGap(Section):
     )
     wall: Length | None = Field(
         default=None, gt=0, description="Distance of the tube from the side face, for wall."
+    )
+    tilts: bool = Field(
+        default=False,
+        description="Whether a tilted armature feels the moment of this gap, with motion: "
+        "three-dimensional.",
     )
 
     @model_validator(mode="after")
@@ -92,6 +98,16 @@ class PoleGap(Section):
         return law(gap, self.shoulder or 0.0)
 
 
+class ArmatureBore(Section):
+    """Where a gap is that surrounds the armature, so that it pulls an armature off its axis."""
+
+    height: Length = Field(description="Middle of the ring along z, in the drawing of the needle.")
+    eccentricity: Length = Field(
+        default=0.0, ge=0, description="Distance of the axis of the bore from that of the guide."
+    )
+    direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
+
+
 class ParasiticGap(Section):
     """A gap that the stroke does not change: the guide of the armature, a joint, a weld ring."""
 
@@ -99,30 +115,48 @@ class ParasiticGap(Section):
     radius: Length | None = Field(default=None, gt=0, description="Inner radius of a guide ring.")
     clearance: Length | None = Field(default=None, gt=0, description="Radial clearance there.")
     length: Length | None = Field(default=None, gt=0, description="Axial length of the ring.")
+    off_axis: ArmatureBore | None = Field(
+        default=None,
+        description="Of a ring round the armature, with motion: three-dimensional: it pulls the "
+        "armature to the nearer side. Without it no force across the axis.",
+    )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        ring = ("radius", "clearance", "length")
+        ring = ("radius", "clearance", "length", "off_axis")
         if self.permeance is not None:
             return self._refuse_with(ring, "permeance", "the permeance is sufficient")
-        if any(getattr(self, name) is None for name in ring):
+        if any(getattr(self, name) is None for name in ring[:3]):
             raise CaseProblem(
                 (),
                 got="an incomplete gap",
                 expected="either permeance, or radius, clearance and length",
                 hint="add the missing lengths of the guide ring.",
             )
+        clearance = self.clearance or 0.0
+        if self.off_axis is not None and self.off_axis.eccentricity >= clearance:
+            raise CaseProblem(
+                ("off_axis", "eccentricity"),
+                got=f"{format_si(self.off_axis.eccentricity, 'm')} in a clearance of "
+                f"{format_si(clearance, 'm')}",
+                expected="less than the clearance",
+                hint="check both, and their units.",
+            )
         return self
 
     @property
     def reluctance(self) -> float:
-        """Reluctance [A/Wb]."""
+        """Reluctance [A/Wb], the armature on the axis of its guide."""
         if self.permeance is not None:
             return 1.0 / self.permeance
         assert self.radius is not None
         assert self.clearance is not None
         assert self.length is not None
-        return 1.0 / ring_permeance(self.radius, self.radius + self.clearance, self.length)
+        outer = self.radius + self.clearance
+        if self.off_axis is not None and self.off_axis.eccentricity > 0.0:
+            e = self.off_axis.eccentricity
+            return 1.0 / float(eccentric_ring(self.radius, outer, self.length, e)[0])
+        return 1.0 / ring_permeance(self.radius, outer, self.length)
 
 
 class IronPart(Section):

@@ -8,6 +8,7 @@ from pydantic import ValidationError
 
 from klack.errors import InputError
 from klack.input.section import Section
+from klack.network.across import OffAxisPart
 from klack.network.port import Port
 from klack.network.rows import Rows
 
@@ -61,6 +62,10 @@ class Component(Section):
         Bodies become rigid, an end stop one spring [N/m] and one dashpot; all else stays.
         """
         return self
+
+    def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
+        """Return what of it acts across the axis of a needle in three dimensions as well."""
+        return ()
 
     @abstractmethod
     def add_rows(self, rows: Rows) -> None:

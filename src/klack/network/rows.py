@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
+from klack.network.across import SideLaw
 from klack.network.protocols import InterfaceLaw, NetworkFluid
 from klack.network.step_function import StepFunction
 
@@ -34,6 +35,7 @@ __all__ = [
     "LineRow",
     "NodeRow",
     "Rows",
+    "SideRow",
     "SliderRow",
     "WallRow",
 ]
@@ -278,6 +280,27 @@ class LineRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SideRow:
+    """Force across the axis of the needle, for motions in three dimensions alone.
+
+    Parameters
+    ----------
+    component : str
+    law : SideLaw
+    element, branch : int
+        Number of the row that the law belongs to; the other one is -1.
+    placement : int
+        Parameter of that row from which on it takes the placement of the law; -1 if it takes none.
+    """
+
+    component: str
+    law: SideLaw
+    element: int = -1
+    branch: int = -1
+    placement: int = -1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LimitRow:
     """Range in which a law holds, of one quantity that changes while the network runs.
 
@@ -355,6 +378,7 @@ class Rows:
     sliders: list[SliderRow] = field(default_factory=list)
     lines: list[LineRow] = field(default_factory=list)
     limits: list[LimitRow] = field(default_factory=list)
+    sides: list[SideRow] = field(default_factory=list)
 
     def port(self, name: str) -> int:
         """Handle of the node that the port ``name`` of the present component is joined to.
@@ -449,6 +473,19 @@ class Rows:
                 failures=failures or {},
                 column=column,
             )
+        )
+
+    def side_of_element(self, law: SideLaw) -> None:
+        """Let the element that was added last act across the axis as well."""
+        self.sides.append(
+            SideRow(component=self.component, law=law, element=len(self.elements) - 1)
+        )
+
+    def side_of_branch(self, law: SideLaw, placement: int) -> None:
+        """Let the branch that was added last act across the axis, and know where the axis is."""
+        number = len(self.branches) - 1
+        self.sides.append(
+            SideRow(component=self.component, law=law, branch=number, placement=placement)
         )
 
     def chamber(self, node: int, *, volume: float, pressure: float | None) -> None:

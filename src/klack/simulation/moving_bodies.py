@@ -52,6 +52,10 @@ class MovingBodies(Protocol):
         """Energies [J] that they hold beside that of their modes."""
         ...
 
+    def supplies(self) -> dict[str, float]:
+        """Energies [J] from sources of their own since the start of the run."""
+        ...
+
     def losses(self) -> dict[str, float]:
         """Energies [J] lost since the start of the run."""
         ...

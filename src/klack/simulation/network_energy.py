@@ -127,7 +127,7 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
             losses[f"{line.component} {what}"] = float(accounts.lines[k, j])
     if network.moving is not None:
         return EnergyBooks(
-            supplies=supplies,
+            supplies=supplies | network.moving.supplies(),
             losses=losses | network.moving.losses(),
             stores_before=dict(before),
             stores_after=after,

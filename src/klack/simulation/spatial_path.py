@@ -13,19 +13,25 @@ Vector = NDArray[np.float64]
 
 @dataclass(eq=False)
 class SpatialPath:
-    """Rigid motion of the needle and the forces of its guide, filled while it moves."""
+    """Rigid motion of the needle and forces across its axis, filled while it moves."""
 
-    _rows: list[tuple[float, Vector, Vector, Vector]] = field(default_factory=list)
+    _rows: list[tuple[float, Vector, Vector, Vector, Vector]] = field(default_factory=list)
 
     def clear(self) -> None:
         """Forget everything."""
         self._rows.clear()
 
-    def add(self, time: float, place: Vector, speed: Vector, guide: Vector) -> None:
-        """Add a moment; what was later is forgotten, since it has been computed again."""
+    def add(
+        self, time: float, place: Vector, speed: Vector, guide: Vector, side: Vector | None = None
+    ) -> None:
+        """Add a moment; what was later is forgotten, since it has been computed again.
+
+        ``side`` are forces and moments of magnets and seats across the axis, shape (n, 4).
+        """
         while self._rows and self._rows[-1][0] >= time:
             self._rows.pop()
-        self._rows.append((time, place, speed, np.linalg.norm(guide, axis=1)))
+        across = np.zeros((0, 4)) if side is None else side
+        self._rows.append((time, place, speed, np.linalg.norm(guide, axis=1), across))
 
     @property
     def begun(self) -> bool:
@@ -57,3 +63,8 @@ class SpatialPath:
     def guide_force(self) -> Vector:
         """Side force at each height of the guide, shape (n, k) [N]."""
         return np.array([row[3] for row in self._rows])
+
+    @property
+    def side_force(self) -> Vector:
+        """Forces [N] and moments [N m] about the centre of mass, shape (n, k, 4)."""
+        return np.array([row[4] for row in self._rows])

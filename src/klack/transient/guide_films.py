@@ -40,9 +40,12 @@ def _within(place: Vector, clearance: float) -> float:
 
 @njit
 def _bearings(
-    films: Films, bore: Bore, before: Matrix, after: Matrix, step: float
+    films: Films, bore: Bore, before: Matrix, after: Matrix, step: float, slides: bool
 ) -> tuple[Vector, Matrix]:
-    """Forces of all heights over a step, shape (2 g,), and their slopes with the places after."""
+    """Forces of all heights over a step, shape (2 g,), and their slopes with the places after.
+
+    ``slides``: slopes of a shaft that the wall stops and that slides along it, as it is.
+    """
     heights = len(films.room)
     force, slopes = np.zeros(2 * heights), np.zeros((2 * heights, 2 * heights))
     for k in range(heights):
@@ -55,8 +58,15 @@ def _bearings(
         )  # fmt: skip
         force[2 * k], force[2 * k + 1] = strength * x, strength * y
         for c in range(2):
-            for d in range(2):  # of a shaft that does not slide along the wall
+            for d in range(2):
                 slopes[2 * k + c, 2 * k + d] = strength * steep[c, d] * last
+        if slides and last * room < 1.0:  # no further out: the slope along the wall is left
+            nx, ny = after[k, 0], after[k, 1]
+            square = nx * nx + ny * ny
+            for c in range(2):
+                out = slopes[2 * k + c, 2 * k] * nx + slopes[2 * k + c, 2 * k + 1] * ny
+                slopes[2 * k + c, 2 * k] -= out * nx / square
+                slopes[2 * k + c, 2 * k + 1] -= out * ny / square
     return force, slopes
 
 
@@ -81,8 +91,37 @@ def squeeze_guide(
     soft = (rows * modes.B1) @ rows.T
     old = state.bearing[:, :2].copy().reshape(n)
     free -= soft @ old
+    least = np.min(films.room)
+    slides = False
+    force, size = _search(films, bore, before, free, soft, old, modes.step, slides)
+    if not size < _NEARLY * least:
+        slides = True
+        force, size = _search(films, bore, before, free, soft, old, modes.step, slides)
+    if not size < _NEARLY * least:
+        return -1.0
+    for k in range(heights):
+        state.bearing[k, 0], state.bearing[k, 1] = force[2 * k], force[2 * k + 1]
+    way = np.max(np.abs(free + soft @ force - before.reshape(n))) + _FOUND * least
+    force -= old
+    kick[:] = rows.T @ force
+    return float(np.max(np.abs(soft @ force)) / way)
+
+
+@njit
+def _search(
+    films: Films,
+    bore: Bore,
+    before: Matrix,
+    free: Vector,
+    soft: Matrix,
+    old: Vector,
+    step: float,
+    slides: bool,
+) -> tuple[Vector, float]:
+    """Forces of the films by Newton's method, and by how much places do not fit [m]."""
+    n, heights = len(free), len(before)
     u = free + soft @ old
-    force, slopes = _bearings(films, bore, before, u.reshape((heights, 2)), modes.step)
+    force, slopes = _bearings(films, bore, before, u.reshape((heights, 2)), step, slides)
     left = free + soft @ force - u
     size, least = np.max(np.abs(left)), np.min(films.room)
     rounds = 0
@@ -92,7 +131,9 @@ def squeeze_guide(
         share, now = 1.0, size
         for _ in range(_HALVINGS):
             tried = u + share * change
-            force, slopes = _bearings(films, bore, before, tried.reshape((heights, 2)), modes.step)
+            force, slopes = _bearings(
+                films, bore, before, tried.reshape((heights, 2)), step, slides
+            )
             left = free + soft @ force - tried
             now = np.max(np.abs(left))
             if now < size:
@@ -102,14 +143,7 @@ def squeeze_guide(
         if not now < size:  # round-off
             break
         size = now
-    if not size < _NEARLY * least:
-        return -1.0
-    for k in range(heights):
-        state.bearing[k, 0], state.bearing[k, 1] = force[2 * k], force[2 * k + 1]
-    force -= old
-    kick[:] = rows.T @ force
-    way = np.max(np.abs(u - before.reshape(n))) + _FOUND * least
-    return float(np.max(np.abs(soft @ force)) / way)
+    return force, size
 
 
 @njit

@@ -68,6 +68,7 @@ from klack.transient.interface_arrays import (
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
+from klack.transient.side_forces import SideForces
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
 from klack.transient.spatial_rubbing import (
     across_energy,
@@ -196,6 +197,7 @@ class _Moving:
         self.model, self.ports = model, len(network.ports)
         self.place_q, self.place_v, self.P = _places(valve, network)
         self.at = network.bodies.at
+        self.sides = SideForces(network, model, self.P)
         h = sizes.step
         steps = {FINE: 1, COARSE: sizes.coarse, NEAR: sizes.near}
         self.steps = steps
@@ -264,6 +266,7 @@ class _Moving:
         self.q[: self.rigid_count] += self.coordinates(self.valve.placement)
         self.v[: self.rigid_count] += self.coordinates(self.valve.velocity)
         self.take_gaps()
+        self.sides.place(self.q)
         rests = balance is not None and not np.any(self.v)
         begun = None
         if balance is not None and rests:
@@ -294,7 +297,10 @@ class _Moving:
         left = np.inf
         for balanced in range(_BALANCES):
             force, kept = self.P @ self.at[LAST:][here], self._keep()
+            self.sides.begin(self.q, 0.0 * self.v, 0.0, self.network.node_state.p, 0.0)
+            force += self.sides.push
             settle_at_rest(smooth, self.state, self._gaps_now, self.bore, force)
+            self.sides.place(self.q)
             moved = self.P.T @ self.q - self.at[Y0:][here]
             before, left = left, float(np.max(np.abs(moved), initial=0.0))
             if left < _BALANCED:
@@ -329,6 +335,8 @@ class _Moving:
     def resume(self) -> None:
         """Continue from a stored state."""
         self._silence_interfaces()
+        self.read()
+        self.sides.place(self.q)
         self.path.clear()
 
     def _silence_interfaces(self) -> None:
@@ -375,15 +383,28 @@ class _Moving:
             here = self.bore.offset[k] + at[:, :2] + arm * slope
             for i, name in enumerate(("x", "y")):
                 told[f"guide {k + 1} {name}"] = ChannelData(unit="m", values=here[:, i])
+        return told | self._side_channels(time)
+
+    def _side_channels(self, time: Vector) -> dict[str, ChannelData]:
+        """Forces and moments of magnets and seats, these about the centre of mass."""
+        told = {}
+        self.sides.warn()
+        for k, row in enumerate(self.sides.rows):
+            for i, name in enumerate(("force x", "force y", "moment x", "moment y")):
+                values = np.interp(time, self.path.time, self.path.side_force[:, k, i])
+                unit = "N" if i < 2 else "N m"
+                told[f"{row.component} side {name}"] = ChannelData(unit=unit, values=values)
         return told
 
     def changing(self) -> dict[str, NDArray[np.generic]]:
         """All arrays that a step changes and the next one begins with."""
         lifts = {} if self.films is None else {"lifts": self.films.offset}
         rubs = rubbing_arrays(self.state.rubbing) if self.model.ways else {}
+        sides = {"sides": self.sides.work} if self.sides.acts else {}
         return (
             lifts
             | rubs
+            | sides
             | {
                 "forces": self.state.lam,
                 "guide": self.state.guide_force,
@@ -417,6 +438,10 @@ class _Moving:
             held[f"{film.stop} under its film"] = film_strain(self.films, k, self.state)
         return held
 
+    def supplies(self) -> dict[str, float]:
+        """Energies [J] that forces across the axis gave since the start of the run."""
+        return self.sides.supplies()
+
     def losses(self) -> dict[str, float]:
         """Energies [J] lost since the start of the run."""
         lost = {}
@@ -442,6 +467,7 @@ class _Moving:
         self.state.films[:, LOST] = 0.0
         self.state.bearing[:, 2] = 0.0
         self.state.rubbing.lost[:] = 0.0
+        self.sides.work[:] = 0.0
 
     # ------------------------------------------------------------------ motion
 
@@ -513,7 +539,7 @@ class _Moving:
             self.take_gaps(careful=True)
             safe = self._safe(horizon, self._stale())
         fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
-        if self.films is not None:  # a film acts wherever the needle is
+        if self.films is not None or self.sides.acts:  # they act wherever the needle is
             fly = 0
         while fly and not self._unguided(fly * span):
             fly //= 2
@@ -644,30 +670,32 @@ class _Moving:
         kept = self._keep()
         at, here = self.at, self.ports
         self.network.interface_state.far[:] = 0.0
+        begun, report[2] = self.q.copy(), t
+        self.sides.begin(self.q, self.v, H, scratch.nodes.p, t)
         for attempt in range(MOST_REPEATS if level == FINE else MACRO_REPEATS):
             if attempt:
                 self._put_back(kept)
                 at[GUESS : GUESS + PORTS] = at[ANSWER : ANSWER + PORTS]
                 at[GUESS + here] = 0.0
                 clock[7] += 1
-            push = self.P @ at[GUESS : GUESS + here]
+            push = self.P @ at[GUESS : GUESS + here] + self.sides.push
             found = self._march(modes._replace(push=push), count, points, rest)
             while not rest and self._too_long(found, steps, count):
                 self._put_back(kept)
                 count, modes = self._cut(steps, 2 * count)
                 found = self._march(modes._replace(push=push), count, points, rest)
-            if found is None:
-                report[2] = t
+            if found is None and not rest:
                 raise ConvergenceError(
                     f"needle: no contact forces found at {1e6 * t:.4g} us.\n"
                     "Try: a shorter step, or fewer kept modes."
                 )
-            record_ = found
-            if rest and not self._still(record_):
+            if found is None or (rest and not self._still(found)):
                 self._put_back(kept)
                 clock[1] = level
                 return STATUS_REFUSED
+            record_ = found
             at[Y1 : Y1 + here] = self.P.T @ self.q
+            self.sides.place(0.5 * (begun + self.q))
             status = answer_step(level, steps, attempt, t, H, arrays, scratch, report)
             if status != STATUS_REPEAT:
                 break
@@ -680,6 +708,7 @@ class _Moving:
         if status != STATUS_DONE:
             return int(status)
         excess = self._repair(level)
+        self.sides.move(self.q - begun)
         self._tell(record_, t, H / count, recording, scratch, points)
         clock[0] += steps
         clock[1] = level
@@ -699,6 +728,8 @@ class _Moving:
         films = self.films
         wet = films is not None and len(films.room) > 0
         clear = points or (self._off_the_wall(H) if wet else self._unguided(H))
+        if films is None and self.sides.acts and not points and clear:
+            longest = steps
         if not points and films is not None and (wet or clear):
             changes = [0.0]  # of heights over the macro step, over what is left of them
             for k in range(len(self.squeezed)):
@@ -776,7 +807,8 @@ class _Moving:
         self.v += dv
         self.books[DEBT] += 0.5 * contact
         self.books[GUIDE] -= guided
-        return energy - contact - guided - float(missed @ (way + d) + guess @ d)
+        pulled = float(self.sides.push @ dq)
+        return energy - contact - guided - pulled - float(missed @ (way + d) + guess @ d)
 
     # ------------------------------------------------------------------ rest
 
@@ -882,7 +914,11 @@ class _Moving:
     def _tell_path(self, steps: int) -> None:
         rigid = self.model.rigid
         self.path.add(
-            steps * self.sizes.step, rigid @ self.q, rigid @ self.v, self.state.guide_force
+            steps * self.sizes.step,
+            rigid @ self.q,
+            rigid @ self.v,
+            self.state.guide_force,
+            self.sides.now(self.q, steps * self.sizes.step),
         )
 
     # ------------------------------------------------------------------ state
@@ -950,7 +986,7 @@ class _Moving:
 
     def _safe(self, horizon: float, stale: Vector) -> float:
         model = self.model
-        force = self.P @ self.at[LAST : LAST + self.ports]
+        force = self.P @ self.at[LAST : LAST + self.ports] + self.sides.push
         args = (model.traces, model.omega, self.q, self.v, force, horizon)
         return float(safe_flight(self.gap0 - stale, *args))
 

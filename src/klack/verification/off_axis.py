@@ -14,6 +14,7 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.pulled_needle import pulls
 from klack.verification.rigid_needle import (
     FACE,
     INERTIA,
@@ -39,8 +40,17 @@ _LEAN = np.array([0.0, 0.0, 0.0, 4e-4, 6e-4, 0.0])  # [rad]
 
 
 def checks() -> list[Check]:
-    """Films that tilt, films in a guide, drops and starts in a network, faces that rub."""
-    return [*_films(), *_bearing(), *_driven(), *_centred(), _rest(), _energy(), *_rubbing()]
+    """Films that tilt, films in a guide, drops and starts in a network, magnets, faces that rub."""
+    return [
+        *_films(),
+        *_bearing(),
+        *_driven(),
+        *_centred(),
+        _rest(),
+        _energy(),
+        *_rubbing(),
+        *pulls(),
+    ]
 
 
 # ---------------------------------------------------------------------- films

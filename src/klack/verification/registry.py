@@ -28,8 +28,8 @@ COVERS = {
     "friction": "Coulomb friction between the faces: partial slip, oblique impacts, seats, jams.",
     "plasticity": "Faces that yield: one point, spheres and a seat on finite elements, running-in, "
     "impacts in time.",
-    "off-axis": "A needle in space: films that tilt, films in its guide, drops and starts in a "
-    "network, faces that rub.",
+    "off-axis": "A needle in space: films that tilt, films in its guide, magnet and seat, drops "
+    "and starts in a network, faces that rub.",
     "spectra": "Spectra of pulses, Parseval, and one-third-octave bands of IEC 61260-1.",
     "vibration": "Mobility, force on the support, energy injected, plates, and radiation of "
     "pistons.",

@@ -191,16 +191,19 @@ def fly_in_network(
     at_tip: tuple[str, ...] = (),
     aside: tuple[str, ...] = (),
     arm: float = 0.0,
+    joints: tuple[tuple[str, ...], ...] = (),
     gap: float = 0.0,
     speed: float = 0.0,
     wet: bool = False,
+    film: bool = True,
     start: Literal["rest", "free"] = "free",
     state: NetworkState | None = None,
     duration: float,
 ) -> NetworkResult:
     """A needle over its stop in a network: in space, or along its axis without ``valve``.
 
-    Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x from there.
+    Ports of ``parts`` meet it on its axis, or ``arm`` [m] along x from there; ``joints`` are
+    further connections.  ``wet`` has a fluid, and with ``film`` one at the contact.
     """
     rigid = np.diag([MASS**-0.5] * 3 + [J**-0.5 for J in INERTIA])
     tip = rigid[2]
@@ -222,12 +225,16 @@ def fly_in_network(
     law = LinearStopLaw(kind="linear", stiffness=STIFFNESS)
     needle = FlexibleBody.of(body if valve is not None else body.along_axis(), speed=speed)
     network = Network(
-        {"needle": needle, "contact": EndStop(gap=gap, law=law, film=FACE if wet else None)}
+        {
+            "needle": needle,
+            "contact": EndStop(gap=gap, law=law, film=FACE if wet and film else None),
+        }
         | dict(parts),
         [
             ["needle.tip", "contact.upper", *at_tip],
             ["contact.lower", "ground"],
             *([["needle.side", *aside]] if aside else []),
+            *(list(joint) for joint in joints),
         ],
         fluid=library_fluid("n-heptane").at(293.15) if wet else None,
     )

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.stroke.axis_place import guide_of, moves_in_space
+from klack.analyses.stroke.axis_place import acts_across, guide_of, moves_in_space
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.report.chart import AxisSpec, Chart, Colour, Curve, Mark, Panel
 from klack.report.looks import look_of
@@ -108,14 +108,19 @@ def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
             for k, z in enumerate(guide.heights)
         ]
         panels.append(_panel(variant, forces, "guide force", "N", 1.0, touches, first=2))
+    across = acts_across(variant)
+    sides = [(f"{name} side force {a}", f"{name} {a}") for name in across for a in "xy"]
+    if sides:
+        panels.append(_panel(variant, sides, "side force", "N", 1.0, touches))
     return Chart(
         name="axis-time",
         title="Needle off its axis",
         x=AxisSpec(label="time", unit="ms", range=(float(time[0]), float(time[-1]))),
         panels=tuple(panels),
         note=(
-            "Position of the axis at the height of the seat, slope of the axis, and side forces of "
-            "the guide at the ends of the records. Thin upright lines: impacts. After the first "
+            "Position of the axis at the height of the seat, slope of the axis, forces of "
+            "the guide, and of magnet and seat across the axis if the case has them, at the ends "
+            "of the records. Thin upright lines: impacts. After the first "
             "few impacts the path depends on the least detail: another step, or another "
             "micrometre at the start, gives another one of the same kind."
         ),

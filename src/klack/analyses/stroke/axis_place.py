@@ -6,9 +6,9 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
-from klack.case.guide import CaseGuide
+from klack.case.motion_of_valve import ValveGuide
 
-__all__ = ["AxisPlace", "axis_place", "guide_of", "moves_in_space"]
+__all__ = ["AxisPlace", "acts_across", "axis_place", "guide_of", "moves_in_space"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,7 +54,13 @@ def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisP
     return AxisPlace(x=found[0], y=found[1], tilt_x=found[2], tilt_y=found[3])
 
 
-def guide_of(study: StrokeStudy) -> CaseGuide | None:
+def acts_across(variant: StrokeVariant) -> tuple[str, ...]:
+    """Magnets and seats that act across the axis in a variant."""
+    end = " side force x"
+    return tuple(name.removesuffix(end) for name in variant.result.channels if name.endswith(end))
+
+
+def guide_of(study: StrokeStudy) -> ValveGuide | None:
     """Section ``guide`` of the case, which was checked when it was run; None without."""
     given = YAML(typ="safe").load(study.case_text).get("guide")
-    return None if given is None else CaseGuide.model_validate(given)
+    return None if given is None else ValveGuide.model_validate(given)

@@ -9,7 +9,7 @@ from klack.analyses.impact.content import body_table, size_verdict
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
 from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
-from klack.analyses.stroke.axis_place import axis_place, moves_in_space
+from klack.analyses.stroke.axis_place import acts_across, axis_place, moves_in_space
 from klack.analyses.stroke.figures import (
     actuation_chart,
     echo_chart,
@@ -407,6 +407,17 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
 )
 
 
+def _along_the_axis(study: StrokeStudy) -> str:
+    """What does not follow a needle off its axis."""
+    across = [f"'{name}'" for name in acts_across(study.reference)]
+    if not across:
+        return (
+            "fluid, magnet and springs act along the axis, wherever the needle is (the keys "
+            "off_axis and tilts of solenoid and seat add forces across it)"
+        )
+    return f"of fluid, magnets and springs only {' and '.join(across)} act across the axis as well"
+
+
 def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
     rough = " and ".join(f"'{stop.name}'" for stop in study.stops if stop.friction)
     contact = f"contact, frictionless but at {rough}," if rough else "frictionless contact"
@@ -421,9 +432,8 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         ),
         (
             "Contact",
-            "Point by point on smooth faces, off-axis as well; fluid, magnet and springs act "
-            "along the axis, wherever the needle is. Small rotations; the bore of the guide does "
-            "not move, and no film fills it."
+            f"Point by point on smooth faces, off-axis as well; {_along_the_axis(study)}. Small "
+            "rotations; the bore of the guide does not move."
             if space
             else "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
             "contact are outside the assumptions.",

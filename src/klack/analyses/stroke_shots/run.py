@@ -23,7 +23,6 @@ from klack.analyses.stroke_shots.one_stroke import (
 )
 from klack.analyses.stroke_shots.record import StrokeColumns, StrokeShotsStudy, VariantShots
 from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve
-from klack.assembling.position_in_guide import largest_eccentricity
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
 from klack.case.valve import ValveCase
@@ -277,7 +276,7 @@ def _largest(case: ValveCase, spatial: SpatialValve, starts: Starts) -> dict[str
         stop: float(starts.centre[2] + arm[2])
         for stop, arm in zip(spatial.stops, spatial.arms, strict=True)
     }
-    return {stop: largest_eccentricity(case.guide, z) for stop, z in heights.items()}
+    return {stop: case.guide.largest_eccentricity(z) for stop, z in heights.items()}
 
 
 def _distributions(case: ValveCase) -> dict[str, str]:

@@ -1,0 +1,86 @@
+r"""Forces across the axis of a needle that moves in three dimensions.
+
+The axis of the needle is the line :math:`(a_x + s_x z,\; a_y + s_y z)`, with ``z`` as in the
+drawing of the needle: four numbers, position where z is zero and slopes.  A component whose force
+depends on them adds a :class:`SideLaw` to its rows.  A motion along the axis does not ask it.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["OffAxisPart", "SideInputs", "SideLaw"]
+
+Vector = NDArray[np.float64]
+
+
+class SideInputs(NamedTuple):
+    """What a law of a force across the axis is told.
+
+    Parameters
+    ----------
+    axis : array, shape (4,) [m], [m], [-], [-]
+        ``a_x, a_y, s_x, s_y``, in the middle of the step.
+    ports : array [m]
+        Displacements of the ports of the row along z, in the middle of the step.
+    state : array
+        Of the row, at the start of the step.
+    ahead : float [s]
+        From there to the middle of the step.
+    pressures : array, shape (2,) [Pa]
+        Of the nodes of a branch, as they act in the step; zeros for an element.
+    """
+
+    axis: Vector
+    ports: Vector
+    state: Vector
+    ahead: float
+    pressures: Vector
+
+
+class SideLaw(Protocol):
+    """Force across the axis of a needle."""
+
+    def force(self, now: SideInputs) -> Vector:
+        """Force and moments of what the needle feels, shape (4,) [N], [N], [N m], [N m].
+
+        Their work on a small change of ``now.axis`` is the scalar product of both.
+        """
+        ...
+
+    def room(self, now: SideInputs) -> float:
+        """Distance [m] that is left until the faces meet, where the law ends."""
+        ...
+
+    def left_out(self, now: SideInputs) -> float:
+        """Share of what acts along the axis that the position changes and the row does not [-]."""
+        ...
+
+    def placement(self, axis: Vector) -> Vector:
+        """Numbers that the step function of the row takes of the position of the axis."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OffAxisPart:
+    """A part of a component that acts across the axis of the needle.
+
+    Parameters
+    ----------
+    key : tuple of str or int
+        Where the component is told so.
+    port : str
+        Its port that has to be at the needle.
+    heights : tuple of float [m]
+        Of its ends, in the drawing of the needle.
+    room : float [m]
+        Way of the axis across itself that it allows at these heights; infinite where nothing can
+        touch.
+    """
+
+    key: tuple[str | int, ...]
+    port: str
+    heights: tuple[float, ...]
+    room: float
