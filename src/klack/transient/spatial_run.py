@@ -40,6 +40,8 @@ from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_net
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import everything, put_back
 from klack.simulation.propagator import modal_propagator
+from klack.simulation.rest import longest_period
+from klack.simulation.spatial_impact import SpatialImpact
 from klack.simulation.spatial_path import SpatialPath
 from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
 from klack.simulation.step_sizes import StepSizes
@@ -50,6 +52,7 @@ from klack.simulation.step_status import (
     STATUS_REPEAT,
 )
 from klack.transient.guide import Guide
+from klack.transient.impact_recorder import ImpactRecorder, film_lands
 from klack.transient.interface_arrays import (
     DAMPING,
     DEBT,
@@ -92,6 +95,7 @@ _STEADY = 0.04  # change of the force of a contact at rest in a step
 _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
+_HALF_BOUNCES = 8.0  # in the time to rest of rigid bodies
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
 
@@ -221,6 +225,7 @@ class _Moving:
             [row.component for row in network.rows.interfaces].index(stop) for stop in valve.stops
         ]
         self.rest = network.interfaces.rest[self.order] / h
+        self.impacts = _impact_recorder(self, network)
         self.side = np.array([np.sign(np.sum(model.axial[a:b])) for _, a, b in model.contacts])
         self.fresh = True
 
@@ -297,6 +302,7 @@ class _Moving:
         """Continue from a stored state."""
         self._silence_interfaces()
         self.path.clear()
+        self.impacts.resume()
 
     def _silence_interfaces(self) -> None:
         """Let the points act in place of the interfaces of the network."""
@@ -315,6 +321,10 @@ class _Moving:
         self._rest_on(rest=not bool(np.all(np.isnan(self.closed))))
 
     # ------------------------------------------------------------------ what others ask
+
+    def recorded_impacts(self, end: float) -> tuple[SpatialImpact, ...]:
+        """What was recorded of the impacts up to a moment [s]."""
+        return self.impacts.impacts(end)
 
     def gap(self) -> Vector:
         """Add this to a recorded gap to have the true one, of each interface [m]."""
@@ -344,7 +354,9 @@ class _Moving:
     def changing(self) -> dict[str, NDArray[np.generic]]:
         """All arrays that a step changes and the next one begins with."""
         lifts = {} if self.films is None else {"lifts": self.films.offset}
-        return lifts | {
+        return {
+            **lifts,
+            **self.impacts.changing(),
             "forces": self.state.lam,
             "guide": self.state.guide_force,
             "films": self.state.films,
@@ -616,6 +628,7 @@ class _Moving:
             return int(status)
         excess = self._repair(level)
         self._tell(record_, t, H / count, recording, scratch, points)
+        self.impacts.tell(t, H / count, record_, kept.vectors[0])
         clock[0] += steps
         clock[1] = level
         clock[2 if level == FINE else 3 if rest else 4] += 1
@@ -659,7 +672,10 @@ class _Moving:
         """Fine steps under a constant modal force, that of ``modes.push``."""
         n = self.model.count if points else 0
         record = Record.empty(
-            count, len(self.model.bodies), n, keep_points=False, films=len(self.squeezed)
+            *(count, len(self.model.bodies), n),
+            keep_points=n > 0,
+            films=len(self.squeezed),
+            modes=self.model.mode_count,
         )
         touching = self.nothing
         if points:
@@ -925,6 +941,21 @@ def _places(valve: SpatialValve, network: CompiledNetwork) -> tuple[Index, Index
         place_q.append(first + ROW * ROW_Q + local % ROW)
         place_v.append(first + ROW * ROW_V + local % ROW)
     return np.concatenate(place_q), np.concatenate(place_v), P
+
+
+def _impact_recorder(moving: _Moving, network: CompiledNetwork) -> ImpactRecorder:
+    """Record of impacts with the pauses by which the network tells impacts apart."""
+    rows, order = network.rows, moving.order
+    rest = np.asarray(network.interfaces.rest[order])
+    pause = longest_period(rows.bodies)
+    return ImpactRecorder(
+        moving.model,
+        moving.valve.stops,
+        film_lands(moving.films, moving.squeezed),
+        felt=network.interfaces.film_felt[order],
+        pause=np.full(len(order), pause) if pause > 0.0 else rest / _HALF_BOUNCES,
+        rest=rest,
+    )
 
 
 def _check(valve: SpatialValve, network: CompiledNetwork) -> None:
