@@ -95,6 +95,7 @@ _STEADY = 0.04  # change of the force of a contact at rest in a step
 _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
+_NO_FACE = 0.2e-3  # [m] no gap changes by so much with the placement: nothing faces the point
 _HALF_BOUNCES = 8.0  # in the time to rest of rigid bodies
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -853,8 +854,11 @@ class _Moving:
         if self.films is None:
             return
         at = {name: slice(first, last) for name, first, last in self.model.contacts}
+        # a point that has slid over the edge of the other face has no gap: its linear one
+        faced = self.gap0 - self.model.gap < _NO_FACE
+        gap0 = np.where(faced, self.gap0, self.model.gap)
         for k, film in enumerate(self.squeezed):
-            self.films.offset[k] = film.fit @ self.gap0[at[film.stop]] - film.base
+            self.films.offset[k] = film.fit @ gap0[at[film.stop]] - film.base
 
     def _stale(self) -> float:
         """Largest possible difference of the gaps from those of the geometry [m]."""
