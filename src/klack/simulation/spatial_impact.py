@@ -81,12 +81,15 @@ class ModalMoments:
         The first one is before the first touch.
     coordinates : array, shape (k, M) [m sqrt(kg)]
         Body by body.
+    shape_marks : array, shape (M,) [1/sqrt(kg)]
+        By which the shapes of the modes are known again; empty where nobody made them.
     """
 
     bodies: tuple[str, ...]
     counts: tuple[int, ...]
     time: Floats
     coordinates: Floats
+    shape_marks: Floats
 
     def of(self, body: str) -> Floats:
         """Coordinates of one body, shape (k, m)."""
@@ -118,7 +121,7 @@ class SpatialImpact:
     spread : float [m]
         Standard deviation of that distance.
     height : float [m]
-        Mean height of the force in the coordinates of ``radius``: the needle as it is drawn.
+        Mean height of the force, in the drawing of the lower body of the stop.
     film : FilmMoments or None
         Of a stop without a film, or whose film no tilt changes.
     modes : ModalMoments or None

@@ -61,8 +61,10 @@ class ImpactRecorder:
     model : InterfaceModel
     stops : sequence of str
         Of ``model.contacts``.
-    films : mapping of str to (int, FilmLand)
-        Place of the film of a stop in the record of steps, and its land.
+    films : sequence of (str, FilmLand or None)
+        Stop and land of each film, in the order of the record of steps.
+    shape_marks : array, shape (M,)
+        By which the shapes of the modes are known again.
     felt, pause, rest : array, shape (stops,) [N], [s], [s]
         Force from which on a film is felt; contacts that are closer together are one impact; a
         contact that lasts so long ends the impact.
@@ -73,11 +75,12 @@ class ImpactRecorder:
         model: InterfaceModel,
         stops: Sequence[str],
         films: Sequence[tuple[str, FilmLand | None]],
+        shape_marks: Vector,
         felt: Vector,
         pause: Vector,
         rest: Vector,
     ) -> None:
-        self.model = model
+        self.model, self._marks = model, shape_marks
         names = [name for name, _ in films]
         self._stops = []
         for c, name in enumerate(stops):
@@ -199,6 +202,7 @@ class ImpactRecorder:
                 ),
                 time=rows.moments[c, : words[MODE_ROWS]].copy(),
                 coordinates=rows.places[c, : words[MODE_ROWS]].copy(),
+                shape_marks=self._marks,
             )
         return SpatialImpact(
             number=int(words[NUMBER]),

@@ -127,6 +127,8 @@ class SpatialValve:
         Lands of squeeze films, for the stops that have one in the network.
     bearing : BearingFilm, optional
         Film in the guide, where the network has a fluid.
+    shape_marks : array, shape (M,), optional
+        By which the shapes of the modes are known again: recorded with their coordinates.
     """
 
     model: InterfaceModel
@@ -139,6 +141,7 @@ class SpatialValve:
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
     bearing: BearingFilm | None = None
+    shape_marks: Vector = field(default_factory=lambda: np.zeros(0))
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
         """Return them in a network.
@@ -956,6 +959,7 @@ def _impact_recorder(moving: _Moving, network: CompiledNetwork) -> ImpactRecorde
         moving.model,
         moving.valve.stops,
         film_lands(moving.films, moving.squeezed),
+        moving.valve.shape_marks,
         felt=network.interfaces.film_felt[order],
         pause=np.full(len(order), pause) if pause > 0.0 else rest / _HALF_BOUNCES,
         rest=rest,
