@@ -15,6 +15,7 @@ import plotly.graph_objects as go
 import pytest
 
 from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.axis_place import guide_of
 from klack.analyses.stroke.content import stroke_charts, stroke_content
 from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.record import (
@@ -618,3 +619,11 @@ def test_a_ring_keeps_its_values_over_colours():
     colours = squeezed(frames, np.array([0.1, 10.0, 100.0]))
     assert colours[0] == pytest.approx(0.1, rel=2e-3)  # linear
     assert colours[2] - colours[1] == pytest.approx(np.log(10.0), rel=2e-3)  # logarithmic
+
+
+def test_a_guide_with_a_film_is_known_to_the_report(study: StrokeStudy):
+    guide = "guide: {surface: shaft, heights: [4 mm, 13 mm], clearance: 4 um, film: {length: 1 mm}}"
+    found = guide_of(replace(study, case_text=f"klack: 1\n{guide}\n"))
+    assert found is not None
+    assert found.film is not None
+    assert found.film.length == pytest.approx(1e-3, rel=1e-12)

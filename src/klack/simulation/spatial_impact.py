@@ -82,7 +82,7 @@ class ModalMoments:
     coordinates : array, shape (k, M) [m sqrt(kg)]
         Body by body.
     shape_marks : array, shape (M,) [1/sqrt(kg)]
-        By which the shapes of the modes are known again; empty where nobody made them.
+        By which the shapes of the modes are known again; empty for bodies without meshes.
     """
 
     bodies: tuple[str, ...]

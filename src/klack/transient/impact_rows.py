@@ -99,7 +99,7 @@ def follow(
 ) -> int:
     """Take in steps ``first`` and later; the step before which a recorded impact is over, or -1.
 
-    Then the caller takes its rows, sets the phase, and goes on with that step.
+    Then the caller takes its rows, sets the phase, and continues with that step.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
-from klack.case.guide import CaseGuide
+from klack.case.motion_of_valve import ValveGuide
 
 __all__ = ["AxisPlace", "axis_place", "guide_of", "moves_in_space"]
 
@@ -54,7 +54,7 @@ def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisP
     return AxisPlace(x=found[0], y=found[1], tilt_x=found[2], tilt_y=found[3])
 
 
-def guide_of(study: StrokeStudy) -> CaseGuide | None:
+def guide_of(study: StrokeStudy) -> ValveGuide | None:
     """Section ``guide`` of the case, which was checked when it was run; None without."""
     given = YAML(typ="safe").load(study.case_text).get("guide")
-    return None if given is None else CaseGuide.model_validate(given)
+    return None if given is None else ValveGuide.model_validate(given)

@@ -450,7 +450,7 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
             "Contact",
             "Point by point on smooth faces, off-axis as well; fluid, magnet and springs act "
             "along the axis, wherever the needle is. Small rotations; the bore of the guide does "
-            "not move, and no film fills it."
+            "not move."
             if space
             else "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
             "contact are outside the assumptions.",
