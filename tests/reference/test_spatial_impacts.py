@@ -28,7 +28,7 @@ FILM = (
     "pressure: 6 bar}}"
 )
 SOLVED = 1e-7  # the film is found to 1e-11 of its height
-CLIPPED = 0.01  # a sector that is closed across a part of its width is cut off at its circles
+CLIPPED = 0.05  # a sector that is closed across a part of its width is cut off at its circles
 
 
 def case(duration="0.25 ms", variants="[dry, wet]", land="0.2 mm"):
@@ -45,7 +45,7 @@ def case(duration="0.25 ms", variants="[dry, wet]", land="0.2 mm"):
 
 @pytest.fixture(scope="module")
 def study():
-    return run_stroke(case())
+    return run_stroke(case("0.78 ms"))
 
 
 @pytest.fixture(scope="module", params=["dry", "wet"])
@@ -62,7 +62,8 @@ def recorded_impulse(variant, stop, begin, end):
 
 def test_the_sum_round_the_ring_is_the_recorded_contact_force(variant):
     impacts = recorded_impacts(variant)
-    assert len(impacts) == len(variant.result.events) > 0
+    assert len(impacts) == len(variant.result.events)
+    assert {event.stop for _, event, _ in impacts} == {"opening", "seat"}  # a cone, too
     for _, event, record in impacts:
         assert record.stop == event.stop
         assert record.begin == pytest.approx(event.time, abs=1e-12)
@@ -80,7 +81,8 @@ def test_without_a_film_the_impulse_is_that_of_the_impact(study):
     for _, event, record in recorded_impacts(study.variants["dry"]):
         assert record.impulse == pytest.approx(event.impulse, rel=SINGLE)
         peak = float(record.sector_force.sum(axis=1).max())
-        assert peak == pytest.approx(event.peak_force, rel=1e-3)  # means over 40 ns at most
+        assert peak == pytest.approx(event.peak_force, rel=5e-3)  # means over some 40 ns
+        assert peak <= event.peak_force * (1.0 + SINGLE)
 
 
 def test_the_ring_lies_where_the_faces_touch(study):

@@ -11,7 +11,9 @@ the drag along a cone,
 .. math:: f_s = c_s \frac{\ln(h_0 / h_1)}{h_0 - h_1} \frac{h_0 - h_1}{\Delta t}, \qquad
     F = s \Bigl(\sum_k F_k + f_s\Bigr),
 
-the forces of all sectors are the recorded axial force, to the tolerance with which it was found.
+the forces of all sectors are the recorded axial force, to the tolerance with which it was found;
+to some per cent of the largest force where a sector is closed across a part of its width, since the
+step cuts heights off between the circles and this computation at the circles.
 """
 
 from dataclasses import dataclass
