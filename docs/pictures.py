@@ -11,6 +11,10 @@ same two cases comes levels.svg.
 
 Of ``klack calibrate measured --measurement cases/measured/strokes_synthetic.csv`` comes
 calibration.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg.
+
+Of ``klack stroke`` of a copy of ``docs/how-to/guided_stroke.yaml`` with ``placement: {seed: 4}``,
+without ``shots`` and with ``run: {duration: 0.8 ms, variants: [wet]}`` come off-axis-line-load.svg
+and off-axis-film.svg.
 """
 
 import sys
@@ -30,7 +34,9 @@ from klack.analyses.noise.figures import click_charts
 from klack.analyses.store import stored_format
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.figures import actuation_chart
+from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.ring_figure import line_load_picture
 from klack.report.chart import AxisSpec, Chart
 from klack.report.printed import svg_chart
 
@@ -44,7 +50,7 @@ def main(results: list[Path]) -> None:
     for result in results:
         form = stored_format(result)
         if form == STROKE.form.name:
-            (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(STROKE.load(result))))
+            _write_stroke(STROKE.load(result))
             continue
         if form == CALIBRATION.form.name:
             study = CALIBRATION.load(result)
@@ -95,6 +101,16 @@ def stroke_chart(study: StrokeStudy) -> Chart:
     axis = replace(first.y, range=(-0.05 * top, 1.4 * top))  # with room for the words of the marks
     kept[0] = replace(first, y=axis, marks=whole.panels[0].marks)
     return replace(whole, panels=tuple(kept))
+
+
+def _write_stroke(study: StrokeStudy) -> None:
+    """Picture of a stroke along its axis, or of the impacts of one in three dimensions."""
+    rings = line_load_picture(study.reference)
+    if rings is None:
+        (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(study)))
+        return
+    (IMAGES / "off-axis-line-load.svg").write_bytes(rings.image)
+    (IMAGES / "off-axis-film.svg").write_bytes(svg_chart(film_charts(study.reference)[0]))
 
 
 def _ring(study: ImpactStudy) -> list[PressureView]:

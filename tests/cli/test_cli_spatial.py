@@ -41,3 +41,15 @@ def test_what_knows_the_axis_only_says_so(command, added, tmp_path, monkeypatch,
     assert "three-dimensional" in told or "three dimensions" in told
     assert "Try:" in told
     assert sorted(path.name for path in tmp_path.iterdir()) == ["valve.yaml"]
+
+
+def test_an_impact_to_show_is_one_of_a_result(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    code = main(["export", str(CASE), "--to", "vtk", "--impact", "1", "--quiet"])
+
+    assert code == 2
+    assert "the folder of a stored stroke in three dimensions" in capsys.readouterr().err
+    assert main(["export", str(CASE), "--to", "csv", "--impact", "1", "--quiet"]) == 2
+    assert "--impact" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())

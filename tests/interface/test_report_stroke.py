@@ -15,7 +15,9 @@ import plotly.graph_objects as go
 import pytest
 
 from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.axis_place import guide_of
 from klack.analyses.stroke.content import stroke_charts, stroke_content
+from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.record import (
     FluidSummary,
     LineSummary,
@@ -24,14 +26,17 @@ from klack.analyses.stroke.record import (
     StrokeStudy,
     StrokeVariant,
 )
+from klack.analyses.stroke.ring_figure import line_load_picture
 from klack.analyses.stroke.summary import first_impact, stroke_to_json
 from klack.analyses.stroke.wording import stroke_answer
 from klack.assembling.body_summary import BodySummary
 from klack.report.chart import BarChart, Chart
 from klack.report.html import render_html, write_report
 from klack.report.pdf import render_pdf
+from klack.report.ring_frames import RingFrames, frame_text, squeezed, ticks_of
 from klack.report.thinning import thinned
 from klack.report.wording import quantity
+from klack.simulation.film_sectors import sector_pressure
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,
@@ -40,6 +45,7 @@ from klack.simulation.network_result import (
     NetworkResult,
     StepCounts,
 )
+from klack.simulation.spatial_impact import FilmLand, FilmMoments, SpatialImpact
 from klack.simulation.step_sizes import StepSizes
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
@@ -471,3 +477,153 @@ def test_numbers_of_a_study_are_pure_json(study: StrokeStudy):
         900.0,
         20e-6,
     )
+
+
+# --------------------------------------------------------------------------- three dimensions
+
+LAND = FilmLand(
+    inner_radius=1.35e-3,
+    outer_radius=1.95e-3,
+    sectors=36,
+    circles=2,
+    viscosity=4e-4,
+    tension=6e5,
+    lowest=1e-6,
+    slope=1.0,
+    shear=0.0,
+)
+
+
+def ring_impact(number: int, begin: float) -> SpatialImpact:
+    """Half a sine over time, one side carries; the film closes, then opens, tilted."""
+    edges = begin + np.linspace(0.0, 20e-6, 101)
+    angle = 2.0 * np.pi * (np.arange(36) + 0.5) / 36
+    rise = np.sin(np.pi * (np.arange(100) + 0.5) / 100)
+    time = begin + np.linspace(-10e-6, 30e-6, 60)
+    lift = np.append(np.linspace(12e-6, 2e-6, 30), np.linspace(2e-6, 12e-6, 31))
+    tilts = np.tile([2e-4, 0.0], (61, 1))
+    ends = np.column_stack([lift, tilts])
+    return SpatialImpact(
+        number=number,
+        stop="opening",
+        edges=edges,
+        sector_force=np.outer(rise, 10.0 * np.maximum(np.cos(angle), 0.0)),
+        radius=1.6e-3,
+        spread=5e-5,
+        height=18.5e-3,
+        film=FilmMoments(
+            land=LAND,
+            time=time,
+            step=np.full(60, 20e-9),
+            film_force=np.ones(60),
+            before=ends[:-1],
+            after=ends[1:],
+        ),
+    )
+
+
+def in_space(study: StrokeStudy, impacts: int | None) -> StrokeStudy:
+    """The study as if it had moved in three dimensions, with so many recorded impacts."""
+    wet = study.variants["wet"]
+    result = wet.result
+    aside = ChannelData(unit="m", values=np.zeros(len(result.time)))
+    channels = {
+        **result.channels,
+        **{f"needle {what}": aside for what in ("x", "y", "tilt x", "tilt y")},
+    }
+    begins = [0.3e-3 + 60e-6 * k for k in range(impacts or 0)]
+    result = replace(
+        result,
+        channels=channels,
+        events=tuple(impact("opening", begin, 100.0, 20e-6, 1.0) for begin in begins)
+        or result.events,
+        spatial_impacts=None
+        if impacts is None
+        else tuple(ring_impact(k + 1, begin) for k, begin in enumerate(begins)),
+    )
+    return replace(study, variants={"wet": replace(wet, result=result)})
+
+
+def test_impacts_round_the_ring_have_their_figures(study: StrokeStudy):
+    content = stroke_content(in_space(study, 2))
+    rings, films = (
+        next(s for s in content.sections if s.title == title)
+        for title in ("Line load round the ring, wet", "Pressure in the films, wet")
+    )
+    assert rings.picture is not None
+    assert "left out" not in rings.picture.note
+    assert len(films.charts) == 2
+    page = render_html(content)
+    text = page[page.index("Pressure in the films, wet") :]
+    figure = json.loads(re.search(r'<script type="application/json">(.*?)</script>', text)[1])
+    go.Figure(data=figure["data"], layout=figure["layout"], frames=figure["frames"])
+    assert 10 < len(figure["frames"]) <= 41
+    assert len(figure["frames"]) == len(figure["layout"]["sliders"][0]["steps"])
+    assert [len(trace["r"]) for trace in figure["data"]] == [36, 36]
+    assert len(json.dumps(figure)) < 100_000
+    assert render_pdf(content).startswith(b"%PDF")
+
+
+def test_the_animation_shows_the_pressure_of_the_sectors(study: StrokeStudy):
+    chart = film_charts(in_space(study, 1).reference)[0]
+    truth = sector_pressure(ring_impact(1, 0.3e-3).film)
+    k = int(np.argmax(chart.values.max(axis=1)))
+    at = int(np.argmax(truth.pressure.max(axis=1)))
+    np.testing.assert_allclose(chart.values[k], 1e-5 * truth.pressure[at], rtol=1e-12)
+    # a tilt of the height along +x: the film is lowest, and presses most, at 180 degrees
+    assert int(np.argmax(chart.values[k])) == 18
+    assert chart.marked.any()
+    assert np.all(chart.values[chart.marked] == pytest.approx(-6.0, rel=1e-6))
+    assert np.all(np.diff(chart.time) > 0.0)
+
+
+def test_impacts_that_are_not_shown_are_counted(study: StrokeStudy):
+    found = in_space(study, 11)
+    picture = line_load_picture(found.reference)
+    assert picture is not None
+    assert "first 8 of 11 impacts" in picture.note
+    assert "3 are left out" in picture.note
+    charts = film_charts(found.reference)
+    assert len(charts) == 4
+    assert "7 further impacts are left out" in charts[0].note
+
+
+def test_a_result_of_an_earlier_version_says_so(study: StrokeStudy, tmp_path: Path):
+    old = in_space(study, None)
+    STROKE.save(old, tmp_path)
+    content = stroke_content(STROKE.load(tmp_path))
+    section = next(s for s in content.sections if s.title.startswith("Line load"))
+    assert "a version of klack that did not record" in section.paragraphs[0]
+    assert section.picture is None
+
+
+def test_an_axial_stroke_has_no_rings(study: StrokeStudy, page: str):
+    assert "Line load round the ring" not in page
+
+
+def test_a_ring_keeps_its_values_over_colours():
+    frames = RingFrames(
+        name="a",
+        title="b",
+        label="pressure",
+        unit="bar",
+        time=np.array([-1.5, 2.0]),
+        time_unit="µs",
+        values=np.array([[-5.0, 0.0, 0.5, 20.0], [0.0, 0.0, 0.0, 300.0]]),
+        marked=np.zeros((2, 4), dtype=bool),
+        mark="cavitates",
+        captions=("1 N", "2 N"),
+    )
+    assert ticks_of(frames) == (-1.0, 0.0, 1.0, 10.0, 100.0)
+    assert frame_text(frames, 0) == "\N{MINUS SIGN}1.50 µs, 1 N"
+    colours = squeezed(frames, np.array([0.1, 10.0, 100.0]))
+    assert colours[0] == pytest.approx(0.1, rel=2e-3)  # linear
+    assert colours[2] - colours[1] == pytest.approx(np.log(10.0), rel=2e-3)  # logarithmic
+
+
+def test_a_guide_with_a_film_is_known_to_the_report(study: StrokeStudy):
+    guide = "guide: {surface: shaft, heights: [4 mm, 13 mm], clearance: 4 um, film: {length: 1 mm}}"
+    found = guide_of(replace(study, case_text=f"klack: 1\n{guide}\n"))
+    assert found is not None
+    assert found.film is not None
+    assert found.film.length == pytest.approx(1e-3, rel=1e-12)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
+from klack.assembling.mode_marks import shape_marks
 from klack.assembling.modes import selection_of
 from klack.assembling.off_axis_points import off_axis_space, touch_height
 from klack.assembling.position_in_guide import axis_through, in_disc
@@ -37,7 +38,13 @@ from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.units import format_si
 
-__all__ = ["build_spatial", "check_heights", "placement_of", "seat_height"]
+__all__ = [
+    "build_spatial",
+    "check_heights",
+    "modes_in_network",
+    "placement_of",
+    "seat_height",
+]
 
 Vector = NDArray[np.float64]
 
@@ -81,14 +88,7 @@ def build_spatial(
     parts = case.network.components
     component = {str(getattr(part, "body", "")): name for name, part in parts.items()}
     needle = str(getattr(parts[roles.needle], "body", ""))
-    kept = {
-        name: kept_modes(
-            selection_of(case.reduction.choice(name)),
-            pools[name],
-            np.column_stack([port.pattern for port in ports[name]]),
-        )
-        for name in bodies
-    }
+    kept = {name: modes_in_network(case, name, pools, ports) for name in bodies}
     height = seat_height(contacts, needle)
     placement = placement_of(case, height)
     off_axis = _farthest(case, height, placement)
@@ -164,6 +164,12 @@ def build_spatial(
         course=gap_course(gaps, float(np.max(np.linalg.norm(arms, axis=1)))),
         placement=rigid_placement(*placement, *about),
         bearing=_bearing(case.guide),
+        shape_marks=np.concatenate(
+            [
+                shape_marks(np.hstack([bodies[name].rigid_modes, kept[name].shapes]))
+                for name in model.bodies
+            ]
+        ),
         films=tuple(
             tilting_film(meeting.name, film, meeting.space)
             for meeting in meetings
@@ -188,6 +194,17 @@ def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, Elast
                     f"{format_si(high, 'm')}",
                     hint="height counts along z in the drawing of the needle, as guide.heights.",
                 )
+
+
+def modes_in_network(
+    case: ValveCase, name: str, pools: Mapping[str, Modes], ports: Mapping[str, Sequence[Port]]
+) -> Modes:
+    """Elastic modes of a body that the network keeps, with their full shapes."""
+    return kept_modes(
+        selection_of(case.reduction.choice(name)),
+        pools[name],
+        np.column_stack([port.pattern for port in ports[name]]),
+    )
 
 
 def _bearing(guide: ValveGuide | None) -> BearingFilm | None:

@@ -35,7 +35,14 @@ from klack.reduction.structure import Structure
 from klack.stages import warnings_of
 from klack.transient.spatial_run import SpatialValve
 
-__all__ = ["Valve", "build_valve", "build_valve_bodies", "filled_network"]
+__all__ = [
+    "Valve",
+    "ValveParts",
+    "build_valve",
+    "build_valve_bodies",
+    "filled_network",
+    "valve_parts",
+]
 
 _FEW = 100_000
 """Unknowns of all bodies up to which several threads cost more than they save."""
@@ -100,21 +107,58 @@ def build_valve(
         return _built(case, bodies, progress, threads)
 
 
-def _built(
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ValveParts:
+    """What the reduced bodies of a valve are made of.
+
+    Parameters
+    ----------
+    bodies : mapping of str to ElasticBody
+    flexibilities : mapping of str to Flexibility
+        To be closed.
+    pools : mapping of str to Modes
+    contacts : mapping of str to StopContact
+    ports : mapping of str to list of Port
+    """
+
+    bodies: Mapping[str, ElasticBody]
+    flexibilities: Mapping[str, Flexibility]
+    pools: Mapping[str, Modes]
+    contacts: Mapping[str, StopContact]
+    ports: Mapping[str, list[Port]]
+
+
+def valve_parts(
     case: ValveCase, bodies: Mapping[str, ElasticBody], progress: Progress, threads: int | None
-) -> Valve:
+) -> ValveParts:
+    """Factorise bodies, compute their modes and the static contact of each stop; all cached."""
     flexibilities: dict[str, Flexibility] = {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("factorise", i / len(bodies))
         flexibilities[name] = Flexibility(body, threads=threads, cache=result_cache())
     pools = _mode_pools(case, bodies, flexibilities, progress)
-    in_space, reduced = case.motion == "three-dimensional", {}
-    with_law = case.without_friction() if in_space else case  # there the contact points rub
+    # in space the contact points rub
+    with_law = case.without_friction() if case.motion == "three-dimensional" else case
     contacts = {
         name: build_stop(with_law, name, bodies, flexibilities, pools, progress)
         for name in case.stops
     }
-    ports = {name: _ports(case, body, contacts) for name, body in bodies.items()}
+    return ValveParts(
+        bodies=bodies,
+        flexibilities=flexibilities,
+        pools=pools,
+        contacts=contacts,
+        ports={name: _ports(case, body, contacts) for name, body in bodies.items()},
+    )
+
+
+def _built(
+    case: ValveCase, bodies: Mapping[str, ElasticBody], progress: Progress, threads: int | None
+) -> Valve:
+    parts = valve_parts(case, bodies, progress, threads)
+    flexibilities, pools = parts.flexibilities, parts.pools
+    contacts, ports = parts.contacts, parts.ports
+    in_space, reduced = case.motion == "three-dimensional", {}
     for i, (name, body) in enumerate(bodies.items()):
         progress("reduced", i / len(bodies))
         whole = reduce_body(

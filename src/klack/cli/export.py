@@ -58,6 +58,16 @@ _Level = Annotated[
     Literal["reduced", "full"] | None,
     Parameter(name="--level", help="Whose fields vtk shows. [default: reduced]"),
 ]
+_Impact = Annotated[
+    int | None,
+    Parameter(
+        name="--impact",
+        help="Impact of a stroke in three dimensions that vtk shows, as its report numbers it.",
+    ),
+]
+_Variant = Annotated[
+    str | None, Parameter(name="--variant", help="Its variant. [default: the first one]")
+]
 _Frames = Annotated[
     int | None, Parameter(name="--frames", help="Number of frames for vtk. [default: 50]")
 ]
@@ -99,6 +109,8 @@ _USED_BY: Mapping[str, tuple[str, ...]] = {
     "--platform": ("fmu",),
     "--level": ("vtk",),
     "--frames": ("vtk",),
+    "--impact": ("vtk",),
+    "--variant": ("vtk",),
     "--step": ("calculix",),
     "--duration": ("calculix",),
     "--penalty": ("calculix",),
@@ -119,6 +131,8 @@ def export(
     platform: _Platform = None,
     level: _Level = None,
     frames: _Frames = None,
+    impact: _Impact = None,
+    variant: _Variant = None,
     step: _Step = None,
     duration: _Duration = None,
     penalty: _Penalty = None,
@@ -140,6 +154,8 @@ def export(
             "--platform": platform,
             "--level": level,
             "--frames": frames,
+            "--impact": impact,
+            "--variant": variant,
             "--step": step,
             "--duration": duration,
             "--penalty": penalty,
@@ -155,9 +171,27 @@ def export(
         _tell(name, to, made, wanted)
         return 0
     if is_result(source):
-        name, made = _export_stored(source, to, out, wanted)
+        if to == "vtk" and impact is not None:
+            from klack.cli.export_results import StoredImpact, export_stored_impact
+
+            if level is not None:
+                raise _no_level()
+            chosen = StoredImpact(impact, variant, 50 if frames is None else frames)
+            own = imported(component)
+            name, made = export_stored_impact(
+                source, out, chosen, own, threads=threads, quiet=quiet
+            )
+        else:
+            name, made = _export_stored(source, to, out, wanted)
         _tell(name, to, made, wanted)
         return 0
+    if impact is not None or variant is not None:
+        raise InputError(
+            str(source),
+            got="a case with --impact or --variant",
+            expected="the folder of a stored stroke in three dimensions",
+            hint="run klack stroke first, and give the folder that it names at the end.",
+        )
 
     if to == "parquet":
         from klack.cli.export_results import parquet_is_for_studies
@@ -233,7 +267,8 @@ def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> t
             str(source),
             got=f"a stored result with --to {to}",
             expected=f"--to {', '.join(_RESULTS)} for a result",
-            hint="models, decks and fields come from the case: give the case file or its name.",
+            hint="models, decks and fields come from the case: give the case file or its name; "
+            "vtk of a stroke in three dimensions takes --impact.",
         )
     from klack.analyses.catalogue import load_result
     from klack.analyses.incomplete import missing_in
@@ -244,6 +279,15 @@ def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> t
     study = load_result(source)
     wanted.warn(missing_in(study))
     return study.case, export_result(study, to, folder)
+
+
+def _no_level() -> InputError:
+    return InputError(
+        "--level",
+        got="it with the result of a stroke",
+        expected="no level: the motion is that of the recorded modes",
+        hint="leave --level out.",
+    )
 
 
 def _impact_only(case: Any, to: str) -> Any:

@@ -1,5 +1,6 @@
 """``klack export --to netcdf|mdf|mat|csv|parquet|vtk``: results for other programs."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -11,11 +12,14 @@ if TYPE_CHECKING:
     from klack.analyses.study.record import StudyRecord
     from klack.case.schema import Case
     from klack.case.valve import ValveCase
+    from klack.case.valve_reader import OwnComponents
 
 __all__ = [
+    "StoredImpact",
     "export_fields",
     "export_point",
     "export_result",
+    "export_stored_impact",
     "parquet_is_for_studies",
     "run_and_export",
 ]
@@ -157,3 +161,54 @@ def export_fields(
         )
         place = folder / made.relative_to(stage)
         return Written.of(folder, stage, f"Written: {place}; open it in ParaView")
+
+
+@dataclass(frozen=True, slots=True)
+class StoredImpact:
+    """Which impact of a stored stroke is shown, and in how many frames."""
+
+    number: int
+    variant: str | None
+    frames: int
+
+
+def export_stored_impact(
+    source: Path,
+    out: Path | None,
+    chosen: StoredImpact,
+    components: "OwnComponents",
+    *,
+    threads: int | None,
+    quiet: bool,
+) -> tuple[str, Written]:
+    """Write the bodies and the line load of an impact of a stored stroke, for ParaView."""
+    from klack.analyses.catalogue import load_result
+    from klack.analyses.stroke.record import StrokeStudy
+    from klack.case.valve_reader import read_valve_case
+    from klack.exchange.results.spatial_series import write_spatial_series
+    from klack.terminal.output import require_folder
+
+    study = load_result(source)
+    if not isinstance(study, StrokeStudy):
+        raise InputError(
+            str(source),
+            got=f"a stored {type(study).__name__} with --impact",
+            expected="the folder of klack stroke",
+            hint="fields of an impact of two bodies come from its case: leave --impact out.",
+        )
+    folder = out if out is not None else source
+    require_folder(folder)
+    case = read_valve_case(study.case_text, Path(f"{study.case}.yaml"), components)
+    with show_progress(quiet) as progress, staged_folder(folder) as stage:
+        made = write_spatial_series(
+            study,
+            case,
+            stage,
+            impact=chosen.number,
+            variant=chosen.variant,
+            frames=chosen.frames,
+            progress=progress,
+            threads=threads,
+        )
+        place = folder / made.relative_to(stage)
+        return study.case, Written.of(folder, stage, f"Written: {place}; open it in ParaView")

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.report.ring_frames import RingFrames
 
 __all__ = [
     "AREA_OPACITY",
@@ -258,7 +259,7 @@ class ParallelChart:
         return np.column_stack([axis.values for axis in self.axes])
 
 
-AnyChart = Chart | BarChart | ParallelChart
+AnyChart = Chart | BarChart | ParallelChart | RingFrames
 
 
 def stems(

@@ -24,6 +24,8 @@ from klack.report.chart import (
     Panel,
     ParallelChart,
 )
+from klack.report.ring_frames import RingFrames
+from klack.report.ring_interactive import plotly_ring
 
 __all__ = ["figure_of", "parallel_axes", "plotly_bars", "plotly_chart"]
 
@@ -40,9 +42,11 @@ _PANEL_GAP = 0.06
 
 
 def figure_of(chart: AnyChart) -> dict[str, Any]:
-    """What the page draws: ``data`` and ``layout`` for ``Plotly.newPlot``, or parallel ``axes``."""
+    """What the page draws: arguments of ``Plotly.newPlot``, or parallel ``axes``."""
     if isinstance(chart, ParallelChart):
         return parallel_axes(chart)
+    if isinstance(chart, RingFrames):
+        return plotly_ring(chart, _LAYOUT)
     return plotly_bars(chart) if isinstance(chart, BarChart) else plotly_chart(chart)
 
 

@@ -28,6 +28,8 @@ from klack.report.chart import (
     Panel,
     ParallelChart,
 )
+from klack.report.ring_frames import RingFrames
+from klack.report.ring_printed import printed_ring
 
 __all__ = ["STYLE", "plain", "png_chart", "svg", "svg_chart"]
 
@@ -88,6 +90,8 @@ def png_chart(chart: AnyChart) -> bytes:
 def _drawn(chart: AnyChart, width: float) -> Figure:
     if isinstance(chart, ParallelChart):
         return _parallel(chart, width)
+    if isinstance(chart, RingFrames):
+        return printed_ring(chart, width)
     return _bars(chart) if isinstance(chart, BarChart) else _curves(chart, width)
 
 

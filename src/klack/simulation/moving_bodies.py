@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_result import ChannelData, StaticStart
+from klack.simulation.spatial_impact import SpatialImpact
 from klack.simulation.spatial_path import SpatialPath
 
 __all__ = ["MovingBodies"]
@@ -62,6 +63,10 @@ class MovingBodies(Protocol):
 
     def forget_losses(self) -> None:
         """Begin a new energy balance."""
+
+    def recorded_impacts(self, end: float) -> tuple[SpatialImpact, ...]:
+        """What was recorded of the impacts up to a moment [s], in order of their first touch."""
+        ...
 
     def gap(self) -> Vector:
         """Add this to a recorded gap to have the true one, of each interface [m]."""

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError
+from klack.simulation.spatial_impact import SpatialImpact
 from klack.simulation.spatial_path import SpatialPath
 from klack.simulation.step_sizes import StepSizes
 
@@ -277,6 +278,9 @@ class NetworkResult:
         Way of a needle in three dimensions; not stored with a result.
     faces : mapping of str to PressedFaces
         By component, where faces yield.
+    spatial_impacts : tuple of SpatialImpact or None
+        What was recorded of the first impacts of bodies that meet point by point; empty for a
+        motion along the axis, None in results of versions that did not record it.
     """
 
     time: NDArray[np.float64]
@@ -292,6 +296,7 @@ class NetworkResult:
     start: StaticStart | None = None
     path: SpatialPath | None = None
     faces: Mapping[str, PressedFaces] = field(default_factory=dict)
+    spatial_impacts: tuple[SpatialImpact, ...] | None = None
 
     @property
     def step(self) -> float:

@@ -229,6 +229,9 @@ def simulate_network(
         failure="" if failure is None else str(failure),
         start=begun,
         faces=_pressed_faces(network),
+        spatial_impacts=()
+        if network.moving is None
+        else network.moving.recorded_impacts(step * int(clock[0])),
     )
     for name, faces in result.faces.items():
         if faces.force > faces.known_force:
@@ -598,6 +601,7 @@ def _read_stores(network: CompiledNetwork) -> None:
 _IMPACTS = "impacts.unfinished"
 _SLIDERS = "sliders."
 _LAST = "record.last"
+_RECORDS = "moving.impact_"
 
 
 def _balance(network: CompiledNetwork, step: float, near: RestState, shift: Vector) -> StaticStart:
@@ -669,7 +673,7 @@ def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Chang
 
 def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
     for key, target in _changing(network, clock).items():
-        if key not in state and key.startswith(_SLIDERS):
+        if key not in state and key.startswith((_SLIDERS, _RECORDS)):  # of an earlier version
             continue
         if key not in state or state[key].shape != target.shape:
             came = f"shape {state[key].shape}" if key in state else "nothing"

@@ -363,6 +363,8 @@ class Record(NamedTuple):
     across: NDArray[np.float32]  # (steps, ways n) [N] mean friction of every point, or (0, 0)
     doing: NDArray[np.int8]  # (steps, n) open, stuck or slipping at the end, or (0, 0)
     film: Matrix  # (steps, f) [N] mean axial force of each film
+    lands: Cube  # (steps, f, 6) lift and tilts that each film had at the start and at the end
+    places: Matrix  # (steps, M) modal coordinates at the end of the step, or (0, M)
 
     @classmethod
     def empty(
@@ -374,8 +376,9 @@ class Record(NamedTuple):
         *,
         keep_points: bool,
         films: int = 0,
+        modes: int = 0,
     ) -> Self:
-        """Return room for so many steps."""
+        """Return room for so many steps; ``modes`` above 0 keeps as many modal coordinates."""
         force, gap, outside = np.zeros((3, steps))
         kept = steps if keep_points else 0
         return cls(
@@ -388,4 +391,6 @@ class Record(NamedTuple):
             np.zeros((kept if ways else 0, ways * points), dtype=np.float32),
             np.zeros((kept if ways else 0, points if ways else 0), dtype=np.int8),
             np.zeros((steps, films)),
+            np.zeros((steps, films, 6)),
+            np.zeros((steps if modes else 0, modes)),
         )

@@ -52,6 +52,7 @@ from numpy.typing import NDArray
 from klack.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
+from klack.transient.film_record import tell_land
 from klack.transient.guide_films import count_bearing, squeeze_guide
 from klack.transient.guide_friction import begin_rub, no_rub, rub_guide
 from klack.transient.interface_arrays import (
@@ -657,6 +658,8 @@ def _finish(
     for i in range(len(state.q)):
         state.q[i] = step.q[i]
         state.v[i] = step.v[i]
+        if len(record.places):
+            record.places[taken, i] = step.q[i]
     for k in range(len(step.lam)):
         state.lam[k] = step.lam[k]
     if len(step.moved):
@@ -746,6 +749,7 @@ def march(
                 if moved <= _SETTLED:
                     break
             for k in range(len(films.lowest)):
+                tell_land(films, k, state, step.q, record.lands[taken, k])
                 bend_faces(films, k, state.films[k, :3] - state.films[k, 3:6], points.gap)
         least = 0.0
         answer = 0.0  # of the spring to the forces of the contact

@@ -40,6 +40,8 @@ from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_net
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import everything, put_back
 from klack.simulation.propagator import modal_propagator
+from klack.simulation.rest import longest_period
+from klack.simulation.spatial_impact import SpatialImpact
 from klack.simulation.spatial_path import SpatialPath
 from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
 from klack.simulation.step_sizes import StepSizes
@@ -51,6 +53,7 @@ from klack.simulation.step_status import (
 )
 from klack.transient.gap_course import GapCourse, gap_course
 from klack.transient.guide import Guide
+from klack.transient.impact_recorder import ImpactRecorder, film_lands
 from klack.transient.interface_arrays import (
     DAMPING,
     DEBT,
@@ -105,6 +108,7 @@ _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that ca
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
 _NO_FACE = 0.2e-3  # [m] no gap changes by so much with the placement: nothing faces the point
+_HALF_BOUNCES = 8.0  # in the time to rest of rigid bodies
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
 
@@ -138,6 +142,8 @@ class SpatialValve:
         Lands of squeeze films, for the stops that have one in the network.
     bearing : BearingFilm, optional
         Film in the guide, where the network has a fluid.
+    shape_marks : array, shape (M,), optional
+        By which the shapes of the modes are known again: recorded with their coordinates.
     """
 
     model: InterfaceModel
@@ -151,6 +157,7 @@ class SpatialValve:
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
     bearing: BearingFilm | None = None
+    shape_marks: Vector = field(default_factory=lambda: np.zeros(0))
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
         """Return them in a network.
@@ -255,6 +262,7 @@ class _Moving:
         at = [self.order[valve.stops.index(film.stop)] for film in self.squeezed]
         self.film_at = {row: k for k, row in enumerate(at)}  # by row of the interfaces
         self.rest = network.interfaces.rest[self.order] / h
+        self.impacts = _impact_recorder(self, network)
         self.side = np.array([np.sign(np.sum(model.axial[a:b])) for _, a, b in model.contacts])
         self.fresh = True
 
@@ -338,6 +346,7 @@ class _Moving:
         self.read()
         self.sides.place(self.q)
         self.path.clear()
+        self.impacts.resume()
 
     def _silence_interfaces(self) -> None:
         """Let the points act in place of the interfaces of the network."""
@@ -359,6 +368,10 @@ class _Moving:
         self._take_carrying()
 
     # ------------------------------------------------------------------ what others ask
+
+    def recorded_impacts(self, end: float) -> tuple[SpatialImpact, ...]:
+        """What was recorded of the impacts up to a moment [s]."""
+        return self.impacts.impacts(end)
 
     def gap(self) -> Vector:
         """Add this to a recorded gap to have the true one, of each interface [m]."""
@@ -405,6 +418,7 @@ class _Moving:
             lifts
             | rubs
             | sides
+            | self.impacts.changing()
             | {
                 "forces": self.state.lam,
                 "guide": self.state.guide_force,
@@ -710,6 +724,7 @@ class _Moving:
         excess = self._repair(level)
         self.sides.move(self.q - begun)
         self._tell(record_, t, H / count, recording, scratch, points)
+        self.impacts.tell(t, H / count, record_, begun)
         clock[0] += steps
         clock[1] = level
         clock[2 if level == FINE else 3 if level == COARSE else 4] += 1
@@ -776,9 +791,13 @@ class _Moving:
 
     def _march(self, modes: Modes, count: int, points: bool, rest: bool) -> Record | None:
         """Fine steps under a constant modal force, that of ``modes.push``; None where they fail."""
-        n, ways, films = self.model.count, self.model.ways, len(self.squeezed)
-        room = (count, len(self.model.bodies), *((n, ways) if points else (0, 0)))
-        record = Record.empty(*room, keep_points=False, films=films)
+        n, ways = (self.model.count, self.model.ways) if points else (0, 0)
+        record = Record.empty(
+            *(count, len(self.model.bodies), n, ways),
+            keep_points=n > 0,
+            films=len(self.squeezed),
+            modes=self.model.mode_count,
+        )
         touching = self.nothing
         if points:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
@@ -1052,6 +1071,22 @@ def _places(valve: SpatialValve, network: CompiledNetwork) -> tuple[Index, Index
         place_q.append(first + ROW * ROW_Q + local % ROW)
         place_v.append(first + ROW * ROW_V + local % ROW)
     return np.concatenate(place_q), np.concatenate(place_v), P
+
+
+def _impact_recorder(moving: _Moving, network: CompiledNetwork) -> ImpactRecorder:
+    """Record of impacts with the pauses by which the network tells impacts apart."""
+    rows, order = network.rows, moving.order
+    rest = np.asarray(network.interfaces.rest[order])
+    pause = longest_period(rows.bodies)
+    return ImpactRecorder(
+        moving.model,
+        moving.valve.stops,
+        film_lands(moving.films, moving.squeezed),
+        moving.valve.shape_marks,
+        felt=network.interfaces.film_felt[order],
+        pause=np.full(len(order), pause) if pause > 0.0 else rest / _HALF_BOUNCES,
+        rest=rest,
+    )
 
 
 def _check(valve: SpatialValve, network: CompiledNetwork) -> None:

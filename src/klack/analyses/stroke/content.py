@@ -20,9 +20,11 @@ from klack.analyses.stroke.figures import (
     stop_law_chart,
     variants_chart,
 )
+from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.ring_figure import line_load_picture
 from klack.analyses.stroke.summary import (
     AXIS_COLUMNS,
     TIME_COLUMNS,
@@ -57,6 +59,7 @@ def stroke_content(study: StrokeStudy) -> Content:
             title="Off-axis motion",
             charts=_named(axis_over_time_chart(study), axis_path_chart(study)),
         ),
+        *_ring_sections(study),
         Section(title="First impacts", charts=_named(*_first_impacts(study))),
         Section(title="Echoes of the lines", charts=_named(*_echoes(study))),
         _comparison(study, wet=False),
@@ -146,6 +149,31 @@ def _comparison(study: StrokeStudy, *, wet: bool) -> Section:
             )
             found += _named(chart)
     return Section(title="Flexible against lumped", charts=tuple(found))
+
+
+def _ring_sections(study: StrokeStudy) -> list[Section]:
+    """Line loads and film pressures of every variant that moves in three dimensions."""
+    sections = []
+    for variant in study.variants.values():
+        if not moves_in_space(study, variant):
+            continue
+        if variant.result.spatial_impacts is None:
+            text = (
+                "This result was computed by a version of klack that did not record the contact "
+                "forces round the ring and the films; run the case again to see them."
+            )
+            sections.append(
+                Section(title=f"Line load round the ring, {variant.name}", paragraphs=(text,))
+            )
+            continue
+        sections += [
+            Section(
+                title=f"Line load round the ring, {variant.name}",
+                picture=line_load_picture(variant),
+            ),
+            Section(title=f"Pressure in the films, {variant.name}", charts=film_charts(variant)),
+        ]
+    return sections
 
 
 def _first_impacts(study: StrokeStudy) -> list[Chart | None]:

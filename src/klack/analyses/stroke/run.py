@@ -1,7 +1,7 @@
 """``klack stroke``: one actuation of a whole valve, in the requested variants."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite
 from time import perf_counter
 
@@ -95,7 +95,8 @@ def run_stroke(
     clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         valve = build_valve(case, clock, threads=threads)
-        runs, failure = _runs(valve, roles, states, clock)
+        computed, failure = _runs(valve, roles, states, clock)
+        runs = {name: _without_path(run) for name, run in computed.items()}
         stops = stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
     told = [rest_note(name, item.result, roles.seat) for name, item in results.items()]
@@ -151,6 +152,12 @@ class VariantRun:
     variant: StrokeVariant
     rows: Rows
     failure: ConvergenceError | None
+
+
+def _without_path(run: VariantRun) -> VariantRun:
+    """Leave out the path, which is only of use within a run: channels and impacts have it."""
+    result = replace(run.variant.result, path=None)
+    return replace(run, variant=replace(run.variant, result=result))
 
 
 def stroke_study(

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.mesh.mesh import Mesh
 
-__all__ = ["SeriesFile", "VtuGrid", "write_pvd"]
+__all__ = ["SeriesFile", "VtuGrid", "data_array", "write_pvd"]
 
 _CELLS = {
     **{"tri3": 5, "quad4": 9, "tet4": 10, "hex8": 12, "wedge6": 13},
@@ -60,10 +60,11 @@ class VtuGrid:
         )
         self._piece = (
             f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(sizes)}">\n'
-            f"<Points>\n{_array('Points', points.astype('f8'))}</Points>\n"
-            f"<Cells>\n{_array('connectivity', nodes.astype('i8'))}"
-            f"{_array('offsets', np.cumsum(sizes).astype('i8'))}{_array('types', types)}</Cells>\n"
-            f"<CellData>\n{_array('solid', solid.astype('i8'))}</CellData>\n"
+            f"<Points>\n{data_array('Points', points.astype('f8'))}</Points>\n"
+            f"<Cells>\n{data_array('connectivity', nodes.astype('i8'))}"
+            f"{data_array('offsets', np.cumsum(sizes).astype('i8'))}"
+            f"{data_array('types', types)}</Cells>\n"
+            f"<CellData>\n{data_array('solid', solid.astype('i8'))}</CellData>\n"
         )
 
     def write(self, path: Path, fields: Mapping[str, NDArray[Any]], time: float) -> None:
@@ -76,8 +77,8 @@ class VtuGrid:
             Written in single precision.  Two components are those along x and z.
         time : float [s]
         """
-        data = "".join(_array(name, self._three(values)) for name, values in fields.items())
-        stamp = _array("TimeValue", np.array([time]), tuples=True)
+        data = "".join(data_array(name, self._three(values)) for name, values in fields.items())
+        stamp = data_array("TimeValue", np.array([time]), tuples=True)
         path.write_text(
             f"{self._head}<FieldData>\n{stamp}</FieldData>\n{self._piece}"
             f"<PointData>\n{data}</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
@@ -122,7 +123,7 @@ def write_pvd(path: Path, files: Iterable[SeriesFile]) -> None:
     path.write_text(text, encoding="utf-8")
 
 
-def _array(name: str, values: NDArray[Any], *, tuples: bool = False) -> str:
+def data_array(name: str, values: NDArray[Any], *, tuples: bool = False) -> str:
     """One array with its head: number of pieces, size of a piece, of the last, compressed sizes."""
     raw = np.ascontiguousarray(values).astype(values.dtype.newbyteorder("<")).tobytes()
     pieces = [zlib.compress(raw[i : i + _PIECE], 4) for i in range(0, len(raw), _PIECE)]

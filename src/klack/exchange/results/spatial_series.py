@@ -1,0 +1,239 @@
+r"""One impact of a stroke in three dimensions as a film for ParaView.
+
+Displacements follow from the recorded modal coordinates, :math:`u = \Phi q`, of the needle and of
+the body that it meets; stresses follow from them.  So both are those of the kept modes: the local
+indentation under the contact points, which the static residual compliance carries, is not in them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.stroke.impact_order import recorded_impacts
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.assembling.mode_marks import shape_marks
+from klack.assembling.valve_shapes import BodyShapes, valve_shapes
+from klack.case.valve import ValveCase
+from klack.elasticity.stress import StressField, von_mises
+from klack.errors import InputError
+from klack.exchange.results.naming import file_stems
+from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
+from klack.exchange.results.vtu_ring import write_ring
+from klack.progress import Progress, silent
+from klack.simulation.spatial_impact import ModalMoments, SpatialImpact
+from klack.whole_file import whole_files
+
+__all__ = ["write_spatial_series"]
+
+Floats = NDArray[np.float64]
+
+_SAME = 1e-6  # of the largest mark of a body: its shapes are those of the result
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """One body of the film: its grid, and the fields of it."""
+
+    name: str
+    stem: str
+    shapes: BodyShapes
+    coordinates: Floats
+    stress: StressField | None
+    grid: VtuGrid
+
+    def fields(self, moment: int) -> dict[str, Floats]:
+        q, rigid = self.coordinates[moment], self.shapes.omega == 0.0
+        bent = self.shapes.shapes[:, ~rigid] @ q[~rigid]
+        moved = self.shapes.shapes[:, rigid] @ q[rigid] + bent
+        if self.stress is None:
+            return {"displacement": moved, "deformation": bent}
+        tensor, nodes = self.stress(bent), self.stress.nodes
+        return {
+            "displacement": moved.reshape(-1, 3)[nodes],
+            "deformation": bent.reshape(-1, 3)[nodes],
+            "stress": tensor,
+            "von_mises": von_mises(tensor),
+        }
+
+
+def write_spatial_series(
+    study: StrokeStudy,
+    case: ValveCase,
+    folder: Path,
+    *,
+    impact: int,
+    variant: str | None = None,
+    frames: int = 50,
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Path:
+    """Write ``<case>_<variant>_impact_<n>.pvd`` with a grid per body and instant, and the ring.
+
+    Fields in single precision: ``displacement`` [m] from the drawing, ``deformation`` [m] without
+    the rigid motion, ``stress`` [Pa] (xx, yy, zz, xy, yz, xz) and ``von_mises`` [Pa]; of the ring
+    ``line_load`` [N/m] and ``sector_force`` [N].  The needle stands where it is drawn, the other
+    body where it meets it.
+
+    Parameters
+    ----------
+    study : StrokeStudy
+    case : ValveCase
+        That the study was computed from.
+    folder : Path
+        What stands there under the same names is replaced when everything is complete.
+    impact : int
+        As the report numbers the impacts of the variant, from 1.
+    variant : str, optional
+        The first one by default.
+    frames : int
+        At most so many instants, evenly among those that were recorded.
+    progress : callable
+    threads : int, optional
+
+    Returns
+    -------
+    Path
+        Of the ``.pvd``.
+
+    Raises
+    ------
+    InputError
+        For an impact whose motion was not recorded, fewer than two frames, a case whose bodies are
+        not those of the result, or a place that cannot be written to.
+    """
+    if frames < 2:
+        raise InputError(
+            "--frames", got=f"{frames}", expected="at least 2", hint="50 give a smooth animation."
+        )
+    run = _run(study, variant)
+    record, modes = _recorded(run, impact)
+    shapes = valve_shapes(case, progress, threads=threads)
+    names = _pair(record.stop, modes, shapes)
+    parts = _parts(case, modes, shapes, names, record.stop)
+    count = len(modes.time)
+    chosen = np.unique(np.round(np.linspace(0, count - 1, min(frames, count))).astype(int))
+    stem = f"{file_stems([case.name])[0]}_{run.name}_impact_{impact}"
+    needle = shapes[names[0]]  # heights are those of the lower body, which stands lower then
+    height = record.height - (needle.above[record.stop] if needle.is_upper[record.stop] else 0.0)
+    files: list[SeriesFile] = []
+    with whole_files(folder) as stage:
+        grids = stage / stem
+        grids.mkdir()
+        for number, moment in enumerate(chosen):
+            time = float(modes.time[moment])
+            for k, part in enumerate(parts):
+                name = f"{part.stem}_{number:04d}.vtu"
+                part.grid.write(grids / name, part.fields(int(moment)), time)
+                files.append(SeriesFile(time=time, part=k, name=part.name, file=f"{stem}/{name}"))
+            name = f"contact_ring_{number:04d}.vtu"
+            write_ring(grids / name, record.radius, height, _loads(record, time), time)
+            at = len(parts)
+            files.append(SeriesFile(time=time, part=at, name="ring", file=f"{stem}/{name}"))
+            progress("grids", (number + 1) / len(chosen))
+        write_pvd(stage / f"{stem}.pvd", files)
+    return folder / f"{stem}.pvd"
+
+
+def _run(study: StrokeStudy, variant: str | None) -> StrokeVariant:
+    name = next(iter(study.variants)) if variant is None else variant
+    if name not in study.variants:
+        raise InputError(
+            "--variant",
+            got=f"'{name}'",
+            expected=f"one of: {', '.join(study.variants)}",
+            hint="the variants of this result.",
+        )
+    return study.variants[name]
+
+
+def _recorded(run: StrokeVariant, impact: int) -> tuple[SpatialImpact, ModalMoments]:
+    """Record of an impact with the motion of its bodies."""
+    known = {
+        number: (record, record.modes)
+        for number, _, record in recorded_impacts(run)
+        if record.modes is not None
+    }
+    found = known.get(impact)
+    if found is None or found[1] is None:
+        old = run.result.spatial_impacts is None
+        raise InputError(
+            "--impact",
+            got=f"impact {impact} of '{run.name}', whose motion was not recorded",
+            expected=f"one of: {', '.join(map(str, known))}" if known else "a recorded impact",
+            hint="run the stroke again with this version of klack."
+            if old
+            else "the motion of the first 8 impacts of a stroke in three dimensions is recorded.",
+        )
+    return found[0], found[1]
+
+
+def _pair(stop: str, modes: ModalMoments, shapes: Mapping[str, BodyShapes]) -> tuple[str, str]:
+    """Needle and the body that it meets."""
+    others = [
+        name
+        for name, body in shapes.items()
+        if stop in body.is_upper and name != modes.bodies[0] and name in modes.bodies
+    ]
+    needle = modes.bodies[0]
+    if len(others) != 1 or needle not in shapes or stop not in shapes[needle].is_upper:
+        raise _other_bodies(f"no stop '{stop}' of two of the bodies {', '.join(modes.bodies)}")
+    return needle, others[0]
+
+
+def _parts(
+    case: ValveCase,
+    modes: ModalMoments,
+    shapes: Mapping[str, BodyShapes],
+    names: tuple[str, str],
+    stop: str,
+) -> list[_Part]:
+    starts = dict(zip(modes.bodies, np.cumsum([0, *modes.counts]), strict=False))
+    stems = file_stems(list(names))
+    parts = []
+    for name, stem in zip(names, stems, strict=True):
+        found, q = shapes[name], modes.of(name)
+        first = int(starts[name])
+        marks = modes.shape_marks[first : first + q.shape[1]]
+        _require_same(name, found, q, marks)
+        mesh = found.body.mesh
+        if name != names[0]:  # the needle stays as it is drawn
+            side = 1.0 if found.is_upper[stop] else -1.0
+            mesh = mesh.moved(np.array([0.0, 0.0, side * found.above[stop]]))
+        known = case.bodies[name].material is not None
+        materials = case.materials_of(name, mesh.solids) if known else {}
+        stress = StressField(mesh, materials) if known else None
+        grid = VtuGrid(mesh if stress is None else stress.mesh)
+        parts.append(_Part(name, stem, found, q, stress, grid))
+    return parts
+
+
+def _require_same(name: str, found: BodyShapes, q: Floats, marks: Floats) -> None:
+    """Refuse coordinates of other shapes: mesh, sign or pairing of modes may differ."""
+    if found.shapes.shape[1] != q.shape[1]:
+        raise _other_bodies(
+            f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
+        )
+    here = shape_marks(found.shapes)
+    if len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()):
+        raise _other_bodies(f"modes of '{name}' with other shapes than those of the result")
+
+
+def _other_bodies(got: str) -> InputError:
+    return InputError(
+        "bodies of the case in the result",
+        got=got,
+        expected="those that the stroke was computed with",
+        hint="run the stroke again on this machine, with this version of klack.",
+    )
+
+
+def _loads(record: SpatialImpact, time: float) -> dict[str, Floats]:
+    """Loads of the sectors in the interval that ends at or after a moment; 0 outside."""
+    at = int(np.searchsorted(record.edges, time * (1.0 - 1e-12))) - 1
+    if 0 <= at < len(record.sector_force):
+        return {"line_load": record.line_load[at], "sector_force": record.sector_force[at]}
+    nothing = np.zeros(record.sector_force.shape[1])
+    return {"line_load": nothing, "sector_force": nothing}
