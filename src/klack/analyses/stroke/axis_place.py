@@ -7,6 +7,7 @@ from ruamel.yaml import YAML
 
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.case.guide import CaseGuide
+from klack.case.motion_of_valve import ValveGuide
 
 __all__ = ["AxisPlace", "axis_place", "guide_of", "moves_in_space"]
 
@@ -57,4 +58,4 @@ def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisP
 def guide_of(study: StrokeStudy) -> CaseGuide | None:
     """Section ``guide`` of the case, which was checked when it was run; None without."""
     given = YAML(typ="safe").load(study.case_text).get("guide")
-    return None if given is None else CaseGuide.model_validate(given)
+    return None if given is None else ValveGuide.model_validate(given)
