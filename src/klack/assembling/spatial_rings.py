@@ -12,9 +12,8 @@ from math import hypot, inf
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
-from klack.assembling.off_axis import ANGLES, turning_body
+from klack.assembling.off_axis import ANGLES, turned
 from klack.assembling.off_axis_points import off_axis_rings
 from klack.assembling.spatial import (
     Meeting,
@@ -50,11 +49,14 @@ from klack.transient.revolved_model import (
     reduced_bodies,
 )
 from klack.transient.revolved_points import RevolvedPoints
+from klack.transient.ring_arcs import RingArcs
 from klack.transient.spatial_run import SpatialValve
 
 __all__ = ["RingValve", "build_spatial_rings", "in_all_orders"]
 
 Vector = NDArray[np.float64]
+
+_JUDGED = 0.1  # of the peak force at the speed that the case gives for a stop
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,9 +85,9 @@ def build_spatial_rings(
 ) -> RingValve:
     """Bodies of a valve with all their freedoms, contact points on rings, and the guide.
 
-    Beside the modes of order 0, which an axial stroke has, each body keeps as many others, the
-    lowest of the orders above.  Rings are all that can close in any position which the guide
-    allows; without a guide, in that of the start.
+    Beside the modes of order 0, which an axial stroke has, each body keeps others, see
+    :func:`klack.assembling.off_axis.turned`.  Rings are all that can close in any position which
+    the guide allows; without a guide, in that of the start.
 
     Parameters
     ----------
@@ -146,10 +148,18 @@ def build_spatial_rings(
         None if sections is None else _guide(case, model, sections, points[0]),
         rigid_placement(*placement_of(case, height), *about),
     )
+    arcs = RingArcs(
+        count=count,
+        stops=spatial.stops,
+        turn=tuple(contact.space.turn for _, contact in found),
+        weakest=tuple(_JUDGED * contact.pattern_force for contact in contacts.values()),
+    )
     whole = {
         name: in_all_orders(reduced[name], item) for name, item in zip(names, points, strict=True)
     }
-    return RingValve(spatial=spatial, reduced={name: whole[name] for name in bodies})
+    return RingValve(
+        spatial=replace(spatial, arcs=arcs), reduced={name: whole[name] for name in bodies}
+    )
 
 
 def _meeting(
@@ -207,15 +217,8 @@ def _revolved(
     sections: RingSections | None,
 ) -> RevolvedBody:
     patterns = np.column_stack([port.pattern for port in ports])
-    axial = kept_modes(selection_of(case.reduction.choice(body.name)), pool, patterns)
-    return RevolvedBody(
-        name=body.name,
-        in_order=turning_body(case, body.name, body.mesh),
-        axial=axial,
-        others=len(axial.omega),
-        damping=damping_of(case.bodies[body.name].damping).ratios,
-        sections=sections,
-    )
+    choice = selection_of(case.reduction.choice(body.name))
+    return turned(case, body, kept_modes(choice, pool, patterns), sections)
 
 
 def _guide(

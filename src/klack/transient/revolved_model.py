@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,10 +44,12 @@ class RevolvedBody:
         Body in a Fourier order, of the half section at its centred place.
     axial : Modes
         Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others : int
-        Modes of the orders above that are kept, the lowest ones.
+    others : int or None
+        Modes of the orders above that are kept, the lowest ones; None: all with ``below``.
     damping : callable
         Ratios of modes with these angular frequencies [rad/s].
+    below : float [rad/s]
+        Highest angular frequency of the others.
     sections : RingSections, optional
         Of its shaft, in a guide.
     """
@@ -54,8 +57,9 @@ class RevolvedBody:
     name: str
     in_order: Callable[[int], FourierBody]
     axial: Modes
-    others: int
+    others: int | None
     damping: Callable[[Floats], Floats]
+    below: float = inf
     sections: RingSections | None = None
 
 
@@ -135,6 +139,7 @@ def reduced_bodies(
             points,
             axial=body.axial,
             others=body.others,
+            below=body.below,
             damping=body.damping,
             loads=loads[place],
             sections=body.sections,

@@ -9,6 +9,7 @@ What comes out, :class:`RevolvedPoints`, is what the interface level takes of a 
 a mesh of it: :func:`klack.transient.interface_model.model_at_points` puts two or three together.
 """
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import inf
@@ -84,9 +85,10 @@ def reduce_revolved(
     points: RingPoints,
     *,
     axial: Modes,
-    others: int,
+    others: int | None,
     damping: Callable[[Floats], Floats],
     loads: Floats,
+    below: float = inf,
     sections: RingSections | None = None,
     cache: ResultCache | None = None,
 ) -> RevolvedPoints:
@@ -102,20 +104,22 @@ def reduce_revolved(
         Points of all its contacts, and the rows that read them.
     axial : Modes
         Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others : int
+    others : int or None
         Modes of the orders above that are kept, both motions of an order counted: those with the
-        lowest frequencies.
+        lowest frequencies; None: all with ``below``.
     damping : callable
         Ratios of modes with these angular frequencies.
     loads : array, shape (p, k) [N]
         For ``answers``.
+    below : float [rad/s]
+        Highest angular frequency of these others.
     sections : RingSections, optional
         That are read as well.
     cache : ResultCache, optional
         As of :class:`klack.elasticity.statics.Flexibility`.
     """
     sums = _Orders(rows, points, loads, sections)
-    pairs = _Pairs(others // 2, (points.count - 1) // 2)
+    pairs = _Pairs(others, below, (points.count - 1) // 2)
     for order in resolved_orders(points.count):
         body = in_order(order)
         with (
@@ -235,11 +239,12 @@ class _Orders:
 class _Pairs:
     """The lowest pairs of modes of the orders above 0, found order by order."""
 
-    def __init__(self, count: int, highest: int) -> None:
-        self.count, self.highest = count, highest
+    def __init__(self, others: int | None, below: float, highest: int) -> None:
+        self.count = sys.maxsize if others is None else others // 2
+        self.below, self.highest = below, highest
         self.found: list[tuple[int, float, Floats]] = []
         self.lowest_before = inf
-        self.is_complete = count == 0
+        self.is_complete = self.count == 0
 
     def look(
         self, order: int, body: FourierBody, flexibility: Flexibility, rows: csr_array
@@ -266,9 +271,11 @@ class _Pairs:
 
     def lowest(self) -> list[tuple[int, float, Floats]]:
         """The pairs that are kept, lowest first."""
-        return sorted(self.found, key=lambda one: one[:2][::-1])[: self.count]
+        low = [one for one in self.found if one[1] <= self.below]
+        return sorted(low, key=lambda one: one[:2][::-1])[: self.count]
 
     def _cut(self, more: "Floats | list[float]") -> float:
         """Angular frequency of the last pair that is kept, with the modes found so far."""
         known = sorted([*(omega for _, omega, _ in self.found), *more])
-        return float(known[self.count - 1]) if len(known) >= self.count else inf
+        last = float(known[self.count - 1]) if len(known) >= self.count else inf
+        return min(last, self.below)

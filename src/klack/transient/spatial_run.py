@@ -67,6 +67,7 @@ from klack.transient.interface_arrays import (
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
+from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import bend_faces, film_state, film_strain
@@ -122,6 +123,8 @@ class SpatialValve:
         Lands of squeeze films, for the stops that have one in the network.
     bearing : BearingFilm, optional
         Film in the guide, where the network has a fluid.
+    arcs : RingArcs, optional
+        Angles of contact points on rings, for a doubt about short contacts.
     """
 
     model: InterfaceModel
@@ -134,6 +137,7 @@ class SpatialValve:
     velocity: Vector = field(default_factory=lambda: np.zeros(6))
     films: tuple[TiltingFilm, ...] = ()
     bearing: BearingFilm | None = None
+    arcs: RingArcs | None = None
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
         """Return them in a network.
@@ -175,6 +179,7 @@ class _Moving:
     def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
         self.valve, self.network, self.sizes = valve, network, sizes
         self.path = SpatialPath()
+        self.arcs = None if valve.arcs is None else ArcWatch(valve.arcs)
         model = valve.model
         self.model, self.ports = model, len(network.ports)
         self.place_q, self.place_v, self.P = _places(valve, network)
@@ -772,6 +777,8 @@ class _Moving:
             told[1:] |= acted[:-1]  # a step without force ends a contact
             told[-1] &= not np.any(lam > 0.0)
             told[:-1] |= np.abs(pressed) > faces.film_felt[row]
+            if self.arcs is not None:
+                self.arcs.see(c, float(force[-1]), lam)
             if points:
                 self.force[c] = force[-1]
                 if not np.any(lam > 0.0):
