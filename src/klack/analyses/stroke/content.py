@@ -422,7 +422,7 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
             "Contact",
             "Point by point on smooth faces, off-axis as well; fluid, magnet and springs act "
             "along the axis, wherever the needle is. Small rotations; the bore of the guide does "
-            "not move, and no film fills it."
+            "not move."
             if space
             else "One force along the axis with one pressure pattern per stop. Tilt and eccentric "
             "contact are outside the assumptions.",
@@ -433,12 +433,14 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         for body in study.bodies
         if body.frequencies.size
     ]
+    rings = space and any(body.model == "axisymmetric" for body in study.bodies)
     if tops:
         limits.append(
             (
                 "Frequency",
-                f"Highest kept modes: {', '.join(tops)}. Above them a body responds "
-                "only by its static compliance.",
+                f"Highest kept modes{' along the axis' if rings else ''}: {', '.join(tops)}. Above "
+                "them a body responds only by its static compliance."
+                + (" Across the axis the lowest modes of all orders are kept." if rings else ""),
             )
         )
     incomplete = [
