@@ -38,7 +38,6 @@ from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
 from klack.reduction.reduced_body import ReducedBody
-from klack.stages import warnings_of
 from klack.transient.guide import Guide, guide_at_sections
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_guide import shaft_sections, turned_sections
@@ -186,8 +185,14 @@ def _meeting(
     )
     up = np.array([0.0, 0.0, gap])
     raised, open_by = pair.upper.mesh.moved(up[1:]), section.shifted(gap)
-    with warnings_of(f"stop '{contact.name}'"):
-        space = RingSpace.within(open_by, np.tile(open_by.gap[:, None], count), inf)
+    space = RingSpace.within(
+        open_by,
+        np.tile(open_by.gap[:, None], count),
+        inf,
+        where=f"stop '{contact.name}'",
+        more="where the guide lets the needle touch there, smaller elements on both surfaces "
+        "(mesh.surfaces), a smaller guide.clearance, or guiding heights farther apart. Else ",
+    )
     meeting = Meeting(
         name=contact.name,
         space=space,
