@@ -2,9 +2,11 @@
 
 import warnings
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
+from klack.analyses.stroke.axis_place import guide_of
 from klack.assembling.valve import build_valve
 from klack.case.valve_reader import read_valve_case
 from klack.errors import AccuracyWarning, InputError
@@ -73,3 +75,9 @@ def test_bodies_without_a_mode_of_order_1_are_named():
     ]
     needle = valve.reduced["needle"]
     assert (needle.rigid_count, needle.mode_count) == (6, 7)
+
+
+def test_a_report_reads_a_guide_with_a_film():
+    text = HALF.replace("friction: 0.1}", "friction: 0.1, film: {length: 1.5 mm}}")
+    found = guide_of(SimpleNamespace(case_text=text))
+    assert found.film.length == pytest.approx(1.5e-3, rel=1e-12)
