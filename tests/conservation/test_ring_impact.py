@@ -3,6 +3,8 @@
 Truth: Newton's laws; the forces are summed over the hats of the half section, without orders.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -122,3 +124,21 @@ def test_the_number_of_angles_converges_fast(pair):
         peaks[count] = measure_impact(hit(pair.model(space, axial=6, others=8)).history)
     assert peaks[24].peak_force == pytest.approx(peaks[48].peak_force, rel=2e-3)
     assert peaks[24].restitution == pytest.approx(peaks[48].restitution, abs=1e-3)
+
+
+def test_all_others_up_to_a_frequency_are_kept(pair):
+    """Truth: eigenvalues of each order alone; both motions of an order count."""
+    below = 2.0 * np.pi * 400e3
+    space, _ = pair.placed(12, ASIDE)
+    bodies = [replace(body, others=None, below=below) for body in pair.revolved(3, 4)]
+    reduced, _ = reduced_bodies(bodies, [pair.contact(space)])
+    for number, item in enumerate(reduced):
+        low = {
+            order: eigenmodes(pair.in_order(number)(order), max_frequency=400e3).omega
+            for order in range(1, 6)
+        }
+        expected = sorted(w for values in low.values() for w in values for _ in range(2))
+        others = item.body.omega[(item.order > 0) & (item.body.omega > 0.0)]
+        assert len(expected) > 8
+        assert item.order.max() > number  # of the seat, beyond bending
+        np.testing.assert_allclose(np.sort(others), expected, rtol=1e-9)

@@ -24,7 +24,7 @@ def test_the_example_prints_what_the_page_shows(monkeypatch):
 
 
 def test_the_sections_of_the_page_are_those_of_its_case():
-    text, case = PAGE.read_text(encoding="utf-8"), PAGE.with_name("stroke_off_axis.yaml")
+    text, case = PAGE.read_text(encoding="utf-8"), PAGE.with_name("half_section_stroke.yaml")
     (shown,) = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
 
     assert shown in case.read_text(encoding="utf-8")

@@ -26,7 +26,7 @@ class BodySummary:
     mass : float [kg]
     nodes, elements, dofs : int
     frequencies : array [Hz]
-        Elastic eigenfrequencies that the reduction keeps.
+        Elastic eigenfrequencies that the reduction keeps, lowest first.
     compliance_share : float [-]
         Share of the static compliance at the contact that the kept modes carry.
     """
@@ -75,7 +75,7 @@ def summarise_body(
         nodes=body.mesh.node_count,
         elements=body.mesh.element_count,
         dofs=body.dof_count,
-        frequencies=reduced.frequencies[first:last],
+        frequencies=np.sort(reduced.frequencies[first:last]),
         compliance_share=compliance_share,
     )
 

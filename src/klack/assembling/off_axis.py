@@ -6,6 +6,7 @@ which are those of the surfaces where the moving body is.
 
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from math import inf, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,22 +14,27 @@ from numpy.typing import NDArray
 from klack.assembling.bodies import BodyPair, warn_far_touch
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.held_nodes import held_nodes
+from klack.assembling.modes import selection_of
 from klack.assembling.problem import ContactProblem
 from klack.case.bodies import CaseFile
 from klack.case.placement import Placement
 from klack.case.schema import Case
+from klack.case.valve import ValveCase
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingFriction, RingSpace
+from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.elasticity.ring_sections import RingSections
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import Pose, rotation_matrix
+from klack.reduction.selection import ByFrequency
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
 
-__all__ = ["ANGLES", "off_axis_model", "ring_contacts", "turning_body"]
+__all__ = ["ANGLES", "off_axis_model", "ring_contacts", "turned", "turning_body"]
 
 Floats = NDArray[np.float64]
 
@@ -224,12 +230,43 @@ def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], Fouri
     return lambda order: fourier_body(name, mesh, materials, order=order, fixed_nodes=nodes)
 
 
+def turned(
+    case: Case | ValveCase, body: ElasticBody, axial: Modes, sections: RingSections | None = None
+) -> RevolvedBody:
+    """Body of a case that moves in all Fourier orders.
+
+    It keeps the axial modes and as many others, the lowest of the orders above 0; where the case
+    gives a highest frequency, all others up to it.
+
+    Parameters
+    ----------
+    case : Case or ValveCase
+    body : ElasticBody
+        Half section.
+    axial : Modes
+        That the centred case keeps.
+    sections : RingSections, optional
+        Of its shaft, in a guide.
+    """
+    choice = selection_of(case.reduction.choice(body.name))
+    highest = choice.maximum if isinstance(choice, ByFrequency) else None
+    return RevolvedBody(
+        name=body.name,
+        in_order=turning_body(case, body.name, body.mesh),
+        axial=axial,
+        others=len(axial.omega) if highest is None else None,
+        below=inf if highest is None else 2.0 * pi * highest,
+        damping=damping_of(case.bodies[body.name].damping).ratios,
+        sections=sections,
+    )
+
+
 def off_axis_model(
     problem: ContactProblem, kept: Mapping[str, Modes], contacts: Sequence[RingContact]
 ) -> InterfaceModel:
     """Interface model of the bodies of a case at points on rings.
 
-    Beside the axial modes each body keeps as many others, the lowest of the orders above 0.
+    Beside the axial modes each body keeps others of the orders above 0: see :func:`turned`.
 
     Parameters
     ----------
@@ -241,13 +278,7 @@ def off_axis_model(
     """
     case, pair, above = problem.case, problem.pair, problem.opposite
     bodies = [
-        RevolvedBody(
-            name=body.name,
-            in_order=turning_body(case, body.name, body.mesh),
-            axial=kept[body.name],
-            others=len(kept[body.name].omega),
-            damping=damping_of(case.bodies[body.name].damping).ratios,
-        )
+        turned(case, body, kept[body.name])
         for body in (pair.upper, pair.lower, *(() if above is None else (above.body,)))
     ]
     return revolved_model(bodies, contacts, cache=problem.flexibility_upper.cache)

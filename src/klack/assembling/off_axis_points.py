@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from klack.assembling.bodies import BodyPair
 from klack.contact.gap_update import PlacedGaps, RigidGaps
 from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.ring_gaps import RingGaps
 
-__all__ = ["off_axis_space", "touch_height"]
+__all__ = ["off_axis_rings", "off_axis_space", "touch_height"]
 
 Vector = NDArray[np.float64]
 
@@ -24,7 +25,7 @@ def touch_height(space: ContactSpace) -> float:
     facing = space.axial > 1e-6
     lift = space.gap[facing] / space.axial[facing]
     first = lift <= lift.min() + _FIRST * space.reach
-    return float(np.mean(space.points[facing][first, 2]))
+    return float(np.mean(space.points[facing][first, -1]))
 
 
 def off_axis_space(
@@ -62,20 +63,61 @@ def off_axis_space(
     gaps = PlacedGaps((rigid,), (upper_moves,))
     keep = wide.gap <= wide.gap.min() + _SOFTER * reach
     for placement in farthest:
-        keep |= _gaps_in_touch(gaps, wide, placement, upper_moves) <= _SOFTER * reach
-    # and one row more: on coarse elements a contact is not much wider than a point
+        keep |= _gaps_in_touch(gaps, wide.axial, placement, upper_moves) <= _SOFTER * reach
+    return _with_neighbours(wide, keep)
+
+
+def off_axis_rings(
+    pair: BodyPair,
+    space: ContactSpace,
+    farthest: Sequence[Vector],
+    off_axis: float,
+    *,
+    angle: Vector,
+    centre: Vector,
+    upper_moves: bool = True,
+) -> ContactSpace:
+    """Hats of a half section whose rings close in a centred impact or in one from afar.
+
+    Whole rings: a needle may come from any side.
+
+    Parameters
+    ----------
+    pair : BodyPair
+        Of bodies of revolution, in first touch.
+    angle : array, shape (n,) [rad]
+        Of the points of every ring.
+    space, farthest, off_axis, centre, upper_moves
+        As of :func:`off_axis_space`.
+    """
+    reach = space.reach
+    surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
+    wide = contact_space(
+        *surfaces, reach=_WIDER * reach + off_axis, slave=space.slave, form=pair.form
+    )
+    rings = RingGaps.of(wide, *surfaces, angle=angle, centre=centre, form=pair.form)
+    gaps, axial = PlacedGaps((rings,), (upper_moves,)), np.repeat(wide.axial, len(angle))
+    keep = wide.gap <= wide.gap.min() + _SOFTER * reach
+    for placement in farthest:
+        near = _gaps_in_touch(gaps, axial, placement, upper_moves) <= _SOFTER * reach
+        keep |= np.any(near.reshape(wide.count, -1), axis=1)
+    return _with_neighbours(wide, keep)
+
+
+def _with_neighbours(wide: ContactSpace, keep: NDArray[np.bool_]) -> ContactSpace:
+    """These hats and one row more: on coarse elements a contact is hardly wider than a point."""
     G = abs(wide.G_a if wide.slave == "a" else wide.G_b)
     return wide.restricted(G @ (G.T @ keep.astype(float)) > 0)
 
 
 def _gaps_in_touch(
-    gaps: Callable[[Vector], Vector], space: ContactSpace, placement: Vector, upper_moves: bool
+    gaps: Callable[[Vector], Vector], axial: Vector, placement: Vector, upper_moves: bool
 ) -> Vector:
     """Gaps [m] after the moving body has been moved along z to its first touch."""
-    facing = space.axial > 1e-6
+    facing = axial > 1e-6
     side = 1.0 if upper_moves else -1.0
     for _ in range(3):  # points slide along the other surface
         gap = gaps(placement)
-        lift = float(np.min(gap[facing] / space.axial[facing]))
+        lift = float(np.min(gap[facing] / axial[facing]))
         placement = placement - side * np.array([0.0, 0.0, lift, 0.0, 0.0, 0.0])
-    return np.asarray(gap - lift * space.axial)
+    return np.asarray(gap - lift * axial)

@@ -7,7 +7,6 @@ from math import cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.bodies import BodyPair
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.mode_marks import shape_marks
 from klack.assembling.modes import selection_of
@@ -23,6 +22,8 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.gap_update import PlacedGaps, RigidGaps
 from klack.contact.mortar import ContactSpace
+from klack.contact.ring_gaps import RingGaps
+from klack.contact.rings import RingSpace
 from klack.contact.statics import contact_compliance, extended_compliance
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -32,18 +33,27 @@ from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
 from klack.transient.gap_course import gap_course
-from klack.transient.guide import guide_of_shaft
-from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
+from klack.transient.guide import Guide, guide_of_shaft
+from klack.transient.interface_model import (
+    InterfaceBody,
+    InterfaceContact,
+    InterfaceModel,
+    interface_model,
+)
 from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.units import format_si
 
 __all__ = [
+    "Meeting",
+    "about_axis",
     "build_spatial",
     "check_heights",
+    "farthest_positions",
     "modes_in_network",
     "placement_of",
     "seat_height",
+    "valve_of_meetings",
 ]
 
 Vector = NDArray[np.float64]
@@ -53,16 +63,30 @@ _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as 
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Meeting:
-    """One stop, its bodies as far apart as they start."""
+class Meeting:
+    """One stop, its bodies as far apart as they start.
+
+    Parameters
+    ----------
+    name : str
+    space : ContactSpace or RingSpace
+        Contact points.
+    reach : float [m]
+        Largest gap of those of the centred bodies in touch.
+    arm : array, shape (3,) [m]
+        Their middle from the centre of mass of the needle.
+    gaps : RigidGaps or RingGaps
+        At any rigid placement.
+    upper_moves : bool
+        Whether the needle is the upper body.
+    """
 
     name: str
-    pair: BodyPair
-    space: ContactSpace
-    compliance: NDArray[np.float64]
+    space: ContactSpace | RingSpace
+    reach: float
+    arm: Vector
+    gaps: RigidGaps | RingGaps
     upper_moves: bool
-    centre: Vector
-    faces: FaceFriction | None
 
 
 def build_spatial(
@@ -86,25 +110,19 @@ def build_spatial(
         For a guide that the needle does not fit in, or a placement outside of it.
     """
     parts = case.network.components
-    component = {str(getattr(part, "body", "")): name for name, part in parts.items()}
     needle = str(getattr(parts[roles.needle], "body", ""))
     kept = {name: modes_in_network(case, name, pools, ports) for name in bodies}
     height = seat_height(contacts, needle)
-    placement = placement_of(case, height)
-    off_axis = _farthest(case, height, placement)
-    about = _about(height, bodies[needle])
-    drawn = case.shots is not None and case.shots.contact_friction is not None
-    rubs = drawn or any(stop.friction > 0.0 for stop in case.stops.values())
-    meetings = [
+    off_axis = farthest_positions(case, height)
+    about = about_axis(height, bodies[needle])
+    rubs = case.rubs
+    found = [
         _meeting(
             contact,
             needle,
             bodies[needle],
             flexibilities,
-            [
-                rigid_placement(aside, lean, *_about(height, bodies[needle]))
-                for aside, lean in off_axis
-            ],
+            [rigid_placement(aside, lean, *about) for aside, lean in off_axis],
             max(hypot(*aside) for aside, _ in off_axis),
             float(getattr(parts[name], "gap", 0.0)),
             Friction.coulomb(case.stops[name].friction) if rubs else None,
@@ -123,14 +141,16 @@ def build_spatial(
         ],
         [
             InterfaceContact(
-                name=meeting.name,
-                upper=meeting.pair.upper.name,
-                lower=meeting.pair.lower.name,
-                space=meeting.space,
-                compliance=meeting.compliance,
-                faces=meeting.faces,
+                name=name,
+                upper=contact.pair.upper.name,
+                lower=contact.pair.lower.name,
+                space=space,
+                compliance=compliance,
+                faces=faces,
             )
-            for meeting in meetings
+            for (name, contact), (_, space, compliance, faces) in zip(
+                contacts.items(), found, strict=True
+            )
         ],
     )
     guide = None
@@ -149,9 +169,41 @@ def build_spatial(
             friction=case.guide.friction,
             viscous=case.guide.viscous,
         )
-    arms = np.array([meeting.space.points.mean(axis=0) - meeting.centre for meeting in meetings])
+    spatial = valve_of_meetings(
+        case,
+        model,
+        [meeting for meeting, *_ in found],
+        guide,
+        rigid_placement(*placement_of(case, height), *about),
+    )
+    shapes = [np.hstack([bodies[name].rigid_modes, kept[name].shapes]) for name in model.bodies]
+    return replace(spatial, shape_marks=np.concatenate([shape_marks(each) for each in shapes]))
+
+
+def valve_of_meetings(
+    case: ValveCase,
+    model: InterfaceModel,
+    meetings: Sequence[Meeting],
+    guide: Guide | None,
+    placement: Vector,
+) -> SpatialValve:
+    """Put the bodies of a valve together that meet there.
+
+    Parameters
+    ----------
+    case : ValveCase
+    model : InterfaceModel
+        With the contacts of the meetings.
+    meetings : sequence of Meeting
+    guide : Guide or None
+    placement : array, shape (6,) [m], [rad]
+        Of the needle at the start.
+    """
+    parts = case.network.components
+    component = {str(getattr(part, "body", "")): name for name, part in parts.items()}
+    arms = np.array([meeting.arm for meeting in meetings])
     gaps = PlacedGaps(
-        tuple(_gaps(meeting) for meeting in meetings),
+        tuple(meeting.gaps for meeting in meetings),
         tuple(meeting.upper_moves for meeting in meetings),
     )
     return SpatialValve(
@@ -162,16 +214,10 @@ def build_spatial(
         guide=guide,
         gaps=gaps,
         course=gap_course(gaps, float(np.max(np.linalg.norm(arms, axis=1)))),
-        placement=rigid_placement(*placement, *about),
+        placement=placement,
         bearing=_bearing(case.guide),
-        shape_marks=np.concatenate(
-            [
-                shape_marks(np.hstack([bodies[name].rigid_modes, kept[name].shapes]))
-                for name in model.bodies
-            ]
-        ),
         films=tuple(
-            tilting_film(meeting.name, film, meeting.space)
+            tilting_film(meeting.name, film, meeting.space, meeting.reach)
             for meeting in meetings
             if (film := getattr(parts[meeting.name], "film", None)) is not None
         ),
@@ -181,7 +227,7 @@ def build_spatial(
 def check_heights(case: ValveCase, roles: ValveRoles, bodies: Mapping[str, ElasticBody]) -> None:
     """Raise :class:`InputError` for a force across the axis beside the needle."""
     needle = str(getattr(case.network.components[roles.needle], "body", ""))
-    low, high = (float(f(bodies[needle].mesh.points[:, 2])) for f in (np.min, np.max))
+    low, high = (float(f(bodies[needle].mesh.points[:, -1])) for f in (np.min, np.max))
     for name, component in case.network.components.items():
         for part in component.off_axis_parts():
             outside = [z for z in part.heights if not low <= z <= high]
@@ -213,9 +259,9 @@ def _bearing(guide: ValveGuide | None) -> BearingFilm | None:
     return BearingFilm(length=guide.film.length, cut_off=guide.film.cut_off)
 
 
-def _about(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:
+def about_axis(height: float, needle: ElasticBody) -> tuple[Vector, Vector]:
     """Point about which the needle is tilted, and its centre of mass, as drawn [m]."""
-    return np.array([0.0, 0.0, height]), needle.centre_of_mass
+    return np.array([0.0, 0.0, height]), needle.centre_in_space
 
 
 def seat_height(contacts: Mapping[str, StopContact], needle: str) -> float:
@@ -256,13 +302,14 @@ def placement_of(case: ValveCase, height: float) -> tuple[Vector, Vector]:
     return aside, lean
 
 
-def _farthest(
-    case: ValveCase, height: float, placement: tuple[Vector, Vector]
-) -> list[tuple[Vector, Vector]]:
-    """Positions and slopes of the axis that contact points must suffice for."""
+def farthest_positions(case: ValveCase, height: float) -> list[tuple[Vector, Vector]]:
+    """Positions and slopes of the axis that contact points must suffice for, all round.
+
+    The first two are those in the direction of x; the others are the same, turned.
+    """
     guide = case.guide
+    placement = aside, lean = placement_of(case, height)
     if guide is None:
-        aside, lean = placement
         turns = [_turned(2.0 * pi * k / _DIRECTIONS) for k in range(_DIRECTIONS)]
         return [(R @ aside, R @ lean) for R in turns] if np.any([aside, lean]) else [placement]
     found = []
@@ -285,7 +332,8 @@ def _meeting(
     off_axis: float,
     gap: float,
     friction: Friction | None,
-) -> _Meeting:
+) -> tuple[Meeting, ContactSpace, NDArray[np.float64], FaceFriction | None]:
+    """A stop, its contact points, and the static compliance of both bodies there."""
     pair, static = contact.pair, contact.static
     upper_moves = pair.upper.name == needle
     centre = pair.upper.centre_of_mass if upper_moves else body.centre_of_mass
@@ -302,25 +350,21 @@ def _meeting(
         compliance = contact_compliance(space, *both, faces=faces)
     up = np.array([0.0, 0.0, gap])
     raised = replace(pair, upper=replace(pair.upper, mesh=pair.upper.mesh.moved(up)))
-    return _Meeting(
+    open_by, here = space.shifted(gap), centre + up if upper_moves else centre
+    meeting = Meeting(
         name=contact.name,
-        pair=raised,
-        space=space.shifted(gap),
-        compliance=compliance,
+        space=open_by,
+        reach=space.reach,
+        arm=space.points.mean(axis=0) - here,
+        gaps=RigidGaps.of(
+            open_by,
+            raised.upper.mesh,
+            raised.upper_surface,
+            raised.lower.mesh,
+            raised.lower_surface,
+            centre=here,
+            form=raised.form,
+        ),
         upper_moves=upper_moves,
-        centre=centre + up if upper_moves else centre,
-        faces=faces,
     )
-
-
-def _gaps(meeting: _Meeting) -> RigidGaps:
-    pair = meeting.pair
-    return RigidGaps.of(
-        meeting.space,
-        pair.upper.mesh,
-        pair.upper_surface,
-        pair.lower.mesh,
-        pair.lower_surface,
-        centre=meeting.centre,
-        form=pair.form,
-    )
+    return meeting, open_by, compliance, faces

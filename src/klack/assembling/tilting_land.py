@@ -5,6 +5,7 @@ from math import sin
 import numpy as np
 
 from klack.contact.mortar import ContactSpace
+from klack.contact.rings import RingSpace
 from klack.hydraulics.film import ConeFilm, DiscFilm, FilmShape, RingFilm
 from klack.hydraulics.tilted_film import SectorFilm, sector_film
 from klack.transient.tilting_film import TiltingFilm
@@ -15,7 +16,9 @@ _WIDE = 0.1  # width over mean radius, above which heights differ across the lan
 _TOUCHING = 0.05  # share of the reach: points that touch first
 
 
-def tilting_film(stop: str, film: FilmShape, space: ContactSpace) -> TiltingFilm:
+def tilting_film(
+    stop: str, film: FilmShape, space: ContactSpace | RingSpace, reach: float
+) -> TiltingFilm:
     """Land of a film, and the lift and tilts of it in the gaps of contact points.
 
     A conical land is unrolled: a flat ring of its mean radius and its width, whose height is normal
@@ -25,8 +28,10 @@ def tilting_film(stop: str, film: FilmShape, space: ContactSpace) -> TiltingFilm
     ----------
     stop : str
     film : FilmShape
-    space : ContactSpace
-        Contact points of the stop, centred.
+    space : ContactSpace or RingSpace
+        Contact points of the stop, centred, all round.
+    reach : float [m]
+        Their largest gap in touch.
     """
     slope, land, cubic = 1.0, None, 1.0
     if isinstance(film, RingFilm):
@@ -42,9 +47,9 @@ def tilting_film(stop: str, film: FilmShape, space: ContactSpace) -> TiltingFilm
         flat = RingFilm(shape="ring", inner_radius=inner, outer_radius=outer)
         cubic = flat.coefficients()[0]
     lift = space.gap / np.maximum(space.axial * np.sign(np.sum(space.axial)), 1e-6)
-    near = lift <= lift.min() + _TOUCHING * space.reach
+    near = lift <= lift.min() + _TOUCHING * reach
     weight = np.where(near, space.area, 0.0)
-    shapes = np.column_stack([np.ones(space.count), space.points[:, :2]])
+    shapes = np.column_stack([np.ones(len(space.gap)), space.points[:, :2]])
     fit = np.linalg.solve((shapes.T * weight) @ shapes, shapes.T * weight)
     touching = space.gap - lift.min() * np.abs(space.axial)
     return TiltingFilm(stop=stop, land=land, cubic=cubic, slope=slope, fit=fit, base=fit @ touching)

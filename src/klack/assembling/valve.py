@@ -12,6 +12,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes
 from klack.assembling.modes import mode_pool, selection_of
 from klack.assembling.spatial import build_spatial, check_heights
+from klack.assembling.spatial_rings import build_spatial_rings
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
 from klack.cache.setting import result_cache
@@ -175,7 +176,11 @@ def _built(
     progress("radiating surfaces", 0.0)
     structures = valve_structures(case, bodies, ports, contacts, pools, flexibilities)
     spatial = None
-    if in_space:
+    if in_space and all(body.dimension == 2 for body in bodies.values()):
+        progress("contact points", 0.0)
+        rings = build_spatial_rings(case, find_roles(case), bodies, pools, ports, contacts, reduced)
+        spatial, reduced = rings.spatial, dict(rings.reduced)
+    elif in_space:
         progress("contact points", 0.0)
         spatial = build_spatial(
             case, find_roles(case), bodies, flexibilities, pools, ports, contacts

@@ -29,6 +29,7 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
                     on_key=True,
                 )
         refuse_off_axis(case)
+        _refuse_angles(case, "angles of rings that are touched all round at once")
         return
     _check_bodies(case)
     parts = case.network.components
@@ -72,14 +73,53 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
 
 
 def _check_bodies(case: ValveSections) -> None:
-    for name, body in case.bodies.items():
-        if body.geometry.dimension != 3:
+    """Bodies of one kind, half sections that klack assembles, and angles for these alone."""
+    flat = [name for name, body in case.bodies.items() if body.geometry.dimension == 2]
+    solid = [name for name in case.bodies if name not in flat]
+    if flat and solid:
+        raise CaseProblem(
+            ("bodies", flat[0], "geometry"),
+            got=f"an axisymmetric '{flat[0]}' beside a three-dimensional '{solid[0]}'",
+            expected="all bodies axisymmetric or all three-dimensional",
+            hint=f"take 'model: swept' with 'layers: 18' for '{flat[0]}', or 'model: axisymmetric' "
+            f"for '{solid[0]}' if it is a turned part.",
+        )
+    for name in flat:
+        if case.bodies[name].matrices is not None:
             raise CaseProblem(
-                ("bodies", name, "geometry"),
-                got="an axisymmetric body, which has no lateral motion",
-                expected="three-dimensional bodies with motion: three-dimensional",
-                hint="take 'model: swept' with 'layers: 18'.",
+                ("bodies", name, "matrices"),
+                got=f"the axial motion of '{name}' with motion: three-dimensional",
+                expected="a body that klack assembles, which then moves in every way",
+                hint="remove 'matrices', or give those of a solid.",
+                on_key=True,
             )
+    if solid:
+        _refuse_angles(case, "angles of bodies of three dimensions")
+        return
+    rubbing: list[Key] = [
+        ("stops", name, "friction") for name, stop in case.stops.items() if stop.friction > 0.0
+    ]
+    if case.shots is not None and case.shots.contact_friction is not None:
+        rubbing.append(("shots", "contact_friction"))
+    for key in rubbing:
+        raise CaseProblem(
+            key,
+            got="friction between the faces of axisymmetric bodies with motion: three-dimensional",
+            expected="smooth faces there, or bodies of three dimensions",
+            hint="remove it, or take 'model: swept' with 'layers: 18' for all bodies.",
+            on_key=True,
+        )
+
+
+def _refuse_angles(case: ValveSections, what: str) -> None:
+    if case.angles is not None:
+        raise CaseProblem(
+            ("angles",),
+            got=what,
+            expected="axisymmetric bodies with motion: three-dimensional",
+            hint="remove it; more 'layers' make a swept mesh finer round the ring.",
+            on_key=True,
+        )
 
 
 def _check_stop(case: ValveSections, name: str, part: Component) -> None:

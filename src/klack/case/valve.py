@@ -46,6 +46,12 @@ class ValveCase(ValveSections):
         }
         return {name: file for name, file in files.items() if isinstance(file, Path)}
 
+    @property
+    def rubs(self) -> bool:
+        """Whether the faces of a stop rub in space, or may in one of the shots."""
+        drawn = self.shots is not None and self.shots.contact_friction is not None
+        return drawn or any(stop.friction > 0.0 for stop in self.stops.values())
+
     def without_friction(self) -> Self:
         """The same with smooth faces at all stops."""
         smooth = {

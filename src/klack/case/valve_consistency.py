@@ -134,13 +134,15 @@ def _check_stop(case: ValveSections, name: str, meetings: dict[str, Meeting]) ->
             expected="surfaces of two bodies",
             hint="draw the stop as a separate body.",
         )
-    dimensions = [case.bodies[surface.body].geometry.dimension for surface in stop.between]
-    if dimensions[0] != dimensions[1]:
+    flat = [side.body for side in stop.between if case.bodies[side.body].geometry.dimension == 2]
+    if len(flat) == 1:
+        (solid,) = {stop.upper.body, stop.lower.body} - set(flat)
         raise CaseProblem(
             (*key, "between"),
-            got="an axisymmetric and a three-dimensional body",
+            got=f"an axisymmetric '{flat[0]}' and a three-dimensional '{solid}'",
             expected="both axisymmetric or both three-dimensional",
-            hint="take 'model: swept' with 'layers: 18' for the axisymmetric one.",
+            hint=f"take 'model: swept' with 'layers: 18' for '{flat[0]}', or 'model: axisymmetric' "
+            f"for '{solid}' if it is a turned part.",
         )
     require_known(key, name, meetings, f"{END_STOP} of the network", on_key=True)
     for side, surface in zip(("upper", "lower"), stop.between, strict=True):

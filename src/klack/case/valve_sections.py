@@ -175,6 +175,13 @@ class ValveSections(CaseFile):
         default=None,
         description="Position of the needle at the start in three dimensions; default centred.",
     )
+    angles: Count | None = Field(
+        default=None,
+        ge=8,
+        le=512,
+        description="Contact points round each ring of axisymmetric bodies in three dimensions; "
+        "default 48.",
+    )
     shots: StrokeShots | None = Field(
         default=None, description="Many strokes in three dimensions: input of klack shots."
     )

@@ -24,6 +24,7 @@ from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, hat_quadrature
 from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
 from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
+from klack.contact.ring_gaps import RingGaps
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
@@ -173,13 +174,13 @@ class PlacedGaps:
 
     Parameters
     ----------
-    contacts : tuple of RigidGaps
+    contacts : tuple of RigidGaps or RingGaps
         Each with the centre of mass of the moving body as its ``centre``.
     is_upper : tuple of bool
         Whether the moving body is body a there; else a is moved the opposite way.
     """
 
-    contacts: tuple[RigidGaps, ...]
+    contacts: tuple[RigidGaps | RingGaps, ...]
     is_upper: tuple[bool, ...]
 
     def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -188,7 +189,7 @@ class PlacedGaps:
         back = np.concatenate([-rotation_matrix(rotation).T @ shift, -rotation])
         return np.concatenate(
             [
-                gaps(placement if upper else back)
+                gaps(placement if upper else back).ravel()
                 for gaps, upper in zip(self.contacts, self.is_upper, strict=True)
             ]
         )

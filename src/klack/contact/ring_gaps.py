@@ -12,6 +12,7 @@ line and the plane, so that two or three rounds are exact.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
@@ -19,7 +20,8 @@ from numpy.typing import NDArray
 
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, HatQuadrature, hat_quadrature
-from klack.contact.pairing import project_to_surface
+from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
+from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
@@ -29,6 +31,7 @@ Floats = NDArray[np.float64]
 
 _ROUNDS = 8
 _SETTLED = 1e-14  # [m]
+_LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of faces holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,10 +43,11 @@ class RingGaps:
     hats : HatQuadrature
         On the half section of the slave side.
     angle : array, shape (n,) [rad]
-    master : Mesh
-        Half section of the other side.
-    surface : Surface
-        Of it.
+    faces : CurvedFaces
+        Of the half section of the other side.
+    first, listed : int array
+        Faces near the line of each point at each angle, up to a motion of ``within`` [m].
+    within : float [m]
     centre : array, shape (3,) [m]
         Point that a rotation leaves in place.
     slave_moves : bool
@@ -56,8 +60,10 @@ class RingGaps:
 
     hats: HatQuadrature
     angle: Floats
-    master: Mesh
-    surface: Surface
+    faces: CurvedFaces
+    first: NDArray[np.int64]
+    listed: NDArray[np.int64]
+    within: float
     centre: Floats
     slave_moves: bool
     form: Floats
@@ -100,11 +106,18 @@ class RingGaps:
             for mesh, surface in (slave, master)
         ]
         flat = np.zeros(len(hats.position))
+        faces, within = curved_faces(*master), _LISTED_WITHIN * section.reach
+        lines = (_in_half_plane(hats.position), _in_half_plane(hats.normal))
+        met, _, _ = cut_nearest(*lines, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
+        first, listed = list_near(*lines, met, faces.centre, faces.axes, faces.half, within)
+        near = [np.tile(listed[a:b], len(angle)) for a, b in pairwise(first)]
         return cls(
             hats=hats,
             angle=angle,
-            master=master[0],
-            surface=master[1],
+            faces=faces,
+            first=np.append(0, np.cumsum(np.repeat(np.diff(first), len(angle)))),
+            listed=np.concatenate(near),
+            within=within,
             centre=np.array(centre, dtype=float),
             slave_moves=moves,
             form=flat if form is None else form.gaps(hats.position, hats.normal),
@@ -144,22 +157,33 @@ class RingGaps:
     def _along(self, position: Floats, normal: Floats) -> Floats:
         """Distance along each line to the revolved surface [m]; nan where it is not met."""
         s = np.zeros(len(position))
-        rows = np.arange(len(position))
+        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
+        moved = np.column_stack([np.hypot(*position[:, :2].T), position[:, 2]])
+        moved -= np.repeat(self.hats.position, len(self.angle), axis=0)
+        near = bool(np.max(np.sum(moved**2, axis=1)) <= self.within**2)
         for _ in range(_ROUNDS):
-            n = normal[rows]
-            x, y, z = (position[rows] + s[rows, None] * n).T
+            x, y, z = (position + s[:, None] * normal).T
             rho = np.hypot(x, y)
-            way = np.column_stack([(x * n[:, 0] + y * n[:, 1]) / rho, n[:, 2]])
+            way = np.column_stack([(x * normal[:, 0] + y * normal[:, 1]) / rho, normal[:, 2]])
             length = np.linalg.norm(way, axis=1)
-            met = project_to_surface(
-                np.column_stack([rho, z]), way / length[:, None], self.master, self.surface
+            lines = (
+                _in_half_plane(np.column_stack([rho, z])),
+                _in_half_plane(way / length[:, None]),
             )
-            more = np.where(met.met, met.gap / length, np.nan)
-            s[rows] += more
-            rows = rows[np.abs(more) > _SETTLED]  # none of those that met nothing
-            if not len(rows):
+            if near:
+                gap = cut_listed(self.first, self.listed, *lines, *master, *limits)
+            else:
+                _, _, gap = cut_nearest(*lines, *master, *limits)
+            more = gap / length
+            s += more
+            if not np.any(np.abs(more) > _SETTLED):  # none of those that met nothing
                 break
         return s
+
+
+def _in_half_plane(x: Floats) -> Floats:
+    """Columns (r, z) become (r, 0, z)."""
+    return np.ascontiguousarray(np.insert(x, 1, 0.0, axis=1))
 
 
 def _around(vectors: Floats, angle: Floats) -> Floats:

@@ -54,7 +54,15 @@ class RingSpace:
     beyond: float
 
     @classmethod
-    def within(cls, section: ContactSpace, gap: Floats, limit: float) -> Self:
+    def within(
+        cls,
+        section: ContactSpace,
+        gap: Floats,
+        limit: float,
+        *,
+        where: str = "contact",
+        more: str = "",
+    ) -> Self:
         """Points whose gap is at most ``limit`` [m].
 
         Parameters
@@ -64,6 +72,8 @@ class RingSpace:
         gap : array, shape (hats, N) [m]
             Where the bodies are.
         limit : float [m]
+        where, more : str
+            Name of the contact, and what else may help, for a message.
 
         Raises
         ------
@@ -74,12 +84,12 @@ class RingSpace:
         central = section.points[:, 0] < _CENTRAL * section.size
         if np.any(keep[central]):
             raise InputError(
-                "contact: points on rings",
+                f"{where}: points on rings",
                 got=f"contact points {format_si(float(section.points[:, 0].min()), 'm', 2)} from "
                 "the axis",
                 expected=f"a ring, more than {_CENTRAL:g} elements away from it",
-                hint="take 'model: swept' with 'layers: 18' for both bodies: a contact around the "
-                "axis has no ring to put points on.",
+                hint=f"{more}take 'model: swept' with 'layers: 18' for both bodies: a contact "
+                "around the axis has no ring to put points on.",
             )
         G = section.G_a if section.slave == "a" else section.G_b
         beside = abs(G) @ abs(G).T > 0  # hats that share nodes

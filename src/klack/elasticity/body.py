@@ -87,6 +87,11 @@ class ElasticBody:
             centre[0] = 0.0
         return centre
 
+    @property
+    def centre_in_space(self) -> NDArray[np.float64]:
+        """Centre of mass (x, y, z) [m], of a body of revolution on its axis."""
+        return np.array([0.0, 0.0, *self.centre_of_mass])[-3:]
+
     @cached_property
     def inertia(self) -> NDArray[np.float64]:
         """Tensor of inertia about the centre of mass, shape (3, 3) [kg m^2]; the axis is z."""

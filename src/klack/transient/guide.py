@@ -27,7 +27,7 @@ from klack.elasticity.statics import Flexibility
 from klack.errors import InputError, require_nonnegative, require_positive
 from klack.transient.interface_model import InterfaceModel
 
-__all__ = ["Guide", "guide_of_shaft"]
+__all__ = ["Guide", "ShaftSection", "guide_at_sections", "guide_of_shaft", "require_within"]
 
 _ROUND = 1e-2
 """Largest deviation of a guided surface from a round one, over its width."""
@@ -125,52 +125,122 @@ def guide_of_shaft(
         For a height without nodes, a surface that is not round, a body of revolution, or a contact
         without any compliance.
     """
-    require_positive("guide: clearance", clearance, "m")
-    require_nonnegative("guide: friction", friction, "-")
-    require_nonnegative("guide: viscous", viscous, "N s/m")
     if body.dimension != 3:
         raise InputError(
             f"guide of body '{body.name}'",
-            got="a body of revolution, which can only move along its axis",
+            got="a body of revolution in its motion along the axis",
             expected="a solid body",
             hint="model the bodies as swept or solid.",
         )
-    count, modes = len(heights), model.mode_count
-    traces, slide = np.zeros((count, 2, modes)), np.zeros((count, modes))
-    turn, radius = np.zeros((count, 3, modes)), np.zeros(count)
-    compliance = np.zeros((count, 2, 2))
-    centre = np.zeros((count, 3))
-    for k, height in enumerate(heights):
+    sections = []
+    for height in heights:
         section = _section(body, surface, height)
-        load, centre[k] = section.load, section.centre
-        own = load.T @ shapes
-        traces[k, :, : shapes.shape[1]] = own[:2]
-        slide[k, : shapes.shape[1]] = own[2]
-        turn[k, :, : shapes.shape[1]] = section.moment.T @ shapes
-        radius[k] = section.radius
+        across = section.load[:, :2]
+        sections.append(
+            ShaftSection(
+                motion=np.vstack([section.load.T @ shapes, section.moment.T @ shapes]),
+                centre=section.centre,
+                radius=section.radius,
+                compliance=across.T @ flexibility.deflections(across) if consistent else None,
+            )
+        )
+    return guide_at_sections(
+        model,
+        body.name,
+        sections,
+        clearance=clearance,
+        stiffness=stiffness,
+        friction=friction,
+        viscous=viscous,
+    )
+
+
+class ShaftSection(NamedTuple):
+    """A section of the shaft in its guide.
+
+    Parameters
+    ----------
+    motion : array, shape (6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
+        Displacement and rotation vector per unit coordinate of the modes of the shaft.
+    centre : array, shape (3,) [m]
+        The axis there.
+    radius : float [m]
+    compliance : array, shape (2, 2), or None [m/N]
+        Static one across the axis, of a free body with inertia relief; None: nothing is added to
+        that of the modes.
+    """
+
+    motion: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    radius: float
+    compliance: NDArray[np.float64] | None
+
+
+def guide_at_sections(
+    model: InterfaceModel,
+    name: str,
+    sections: Sequence[ShaftSection],
+    *,
+    clearance: float,
+    stiffness: float | None,
+    friction: float,
+    viscous: float,
+) -> Guide:
+    """Guide of sections that are known on the modes of the moving body, the first of the model.
+
+    Parameters
+    ----------
+    model : InterfaceModel
+    name : str
+        Of the body, for messages.
+    sections : sequence of ShaftSection
+    clearance, stiffness, friction, viscous
+        As given to :func:`guide_of_shaft`.
+    """
+    require_positive("guide: clearance", clearance, "m")
+    require_nonnegative("guide: friction", friction, "-")
+    require_nonnegative("guide: viscous", viscous, "N s/m")
+    count, modes = len(sections), sections[0].motion.shape[1]
+    motion = np.zeros((count, 6, model.mode_count))
+    compliance = np.zeros((count, 2, 2))
+    for k, section in enumerate(sections):
+        motion[k, :, :modes] = section.motion
         if stiffness is not None:
             compliance[k] = np.eye(2) / stiffness
-        if consistent:
-            compliance[k] += _missing(model, own[:2], load[:, :2], flexibility)
+        if section.compliance is not None:
+            compliance[k] += _missing(model, section.motion[:2], section.compliance)
         if not np.linalg.eigvalsh(compliance[k])[0] > 0:
             raise InputError(
-                f"guide of body '{body.name}' at z = {height * 1e3:.4g} mm",
+                f"guide of body '{name}' at z = {section.centre[2] * 1e3:.4g} mm",
                 got="a contact without compliance",
                 expected="a stiffness of the bore, or the consistent law",
                 hint="give law: {kind: linear, stiffness: 1e8 N/m}.",
             )
+    centre = np.array([section.centre for section in sections])
     return Guide(
         heights=centre[:, 2],
         clearance=np.full(count, clearance),
         offset=centre[:, :2],
-        traces=traces,
-        slide=slide,
-        turn=turn,
-        radius=radius,
+        traces=np.ascontiguousarray(motion[:, :2]),
+        slide=np.ascontiguousarray(motion[:, 2]),
+        turn=np.ascontiguousarray(motion[:, 3:]),
+        radius=np.array([section.radius for section in sections]),
         compliance=compliance,
         friction=np.full(count, friction),
         viscous=np.full(count, viscous / count),
     )
+
+
+def require_within(body: str, surface: str, height: float, z: NDArray[np.float64]) -> None:
+    """Raise :class:`InputError` for a height where a surface with these nodes is not."""
+    if not z.min() - 1e-6 <= height <= z.max() + 1e-6:
+        raise InputError(
+            f"guide of body '{body}': heights",
+            got=f"z = {height * 1e3:.4g} mm",
+            expected=f"between {z.min() * 1e3:.4g} and {z.max() * 1e3:.4g} mm, where surface "
+            f"'{surface}' is",
+            hint="heights are those of the placed body.",
+        )
 
 
 class _Section(NamedTuple):
@@ -192,14 +262,7 @@ def _section(body: ElasticBody, surface: str, height: float) -> _Section:
     """
     nodes = body.mesh.surface(surface).nodes
     z = body.mesh.points[nodes, 2]
-    if not z.min() - 1e-6 <= height <= z.max() + 1e-6:
-        raise InputError(
-            f"guide of body '{body.name}': heights",
-            got=f"z = {height * 1e3:.4g} mm",
-            expected=f"between {z.min() * 1e3:.4g} and {z.max() * 1e3:.4g} mm, where surface "
-            f"'{surface}' is",
-            hint="heights are those of the placed body.",
-        )
+    require_within(body.name, surface, height, z)
     at = min(max(height, float(z.min())), float(z.max()))
     places = body.mesh.points[nodes] - [0.0, 0.0, at]
     centre = _axis(f"guide of body '{body.name}': surface '{surface}'", places)
@@ -270,15 +333,11 @@ def _supports(places: NDArray[np.float64], size: float) -> bool:
 
 
 def _missing(
-    model: InterfaceModel,
-    own: NDArray[np.float64],
-    load: NDArray[np.float64],
-    flexibility: Flexibility,
+    model: InterfaceModel, own: NDArray[np.float64], whole: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Static compliance of a section less that of the kept modes, shape (2, 2) [m/N]."""
     omega = model.omega[: own.shape[1]]
     elastic = omega > 0
-    whole = load.T @ flexibility.deflections(load)
     modal = (own[:, elastic] / omega[elastic]) @ (own[:, elastic] / omega[elastic]).T
     rest = whole - modal
     return np.asarray(0.5 * (rest + rest.T))

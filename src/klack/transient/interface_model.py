@@ -485,7 +485,7 @@ def _point_body(
     return PointBody(
         name=body.name,
         mass=inf if body.is_fixed else body.mass,
-        centre=_in_space(body.centre_of_mass),
+        centre=body.centre_in_space,
         rigid=rigid_motion(body),
         omega=_with_rigid(item, item.modes.omega),
         damping=_with_rigid(item, item.damping),
@@ -585,10 +585,6 @@ def _rigid_count(body: ElasticBody) -> int:
 
 def _with_rigid(item: InterfaceBody, values: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.concatenate([np.zeros(_rigid_count(item.body)), values])
-
-
-def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
-    return x if len(x) == 3 else np.array([0.0, 0.0, x[1]])
 
 
 def _traces(

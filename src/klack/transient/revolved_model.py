@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody
 from klack.elasticity.ring_points import RingPoints, RingRows
+from klack.elasticity.ring_sections import RingSections
 from klack.errors import InputError
 from klack.memory import require_memory
 from klack.transient.interface_model import (
@@ -24,7 +26,7 @@ from klack.transient.interface_model import (
 )
 from klack.transient.revolved_points import RevolvedPoints, reduce_revolved
 
-__all__ = ["RevolvedBody", "RingContact", "reduced_bodies", "revolved_model"]
+__all__ = ["RevolvedBody", "RingContact", "model_of_reduced", "reduced_bodies", "revolved_model"]
 
 Floats = NDArray[np.float64]
 
@@ -42,17 +44,23 @@ class RevolvedBody:
         Body in a Fourier order, of the half section at its centred place.
     axial : Modes
         Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others : int
-        Modes of the orders above that are kept, the lowest ones.
+    others : int or None
+        Modes of the orders above that are kept, the lowest ones; None: all with ``below``.
     damping : callable
         Ratios of modes with these angular frequencies [rad/s].
+    below : float [rad/s]
+        Highest angular frequency of the others.
+    sections : RingSections, optional
+        Of its shaft, in a guide.
     """
 
     name: str
     in_order: Callable[[int], FourierBody]
     axial: Modes
-    others: int
+    others: int | None
     damping: Callable[[Floats], Floats]
+    below: float = inf
+    sections: RingSections | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,8 +139,10 @@ def reduced_bodies(
             points,
             axial=body.axial,
             others=body.others,
+            below=body.below,
             damping=body.damping,
             loads=loads[place],
+            sections=body.sections,
             cache=cache,
         )
         out.append(reduced.among(place, total))
@@ -160,10 +170,16 @@ def revolved_model(
     ConvergenceError
         As :func:`klack.transient.interface_model.model_at_points`.
     """
-    reduced, loads = reduced_bodies(bodies, contacts, cache=cache)
+    return model_of_reduced(*reduced_bodies(bodies, contacts, cache=cache), contacts)
+
+
+def model_of_reduced(
+    reduced: Sequence[RevolvedPoints], loads: Floats, contacts: Sequence[RingContact]
+) -> InterfaceModel:
+    """Interface model of what :func:`reduced_bodies` returned for these contacts."""
     return model_at_points(
         [item.body for item in reduced],
-        [_point_contact(contact, bodies[0].name) for contact in contacts],
+        [_point_contact(contact, reduced[0].body.name) for contact in contacts],
         np.sum([item.compliance for item in reduced], axis=0),
         loads,
         np.sum([item.answers for item in reduced], axis=0),

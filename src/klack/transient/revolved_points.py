@@ -9,19 +9,21 @@ What comes out, :class:`RevolvedPoints`, is what the interface level takes of a 
 a mesh of it: :func:`klack.transient.interface_model.model_at_points` puts two or three together.
 """
 
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, vstack
 from threadpoolctl import threadpool_limits
 
 from klack.cache.result_cache import ResultCache
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.fourier_body import FourierBody
 from klack.elasticity.ring_points import RingPoints, RingRows, resolved_orders, share_of_order
+from klack.elasticity.ring_sections import RingSections
 from klack.elasticity.statics import Flexibility
 from klack.transient.interface_model import PointBody
 
@@ -46,12 +48,18 @@ class RevolvedPoints:
         Static compliance of the whole body, of a free one with inertia relief.
     answers : array, shape (p, k) [m]
         What the loads move the points by, solved apart from ``compliance``.
+    sections : array, shape (s, 6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
+        Displacement and rotation vector of sections of the body per unit modal coordinate.
+    section_compliance : array, shape (s,) [m/N]
+        Static one of each section across the axis, of a free body with inertia relief.
     """
 
     body: PointBody
     order: NDArray[np.int64]
     compliance: Floats
     answers: Floats
+    sections: Floats
+    section_compliance: Floats
 
     @property
     def residual(self) -> Floats:
@@ -77,9 +85,11 @@ def reduce_revolved(
     points: RingPoints,
     *,
     axial: Modes,
-    others: int,
+    others: int | None,
     damping: Callable[[Floats], Floats],
     loads: Floats,
+    below: float = inf,
+    sections: RingSections | None = None,
     cache: ResultCache | None = None,
 ) -> RevolvedPoints:
     """Modes and static compliance of a body of revolution at points on rings.
@@ -94,18 +104,22 @@ def reduce_revolved(
         Points of all its contacts, and the rows that read them.
     axial : Modes
         Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others : int
+    others : int or None
         Modes of the orders above that are kept, both motions of an order counted: those with the
-        lowest frequencies.
+        lowest frequencies; None: all with ``below``.
     damping : callable
         Ratios of modes with these angular frequencies.
     loads : array, shape (p, k) [N]
         For ``answers``.
+    below : float [rad/s]
+        Highest angular frequency of these others.
+    sections : RingSections, optional
+        That are read as well.
     cache : ResultCache, optional
         As of :class:`klack.elasticity.statics.Flexibility`.
     """
-    sums = _Orders(rows, points, loads)
-    pairs = _Pairs(others // 2, (points.count - 1) // 2)
+    sums = _Orders(rows, points, loads, sections)
+    pairs = _Pairs(others, below, (points.count - 1) // 2)
     for order in resolved_orders(points.count):
         body = in_order(order)
         with (
@@ -115,14 +129,14 @@ def reduce_revolved(
             sums.add(order, flexibility)
             if order < 2 and body.rigid_modes.shape[1]:
                 sums.add_rigid(body)
-            pairs.look(order, body, flexibility, sums.section[order])
+            pairs.look(order, body, flexibility, sums.read[order])
         if order == 0:
             first = body
     shapes = np.repeat(axial.shapes[::2] / 2.0, 3, axis=0)  # a = b = U / 2
     shapes[2::3] = axial.shapes[1::2]
-    blocks = [(0, omega, trace) for omega, trace in _columns(axial.omega, sums.section[0] @ shapes)]
+    blocks = [(0, omega, trace) for omega, trace in _columns(axial.omega, sums.read[0] @ shapes)]
     blocks += pairs.lowest()
-    orders, omega, traces = sums.modes(blocks)
+    orders, omega, traces, moved = sums.modes(blocks)
     return RevolvedPoints(
         body=PointBody(
             name=first.name,
@@ -138,6 +152,8 @@ def reduce_revolved(
         order=orders,
         compliance=points.compliance(np.array(sums.spectrum)),
         answers=sums.answers,
+        sections=moved,
+        section_compliance=sums.across,
     )
 
 
@@ -148,30 +164,38 @@ def _columns(omega: Floats, traces: Floats) -> Iterator[tuple[float, Floats]]:
 class _Orders:
     """Statics and rigid modes, order by order."""
 
-    def __init__(self, rows: RingRows, points: RingPoints, loads: Floats) -> None:
-        self.rows, self.points, self.loads = rows, points, loads
-        self.section: dict[int, csr_array] = {}
+    def __init__(
+        self, rows: RingRows, points: RingPoints, loads: Floats, sections: RingSections | None
+    ) -> None:
+        self.rows, self.points, self.loads, self.sections = rows, points, loads, sections
+        self.read: dict[int, csr_array] = {}  # rows of the points, then those of the sections
         self.spectrum: list[Floats] = []
         self.answers = np.zeros(loads.shape)
+        self.across = np.zeros(0 if sections is None else sections.count)
         self.rigid: list[Floats] = []
-        self._rigid_traces: list[Floats] = []
-        self._rigid_order: list[int] = []
+        self._rigid: list[tuple[int, int, Floats]] = []  # order, way and what is read
 
     def add(self, order: int, flexibility: Flexibility) -> None:
         """Static compliance of the rows, and the answer to the loads."""
-        S = self.section[order] = self.rows.of_order(order)
+        S = self.read[order] = self.rows.of_order(order)
         self.spectrum.append(flexibility.condensed(S))
         share = share_of_order(order, self.points.count)
         forces = self.points.forces(order, self.loads)
         moved = S @ flexibility.solve(S.T @ np.hstack(forces))
         for factor, part in zip(self.points.factors(order), np.hsplit(moved, 2), strict=True):
             self.answers += share * factor[:, None] * part[self.points.row]
+        if self.sections is not None:
+            P = self.sections.of_order(order)
+            self.read[order] = csr_array(vstack([S, P]))
+            if order == 1:
+                across = P[: self.sections.count].toarray().T
+                self.across = np.einsum("ik,ik->k", across, flexibility.deflections(across))
 
     def add_rigid(self, body: FourierBody) -> None:
         """Rigid modes of order 0 or 1, as motions of the centre of mass."""
         R, r = body.rigid_modes, body.mesh.points[:, 0]
         shapes = body.amplitudes(R)
-        traces = self.section[body.order] @ R
+        read = self.read[body.order] @ R
         for k in range(R.shape[1]):
             u, v, w = shapes[:, :, k].T
             for way in range(min(body.order, 1) + 1):
@@ -183,33 +207,44 @@ class _Orders:
                     motion[way] = body.nodal_mass @ (u - v) / (2.0 * body.mass)
                     motion[4 - way] = (-1.0) ** way * -(w @ r) / (r @ r)
                 self.rigid.append(motion)
-                factor = self.points.factors(body.order)[way]
-                self._rigid_traces.append(factor * traces[self.points.row, k])
-                self._rigid_order.append(body.order)
+                self._rigid.append((body.order, way, read[:, k]))
 
     def modes(
         self, elastic: list[tuple[int, float, Floats]]
-    ) -> tuple[NDArray[np.int64], Floats, Floats]:
-        """Orders, angular frequencies and traces of rigid and elastic modes at the points."""
-        order, omega = list(self._rigid_order), [0.0] * len(self.rigid)
-        traces = list(self._rigid_traces)
-        for n, frequency, trace in elastic:
-            for factor in self.points.factors(n)[: 1 if n == 0 else 2]:
-                order.append(n)
-                omega.append(frequency)
-                traces.append(factor * trace[self.points.row])
+    ) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
+        """Of rigid and elastic modes: orders, angular frequencies, traces, motions of sections."""
+        ways = [(n, way, read) for n, _, read in elastic for way in range(1 if n == 0 else 2)]
+        omega = [w for n, w, _ in elastic for _ in range(1 if n == 0 else 2)]
+        all_modes = [*self._rigid, *ways]
+        rows = self.rows.count
+        traces = [
+            self.points.factors(n)[way] * read[:rows][self.points.row] for n, way, read in all_modes
+        ]
+        moved = np.zeros((len(self.across), 6, len(all_modes)))
+        for i, (n, way, read) in enumerate(all_modes):
+            shift, turn = np.split(read[rows:], 2)
+            if n == 0:
+                moved[:, 2, i], moved[:, 5, i] = shift, turn
+            elif n == 1:
+                moved[:, way, i], moved[:, 4 - way, i] = shift, (-1.0) ** way * turn
         columns = np.array(traces).reshape(-1, len(self.points.row)).T
-        return np.array(order, dtype=np.int64), np.array(omega), np.ascontiguousarray(columns)
+        return (
+            np.array([n for n, *_ in all_modes], dtype=np.int64),
+            np.array([0.0] * len(self._rigid) + omega),
+            np.ascontiguousarray(columns),
+            moved,
+        )
 
 
 class _Pairs:
     """The lowest pairs of modes of the orders above 0, found order by order."""
 
-    def __init__(self, count: int, highest: int) -> None:
-        self.count, self.highest = count, highest
+    def __init__(self, others: int | None, below: float, highest: int) -> None:
+        self.count = sys.maxsize if others is None else others // 2
+        self.below, self.highest = below, highest
         self.found: list[tuple[int, float, Floats]] = []
         self.lowest_before = inf
-        self.is_complete = count == 0
+        self.is_complete = self.count == 0
 
     def look(
         self, order: int, body: FourierBody, flexibility: Flexibility, rows: csr_array
@@ -236,9 +271,11 @@ class _Pairs:
 
     def lowest(self) -> list[tuple[int, float, Floats]]:
         """The pairs that are kept, lowest first."""
-        return sorted(self.found, key=lambda one: one[:2][::-1])[: self.count]
+        low = [one for one in self.found if one[1] <= self.below]
+        return sorted(low, key=lambda one: one[:2][::-1])[: self.count]
 
     def _cut(self, more: "Floats | list[float]") -> float:
         """Angular frequency of the last pair that is kept, with the modes found so far."""
         known = sorted([*(omega for _, omega, _ in self.found), *more])
-        return float(known[self.count - 1]) if len(known) >= self.count else inf
+        last = float(known[self.count - 1]) if len(known) >= self.count else inf
+        return min(last, self.below)

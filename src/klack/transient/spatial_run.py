@@ -71,6 +71,7 @@ from klack.transient.interface_arrays import (
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
+from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
 from klack.transient.spatial_rubbing import (
@@ -144,6 +145,8 @@ class SpatialValve:
         Film in the guide, where the network has a fluid.
     shape_marks : array, shape (M,), optional
         By which the shapes of the modes are known again: recorded with their coordinates.
+    arcs : RingArcs, optional
+        Angles of contact points on rings, for a doubt about short contacts.
     """
 
     model: InterfaceModel
@@ -158,6 +161,7 @@ class SpatialValve:
     films: tuple[TiltingFilm, ...] = ()
     bearing: BearingFilm | None = None
     shape_marks: Vector = field(default_factory=lambda: np.zeros(0))
+    arcs: RingArcs | None = None
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
         """Return them in a network.
@@ -200,6 +204,7 @@ class _Moving:
         self.valve, self.network, self.sizes = valve, network, sizes
         self.arrays = network.arrays
         self.path = SpatialPath()
+        self.arcs = None if valve.arcs is None else ArcWatch(valve.arcs)
         model = valve.model
         self.model, self.ports = model, len(network.ports)
         self.place_q, self.place_v, self.P = _places(valve, network)
@@ -910,6 +915,8 @@ class _Moving:
             told[1:] |= acted[:-1]  # a step without force ends a contact
             told[-1] &= not np.any(lam > 0.0)
             told[:-1] |= np.abs(pressed) > faces.film_felt[row]
+            if self.arcs is not None:
+                self.arcs.see(c, float(force[-1]), lam)
             if points:
                 self.force[c] = force[-1]
                 if not np.any(lam > 0.0):

@@ -27,6 +27,8 @@ from klack.verification.rigid_needle import (
     needle_on_cone,
     needle_on_ring,
 )
+from klack.verification.ring_bodies import NeedleOnRing
+from klack.verification.ring_strokes import RingStroke
 
 __all__ = ["checks"]
 
@@ -40,7 +42,7 @@ _LEAN = np.array([0.0, 0.0, 0.0, 4e-4, 6e-4, 0.0])  # [rad]
 
 
 def checks() -> list[Check]:
-    """Films that tilt, films in a guide, drops and starts in a network, magnets, faces that rub."""
+    """Films that tilt, films in a guide, drops and starts in a network, magnets, faces, rings."""
     return [
         *_films(),
         *_bearing(),
@@ -50,6 +52,7 @@ def checks() -> list[Check]:
         _energy(),
         *_rubbing(),
         *pulls(),
+        *_rings(),
     ]
 
 
@@ -377,6 +380,34 @@ def _rubbing() -> list[Check]:
             "the same with guide and spring over 2 ms, energy residual [-]",
             expected=0.0,
             computed=held.books.relative_residual,
+            tolerance=1e-11,
+            source="energy",
+            reason=_ROUND_OFF,
+        ),
+    ]
+
+
+def _rings() -> list[Check]:
+    """Half sections that move in all Fourier orders, in a network."""
+    aside = np.array([3e-7, 1.2e-7, 0.0, 5e-5, -3e-5, 0.0])
+    stroke = RingStroke(pair=NeedleOnRing(), placement=aside)
+    alone = simulate_interface(stroke.model, speed=0.1, duration=90e-6, step=40e-9)
+    driven = stroke.fly(speed=0.1, duration=90e-6)
+    guide = stroke.guide(clearance=0.6e-6, friction=0.1)
+    guided = stroke.fly(speed=0.1, duration=400e-6, guide=guide)
+    return [
+        _check(
+            "half sections off their axis in a network, peak of the first impact [N]",
+            expected=float(alone.history.force.max()),
+            computed=driven.events[0].peak_force,
+            tolerance=1e-9,
+            source="the same drop at the interface level",
+            reason=_ROUND_OFF,
+        ),
+        _check(
+            "the same in a guide with friction over 0.4 ms, energy residual [-]",
+            expected=0.0,
+            computed=guided.books.relative_residual,
             tolerance=1e-11,
             source="energy",
             reason=_ROUND_OFF,

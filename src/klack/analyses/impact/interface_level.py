@@ -42,6 +42,7 @@ from klack.transient.interface_model import (
 )
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
+from klack.transient.ring_arcs import FEWEST_ANGLES
 from klack.units import format_si
 
 __all__ = [
@@ -65,7 +66,6 @@ CONTACT, OPPOSITE = "contact", "opposite"
 
 _FEWEST = 30
 _REACH_GROWTH = 2.0
-_FEWEST_ANGLES = 8  # that carry: with 5 of them the peak force is off by 1 %, with 9 by 0.1 %
 _IN_THE_WALL = 1e-3  # of the clearance: the axis of a meshed shaft is known as well
 _RICHER = 2.0
 _MOST_RECORDS = 30_000_000
@@ -515,12 +515,12 @@ def _angle_doubts(case: Case, model: InterfaceModel, result: InterfaceResult) ->
         x, y = model.points[first:last][carrying, :2].T
         turn = np.round(np.arctan2(y, x) / (2.0 * np.pi) * count).astype(int) % count
         angles = len(np.unique(turn))
-        if 0 < angles < _FEWEST_ANGLES:
+        if 0 < angles < FEWEST_ANGLES:
             stop = "" if name == CONTACT else " with the upper stop"
             yield (
                 f"the contact{stop} is so short that {angles} of {count} angles of the ring carry "
-                f"at peak force, {_FEWEST_ANGLES} or more are needed. Try: contact.angles: "
-                f"{ceil(count * _FEWEST_ANGLES / angles)}."
+                f"at peak force, {FEWEST_ANGLES} or more are needed. Try: contact.angles: "
+                f"{ceil(count * FEWEST_ANGLES / angles)}."
             )
 
 

@@ -472,12 +472,14 @@ def _limits(study: StrokeStudy) -> tuple[tuple[str, str], ...]:
         for body in study.bodies
         if body.frequencies.size
     ]
+    rings = space and any(body.model == "axisymmetric" for body in study.bodies)
     if tops:
         limits.append(
             (
                 "Frequency",
-                f"Highest kept modes: {', '.join(tops)}. Above them a body responds "
-                "only by its static compliance.",
+                f"Highest kept modes{' along the axis' if rings else ''}: {', '.join(tops)}. Above "
+                "them a body responds only by its static compliance."
+                + (" Across the axis the lowest modes of all orders are kept." if rings else ""),
             )
         )
     incomplete = [

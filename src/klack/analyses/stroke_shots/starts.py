@@ -76,7 +76,7 @@ class Starts:
             case=valve.case,
             seed=seed,
             height=seat_height(valve.contacts, needle),
-            centre=valve.bodies[needle].centre_of_mass,
+            centre=valve.bodies[needle].centre_in_space,
         )
 
     def drawn(self, index: int) -> StrokeStart:

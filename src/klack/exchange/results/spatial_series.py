@@ -101,13 +101,14 @@ def write_spatial_series(
     Raises
     ------
     InputError
-        For an impact whose motion was not recorded, fewer than two frames, a case whose bodies are
-        not those of the result, or a place that cannot be written to.
+        For half sections, an impact whose motion was not recorded, fewer than two frames, a case
+        whose bodies are not those of the result, or a place that cannot be written to.
     """
     if frames < 2:
         raise InputError(
             "--frames", got=f"{frames}", expected="at least 2", hint="50 give a smooth animation."
         )
+    _require_solids(case)
     run = _run(study, variant)
     record, modes = _recorded(run, impact)
     shapes = valve_shapes(case, progress, threads=threads)
@@ -135,6 +136,18 @@ def write_spatial_series(
             progress("grids", (number + 1) / len(chosen))
         write_pvd(stage / f"{stem}.pvd", files)
     return folder / f"{stem}.pvd"
+
+
+def _require_solids(case: ValveCase) -> None:
+    for name, body in case.bodies.items():
+        if body.geometry.dimension == 2:
+            raise InputError(
+                f"{case.path or 'case'}: bodies.{name}",
+                got="a half section, whose motion in Fourier orders has no grid",
+                expected="bodies of three dimensions",
+                hint="the report has the line load of the impact; for grids take 'model: swept' "
+                "with 'layers: 18' for all bodies.",
+            )
 
 
 def _run(study: StrokeStudy, variant: str | None) -> StrokeVariant:

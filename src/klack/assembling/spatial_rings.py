@@ -1,0 +1,287 @@
+"""From a case of a valve of half sections to bodies that move in three dimensions.
+
+Each body moves in all Fourier orders (:mod:`klack.transient.revolved_points`); ports of the network
+push along the axis, so that only modes of order 0 have a share in them.
+"""
+
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import hypot, inf
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.modes import selection_of
+from klack.assembling.off_axis import ANGLES, turned
+from klack.assembling.off_axis_points import off_axis_rings
+from klack.assembling.spatial import (
+    Meeting,
+    about_axis,
+    farthest_positions,
+    placement_of,
+    seat_height,
+    valve_of_meetings,
+)
+from klack.assembling.stops import StopContact
+from klack.cache.setting import result_cache
+from klack.case.guide import LinearGuideLaw
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import ValveRoles
+from klack.contact.ring_gaps import RingGaps
+from klack.contact.rings import RingSpace
+from klack.elasticity.body import ElasticBody
+from klack.elasticity.eigen import Modes
+from klack.elasticity.ring_sections import RingSections
+from klack.errors import AccuracyWarning
+from klack.mesh.rigid import rigid_placement
+from klack.reduction.ports import Port
+from klack.reduction.reduce import kept_modes
+from klack.reduction.reduced_body import ReducedBody
+from klack.transient.guide import Guide, guide_at_sections
+from klack.transient.interface_model import InterfaceModel
+from klack.transient.revolved_guide import shaft_sections, turned_sections
+from klack.transient.revolved_model import (
+    RevolvedBody,
+    RingContact,
+    model_of_reduced,
+    reduced_bodies,
+)
+from klack.transient.revolved_points import RevolvedPoints
+from klack.transient.ring_arcs import RingArcs
+from klack.transient.spatial_run import SpatialValve
+
+__all__ = ["RingValve", "build_spatial_rings", "in_all_orders"]
+
+Vector = NDArray[np.float64]
+
+_JUDGED = 0.1  # of the peak force at the speed that the case gives for a stop
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RingValve:
+    """A valve of half sections in three dimensions.
+
+    Parameters
+    ----------
+    spatial : SpatialValve
+    reduced : mapping of str to ReducedBody
+        Its bodies with the modes of all orders, as the model has them.
+    """
+
+    spatial: SpatialValve
+    reduced: Mapping[str, ReducedBody]
+
+
+def build_spatial_rings(
+    case: ValveCase,
+    roles: ValveRoles,
+    bodies: Mapping[str, ElasticBody],
+    pools: Mapping[str, Modes],
+    ports: Mapping[str, Sequence[Port]],
+    contacts: Mapping[str, StopContact],
+    reduced: Mapping[str, ReducedBody],
+) -> RingValve:
+    """Bodies of a valve with all their freedoms, contact points on rings, and the guide.
+
+    Beside the modes of order 0, which an axial stroke has, each body keeps others, see
+    :func:`klack.assembling.off_axis.turned`.  Rings are all that can close in any position which
+    the guide allows; without a guide, in that of the start.
+
+    Parameters
+    ----------
+    case, roles, bodies, pools, ports, contacts
+        As of :func:`klack.assembling.spatial.build_spatial`.
+    reduced : mapping of str to ReducedBody
+        In their motion along the axis.
+
+    Raises
+    ------
+    InputError
+        For a guide that the needle does not fit in, a placement outside of it, and a contact around
+        the axis.
+
+    Warns
+    -----
+    AccuracyWarning
+        For linear elements, and a body without an elastic mode across its axis.
+    """
+    needle = str(getattr(case.network.components[roles.needle], "body", ""))
+    names = [needle, *(name for name in bodies if name != needle)]
+    height = seat_height(contacts, needle)
+    about = about_axis(height, bodies[needle])
+    count = ANGLES if case.angles is None else case.angles
+    found = [
+        _meeting(
+            contact,
+            needle,
+            bodies[needle],
+            farthest_positions(case, height)[:2],
+            about,
+            float(getattr(case.network.components[name], "gap", 0.0)),
+            count,
+        )
+        for name, contact in contacts.items()
+    ]
+    sections = None
+    if case.guide is not None:
+        mesh, guided = bodies[needle].mesh, case.guide
+        sections = turned_sections(needle, mesh, guided.surface, guided.heights)
+    points, loads = reduced_bodies(
+        [
+            _revolved(case, bodies[name], pools[name], ports[name], sections)
+            if name == needle
+            else _revolved(case, bodies[name], pools[name], ports[name], None)
+            for name in names
+        ],
+        [contact for _, contact in found],
+        cache=result_cache(),
+    )
+    for item in points:
+        _tell_stiff(item)
+    model = model_of_reduced(points, loads, [contact for _, contact in found])
+    spatial = valve_of_meetings(
+        case,
+        model,
+        [meeting for meeting, _ in found],
+        None if sections is None else _guide(case, model, sections, points[0]),
+        rigid_placement(*placement_of(case, height), *about),
+    )
+    arcs = RingArcs(
+        count=count,
+        stops=spatial.stops,
+        turn=tuple(contact.space.turn for _, contact in found),
+        weakest=tuple(_JUDGED * contact.pattern_force for contact in contacts.values()),
+    )
+    whole = {
+        name: in_all_orders(reduced[name], item) for name, item in zip(names, points, strict=True)
+    }
+    return RingValve(
+        spatial=replace(spatial, arcs=arcs), reduced={name: whole[name] for name in bodies}
+    )
+
+
+def _meeting(
+    contact: StopContact,
+    needle: str,
+    body: ElasticBody,
+    farthest: Sequence[tuple[Vector, Vector]],
+    about: tuple[Vector, Vector],
+    gap: float,
+    count: int,
+) -> tuple[Meeting, RingContact]:
+    pair, static = contact.pair, contact.static
+    upper_moves = pair.upper.name == needle
+    centre = pair.upper.centre_in_space if upper_moves else body.centre_in_space
+    angle = 2.0 * np.pi * np.arange(count) / count
+    section = off_axis_rings(
+        pair,
+        static.space,
+        [rigid_placement(*position, *about) for position in farthest],
+        max(hypot(*aside) for aside, _ in farthest),
+        angle=angle,
+        centre=centre,
+        upper_moves=upper_moves,
+    )
+    up = np.array([0.0, 0.0, gap])
+    raised, open_by = pair.upper.mesh.moved(up[1:]), section.shifted(gap)
+    space = RingSpace.within(
+        open_by,
+        np.tile(open_by.gap[:, None], count),
+        inf,
+        where=f"stop '{contact.name}'",
+        more="where the guide lets the needle touch there, smaller elements on both surfaces "
+        "(mesh.surfaces), a smaller guide.clearance, or guiding heights farther apart. Else ",
+    )
+    meeting = Meeting(
+        name=contact.name,
+        space=space,
+        reach=static.space.reach,
+        arm=np.array([0.0, 0.0, float(space.points[:, 2].mean() - centre[2])]),
+        gaps=RingGaps.of(
+            open_by,
+            raised,
+            pair.upper_surface,
+            pair.lower.mesh,
+            pair.lower_surface,
+            angle=angle,
+            centre=centre + up if upper_moves else centre,
+            form=pair.form,
+        ),
+        upper_moves=upper_moves,
+    )
+    ring = RingContact(name=contact.name, upper=pair.upper.name, lower=pair.lower.name, space=space)
+    return meeting, ring
+
+
+def _revolved(
+    case: ValveCase,
+    body: ElasticBody,
+    pool: Modes,
+    ports: Sequence[Port],
+    sections: RingSections | None,
+) -> RevolvedBody:
+    patterns = np.column_stack([port.pattern for port in ports])
+    choice = selection_of(case.reduction.choice(body.name))
+    return turned(case, body, kept_modes(choice, pool, patterns), sections)
+
+
+def _guide(
+    case: ValveCase, model: InterfaceModel, sections: RingSections, shaft: RevolvedPoints
+) -> Guide | None:
+    given = case.guide
+    if given is None:
+        return None
+    law, found = given.law, shaft_sections(sections, shaft)
+    linear = isinstance(law, LinearGuideLaw)
+    return guide_at_sections(
+        model,
+        shaft.body.name,
+        [section._replace(compliance=None) for section in found] if linear else found,
+        clearance=given.clearance,
+        stiffness=law.stiffness if isinstance(law, LinearGuideLaw) else law.bore,
+        friction=given.friction,
+        viscous=given.viscous,
+    )
+
+
+def _tell_stiff(body: RevolvedPoints) -> None:
+    """Warn of a body that cannot vibrate across its axis."""
+    if not np.any((body.order == 1) & (body.body.omega > 0.0)):
+        name, free = body.body.name, body.body.rigid.shape[1] > 0
+        moves = "moves as a rigid body" if free else "does not vibrate"
+        warnings.warn(
+            f"'{name}' keeps no elastic mode of order 1: across its axis it {moves}, and yields "
+            f"statically. Try: more modes in reduction.modes.{name}.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+
+
+def in_all_orders(body: ReducedBody, points: RevolvedPoints) -> ReducedBody:
+    """Reduced body with the modes of all orders, of which its ports push those of order 0.
+
+    Parameters
+    ----------
+    body : ReducedBody
+        In its motion along the axis.
+    points : RevolvedPoints
+        The same body, with the same elastic modes of order 0.
+    """
+    own, rigid = points.body, points.body.rigid.shape[1]
+    elastic = body.mode_count - body.rigid_count
+    shapes = np.zeros((len(own.omega), len(body.port_names)))
+    shapes[:rigid] = own.rigid[2][:, None]  # a resultant of 1 N along the axis
+    shapes[rigid : rigid + elastic] = body.port_shapes[body.rigid_count :]
+    observed = np.zeros((len(own.omega), len(body.observer_names)))
+    observed[rigid : rigid + elastic] = body.observer_shapes[body.rigid_count :]
+    return replace(
+        body,
+        omega=own.omega,
+        damping=own.damping,
+        port_shapes=shapes,
+        observer_shapes=observed,
+        rigid_count=rigid,
+        rigid_axial=body.mass * own.rigid[2],
+        recovery=None,
+    )
