@@ -33,6 +33,10 @@ def read(text):
             "an axisymmetric 'housing' and a three-dimensional 'needle'",
         ),
         (HALF.replace("angles: 24", "angles: 5"), "angles: got 5"),
+        (
+            HALF.replace("seat: {between", "seat: {friction: 0.1, between"),
+            "friction between the faces of axisymmetric bodies",
+        ),
     ],
 )
 def test_what_contradicts_itself_is_told_with_its_bodies(text, expected):

@@ -175,6 +175,17 @@ class SpatialValve:
         return _Moving(self, network, sizes)
 
 
+class _Run(NamedTuple):
+    """What the loop of the network works on beside the network, and records."""
+
+    recording: Recording
+    scratch: Scratch
+    clock: Index
+    block: int
+    look: int
+    report: Vector
+
+
 class _Kept(NamedTuple):
     """What a repeated step begins with."""
 
@@ -501,33 +512,25 @@ class _Moving:
         report: Vector,
     ) -> int:
         """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
+        run = _Run(recording, scratch, clock, block, look, report)
         if not looks:
-            return self._loop(recording, scratch, clock, block, look, 0, 0, report)
+            return self._loop(run, 0, 0)
         self.read()
         self._take_carrying()
         if not self.path.begun:
             self._tell_path(int(clock[0]))
         with threadpool_limits(limits=1, user_api="blas"):
-            return self._looks(recording, scratch, clock, block, look, looks, report)
+            return self._looks(run, looks)
 
-    def _looks(
-        self,
-        recording: Recording,
-        scratch: Scratch,
-        clock: Index,
-        block: int,
-        look: int,
-        looks: int,
-        report: Vector,
-    ) -> int:
-        done = 0
+    def _looks(self, run: _Run, looks: int) -> int:
+        done, clock, recording = 0, run.clock, run.recording
         self.fresh = True
-        span = look * block * self.sizes.step
+        span = run.look * run.block * self.sizes.step
         while done < looks:
             fly, points = self._outlook(span, looks - done)
             if fly:
                 kept, filled = everything(self.network, clock), recording.filled.copy()
-                status = self._fly(recording, scratch, clock, block, look, done, fly, report)
+                status = self._fly(run, done, fly)
                 if status != STATUS_DONE:
                     return status
                 if self._clear():
@@ -538,7 +541,7 @@ class _Moving:
                 recording.filled[:] = filled
                 self.read()
                 points = True
-            status = self._watch(recording, scratch, clock, block, look, done, points, report)
+            status = self._watch(run, done, points)
             if status != STATUS_DONE:
                 return status
             done += 1
@@ -564,21 +567,11 @@ class _Moving:
             fly //= 2
         return fly, safe * _SURE < span
 
-    def _fly(
-        self,
-        recording: Recording,
-        scratch: Scratch,
-        clock: Index,
-        block: int,
-        look: int,
-        done: int,
-        looks: int,
-        report: Vector,
-    ) -> int:
+    def _fly(self, run: _Run, done: int, looks: int) -> int:
         """Free flight, in the loop of the axial network."""
         here = slice(0, self.ports)
         before, work = self._modal_energy(), float(np.sum(self.at[WORK:][here]))
-        status = self._loop(recording, scratch, clock, block, look, done, looks, report)
+        status = self._loop(run, done, looks)
         self.read()
         if np.any(self.model.damping > 0.0):
             given = float(np.sum(self.at[WORK:][here])) - work
@@ -586,17 +579,8 @@ class _Moving:
         self.fresh = True
         return status
 
-    def _loop(
-        self,
-        recording: Recording,
-        scratch: Scratch,
-        clock: Index,
-        block: int,
-        look: int,
-        done: int,
-        looks: int,
-        report: Vector,
-    ) -> int:
+    def _loop(self, run: _Run, done: int, looks: int) -> int:
+        recording = run.recording
         part = recording._replace(
             means=recording.means[done:],
             peaks=recording.peaks[done:],
@@ -605,10 +589,10 @@ class _Moving:
         sizes = self.sizes
         return int(
             run_network(
-                looks * look,
-                look,
-                clock,
-                block,
+                looks * run.look,
+                run.look,
+                run.clock,
+                run.block,
                 sizes.near,
                 sizes.middle,
                 0.0,
@@ -616,34 +600,24 @@ class _Moving:
                 sizes.coarse > 1,
                 self.arrays,
                 part,
-                scratch,
-                report,
+                run.scratch,
+                run.report,
             )
         )
 
-    def _watch(
-        self,
-        recording: Recording,
-        scratch: Scratch,
-        clock: Index,
-        block: int,
-        look: int,
-        row: int,
-        points: bool,
-        report: Vector,
-    ) -> int:
+    def _watch(self, run: _Run, row: int, points: bool) -> int:
         """One record in which contact points or the guide are looked at."""
-        left = look * block
+        clock, left = run.clock, run.look * run.block
         time = left * self.sizes.step
         before, flies = self.force.copy(), True
         while left:
             level = NEAR if self.sizes.coarse > 1 else FINE
             if left >= self.steps[COARSE] > 1 and (self._rests(clock) if points else flies):
                 level = COARSE
+            elif points and self.flags[_AT_REST]:  # what is left of the record is shorter
+                self._rest_on(rest=False)
             taken = self.steps[level]
-            status = self._step(
-                level, recording, scratch, clock, points, row if left == taken else -1, time, report
-            )
+            status = self._step(run, level, points, row if left == taken else -1, time)
             if status == STATUS_REFUSED:
                 if level == COARSE:
                     flies = False
@@ -653,9 +627,7 @@ class _Moving:
                     continue
                 for _ in range(taken):
                     left -= 1
-                    status = self._step(
-                        FINE, recording, scratch, clock, points, -1 if left else row, time, report
-                    )
+                    status = self._step(run, FINE, points, -1 if left else row, time)
                     if status != STATUS_DONE:
                         return STATUS_FORCES if status == STATUS_REFUSED else status
                 continue
@@ -664,21 +636,12 @@ class _Moving:
             left -= taken
         self._steady(before)
         self.write()
-        record_moment(row, self.arrays, recording)
+        record_moment(row, self.arrays, run.recording)
         return STATUS_DONE
 
-    def _step(
-        self,
-        level: int,
-        recording: Recording,
-        scratch: Scratch,
-        clock: Index,
-        points: bool,
-        record: int,
-        record_time: float,
-        report: Vector,
-    ) -> int:
+    def _step(self, run: _Run, level: int, points: bool, record: int, record_time: float) -> int:
         """One macro step, with bodies in fine steps; at rest in one."""
+        clock, scratch, report = run.clock, run.scratch, run.report
         h, steps, arrays = self.sizes.step, self.steps[level], self.arrays
         t, H = float(clock[0]) * h, steps * h
         last = self._length(int(clock[1]), steps)
@@ -728,7 +691,7 @@ class _Moving:
             return int(status)
         excess = self._repair(level)
         self.sides.move(self.q - begun)
-        self._tell(record_, t, H / count, recording, scratch, points)
+        self._tell(run, record_, t, H / count, points)
         self.impacts.tell(t, H / count, record_, begun)
         clock[0] += steps
         clock[1] = level
@@ -736,7 +699,7 @@ class _Moving:
         if level == NEAR:
             clock[5] += steps
             clock[6] += steps
-        end_step(steps, H, excess, record, record_time, arrays, recording, scratch)
+        end_step(steps, H, excess, record, record_time, arrays, run.recording, scratch)
         return STATUS_DONE
 
     def _parts(self, steps: int, H: float, points: bool) -> tuple[int, Modes]:
@@ -886,16 +849,9 @@ class _Moving:
 
     # ------------------------------------------------------------------ records
 
-    def _tell(
-        self,
-        record: Record,
-        t: float,
-        h: float,
-        recording: Recording,
-        scratch: Scratch,
-        points: bool,
-    ) -> None:
+    def _tell(self, run: _Run, record: Record, t: float, h: float, points: bool) -> None:
         """Forces and gaps of the stops, in the words of the network."""
+        recording, scratch = run.recording, run.scratch
         network, state = self.network, self.network.interface_state
         first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
         now = round(t / self.sizes.step)
