@@ -39,6 +39,7 @@ PARTS = {
     "calculix": "CalculiX: an impact in 3-D on the same mesh",
     "growth": "every stage over degrees of freedom",
     "stroke": "a whole valve in time; CVODE beside a small one",
+    "stroke_off_axis": "a wet stroke in three dimensions, point by point",
     "many_strokes": "strokes per hour at many points, on threads",
     "study_workers": "points of a study on threads, processes and dask; new geometries per hour",
     "accuracy": "reduced against full order on the shipped cases",

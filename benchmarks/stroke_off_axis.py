@@ -1,0 +1,98 @@
+"""A wet stroke in three dimensions: films that tilt, a guide with a film, contact point by point.
+
+``uv run --group dev python benchmarks/stroke_off_axis.py`` prints the numbers.
+
+The valve is ``docs/how-to/guided_stroke.yaml`` from seed 3 with 80 elastic modes and 18 layers, 864
+and 468 contact points, 36 sectors a film; 5 ms are 14 or so impacts.  Its accuracy is that of the
+first impact beside steps of a quarter.
+"""
+
+import re
+from pathlib import Path
+from time import process_time
+
+from number import Number, Size
+
+from klack.analyses.stroke.run import variant_network
+from klack.assembling.valve import Valve, build_valve
+from klack.case.valve_reader import read_valve_case
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+
+__all__ = ["numbers"]
+
+HOW_TO = Path(__file__).parents[1] / "docs" / "how-to"
+STEP = 20e-9
+FIRST = 0.26e-3  # [s] until after the first impact
+
+
+def numbers(size: Size) -> list[Number]:
+    """Processor time of the bodies and of a stroke, on one thread."""
+    begin = process_time()
+    valve = solids() if size == "full" else half_sections()
+    prepared = process_time() - begin
+    duration = 0.05e-3 if size == "smallest" else 5e-3
+    run(valve, STEP, 0.02e-3)  # compiled
+    begin = process_time()
+    result = run(valve, STEP, duration)
+    seconds = process_time() - begin
+    error = 0.0
+    if result.events:
+        peaks = [run(valve, step, FIRST).events[0].peak_force for step in (STEP, STEP / 4.0)]
+        error = abs(peaks[0] / peaks[1] - 1.0)
+    points = valve.spatial.model.count if valve.spatial is not None else 0
+    name = f"wet stroke off its axis, {points} contact points"
+    return [
+        Number(name=f"{name}: bodies", value=prepared, unit="s"),
+        Number(
+            name=f"{name}: {1e3 * duration:.3g} ms",
+            value=seconds,
+            unit="s",
+            goal=2.0 if size == "full" else None,
+            accuracy=error,
+            accuracy_of="peak of the first impact, beside steps of a quarter",
+        ),
+        Number(
+            name=f"{name}: energy residual", value=abs(result.books.relative_residual), unit="-"
+        ),
+    ]
+
+
+def solids() -> Valve:
+    """The valve of the how-to page with 80 modes."""
+    text = (HOW_TO / "guided_stroke.yaml").read_text(encoding="utf-8")
+    for old, new in (
+        ("layers: 12", "layers: 18"),
+        ("needle: {count: 12}", "needle: {count: 40}"),
+        ("housing: {count: 12}", "housing: {count: 24}"),
+        ("pole: {count: 8}", "pole: {count: 16}"),
+    ):
+        text = text.replace(old, new)
+    return built(re.sub(r"shots:.*\n", "placement: {seed: 3}\n", text))
+
+
+def half_sections() -> Valve:
+    """The valve of half sections of the how-to page."""
+    return built((HOW_TO / "half_section_stroke.yaml").read_text(encoding="utf-8"))
+
+
+def built(text: str) -> Valve:
+    """Bodies, contact points and network of a case."""
+    return build_valve(read_valve_case(text, HOW_TO / "valve.yaml"))
+
+
+def run(valve: Valve, step: float, duration: float) -> NetworkResult:
+    """The stroke of the variant ``wet``, or the only one, so long."""
+    variant = valve.case.run.variants[0]
+    return simulate_network(
+        variant_network(valve, variant).rows(),
+        duration=duration,
+        step=step,
+        record=1e-6,
+        spatial=valve.spatial,
+    )
+
+
+if __name__ == "__main__":
+    for number in numbers("full"):
+        print(f"{number.name}: {number.value:.4g} {number.unit} (accuracy {number.accuracy})")
