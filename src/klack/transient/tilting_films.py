@@ -40,6 +40,7 @@ _ROUNDS, _SEARCHES = 60, 12
 _ENOUGH = 0.2  # of the slope of the potential: found along a change
 _ROUND_OFF = 1e-16
 _FOUND = 1e-11  # heights that do not fit, over lift and the least height
+_EXACTLY = 1e-13  # of the way of a step: no correction is left
 _NEARLY = 1e-4  # the same at a corner, where sectors take turns in opening and closing
 _LINEAR = 1e-4  # of the force: a change by so little follows the slopes
 _ALONG = 1e-3  # of the way of a step: slopes of an earlier one serve for so little
@@ -223,13 +224,14 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
     least = _size(left, reach)
     best = f.copy()
     known = state.films[k, KNOWN]
-    found = least <= tiny
-    if not found and known > 0.0 and least <= _ALONG * _size(u - before, reach):
+    way = _size(u - before, reach)
+    close, found = least <= tiny, least <= min(tiny, _EXACTLY * way)
+    if known > 0.0 and not found and (close or least <= _ALONG * way):
         for c in range(3):
             for d in range(3):
                 slopes[c, d] = state.films[k, SLOPES + 3 * c + d] * known / step
         more = slopes @ np.linalg.solve(np.eye(3) - soft @ slopes, left)
-        if _weight(more, reach) <= _LINEAR * _weight(f, reach):
+        if close or _weight(more, reach) <= _LINEAR * _weight(f, reach):
             best += more
             found = True
     if not found:
