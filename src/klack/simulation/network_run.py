@@ -681,7 +681,8 @@ def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -
                 f"state: {key}",
                 got=came,
                 expected=f"shape {target.shape}",
-                hint="continue with the same network, step and coarse as those of the state.",
+                hint="continue with the same network, step and coarse as those of the state, in the "
+                "version of klack that made it.",
             )
         target[...] = state[key]
     if f"{_SLIDERS}seen" not in state:  # of an earlier version
