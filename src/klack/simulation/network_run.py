@@ -681,8 +681,8 @@ def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -
                 f"state: {key}",
                 got=came,
                 expected=f"shape {target.shape}",
-                hint="continue with the same network, step and coarse as those of the state, in the "
-                "version of klack that made it.",
+                hint="continue with the same network, step and coarse as those of the state, and "
+                "with its version of klack.",
             )
         target[...] = state[key]
     if f"{_SLIDERS}seen" not in state:  # of an earlier version
