@@ -261,7 +261,7 @@ class _Moving:
         self.gap0 = np.array(model.gap)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
         self.taken_at, self.followed_to = np.zeros(6), np.zeros(6)
-        self.course = valve.course
+        self.course = valve.course if valve.gaps is not None else None
         if self.course is None and valve.gaps is not None:
             self.course = gap_course(valve.gaps, float(np.max(np.linalg.norm(valve.arms, axis=1))))
         if self.course is not None:  # what slopes have beside the linear gaps of the modes
