@@ -27,7 +27,7 @@ FILM = (
     ", film: {shape: ring, inner_radius: 1.35 mm, outer_radius: 1.95 mm, cut_off: 1 um, "
     "pressure: 6 bar}}"
 )
-SOLVED = 1e-7  # the film is found to 1e-11 of its height
+SOLVED = 1e-5  # forces of a step follow known slopes where little is left
 CLIPPED = 0.05  # a sector that is closed across a part of its width is cut off at its circles
 
 
