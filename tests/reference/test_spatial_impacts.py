@@ -27,8 +27,8 @@ FILM = (
     ", film: {shape: ring, inner_radius: 1.35 mm, outer_radius: 1.95 mm, cut_off: 1 um, "
     "pressure: 6 bar}}"
 )
-SOLVED = 1e-5  # forces of a step follow known slopes where little is left
-CLIPPED = 1.0  # single steps in which sectors close in part: 0.82 seen, not explained yet
+SOLVED = 1e-7  # forces of a step follow known slopes where little is left
+CLIPPED = 5e-3  # single steps in which sectors close in part
 
 
 def case(duration="0.25 ms", variants="[dry, wet]", land="0.2 mm"):

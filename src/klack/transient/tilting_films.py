@@ -230,8 +230,9 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
         for c in range(3):
             for d in range(3):
                 slopes[c, d] = state.films[k, SLOPES + 3 * c + d] * known / step
-        more = slopes @ np.linalg.solve(np.eye(3) - soft @ slopes, left)
-        if close or _weight(more, reach) <= _LINEAR * _weight(f, reach):
+        change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
+        more = slopes @ change
+        if close or _is_little(more, np.linalg.solve(soft, change), f, reach):
             best += more
             found = True
     if not found:
@@ -244,7 +245,7 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
             along = stiff @ change
             first = along @ left  # slope of the potential along the change, its sign turned
             more = slopes @ change
-            if first > 0.0 and _weight(more, reach) <= _LINEAR * _weight(f, reach):
+            if first > 0.0 and _is_little(more, along, f, reach):
                 best[:] = f + more
                 least = 0.0
                 break
@@ -285,6 +286,17 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
         for c in range(3):
             kick[i] += rows[c, i] * best[c]
     return float(_size(soft @ best, reach) / (tiny + _size(u - before, reach)))
+
+
+@njit
+def _is_little(more: Vector, needed: Vector, f: Vector, reach: float) -> bool:
+    """Whether a change of heights is so small that the forces follow their slopes.
+
+    ``more`` is what the slopes make of it, ``needed`` what ``soft`` would need for it: no corner on
+    the way, where sectors open or close, can change the forces by more than that.
+    """
+    little = _LINEAR * _weight(f, reach)
+    return max(_weight(more, reach), _weight(needed, reach)) <= little
 
 
 @njit

@@ -81,15 +81,15 @@ def _films() -> list[Check]:
     v, tilted = _squeezed(300, _LEAN)
     times, lifts, ends = _reynolds()
     errors = [
-        np.linalg.norm((_squeezed(steps, _LEAN)[1].v - ends)[[2, 3, 4]]) for steps in (300, 600)
+        np.linalg.norm((_squeezed(steps, _LEAN)[1].v - ends)[[2, 3, 4]]) for steps in (150, 300)
     ]
     return [
         _check(
             "momentum that a film of parallel faces takes in time [N s]",
             expected=taken,
             computed=float((flat.v[2] - before[2]) * MASS**0.5),
-            tolerance=1e-7,
-            source="B/2 (1/h^2 - 1/h0^2); forces that follow known slopes, third order in the step",
+            tolerance=2e-9,
+            source="B/2 (1/h^2 - 1/h0^2); small changes of the force follow its slopes",
         ),
         _check(
             "needle that tilts into its film: speed after 6 us [m/s]",
@@ -115,8 +115,8 @@ def _films() -> list[Check]:
             "the same: order in the step",
             expected=2.0,
             computed=float(np.log2(errors[0] / errors[1])),
-            tolerance=6e-2,
-            source="midpoint rule; forces follow known slopes, third order",
+            tolerance=2e-3,
+            source="midpoint rule",
         ),
         _check(
             "the same: loss of the film over the energy that the needle loses [-]",
