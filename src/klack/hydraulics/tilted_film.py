@@ -300,7 +300,8 @@ def _solved(
     ways = np.eye(heights) if rate else np.zeros((heights, 0))
     land, head, still = land_of(film), *edges
     closing = np.ascontiguousarray(closing, dtype=float)
-    force, pressed = film_pressure(land, mobility, closing, head, still, tension)
+    held = np.zeros(film.sectors, dtype=np.bool_)
+    force, pressed = film_pressure(land, mobility, closing, head, still, tension, held)
     slopes = film_slopes(land, pressed, mobility, change, head, rate, ways)
     return np.asarray(force), np.asarray(slopes)
 
@@ -356,6 +357,7 @@ def film_pressure(
     head: Array,
     still: Array,
     tension: float,
+    held: NDArray[np.bool_],
 ) -> tuple[Array, Pressed]:
     """Forces on the circles, shape (S, N) [N], and the pressure that makes them.
 
@@ -368,6 +370,8 @@ def film_pressure(
     head, still : array (G, Q) [Pa m^2], (N,) [N]
         Of the pressures at the edges.
     tension : float [Pa]
+    held : bool array (S,)
+        In: sectors with which the search for those at the limit of tension begins; out: those.
     """
     shared = land.shared
     S, N = closing.shape
@@ -392,22 +396,27 @@ def film_pressure(
         for a in range(Q):
             mean[a] += L[j, a]
     normal, common = mean[shared:], mean[:shared]
-    held, raised = np.zeros(S, dtype=np.bool_), np.zeros((S, own))
+    raised, square = np.zeros((S, own)), normal @ normal
     X, Y = x.copy(), y.copy()
-    ring = eliminate_ring(blocks, links, border, corner, held, normal, X, Y)
     tries = 0
-    while tension < np.inf and tries < _ACTIVE_SETS + S * S:
+    while True:
+        some = False
+        for k in range(S):
+            some = some or held[k]
+            for a in range(own):
+                raised[k, a] = normal[a] / square if held[k] else 0.0
+        if some:
+            ring = _hold(blocks, links, border, corner, held, normal, common, raised, base, X, Y)
+        else:
+            ring = eliminate_ring(blocks, links, border, corner, held, normal, X, Y)
+        if tension == np.inf or tries >= _ACTIVE_SETS + S * S:
+            break
         one = tries >= _ACTIVE_SETS  # by one at a time, the first one: it never turns in a circle
         if not _regroup(blocks, links, border, x, X, Y, mean, base, held, one):
             break
         tries += 1
-        square = normal @ normal
-        for k in range(S):
-            for a in range(own):
-                raised[k, a] = normal[a] / square if held[k] else 0.0
         X[:] = x
         Y[:] = y
-        ring = _hold(blocks, links, border, corner, held, normal, common, raised, base, X, Y)
     P, force = np.empty((S, Q)), np.empty((S, N))
     for k in range(S):
         for a in range(Q):

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import njit
 from klack.transient.interface_arrays import Films, State
-from klack.transient.tilting_films import film_state
+from klack.transient.tilting_films import contact_resultant, film_state
 
 __all__ = ["tell_land"]
 
@@ -19,10 +19,7 @@ def tell_land(films: Films, k: int, state: State, q: Vector, out: Vector) -> Non
     Called when the film has been found and before the contact is: ``q`` is what the film saw, and
     the contact forces are those of the step before (:mod:`klack.transient.tilting_films`).
     """
-    D, held = films.compliance[k], np.zeros(3)
-    for i in range(len(state.lam)):
-        for c in range(3):
-            held[c] += films.arms[k, i, c] * state.lam[i]
+    D, held = films.compliance[k], contact_resultant(films, k, state.lam)
     first, last = film_state(films, k, state.q), film_state(films, k, q)
     for c in range(3):
         out[c], out[c + 3] = first[c], last[c]

@@ -183,6 +183,7 @@ class Films(NamedTuple):
     shear: Vector  # (k,) [N s] force over closing speed, times the height
     axial: Vector  # (k,) [-] axial force per force along the lift
     arms: Cube  # (k, n, 3) lift and tilts per gap of a contact point: force and moments per force
+    span: NDArray[np.int64]  # (k, 2) first point of the stop, and the one behind its last
     compliance: Cube  # (k, 3, 3) of the bulk under film and contact, in series with both
     bearing: Vector  # (g,) [N s] of heights of the guide: mu L^3 R / c^2, see ``guide_film``
     room: Vector  # (g,) [m] c: clearance and what roughness leaves
@@ -317,7 +318,7 @@ class State(NamedTuple):
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
     films: (
-        Matrix  # (f, 21) force and moments of the last step, see ``klack.transient.tilting_films``
+        Matrix  # (f, 24 + S) forces of the last step and more, see ``klack.transient.tilting_films``
     )
     bearing: Matrix  # (g, 3) [N] force of the film in the guide in the last step, energy lost [J]
     books: Vector  # sums, see ``DAMPING`` and the following names
@@ -332,6 +333,7 @@ class State(NamedTuple):
         *,
         yields: bool = False,
         films: int = 0,
+        sectors: int = 0,
         rough: bool = False,
     ) -> Self:
         """Return a state of rest at q = 0, of faces as made."""
@@ -345,7 +347,7 @@ class State(NamedTuple):
             Pressed.none(points if rough else 0),
             np.zeros(points, dtype=bool),
             np.zeros((heights, 2)),
-            np.zeros((films, 21)),
+            np.zeros((films, 24 + sectors)),
             np.zeros((heights, 3)),
             np.zeros(_BOOKS),
         )

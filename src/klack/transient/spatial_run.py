@@ -247,7 +247,10 @@ class _Moving:
             rigid = self.films.rows[:, 0, self.model.omega == 0]
             self.inertia = np.sum(rigid**2, axis=1)  # of the lift, inverse [1/kg]
         heights, films = len(self.bore.clearance), len(self.squeezed)
-        self.state = State.still(model.mode_count, model.count, heights, model.ways, films=films)
+        sectors = 0 if self.films is None else int(np.max(self.films.sizes[:, 0], initial=0))
+        self.state = State.still(
+            *(model.mode_count, model.count, heights, model.ways), films=films, sectors=sectors
+        )
         self.kept = (
             *(self.state.q, self.state.v, self.state.lam, self.state.guide_force),
             *(self.state.books, self.state.films, self.state.bearing),

@@ -108,6 +108,7 @@ def film_arrays(
         shear=np.array([row.linear for _, row in here]) / slope,
         axial=slope,
         arms=each([_arms(model, film) for film in films], n, 3),
+        span=np.array([(at[f.stop].start, at[f.stop].stop) for f in films], int).reshape(-1, 2),
         compliance=each([_bulk(model, film, series[film.stop]) for film in films], 3, 3),
         bearing=bearing,
         room=room,

@@ -27,6 +27,7 @@ __all__ = [
     "begin_films",
     "bend_faces",
     "bulk_work",
+    "contact_resultant",
     "count_squeeze",
     "film_state",
     "film_strain",
@@ -36,19 +37,21 @@ __all__ = [
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-_ROUNDS, _SEARCHES = 60, 12
+_ROUNDS, _SEARCHES = 60, 40
 _ENOUGH = 0.2  # of the slope of the potential: found along a change
 _ROUND_OFF = 1e-16
 _FOUND = 1e-11  # heights that do not fit, over lift and the least height
 _EXACTLY = 1e-13  # of the way of a step: no correction is left
 _NEARLY = 1e-4  # the same at a corner, where sectors take turns in opening and closing
 _LINEAR = 1e-4  # of the force: a change by so little follows the slopes
+_UNMOVED = 1e-6  # of the way of a step: a film need not be solved again
 _ALONG = 1e-3  # of the way of a step: slopes of an earlier one serve for so little
 
-BEFORE, LOST, RATE, LENGTH, KNOWN, SLOPES = 3, 6, 7, 10, 11, 12
+BEFORE, LOST, RATE, LENGTH, KNOWN, SLOPES, SOLVED, LIMIT = 3, 6, 7, 10, 11, 12, 21, 24
 """Columns of the state of a film, behind force and moments: those of the step before, the energy
 lost, what the forces change by [1/s], the length of the last step [s], that of the step whose
-slopes are known [s] and these nine slopes."""
+slopes are known [s], these nine slopes, lift and tilts for which the film was solved, and which
+sectors are at the limit of tension."""
 
 
 @njit
@@ -90,7 +93,7 @@ def film_state(films: Films, k: int, q: Vector) -> Vector:
 def contact_resultant(films: Films, k: int, lam: Vector) -> Vector:
     """Force and moments of contact forces under a film, shape (3,)."""
     held = np.zeros(3)
-    for i in range(len(lam)):
+    for i in range(films.span[k, 0], min(films.span[k, 1], len(lam))):
         if lam[i] > 0.0:
             for c in range(3):
                 held[c] += films.arms[k, i, c] * lam[i]
@@ -100,11 +103,10 @@ def contact_resultant(films: Films, k: int, lam: Vector) -> Vector:
 @njit
 def bend_faces(films: Films, k: int, change: Vector, gap: Vector) -> None:
     """Open the gaps of contact points by a change of the film's force and moments."""
-    D = films.compliance[k]
-    for i in range(len(gap)):
+    bend = films.compliance[k] @ change
+    for i in range(films.span[k, 0], min(films.span[k, 1], len(gap))):
         for c in range(3):
-            for d in range(3):
-                gap[i] += films.arms[k, i, c] * D[c, d] * change[d]
+            gap[i] += films.arms[k, i, c] * bend[c]
 
 
 @njit
@@ -121,9 +123,12 @@ def _raw_heights(films: Films, k: int, u: Vector) -> Matrix:
 
 @njit
 def _pressed(
-    films: Films, k: int, u0: Vector, u1: Vector, step: float, steeply: bool
+    films: Films, k: int, u0: Vector, u1: Vector, step: float, steeply: bool, limit: Vector
 ) -> tuple[Vector, Matrix]:
-    """Mean force and moments over a step, and ``steeply`` their slopes with its end."""
+    """Mean force and moments over a step, and ``steeply`` their slopes with its end.
+
+    ``limit``: sectors at the limit of tension, 0 or 1; in: where the search for them begins.
+    """
     f, slopes = np.zeros(3), np.zeros((3, 3))
     lowest = films.lowest[k]
     if films.sizes[k, 0]:
@@ -152,7 +157,10 @@ def _pressed(
         for s in range(S):
             for j in range(N):
                 closing[s, j] = (max(x0[s, j], 0.0) - max(x1[s, j], 0.0)) / step
-        force, pressed = film_pressure(land, mobility, closing, head, still, films.tension[k])
+        held = limit[:S] > 0.0
+        force, pressed = film_pressure(land, mobility, closing, head, still, films.tension[k], held)
+        for s in range(S):
+            limit[s] = 1.0 if held[s] else 0.0
         for s in range(S):
             for j in range(N):
                 for c in range(3):
@@ -190,6 +198,7 @@ def begin_films(state: State, step: float) -> None:
         for c in range(3):
             films[k, BEFORE + c] = films[k, c]
             films[k, c] += films[k, RATE + c] * 0.5 * (films[k, LENGTH] + step)
+            films[k, SOLVED + c] = np.inf
 
 
 @njit
@@ -219,34 +228,34 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
     soft += D
     tiny = _FOUND * (films.lowest[k] + abs(before[0]) + abs(free[0] - before[0]))
     u = free + soft @ now
-    f, slopes = _pressed(films, k, before, u, step, False)
+    way = _size(u - before, reach)
+    solved, limit = state.films[k, SOLVED : SOLVED + 3], state.films[k, LIMIT:]
+    if _size(u - solved, reach) <= _UNMOVED * (tiny + way):  # other films moved nothing here
+        kick[:] = 0.0
+        return 0.0
+    known = state.films[k, KNOWN]
+    steeply = known == state.films[k, LENGTH]  # the step before had to find slopes
+    f, slopes = _pressed(films, k, before, u, step, steeply, limit)
     left = free + soft @ f - u
     least = _size(left, reach)
     best = f.copy()
-    known = state.films[k, KNOWN]
-    way = _size(u - before, reach)
-    close, found = least <= tiny, least <= min(tiny, _EXACTLY * way)
-    if known > 0.0 and not found and (close or least <= _ALONG * way):
+    found = least <= min(tiny, _EXACTLY * way)
+    if known > 0.0 and not steeply and (least <= tiny or least <= _ALONG * way):
         for c in range(3):
             for d in range(3):
                 slopes[c, d] = state.films[k, SLOPES + 3 * c + d] * known / step
-        change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
-        more = slopes @ change
-        if close or _is_little(more, np.linalg.solve(soft, change), f, reach):
-            best += more
-            found = True
+        found = found or _follow(films, k, u, f, slopes, soft, left, best) or least <= tiny
     if not found:
         stiff = np.linalg.inv(soft)
         rounds = 0
         while rounds < _ROUNDS:
             rounds += 1
-            f, slopes = _pressed(films, k, before, u, step, True)
+            if rounds > 1 or not steeply:
+                f, slopes = _pressed(films, k, before, u, step, True, limit)
             change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
             along = stiff @ change
             first = along @ left  # slope of the potential along the change, its sign turned
-            more = slopes @ change
-            if first > 0.0 and _is_little(more, along, f, reach):
-                best[:] = f + more
+            if first > 0.0 and _follow(films, k, u, f, slopes, soft, left, best):
                 least = 0.0
                 break
             if not first > 0.0:
@@ -254,24 +263,29 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
                 along = stiff @ change
                 first = along @ left
             low, high, at_low, at_high, share = 0.0, 1.0, first, 0.0, 1.0
-            for _ in range(_SEARCHES):
+            for search in range(_SEARCHES):
                 tried = u + share * change
-                f, _ = _pressed(films, k, before, tried, step, False)
+                f, _ = _pressed(films, k, before, tried, step, False, limit)
                 left = free + soft @ f - tried
                 slope = along @ left
                 if (share == 1.0 and slope >= 0.0) or abs(slope) <= _ENOUGH * abs(first):
                     break
                 if slope > 0.0:
-                    low, at_low, at_high = share, slope, 0.5 * at_high
+                    low, at_low = share, slope
                 else:
-                    high, at_high, at_low = share, slope, at_low if share == 1.0 else 0.5 * at_low
-                share = low + (high - low) * at_low / (at_low - at_high)
+                    high, at_high = share, slope
+                # across a corner a straight line finds little: every other time the middle
+                share = at_low / (at_low - at_high) if search % 2 == 0 else 0.5
+                share = low + (high - low) * share
             u = tried
             size = _size(left, reach)
             if size < least:
                 least = size
                 best[:] = f
             if size <= tiny or _size(share * change, reach) <= _ROUND_OFF * _size(u, reach):
+                break
+            if size <= _ALONG * way and _follow(films, k, u, f, slopes, soft, left, best):
+                least = 0.0
                 break
         if not least < _NEARLY / _FOUND * tiny:
             return -1.0
@@ -280,6 +294,7 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
                 state.films[k, SLOPES + 3 * c + d] = slopes[c, d]
         state.films[k, KNOWN] = step
     state.films[k, :3] = best
+    solved[:] = free + soft @ best
     best -= now
     for i in range(len(q)):
         kick[i] = 0.0
@@ -289,14 +304,38 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
 
 
 @njit
-def _is_little(more: Vector, needed: Vector, f: Vector, reach: float) -> bool:
-    """Whether a change of heights is so small that the forces follow their slopes.
+def _follow(
+    films: Films,
+    k: int,
+    u: Vector,
+    f: Vector,
+    slopes: Matrix,
+    soft: Matrix,
+    left: Vector,
+    best: Vector,
+) -> bool:
+    """Let the forces follow their slopes to where heights fit, into ``best``, if that is little.
 
-    ``more`` is what the slopes make of it, ``needed`` what ``soft`` would need for it: no corner on
-    the way, where sectors open or close, can change the forces by more than that.
+    The change must be little of the forces.  Where sectors open or close on the way, slopes tell
+    nothing: then also the forces that ``soft`` would need for the change, which none exceeds.
     """
+    reach = films.reach[k]
+    change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
+    more = slopes @ change
     little = _LINEAR * _weight(f, reach)
-    return max(_weight(more, reach), _weight(needed, reach)) <= little
+    if _weight(more, reach) > little:
+        return False
+    size, corner = _size(change, reach), False
+    if films.sizes[k, 0]:
+        x = _raw_heights(films, k, u)
+        for height in x.flat:
+            corner = corner or abs(height) <= size
+    else:
+        corner = abs(u[0]) <= size
+    if corner and _weight(np.linalg.solve(soft, change), reach) > little:
+        return False
+    best[:] = f + more
+    return True
 
 
 @njit

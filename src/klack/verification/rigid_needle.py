@@ -158,7 +158,11 @@ def fly_in_films(
         *(bearing or (none, none)),
     )
     bore = bore_arrays(guide, model.mode_count)
-    state = State.still(model.mode_count, model.count, len(bore.clearance), films=len(films.lowest))
+    state = State.still(
+        *(model.mode_count, model.count, len(bore.clearance)),
+        films=len(films.lowest),
+        sectors=int(np.max(films.sizes[:, 0], initial=0)),
+    )
     state.q[:], state.v[:] = q, v
     modes = modes_of_step(model, step)
     record = Record.empty(
