@@ -318,7 +318,7 @@ class State(NamedTuple):
     carried: NDArray[np.bool_]  # (n,) points that have carried a force
     guide_force: Matrix  # (k, 2) [N] on the shaft, at the start of the next step
     films: (
-        Matrix  # (f, 24 + S) forces of the last step and more, see ``klack.transient.tilting_films``
+        Matrix  # (f, 24 + S) forces of the last step, and more: ``klack.transient.tilting_films``
     )
     bearing: Matrix  # (g, 3) [N] force of the film in the guide in the last step, energy lost [J]
     books: Vector  # sums, see ``DAMPING`` and the following names
