@@ -191,6 +191,18 @@ def test_centred_and_wet_as_along_the_axis():
     assert abs(space.books.relative_residual) < 1e-11
 
 
+def test_recorded_gaps_before_the_touch_are_those_of_the_bodies():
+    """Exact: the gap of the axial network, also where no point is looked at yet."""
+    run = fly_in_network(valve(), {}, gap=20e-6, speed=-0.5, duration=50e-6, wet=True)
+    record, touch = run.interfaces["contact"], run.events[0].time
+    falling = record.time + record.step < touch
+    assert np.count_nonzero(falling) > 20
+    end = record.time[falling] + record.step[falling]
+    gap = np.interp(end, run.time, run.channels["contact gap"].values)
+    assert gap.max() > 2e-6
+    np.testing.assert_allclose(record.gap[falling], gap, atol=15e-9)  # of 20 ns
+
+
 def test_energy_of_a_wet_eccentric_run():
     """Conservation: film, guide with friction and many contacts."""
     placement = np.array([0.5e-6, 0.0, 0.0, 0.0, 3e-4, 0.0])

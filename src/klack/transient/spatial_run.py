@@ -283,6 +283,8 @@ class _Moving:
         self.rest = network.interfaces.rest[self.order] / h
         self.impacts = _impact_recorder(self, network)
         self.side = np.array([np.sign(np.sum(model.axial[a:b])) for _, a, b in model.contacts])
+        # gap per gap along the axis, of cones
+        self.slope = np.array([np.mean(np.abs(model.axial[a:b])) for _, a, b in model.contacts])
         self.fresh = True
 
     # ------------------------------------------------------------------ start
@@ -852,6 +854,11 @@ class _Moving:
 
     # ------------------------------------------------------------------ records
 
+    def _gaps_after(self, first: int, last: int, record: Record) -> Vector:
+        """Smallest gap of some points at the end of each step, without contact."""
+        gaps = self.gap0[first:last] + record.places @ self.model.traces[first:last].T
+        return np.asarray(np.min(gaps, axis=1))
+
     def _tell(self, run: _Run, record: Record, t: float, h: float, points: bool) -> None:
         """Forces and gaps of the stops, in the words of the network."""
         recording, scratch = run.recording, run.scratch
@@ -891,7 +898,8 @@ class _Moving:
             into[:, 0], into[:, 1] = t + some * h, h
             into[:, 2] = np.append(force, 0.0)[some]
             into[:, 3] = np.append(pressed, 0.0)[some]
-            into[:, 4] = np.append(record.gap, smallest)[some]
+            gaps = record.gap if points else self._gaps_after(a, b, record)
+            into[:, 4] = np.append(gaps, smallest)[some] / self.slope[c]
             recording.filled[row] = place + len(rows)
             scratch.sums[first + 2 * row] += h * float(np.sum(force))
             scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))

@@ -98,8 +98,12 @@ def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
     needle, time = study.needle, 1e3 * variant.result.time
     touches = tuple(Mark(value=1e3 * event.time) for event in variant.result.events[:_MARKED])
     panels = [
-        _panel(variant, [(f"{needle} {a}", a) for a in "xy"], "axis at seat", "µm", 1e6, touches),
-        _panel(variant, [(f"{needle} tilt {a}", a) for a in "xy"], "tilt", "mrad", 1e3, touches),
+        _panel(
+            variant, [(f"{needle} {a}", a) for a in "xy"], "axis at seat", "µm", 1e6, touches, 1e-3
+        ),
+        _panel(
+            variant, [(f"{needle} tilt {a}", a) for a in "xy"], "tilt", "mrad", 1e3, touches, 1e-4
+        ),
     ]
     guide = guide_of(study)
     if guide is not None:
@@ -107,11 +111,11 @@ def axis_over_time_chart(study: StrokeStudy) -> Chart | None:
             (f"guide {k + 1} force", f"guide at {format_si(z, 'm', 3)}")
             for k, z in enumerate(guide.heights)
         ]
-        panels.append(_panel(variant, forces, "guide force", "N", 1.0, touches, first=2))
+        panels.append(_panel(variant, forces, "guide force", "N", 1.0, touches, 1e-3, first=2))
     across = acts_across(variant)
     sides = [(f"{name} side force {a}", f"{name} {a}") for name in across for a in "xy"]
     if sides:
-        panels.append(_panel(variant, sides, "side force", "N", 1.0, touches))
+        panels.append(_panel(variant, sides, "side force", "N", 1.0, touches, 1e-6))
     return Chart(
         name="axis-time",
         title="Needle off its axis",
@@ -166,12 +170,21 @@ def _panel(
     unit: str,
     factor: float,
     marks: tuple[Mark, ...],
+    least: float,
     first: int = 0,
 ) -> Panel:
+    """Curves over time; the axis spans at least ``least``, so that round-off stays a line."""
     curves = []
     for k, (channel, word) in enumerate(names):
         data = variant.channel(channel)
         if data is not None:
             x, y = thinned(1e3 * variant.result.time, factor * data.values)
             curves.append(look_of(first + k).curve(x, y, word))
-    return Panel(y=AxisSpec(label=label, unit=unit), curves=tuple(curves), marks=marks, share=0.6)
+    most = max((float(np.max(np.abs(curve.y), initial=0.0)) for curve in curves), default=0.0)
+    span = (-least, least) if most < least else None
+    return Panel(
+        y=AxisSpec(label=label, unit=unit, range=span),
+        curves=tuple(curves),
+        marks=marks,
+        share=0.6,
+    )

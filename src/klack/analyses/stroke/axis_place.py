@@ -10,6 +10,8 @@ from klack.case.motion_of_valve import ValveGuide
 
 __all__ = ["AxisPlace", "acts_across", "axis_place", "guide_of", "moves_in_space"]
 
+_LEAST_PLACE, _LEAST_TILT = 1e-5, 1e-6  # [um], [mrad]; less is round-off, and shown as 0
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxisPlace:
@@ -30,12 +32,17 @@ class AxisPlace:
     @property
     def position(self) -> str:
         """Both coordinates in micrometres."""
-        return f"{1e6 * self.x:.3g}, {1e6 * self.y:.3g}"
+        return _both(1e6 * self.x, 1e6 * self.y, _LEAST_PLACE)
 
     @property
     def tilt(self) -> str:
         """Both slopes in millirad."""
-        return f"{1e3 * self.tilt_x:.3g}, {1e3 * self.tilt_y:.3g}"
+        return _both(1e3 * self.tilt_x, 1e3 * self.tilt_y, _LEAST_TILT)
+
+
+def _both(first: float, second: float, least: float) -> str:
+    shown = (0.0 if abs(value) < least else value for value in (first, second))
+    return ", ".join(f"{value:.3g}" for value in shown)
 
 
 def moves_in_space(study: StrokeStudy, variant: StrokeVariant) -> bool:
