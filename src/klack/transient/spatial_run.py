@@ -51,7 +51,7 @@ from klack.simulation.step_status import (
     STATUS_REFUSED,
     STATUS_REPEAT,
 )
-from klack.transient.gap_course import GapCourse, gap_course
+from klack.transient.gap_course import GapCourse
 from klack.transient.guide import Guide
 from klack.transient.impact_recorder import ImpactRecorder, film_lands
 from klack.transient.interface_arrays import (
@@ -71,6 +71,7 @@ from klack.transient.interface_arrays import (
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
+from klack.transient.placed_gaps import FRESH, PlacedGaps
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
 from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
@@ -81,6 +82,7 @@ from klack.transient.spatial_rubbing import (
     repair_offsets,
     rubbing_arrays,
 )
+from klack.transient.stop_record import StopRecord
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import LOST, bend_faces, film_state, film_strain
 from klack.units import format_si
@@ -91,7 +93,6 @@ Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 _AWAY = 1.0  # [m] added to the gaps of the axial interfaces, which then never act
-_FRESH = 0.04e-6  # gaps as good as new [m]
 _CLOSING = 1e-6  # gaps that count where others are asked for anew [m]
 _SURE = 0.5  # share of the time in which no gap can close, since forces may change meanwhile
 _LONGEST = 16  # records of a flight at once
@@ -108,7 +109,6 @@ _STEADY = 0.04  # change of the force of a contact at rest in a step
 _AT_REST = 0  # 1: steps are long, and so is the inverse over the points that carry
 _LOST = 1  # energy that damping took in flights [J]
 _STEADILY = 2  # 1: forces changed little in the last record
-_NO_FACE = 0.2e-3  # [m] no gap changes by so much with the placement: nothing faces the point
 _HALF_BOUNCES = 8.0  # in the time to rest of rigid bodies
 _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force of one newton
 
@@ -261,30 +261,19 @@ class _Moving:
         self.apart = self.state._replace(
             lam=np.zeros(0), contact=ActiveSet.none(0), rubbing=Rubbing.none(0, 0)
         )
-        self.gap0 = np.array(model.gap)
         self.rigid_count = int(np.sum((model.owner == 0) & (model.omega == 0)))
-        self.taken_at, self.followed_to = np.zeros(6), np.zeros(6)
-        self.course = valve.course if valve.gaps is not None else None
-        if self.course is None and valve.gaps is not None:
-            self.course = gap_course(valve.gaps, float(np.max(np.linalg.norm(valve.arms, axis=1))))
-        if self.course is not None:  # what slopes have beside the linear gaps of the modes
-            r = self.rigid_count
-            q = np.linalg.pinv(model.rigid[:, :r], rcond=1e-12)
-            self.turning = self.course.slopes - model.traces[:, :r] @ q
-        # closed since [fine steps], nan while open; axial force of the last step
-        self.closed = np.full(len(model.contacts), np.nan)
-        self.force = np.zeros(len(model.contacts))
+        reach = float(np.max(np.linalg.norm(valve.arms, axis=1)))
+        self.gaps = PlacedGaps(model, self.rigid_count, valve.gaps, valve.course, reach)
+        self.gap0 = self.gaps.values
         self.flags = np.zeros(3)  # see the names above
         self.order = [
             [row.component for row in network.rows.interfaces].index(stop) for stop in valve.stops
         ]
         at = [self.order[valve.stops.index(film.stop)] for film in self.squeezed]
-        self.film_at = {row: k for k, row in enumerate(at)}  # by row of the interfaces
+        filmed = {row: k for k, row in enumerate(at)}
         self.rest = network.interfaces.rest[self.order] / h
         self.impacts = _impact_recorder(self, network)
-        self.side = np.array([np.sign(np.sum(model.axial[a:b])) for _, a, b in model.contacts])
-        # gap per gap along the axis, of cones
-        self.slope = np.array([np.mean(np.abs(model.axial[a:b])) for _, a, b in model.contacts])
+        self.stops = StopRecord(network, model, self.P, self.order, filmed, self.arcs, sizes.step)
         self.fresh = True
 
     # ------------------------------------------------------------------ start
@@ -381,9 +370,9 @@ class _Moving:
 
     def _begin_closed(self) -> None:
         for c, (_, a, b) in enumerate(self.model.contacts):
-            self.force[c] = abs(float(self.model.axial[a:b] @ self.state.lam[a:b]))
-            self.closed[c] = -np.inf if np.any(self.state.lam[a:b] > 0.0) else np.nan
-        self.flags[_AT_REST] = float(not bool(np.all(np.isnan(self.closed))))
+            self.stops.force[c] = abs(float(self.model.axial[a:b] @ self.state.lam[a:b]))
+            self.stops.closed[c] = -np.inf if np.any(self.state.lam[a:b] > 0.0) else np.nan
+        self.flags[_AT_REST] = float(not bool(np.all(np.isnan(self.stops.closed))))
         if self.model.ways:
             lie_without_friction(self.model, self.state.rubbing, self.state.lam)
         self._take_carrying()
@@ -402,7 +391,7 @@ class _Moving:
         """Way of the axis of the needle across itself, and the forces of the guide."""
         path, needle = self.path, self.valve.components[0]
         at = path.position_at(time)
-        arm = float(self.valve.arms[np.argmax(self.side), 2])  # of its lower end
+        arm = float(self.valve.arms[np.argmax(self.stops.side), 2])  # of its lower end
         slope = np.column_stack([at[:, 4], -at[:, 3]])
         place = at[:, :2] + arm * slope
         told = {}
@@ -448,10 +437,10 @@ class _Moving:
                 "carried": self.state.carried,
                 "books": self.books,
                 "gaps": self.gap0,
-                "placement": self.taken_at,
-                "followed": self.followed_to,
-                "closed": self.closed,
-                "force": self.force,
+                "placement": self.gaps.taken_at,
+                "followed": self.gaps.followed_to,
+                "closed": self.stops.closed,
+                "force": self.stops.force,
                 "flags": self.flags,
             }
         )
@@ -558,13 +547,14 @@ class _Moving:
         if self.state.contact.counts[0]:
             return 0, True
         horizon = min(most, _LONGEST) * span / _SURE
-        self._follow()
-        stale = self._stale()
+        if self.gaps.follow(self.q):
+            self._lift_films()
+        stale = self.gaps.stale(self.q)
         safe = self._safe(horizon, stale)
         closing = self.gap0 + self.model.traces @ self.q < _CLOSING
-        if safe * _SURE < 2.0 * span and np.max(stale[closing], initial=0.0) > _FRESH:
+        if safe * _SURE < 2.0 * span and np.max(stale[closing], initial=0.0) > FRESH:
             self.take_gaps(careful=True)
-            safe = self._safe(horizon, self._stale())
+            safe = self._safe(horizon, self.gaps.stale(self.q))
         fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
         if self.films is not None or self.sides.acts:  # they act wherever the needle is
             fly = 0
@@ -614,7 +604,7 @@ class _Moving:
         """One record in which contact points or the guide are looked at."""
         clock, left = run.clock, run.look * run.block
         time = left * self.sizes.step
-        before, flies = self.force.copy(), True
+        before, flies = self.stops.force.copy(), True
         while left:
             level = NEAR if self.sizes.coarse > 1 else FINE
             if left >= self.steps[COARSE] > 1 and (self._rests(clock) if points else flies):
@@ -628,7 +618,7 @@ class _Moving:
                     flies = False
                     if points:
                         self._rest_on(rest=False)
-                        self.closed[~np.isnan(self.closed)] = float(clock[0])
+                        self.stops.closed[~np.isnan(self.stops.closed)] = float(clock[0])
                     continue
                 for _ in range(taken):
                     left -= 1
@@ -696,7 +686,8 @@ class _Moving:
             return int(status)
         excess = self._repair(level)
         self.sides.move(self.q - begun)
-        self._tell(run, record_, t, H / count, points)
+        told = (run.recording, run.scratch, record_, t, H / count)
+        self.stops.tell(*told, self.q, self.state.lam, self.gap0, points=points)
         self.impacts.tell(t, H / count, record_, begun)
         clock[0] += steps
         clock[1] = level
@@ -808,7 +799,7 @@ class _Moving:
         """Whether the needle lies on a stop long enough, and steadily."""
         if self.flags[_AT_REST]:
             return True
-        long = float(clock[0]) - self.closed >= self.rest
+        long = float(clock[0]) - self.stops.closed >= self.rest
         if self.sizes.coarse > 1 and np.any(long) and self.flags[_STEADILY]:
             self._rest_on(rest=True)
             return True
@@ -816,13 +807,13 @@ class _Moving:
 
     def _steady(self, before: Vector) -> None:
         """Note whether forces changed little in this record."""
-        scale = np.maximum(np.abs(before), np.abs(self.force))
-        steady = np.all(np.abs(self.force - before) <= _STEADY * scale)
+        scale = np.maximum(np.abs(before), np.abs(self.stops.force))
+        steady = np.all(np.abs(self.stops.force - before) <= _STEADY * scale)
         self.flags[_STEADILY] = float(steady)
 
     def _still(self, record: Record) -> bool:
         """Whether a long step met nothing that it cannot see."""
-        total, before = abs(float(record.force[0])), float(np.sum(self.force))
+        total, before = abs(float(record.force[0])), float(np.sum(self.stops.force))
         steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
         return steady and bool(self.state.contact.counts[0] > 0)
 
@@ -854,56 +845,6 @@ class _Moving:
 
     # ------------------------------------------------------------------ records
 
-    def _gaps_after(self, first: int, last: int, record: Record) -> Vector:
-        """Smallest gap of some points at the end of each step, without contact."""
-        gaps = self.gap0[first:last] + record.places @ self.model.traces[first:last].T
-        return np.asarray(np.min(gaps, axis=1))
-
-    def _tell(self, run: _Run, record: Record, t: float, h: float, points: bool) -> None:
-        """Forces and gaps of the stops, in the words of the network."""
-        recording, scratch = run.recording, run.scratch
-        network, state = self.network, self.network.interface_state
-        first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
-        now = round(t / self.sizes.step)
-        faces, y = network.interfaces, np.append(self.P.T @ self.q, 0.0)
-        of_pressure = record.pressed if len(record.pressed) else record.force
-        for c, row in enumerate(self.order):
-            a, b = self.model.contacts[c][1:]
-            smallest = float(np.min(self.gap0[a:b] + self.model.traces[a:b] @ self.q))
-            lam = self.state.lam[a:b]
-            state.gap[row] = faces.gap0[row] + y[faces.upper[row]] - y[faces.lower[row]]
-            film = self.film_at.get(row)
-            pressed = np.zeros(len(record.force)) if film is None else record.film[:, film]
-            scratch.sums[first + 2 * row + 1] += h * float(np.sum(pressed))
-            force = np.where(self.side[c] * of_pressure > 0.0, self.side[c] * record.force, 0.0)
-            acted = np.append(force > 0.0, False)
-            told = acted.copy()
-            told[1:] |= acted[:-1]  # a step without force ends a contact
-            told[-1] &= not np.any(lam > 0.0)
-            told[:-1] |= np.abs(pressed) > faces.film_felt[row]
-            if self.arcs is not None:
-                self.arcs.see(c, float(force[-1]), lam)
-            if points:
-                self.force[c] = force[-1]
-                if not np.any(lam > 0.0):
-                    self.closed[c] = np.nan
-                elif np.isnan(self.closed[c]):
-                    self.closed[c] = float(now)
-            rows = np.flatnonzero(told)
-            if not len(rows):
-                continue
-            place = int(recording.filled[row])
-            end = min(place + len(rows), recording.fine.shape[1])
-            some, into = rows[: end - place], recording.fine[row, place:end]
-            into[:, 0], into[:, 1] = t + some * h, h
-            into[:, 2] = np.append(force, 0.0)[some]
-            into[:, 3] = np.append(pressed, 0.0)[some]
-            gaps = record.gap if points else self._gaps_after(a, b, record)
-            into[:, 4] = np.append(gaps, smallest)[some] / self.slope[c]
-            recording.filled[row] = place + len(rows)
-            scratch.sums[first + 2 * row] += h * float(np.sum(force))
-            scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))
-
     def _tell_path(self, steps: int) -> None:
         rigid = self.model.rigid
         self.path.add(
@@ -934,48 +875,18 @@ class _Moving:
         return np.asarray(q)
 
     def take_gaps(self, *, careful: bool = False) -> None:
-        """Take the gaps from the geometry at the present placement.
-
-        ``careful``: only where no point is closed by it.
-        """
-        if self.valve.gaps is None:
-            return
-        at = self.model.rigid @ self.q
-        r = self.rigid_count
-        fresh = self.valve.gaps(at) - self.model.traces[:, :r] @ self.q[:r]
-        if careful and np.min(fresh + self.model.traces @ self.q) <= 0.0:
-            return
-        self.gap0[:], self.taken_at[:], self.followed_to[:] = fresh, at, at
-        self._lift_films()
-
-    def _follow(self) -> None:
-        """Let gaps follow the placement along their slopes, unless a point is closed by it."""
-        if self.course is None:
-            return
-        at = self.model.rigid @ self.q
-        change = self.turning @ (at - self.followed_to)
-        if np.min(self.gap0 + change + self.model.traces @ self.q) <= 0.0:
-            return
-        self.gap0 += change
-        self.followed_to[:] = at
-        self._lift_films()
+        """Take the gaps from the geometry at the present placement."""
+        if self.gaps.take(self.q, careful=careful):
+            self._lift_films()
 
     def _lift_films(self) -> None:
         """Let films begin at the present gaps."""
         if self.films is None:
             return
         at = {name: slice(first, last) for name, first, last in self.model.contacts}
-        # a point that has slid over the edge of the other face has no gap: its linear one
-        faced = self.gap0 - self.model.gap < _NO_FACE
-        gap0 = np.where(faced, self.gap0, self.model.gap)
+        gap0 = self.gaps.faced()
         for k, film in enumerate(self.squeezed):
             self.films.offset[k] = film.fit @ gap0[at[film.stop]] - film.base
-
-    def _stale(self) -> Vector:
-        """What each gap may be wrong by [m]."""
-        if self.course is None:
-            return np.zeros(len(self.gap0))
-        return self.course.left(self.model.rigid @ self.q - self.taken_at) + 0.5 * _FRESH
 
     def _safe(self, horizon: float, stale: Vector) -> float:
         model = self.model
