@@ -22,6 +22,7 @@ __all__ = [
     "ExportJson",
     "InspectionJson",
     "ReportJson",
+    "ShowJson",
     "VerificationJson",
     "WarmJson",
     "measures_catalogue",
@@ -100,6 +101,24 @@ class InspectionJson(TypedDict):
     ]
 
 
+class ShownNodeJson(TypedDict):
+    """One connection of a network."""
+
+    domain: str
+    ports: Annotated[list[str], Field(description="As component.port.")]
+    fixed: Annotated[str | None, Field(description="ground or ambient, if it is that.")]
+
+
+class ShowJson(TypedDict):
+    """``klack show``."""
+
+    schema: Literal["klack-show/1"]
+    case: str
+    file: str
+    components: Annotated[dict[str, str], Field(description="Type by name.")]
+    nodes: list[ShownNodeJson]
+
+
 class ReportJson(TypedDict):
     """``klack report``."""
 
@@ -120,7 +139,7 @@ class ExportJson(TypedDict):
     files: Annotated[list[str], Field(description="Names of the files and folders written.")]
 
 
-_OTHERS = (InspectionJson, ReportJson, ExportJson, VerificationJson, CacheJson, WarmJson)
+_OTHERS = (InspectionJson, ShowJson, ReportJson, ExportJson, VerificationJson, CacheJson, WarmJson)
 
 
 def measures_catalogue() -> dict[str, Any]:

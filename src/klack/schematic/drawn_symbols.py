@@ -1,0 +1,166 @@
+"""Symbols of the component types, as strokes; after ISO 1219-1 where it has one.
+
+Symbols with two ends lie along x from the origin to :data:`LENGTH`; all others are drawn round
+their middle, as large as :data:`FRAME`.  Types without an entry get a plain box.
+"""
+
+from collections.abc import Mapping
+
+from klack.network.component import Component
+from klack.schematic.shapes import Stroke
+
+__all__ = ["FRAME", "FRAMELESS", "LENGTH", "MARKS", "framed_strokes", "two_ended_strokes"]
+
+LENGTH, HALF = 36.0, 12.0
+FRAME = (52.0, 48.0)
+"""Width and height of a framed symbol."""
+
+
+def _circle(x: float, y: float, r: float) -> str:
+    return f"M{x - r:g},{y:g} a{r:g},{r:g} 0 1 0 {2 * r:g},0 a{r:g},{r:g} 0 1 0 {-2 * r:g},0 Z"
+
+
+_TWO_ENDED: Mapping[str, tuple[Stroke, ...]] = {
+    "spring": (Stroke("M0,0 H5 l2,-9 l4,18 l4,-18 l4,18 l4,-18 l4,18 l4,-18 l1,9 H36"),),
+    "guide-friction": (
+        Stroke("M9,-6 H25 V6 H9 Z", "metal"),
+        Stroke("M0,0 H9 M6,-8 H31 V8 H6 M31,0 H36"),
+        Stroke(
+            "M8,-8 l4,-4 M15,-8 l4,-4 M22,-8 l4,-4 M8,12 l4,-4 M15,12 l4,-4 M22,12 l4,-4", "thin"
+        ),
+    ),
+    "force-over-stroke": (
+        Stroke("M0,0 H6 M30,0 H36"),
+        Stroke("M6,-12 H30 V12 H6 Z", "paper"),
+        Stroke("M9,9 C16,8 16,-6 27,-8", "line"),
+    ),
+    "fmu": (
+        Stroke("M0,0 H6 M30,0 H36"),
+        Stroke("M6,-12 H30 V12 H6 Z", "unknown"),
+        Stroke("M12,-5 H24 V5 H12 Z M15,-5 V-8 M21,-5 V-8 M15,5 V8 M21,5 V8", "line"),
+    ),
+    "orifice": (Stroke("M0,0 H36 M11,-11 Q18,-1 25,-11 M11,11 Q18,1 25,11"),),
+    "line": (
+        Stroke("M0,0 H3 M33,0 H36"),
+        Stroke("M3,-6 H33 V6 H3 Z", "fluid"),
+        Stroke("M6,0 q3,-5 6,0 t6,0 t6,0 t6,0", "thin"),
+    ),
+    "inertance": (
+        Stroke("M0,0 H3 M33,0 H36"),
+        Stroke("M3,-6 H33 V6 H3 Z", "paper"),
+        Stroke("M10,-4 H26 V4 H10 Z", "fluid"),
+    ),
+    "flow-source": (
+        Stroke("M0,0 H6 M30,0 H36"),
+        Stroke(_circle(18, 0, 12), "paper"),
+        Stroke("M30,0 L20,-7 V7 Z", "solid"),
+    ),
+}
+
+_ARROW_UP = "M0,14 V-14 M-5,-6 L0,-14 L5,-6"
+_ARROW_DOWN = "M0,-14 V14 M-5,6 L0,14 L5,6"
+_AXES = Stroke("M-18,-14 V14 H18", "thin")
+
+_FRAMED: Mapping[str, tuple[Stroke, ...]] = {
+    "annulus": (
+        Stroke("M-20,-12 H20 M-20,12 H20", "heavy"),
+        Stroke("M-14,-7 H12 V7 H-14 Z", "metal"),
+        Stroke("M12,0 H22 M-20,-9.5 H20 M-20,9.5 H20", "thin"),
+    ),
+    "gravity": (Stroke(_circle(0, -11, 4), "metal"), Stroke("M0,-7 V14 M-5,6 L0,14 L5,6")),
+    "chamber": (Stroke("M-14,-12 H14 a12,12 0 0 1 0,24 H-14 a12,12 0 0 1 0,-24 Z", "fluid"),),
+    "pressure-source": (
+        Stroke(_circle(0, 0, 12), "paper"),
+        Stroke("M12,0 L2,-7 V7 Z", "solid"),
+    ),
+    "voltage-step": (_AXES, Stroke("M-18,10 H-10 V-9 H8 V10 H16")),
+    "voltage-table": (_AXES, Stroke("M-18,8 L-9,-6 L-1,2 L7,-11 L16,-4")),
+    "drive-profile": (_AXES, Stroke("M-18,10 L-9,-10 H-2 L3,2 H11 L16,10")),
+    "two-point": (_AXES, Stroke("M-18,12 L-11,-9 l4,7 l3,-7 l4,7 l3,-7 l4,7 l3,-7 L16,12")),
+    "peak-hold": (_AXES, Stroke("M-18,12 L-11,-11 l3,3 l3,-3 L0,2 l3,-3 l3,3 l3,-3 l3,3 L16,12")),
+    "pwm": (_AXES, Stroke("M-18,10 V-8 h5 V10 h5 V-8 h5 V10 h5 V-8 h5 V10 h5")),
+}
+
+_SEATS: Mapping[str, tuple[Stroke, ...]] = {
+    "ball": (
+        Stroke("M-18,1 L-5,14 M18,1 L5,14", "heavy"),
+        Stroke(_circle(0, 1, 8), "metal"),
+        Stroke("M0,-7 V-18"),
+    ),
+    "cone": (
+        Stroke("M-16,0 L-4,14 M16,0 L4,14", "heavy"),
+        Stroke("M-9,-6 H9 L0,9 Z", "metal"),
+        Stroke("M0,-6 V-18"),
+    ),
+    "flat": (
+        Stroke("M-18,10 H-6 V15 M18,10 H6 V15", "heavy"),
+        Stroke("M-12,-2 H12 V5 H-12 Z", "metal"),
+        Stroke("M0,-2 V-18"),
+    ),
+}
+
+FRAMELESS: Mapping[str, tuple[float, float]] = {
+    "chamber": (52.0, 24.0),
+    "pressure-source": (24.0, 24.0),
+}
+"""Sizes of the symbols that are drawn without a frame."""
+
+MARKS: Mapping[str, tuple[Stroke, ...]] = {
+    "ground": (
+        Stroke("M0,-8 V8", "heavy"),
+        Stroke("M0,-8 l-5,4 M0,-3 l-5,4 M0,2 l-5,4 M0,7 l-3,2.5", "thin"),
+    ),
+    "ambient": (Stroke("M-10,-5 V5 H0 V-5"), Stroke("M-5,0 H0", "thin")),
+    "open": (Stroke(_circle(-4, 0, 4), "unknown"),),
+}
+"""Ends of ports that lead to the ground, to the surroundings, or nowhere; they point left."""
+
+
+def two_ended_strokes(part: Component) -> tuple[Stroke, ...] | None:
+    """Symbol from end to end; None for a type that has none."""
+    if part.type == "end-stop":
+        film = (Stroke("M13,-11 H23 V11 H13 Z", "fluid"),) if getattr(part, "film", None) else ()
+        bars = Stroke("M13,-12 V12 M23,-12 V12", "heavy")
+        return (*film, Stroke("M0,0 H13 M23,0 H36"), bars)
+    return _TWO_ENDED.get(part.type)
+
+
+def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
+    """Symbol round its middle; None for a type that has none."""
+    if part.type == "seat":
+        return _SEATS.get(str(getattr(part, "shape", "")))
+    if part.type in ("pressure-face", "land-face"):
+        inner = 1.0 if part.type == "pressure-face" else 0.4
+        return _face(getattr(part, "direction", "") == "closing", inner)
+    if part.type in ("solenoid", "force-map-solenoid"):
+        return _magnet(part)
+    if part.type == "constant-force":
+        upward = float(getattr(part, "force", 0.0)) >= 0.0
+        return (Stroke(_ARROW_UP if upward else _ARROW_DOWN, "heavy"),)
+    if part.type == "force-over-time":
+        return (Stroke("M-14,14 V-14 M-19,-7 L-14,-14 L-9,-7"), Stroke("M-4,9 L2,-7 H9 L16,9"))
+    return _FRAMED.get(part.type)
+
+
+def _face(closing: bool, outer: float) -> tuple[Stroke, ...]:
+    """Plate with the pressure on it; ``outer`` is the share of it at the edges."""
+    way = 1 if closing else -1
+    arrows = "".join(
+        f"M{x},{way * (4 - 18 * share):g} V{way * 4} m-3,{-4 * way} l3,{4 * way} l3,{-4 * way} "
+        for x, share in ((-14, outer), (0, 1.0), (14, outer))
+    )
+    plate = f"M-20,{way * 6} H20 V{way * 12} H-20 Z"
+    return (Stroke(plate, "metal"), Stroke(arrows, "thin"))
+
+
+def _magnet(part: Component) -> tuple[Stroke, ...]:
+    """Coil above its armature, or below where the armature closes the gap downward."""
+    way = -1 if getattr(part, "closes", "upward") == "downward" else 1
+    inside = f"M-17,{way * -1} L17,{way * -16}"
+    if part.type == "force-map-solenoid":
+        inside = f"M-13,{way * -4} C-3,{way * -5} 0,{way * -13} 13,{way * -14}"
+    return (
+        Stroke(f"M-17,{way * -16} H17 V{way * -1} H-17 Z", "paper"),
+        Stroke(inside),
+        Stroke(f"M-20,{way * 7} H20 V{way * 13} H-20 Z", "metal"),
+    )
