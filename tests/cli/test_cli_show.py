@@ -9,6 +9,7 @@ from json_schema_check import require_documented
 
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
+from klack.network.catalogue import type_words
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 VALVE = HOW_TO / "small_valve.yaml"
@@ -82,7 +83,9 @@ def test_a_file_that_cannot_be_written_is_one_error_and_no_file(tmp_path, capsys
         ([str(VALVE), "--out", "valve"], "a name without an ending, expected .svg"),
         ([str(VALVE), "--out", "nowhere/valve.svg"], "a folder that does not exist"),
         ([str(VALVE), "--out", "folder.svg"], "a folder, expected the name of a file"),
-        ([], "CASE"),
+        ([], "CASE: got nothing, expected the case of a valve, or --components"),
+        ([str(VALVE), "--components"], "it beside --components"),
+        (["--components", "--out", "valve.svg"], "it beside --components"),
     ],
 )
 def test_bad_input_is_one_error_and_no_file(words, said, tmp_path, capsys):
@@ -127,3 +130,34 @@ def test_an_own_component_is_drawn_where_it_is_let_in(tmp_path, capsys, monkeypa
 def load_name(folder: Path) -> str:
     (picture,) = folder.glob("*.svg")
     return picture.stem
+
+
+def test_it_lists_every_component_type(tmp_path, capsys):
+    assert main(["show", "--components", "--json", "types.json"]) == 0
+
+    said = capsys.readouterr().out
+    found = json.loads((tmp_path / "types.json").read_text(encoding="utf-8"))
+    require_documented(found)
+    assert list(found["types"]) == list(type_words())
+    assert all(f" {word} " in said for word in type_words())
+    spring = found["types"]["spring"]
+    assert spring["ports"]["base"] == {"domain": "mechanical", "optional": True}
+    assert spring["keys"]["stiffness"]["unit"] == "N/m"
+    assert spring["keys"]["stiffness"]["required"]
+    assert not spring["keys"]["damping"]["required"]
+    assert found["types"]["chamber"]["source"] == "Merritt 1967, sec. 3-8"
+    assert found["types"]["orifice"]["source"] == "Nurick 1976; Sampson 1891; Wuest 1954"
+    assert found["types"]["gravity"]["equation"] == r"F = -m g \cos\vartheta"
+    assert "F = -m g cos θ" in said
+    assert not [path for path in tmp_path.iterdir() if path.suffix == ".svg"]
+
+
+def test_an_own_type_is_listed_last(capsys, monkeypatch):
+    monkeypatch.syspath_prepend(HOW_TO)
+    words = ["--components", "--component", "eddy_brake:EddyBrake", "--json", "-"]
+
+    assert main(["show", *words]) == 0
+
+    *_, (word, last) = json.loads(capsys.readouterr().out)["types"].items()
+    assert word == "eddy_brake:EddyBrake"
+    assert set(last["keys"]) == {"damping", "critical_speed"}

@@ -29,12 +29,21 @@ _Out = Annotated[
 
 def show(
     case: Annotated[
-        Path,
+        Path | None,
         Parameter(name="CASE", help="Case file (YAML) of a valve, or the name of a shipped one."),
-    ],
+    ] = None,
     /,
     *,
     out: _Out = None,
+    components: Annotated[
+        bool,
+        Parameter(
+            name="--components",
+            negative="",
+            help="Instead of a case: list all component types with ports, keys, equations and "
+            "sources.",
+        ),
+    ] = False,
     component: Components = None,
     wanted: Shown = SHOWN,
 ) -> int:
@@ -42,6 +51,15 @@ def show(
 
     Nothing is computed.
     """
+    if components:
+        return _list(case, out, component, wanted)
+    if case is None:
+        raise InputError(
+            "CASE",
+            got="nothing",
+            expected="the case of a valve, or --components",
+            hint="klack show demo-stroke",
+        )
     draw = _PICTURES[_ending(out)]
     require_file_target("--out", out)
 
@@ -58,6 +76,30 @@ def show(
         f"{len(network.components)} components, {len(network.nodes)} connections.\nPicture: {file}"
     )
     wanted.write(lambda: _numbers(checked, file))
+    return 0
+
+
+def _list(case: Path | None, out: Path | None, component: list[str] | None, wanted: Shown) -> int:
+    """List component types, those of the user last."""
+    for option, given in (("CASE", case), ("--out", out)):
+        if given is not None:
+            raise InputError(
+                f"{option} {given}",
+                got="it beside --components",
+                expected="one of the two",
+                hint="klack show --components",
+            )
+
+    from klack.network.catalogue import component_classes
+    from klack.network.described import described_type
+
+    types = [described_type(kind) for kind in component_classes()]
+    types += [described_type(kind, own=True) for kind in imported(component)]
+
+    from klack.cli.show_components import component_tables, components_json
+
+    wanted.show(component_tables(types))
+    wanted.write(lambda: components_json(types))
     return 0
 
 

@@ -4,14 +4,14 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from math import degrees, floor, log10
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
-from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 
 from klack.input.section import Section
 from klack.network.component import Component
+from klack.network.described import kind_of_field
 from klack.network.ranges import value_text
 from klack.units import Kind, format_si
 
@@ -80,7 +80,7 @@ def _lines(part: Component, key: str, info: FieldInfo, name: str) -> Iterator[st
     if key in ("step", "table") and isinstance(value, Section):
         yield from _course(value)
         return
-    text = _text(value, _kind(info))
+    text = _text(value, kind_of_field(info))
     if text == "yes":
         yield f"with {key.replace('_', ' ')}"
     elif text:
@@ -91,11 +91,11 @@ def _course(course: Section) -> Iterator[str]:
     """Step or table of a pressure or flow over time."""
     known = type(course).model_fields
     if {"to", "at"} <= known.keys():
-        to, at = (written(getattr(course, key), _kind(known[key])) for key in ("to", "at"))
+        to, at = (written(getattr(course, key), kind_of_field(known[key])) for key in ("to", "at"))
         yield f"step to {to} at {at}"
     for key, symbol in (("pressure", "p"), ("flow", "Q")):
         if key in known and "time" in known:
-            values, kind = getattr(course, key), _kind(known[key])
+            values, kind = getattr(course, key), kind_of_field(known[key])
             start = float(np.interp(0.0, getattr(course, "time"), values))  # noqa: B009
             yield f"{symbol}(0) {written(start, kind)}"
             yield f"{symbol}(t) {_text(values, kind)}"
@@ -166,20 +166,3 @@ _WRITTEN: Mapping[str, Callable[[float], str]] = {
     "m^3/s": lambda value: f"{6e4 * value:.4g} l/min",
 }
 """How values of units are written that have no usual prefixes of their own."""
-
-
-def _kind(info: FieldInfo) -> Kind | None:
-    """Kind of quantity that a field holds."""
-    return next(_kinds((*info.metadata, info.annotation)), None)
-
-
-def _kinds(places: Any) -> Iterator[Kind]:
-    for place in places:
-        if isinstance(place, BeforeValidator):
-            if isinstance(place.func, partial) and "kind" in place.func.keywords:
-                yield place.func.keywords["kind"]
-        elif metadata := getattr(place, "__metadata__", None):
-            yield from _kinds(metadata)
-            yield from _kinds(get_args(place)[:1])
-        else:
-            yield from _kinds(get_args(place))
