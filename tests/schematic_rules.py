@@ -204,6 +204,8 @@ def _wires_apart(drawn: Schematic) -> Iterator[str]:
     for index, ((a, b), (c, d)) in owned:
         if a != c and b != d:
             yield f"node {index} has a slanted line"
+    if not owned:
+        return
     nodes = np.array([index for index, _ in owned])
     touching = _touching([line for _, line in owned], [line for _, line in owned])
     for i, j in np.argwhere(touching & (nodes[:, None] < nodes)):

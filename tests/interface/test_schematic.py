@@ -57,6 +57,35 @@ def test_no_random_network_breaks_a_rule():
         assert not broken_rules(drawn(network), network), seed
 
 
+SMALL = {
+    "a mass alone": ({"mass": RigidMass(mass=1.0)}, []),
+    "a hole to nowhere": (
+        {"hole": Orifice(diameter=1e-3)},
+        [["hole.a", "ambient"], ["hole.b", "ambient"]],
+    ),
+    "no body": (
+        {
+            "supply": PressureSource(pressure=5e5),
+            "hole": Orifice(diameter=1e-3),
+            "volume": Chamber(volume=1e-7),
+            "outlet": Orifice(diameter=1e-3),
+        },
+        [
+            ["supply.fluid", "hole.a"],
+            ["hole.b", "volume.fluid", "outlet.a"],
+            ["outlet.b", "ambient"],
+        ],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", SMALL)
+def test_the_smallest_networks_break_no_rule(name):
+    network = Network(*SMALL[name], fluid=FLUID)
+
+    assert not broken_rules(drawn(network), network)
+
+
 @pytest.mark.slow
 def test_none_of_two_hundred_random_networks_breaks_a_rule():
     sizes = []

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from statistics import median_low
 
+from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.port import Role
 from klack.schematic.cells import STEP, Cell, PlannedPort, Side, cell_of, passage
@@ -93,17 +94,24 @@ def _column(
 def _by_role(network: Network, name: str, ports: Sequence[PlannedPort]) -> tuple[PlannedPort, ...]:
     """Ports from top to bottom: what is at the ground or in the upper part first."""
     part = network.components[name]
-    if part.type in ("solenoid", "force-map-solenoid"):
+    if _is_magnet(part):
         down = getattr(part, "closes", "upward") == "downward"
         return tuple(sorted(ports, key=lambda port: (port.name == "base") == down))
-    if part.type == "end-stop":
+    if _is_stop(part):
         return tuple(ports)
     if any(port.domain == "mechanical" and port.node is not None for port in ports):
         return tuple(sorted(ports, key=lambda port: port.node is not None or not port.mark))
     return tuple(ports)
 
 
-_KEPT = ("end-stop", "solenoid", "force-map-solenoid")
+def _is_stop(part: Component) -> bool:
+    """Whether it keeps an upper and a lower part asunder."""
+    kinds = part.port_kinds()
+    return all(name in kinds and kinds[name].domain == "mechanical" for name in ("upper", "lower"))
+
+
+def _is_magnet(part: Component) -> bool:
+    return {"armature", "base"} <= part.port_kinds().keys()
 
 
 def _ports_by_height(
@@ -121,7 +129,8 @@ def _ports_by_height(
     ranks = _stop_ranks(network)
     found = {}
     for name, planned in ports.items():
-        if network.components[name].type in _KEPT:
+        part = network.components[name]
+        if _is_stop(part) or _is_magnet(part):
             found[name] = tuple(planned)
             continue
 
@@ -145,7 +154,7 @@ def _stop_ranks(network: Network) -> dict[tuple[str, str], int]:
     ranks: dict[tuple[str, str], int] = {}
     for node in network.nodes:
         for joint in node.joints:
-            if network.components[joint.component].type == "end-stop":
+            if _is_stop(network.components[joint.component]):
                 rank = -1 if joint.name == "lower" else 1
                 for body in node.having(Role.MOTION):
                     ranks[body.component, body.name] = rank
@@ -159,7 +168,7 @@ def _from_above(network: Network, names: Sequence[str]) -> list[str]:
     for node in network.nodes:
         here = [joint.component for joint in node.joints if joint.component in names]
         for joint in node.joints:
-            if here and network.components[joint.component].type == "end-stop":
+            if here and _is_stop(network.components[joint.component]):
                 (upper if joint.name == "upper" else lower)[joint.component] = here[0]
     above: dict[str, set[str]] = {name: set() for name in names}
     for stop, body in lower.items():
