@@ -20,7 +20,7 @@ from klack.schematic.routing import crossings, runs_between
 
 __all__ = ["Column", "columns_of_cells"]
 
-_SWEEPS, _APART, _CROSSING = 8, 18.0, 60.0
+_SWEEPS, _PORT_ORDERS, _APART, _CROSSING = 8, 4, 18.0, 60.0
 
 
 @dataclass(slots=True)
@@ -54,14 +54,13 @@ def columns_of_cells(network: Network, plan: Plan) -> list[Column]:
     """Draw every component as a cell and place all cells."""
     numbers = sorted({*plan.columns.values(), *plan.homes.values()})
     ports = {name: _by_role(network, name, plan.ports[name]) for name in plan.ports}
-    columns: list[Column] = []
-    for again in (False, True):
+    found: list[list[Column]] = []
+    middle = numbers.index(0) if 0 in numbers else len(numbers) - 1
+    for _ in range(_PORT_ORDERS):
         columns = [_column(network, plan, ports, number) for number in numbers]
-        middle = numbers.index(0) if 0 in numbers else len(numbers) - 1
-        columns = _sort(columns, middle)
-        if not again:
-            ports = _ports_by_height(network, plan, ports, columns)
-    return columns
+        found.append(_sort(columns, middle))
+        ports = _ports_by_height(network, ports, found[-1])
+    return min(found[1:], key=_cost)  # the first one has the ports as the case lists them
 
 
 # --------------------------------------------------------------------------- cells of a column
@@ -116,7 +115,6 @@ def _is_magnet(part: Component) -> bool:
 
 def _ports_by_height(
     network: Network,
-    plan: Plan,
     ports: Mapping[str, Sequence[PlannedPort]],
     columns: Sequence[Column],
 ) -> dict[str, tuple[PlannedPort, ...]]:
