@@ -4,6 +4,8 @@ The widths are those of DejaVu Sans, the widest of the fonts that a viewer is to
 another one the text is narrower.
 """
 
+from functools import lru_cache
+
 __all__ = ["cut", "text_width"]
 
 _FIRST, _OTHER, _BOLD, _MOST = 32, 1.0, 1.16, 40
@@ -19,6 +21,7 @@ _ASCII = tuple(int(width) / 1000.0 for width in _WIDTHS.split())
 _NARROW = {"²": 0.44, "³": 0.44, "µ": 0.74, "°": 0.5, "·": 0.38, "Ω": 0.85, "…": 1.0}
 
 
+@lru_cache(maxsize=4096)
 def text_width(text: str, size: float, *, bold: bool = False) -> float:
     """Width [px] that a line of text takes at most.
 

@@ -7,7 +7,7 @@ one side are at different heights, those that meet head on were kept apart
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from klack.schematic.shapes import Point
 
@@ -28,21 +28,21 @@ class Run:
     node : int
     left, right : tuple of float
         Heights of its ports in the left and in the right column.
+    low, high : float
+        Upper and lower end of its trunk.
     """
 
     node: int
     left: tuple[float, ...]
     right: tuple[float, ...]
+    low: float = field(init=False)
+    high: float = field(init=False)
 
-    @property
-    def low(self) -> float:
-        """Upper end of the trunk."""
-        return min(*self.left, *self.right, *self.left[:1], *self.right[:1])
-
-    @property
-    def high(self) -> float:
-        """Lower end of the trunk."""
-        return max(*self.left, *self.right, *self.left[:1], *self.right[:1])
+    def __post_init__(self) -> None:
+        """Look up both ends of the trunk, which are asked for often."""
+        ends = (*self.left, *self.right)
+        object.__setattr__(self, "low", min(ends))
+        object.__setattr__(self, "high", max(ends))
 
     @property
     def is_straight(self) -> bool:
