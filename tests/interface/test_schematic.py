@@ -192,6 +192,15 @@ def test_a_type_without_a_symbol_is_a_dashed_box_with_its_word():
     assert "pilot (open: surroundings)" in texts
 
 
+def test_the_legend_explains_what_occurs():
+    plain = {label.text for label in drawn(injector()).labels}
+    strange = {label.text for label in drawn(random_network(9)).labels}
+
+    assert {"fluid: n-heptane, 20 °C", "motion and force", "ground"} <= plain
+    assert not {"voltage and current", "type without a symbol"} & plain
+    assert {"voltage and current", "surroundings: 1.0132 bar", "type without a symbol"} <= strange
+
+
 def test_bodies_stand_as_their_stops_say():
     parts = {
         "housing": RigidMass(mass=1.0),

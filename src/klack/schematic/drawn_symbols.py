@@ -51,11 +51,7 @@ _TWO_ENDED: Mapping[str, tuple[Stroke, ...]] = {
     "pump": _PUMP,
     "pulsating-flow": (*_PUMP, Stroke("M9,0 q2.5,-8 5,0 t5,0", "thin")),
     "force-over-stroke": (*_BOX, Stroke("M9,9 C16,8 16,-6 27,-8")),
-    "fmu": (
-        Stroke("M0,0 H6 M30,0 H36"),
-        Stroke("M6,-12 H30 V12 H6 Z", "unknown"),
-        Stroke("M12,-5 H24 V5 H12 Z M15,-5 V-8 M21,-5 V-8 M15,5 V8 M21,5 V8", "line"),
-    ),
+    "fmu": (*_BOX, Stroke("M12,-5 H24 V5 H12 Z M15,-5 V-8 M21,-5 V-8 M15,5 V8 M21,5 V8")),
     "orifice": (Stroke("M0,0 H36 M11,-11 Q18,-1 25,-11 M11,11 Q18,1 25,11"),),
     "line": (*_PIPE, Stroke("M6,0 q3,-5 6,0 t6,0 t6,0 t6,0", "thin")),
     "inertance": (
@@ -137,8 +133,10 @@ MARKS: Mapping[str, tuple[Stroke, ...]] = {
     ),
     "ambient": (Stroke("M-10,-5 V5 H0 V-5"), Stroke("M-5,0 H0", "thin")),
     "open": (Stroke(_circle(-4, 0, 4), "unknown"),),
+    "unknown": (Stroke("M-12,-6 h12 v12 h-12 Z", "unknown"),),
 }
-"""Ends of ports that lead to the ground, to the surroundings, or nowhere; they point left."""
+"""Ends of ports that lead to the ground, to the surroundings, or nowhere, pointing left; and a type
+without a symbol, for the legend."""
 
 
 def two_ended_strokes(part: Component) -> tuple[Stroke, ...] | None:

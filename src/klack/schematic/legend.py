@@ -22,6 +22,7 @@ _MARKED = (
     ("ground", "ground"),
     ("ambient", "surroundings"),
     ("open", "port in no connection"),
+    ("unknown", "type without a symbol"),
 )
 _NOTE = "(0): at the start"
 
@@ -43,6 +44,8 @@ def with_legend(drawn: Schematic, network: Network, title: str = "") -> Schemati
     x, y = _MARGIN, dy + drawn.box.height + 2 * _ROW
     domains = {lead.domain for lead in drawn.leads}
     marks = {symbol.strokes for symbol in drawn.symbols}
+    if any(symbol.component and symbol.strokes[0].ink == "unknown" for symbol in drawn.symbols):
+        marks.add(MARKS["unknown"])
     outside = {"ambient": f": {value_text(network.ambient.pressure, 'Pa')}"}
     entries: list[tuple[Domain | None, str, str]] = [
         (domain, "", text + _of_fluid(network) * (domain == "hydraulic"))
