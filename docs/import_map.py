@@ -57,7 +57,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("transient", "acoustics", "measurement", "studies"),
     # from a case to results
     ("case", "report"),
-    ("assembling", "terminal"),
+    ("assembling", "terminal", "schematic"),
     ("analyses",),
     ("exchange",),
     ("verification", "api", "warming"),

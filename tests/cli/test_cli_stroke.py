@@ -184,6 +184,7 @@ def test_the_report_of_a_stroke_is_written_again(run, capsys):
     assert "Report in r: report.html, report.pdf" in capsys.readouterr().out
     page = Path("r/report.html").read_text(encoding="utf-8")
     assert "A small valve of rigid parts" in page
+    assert "<h2>Schematic</h2>" in page
     assert Path("r/report.pdf").read_bytes().startswith(b"%PDF")
 
 

@@ -315,6 +315,13 @@ def test_every_chart_is_one_that_plotly_accepts(study: StrokeStudy, page: str):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("given", ["", "<svg xmlns='http://www.w3.org/2000/svg'/>"])
+def test_the_schematic_is_shown_if_the_result_has_one(study: StrokeStudy, given: str):
+    titles = [section.title for section in stroke_content(replace(study, schematic=given)).sections]
+
+    assert ("Schematic" in titles) is bool(given)
+
+
 def test_the_paper_has_pages(study: StrokeStudy):
     pdf = render_pdf(stroke_content(replace(study, title=HOSTILE)))
 

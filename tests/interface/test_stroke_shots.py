@@ -250,6 +250,7 @@ def test_an_interrupted_study_goes_on_with_the_same_numbers(tmp_path, alone):
     study = run_stroke_shots(CASE, workers=1, folder=tmp_path, threads=1)
 
     assert study.resumed == 2
+    assert study.schematic.startswith("<svg")
     shots = study.variants["dry"]
     same(shots.strokes, alone[1:], lambda outcome: outcome.stroke)
     same(shots.centric, alone[:1], lambda outcome: outcome.stroke)

@@ -19,9 +19,11 @@ from klack.analyses.measures import described
 
 __all__ = [
     "CacheJson",
+    "ComponentsJson",
     "ExportJson",
     "InspectionJson",
     "ReportJson",
+    "ShowJson",
     "VerificationJson",
     "WarmJson",
     "measures_catalogue",
@@ -100,6 +102,59 @@ class InspectionJson(TypedDict):
     ]
 
 
+class ShownNodeJson(TypedDict):
+    """One connection of a network."""
+
+    domain: str
+    ports: Annotated[list[str], Field(description="As component.port.")]
+    fixed: Annotated[str | None, Field(description="ground or ambient, if it is that.")]
+
+
+class ShowJson(TypedDict):
+    """``klack show``."""
+
+    schema: Literal["klack-show/1"]
+    case: str
+    file: str
+    components: Annotated[dict[str, str], Field(description="Type by name.")]
+    nodes: list[ShownNodeJson]
+
+
+class ComponentPortJson(TypedDict):
+    """Port of a component type."""
+
+    domain: str
+    optional: bool
+
+
+class ComponentKeyJson(TypedDict):
+    """Key of a component type."""
+
+    unit: Annotated[str, Field(description="SI; empty for words and whole numbers.")]
+    required: bool
+    meaning: str
+
+
+class ComponentTypeJson(TypedDict):
+    """A component type."""
+
+    summary: str
+    ports: Annotated[
+        dict[str, ComponentPortJson],
+        Field(description="Empty for a body, whose ports are its points."),
+    ]
+    keys: dict[str, ComponentKeyJson]
+    equation: Annotated[str, Field(description="LaTeX; empty if there is none.")]
+    source: Annotated[str, Field(description="Empty for a definition.")]
+
+
+class ComponentsJson(TypedDict):
+    """``klack show --components``."""
+
+    schema: Literal["klack-show-components/1"]
+    types: Annotated[dict[str, ComponentTypeJson], Field(description="By type.")]
+
+
 class ReportJson(TypedDict):
     """``klack report``."""
 
@@ -120,7 +175,16 @@ class ExportJson(TypedDict):
     files: Annotated[list[str], Field(description="Names of the files and folders written.")]
 
 
-_OTHERS = (InspectionJson, ReportJson, ExportJson, VerificationJson, CacheJson, WarmJson)
+_OTHERS = (
+    InspectionJson,
+    ShowJson,
+    ComponentsJson,
+    ReportJson,
+    ExportJson,
+    VerificationJson,
+    CacheJson,
+    WarmJson,
+)
 
 
 def measures_catalogue() -> dict[str, Any]:

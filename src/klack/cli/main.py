@@ -26,7 +26,7 @@ from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from klack import __version__
 from klack.analyses.catalogue import commands
-from klack.cli import cache, compare, demo, export, inspect, report, schema, verify, warm
+from klack.cli import cache, compare, demo, export, inspect, report, schema, show, verify, warm
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
@@ -60,6 +60,7 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     demo.demo: "klack demo",
     **commands(),
     inspect.inspect: "klack inspect needle.step",
+    show.show: "klack show demo-stroke --out valve.svg",
     report.report: "klack report klack-results/demo-stroke --out report",
     export.export: "klack export demo-valve-axisymmetric --to mat --out models",
     compare.compare: "klack compare klack-results/demo-stroke --measurement wet=strokes.csv",

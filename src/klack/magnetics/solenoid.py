@@ -63,6 +63,7 @@ class Solenoid(Component):
     Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes)
     is a matter of a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as
     :mod:`klack.magnetics.lifting_magnet` shows; no hysteresis.
+    Sources: Woodson & Melcher 1968; Roters 1941; Stoll 1974 (eddy currents).
     """
 
     type: ClassVar[str] = "solenoid"

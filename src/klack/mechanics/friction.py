@@ -27,6 +27,7 @@ class GuideFriction(Component):
 
     Limits: no displacement while it sticks (pre-sliding), and no friction that grows with the time
     at rest.
+    Source: Stribeck 1902.
     """
 
     type: ClassVar[str] = "guide-friction"

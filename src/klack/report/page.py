@@ -46,12 +46,17 @@ class Sound:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Section:
-    """A heading with what belongs under it: text, sounds, picture, charts, tables."""
+    """A heading with what belongs under it: text, sounds, picture, charts, tables.
+
+    A ``wide`` picture keeps its size on the screen, and has a page of its own on paper, which lies
+    on its side if the picture is wider than high.
+    """
 
     title: str
     paragraphs: tuple[str, ...] = ()
     sounds: tuple[Sound, ...] = ()
     picture: Picture | None = None
+    wide: bool = False
     charts: tuple[AnyChart, ...] = ()
     tables: tuple[Table, ...] = ()
 

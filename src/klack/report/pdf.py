@@ -9,6 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
+from xml.etree import ElementTree
 
 import matplotlib
 import typst
@@ -72,9 +73,18 @@ def _section(section: Section, name: str, work: Path) -> dict[str, Any]:
     for i, chart in enumerate(section.charts):
         figures.append({"title": chart.title, "note": chart.note, "image": f"{name}-{i}.svg"})
         (work / figures[-1]["image"]).write_bytes(svg_chart(chart))
+    wide = section.picture if section.wide else None
     return {
         "title": section.title,
         "paragraphs": [*section.paragraphs, *(f"{s.title}. {s.note}" for s in section.sounds)],
         "figures": figures,
+        "wide": wide is not None,
+        "lying": wide is not None and _lies(wide.image),
         "tables": [asdict(table) for table in section.tables],
     }
+
+
+def _lies(image: bytes) -> bool:
+    """Whether an SVG is wider than high, by its view box."""
+    box = ElementTree.fromstring(image).get("viewBox", "0 0 1 1").split()
+    return float(box[2]) > float(box[3])

@@ -8,6 +8,7 @@ import numpy as np
 from klack.analyses.impact.content import body_table, size_verdict
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
+from klack.analyses.schematic_section import schematic_section
 from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
 from klack.analyses.stroke.axis_place import acts_across, axis_place, moves_in_space
 from klack.analyses.stroke.figures import (
@@ -69,6 +70,7 @@ def stroke_content(study: StrokeStudy) -> Content:
             charts=_named(energy_bars(study), mechanical_energy_bars(study)),
             tables=(_energy_table(study),),
         ),
+        schematic_section(study.schematic),
         _computed(study),
         Section(
             title="Local laws of the stops",

@@ -265,6 +265,8 @@ class StrokeStudy(CaseRecord):
     lines : tuple of LineSummary
     structures : tuple of Structure
         Held bodies as sources of sound, their stops by the names of the end stops.
+    schematic : str
+        Picture of the network (SVG); empty in older results.
     """
 
     needle: str
@@ -279,6 +281,7 @@ class StrokeStudy(CaseRecord):
     fluid: FluidSummary | None = None
     lines: tuple[LineSummary, ...] = ()
     structures: tuple[Structure, ...] = ()
+    schematic: str = ""
 
     @property
     def reference(self) -> StrokeVariant:

@@ -37,6 +37,7 @@ from klack.network.port import Role
 from klack.network.rows import Rows
 from klack.network.travel import Travel
 from klack.progress import Progress, silent
+from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
 from klack.simulation.spatial_motion import SpatialMotion
@@ -116,6 +117,7 @@ def run_stroke(
         bodies=body_summaries(valve),
         stops=stops,
         warnings=(*missing, *notes, *begun, *(note for note in told if note)),
+        schematic=schematic_svg(case.network.network()),
     )
     if failure is not None:
         raise IncompleteStrokeError(str(failure), study) from failure
@@ -169,6 +171,7 @@ def stroke_study(
     bodies: tuple[BodySummary, ...],
     stops: tuple[StopSummary, ...],
     warnings: tuple[str, ...] = (),
+    schematic: str = "",
 ) -> StrokeStudy:
     """Record of variants that were computed.
 
@@ -183,6 +186,8 @@ def stroke_study(
     bodies : tuple of BodySummary
     stops : tuple of StopSummary
     warnings : tuple of str
+    schematic : str
+        Picture of the network (SVG).
     """
     case = valve.case
     rows = [run.rows for run in runs.values()]
@@ -202,6 +207,7 @@ def stroke_study(
         fluid=_fluid_summary(rows),
         lines=_line_summaries(valve.network, rows),
         structures=valve.structures,
+        schematic=schematic,
         warnings=warnings,
     )
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from klack.analyses.measures import Measure
 from klack.analyses.page import page_of
+from klack.analyses.schematic_section import schematic_section
 from klack.analyses.stroke_shots.figures import lift_chart, rebound_chart
 from klack.analyses.stroke_shots.highest import highest_rebound
 from klack.analyses.stroke_shots.measures import AT_TOUCH, COMPARED, RESULTS, Row
@@ -57,6 +58,7 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
             tables=tuple(_correlations(name, v) for name, v in study.variants.items()),
         ),
         Section(title="Lift", charts=(lift_chart(study),)),
+        schematic_section(study.schematic),
         _drawn(study),
         Section(
             title="All strokes",

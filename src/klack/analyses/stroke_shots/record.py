@@ -189,6 +189,8 @@ class StrokeShotsStudy(CaseRecord):
     points : mapping of str to int
         Contact points of each stop.
     variants : mapping of str to VariantShots
+    schematic : str
+        Picture of the network (SVG); empty in older results.
     """
 
     seed: int
@@ -206,6 +208,7 @@ class StrokeShotsStudy(CaseRecord):
     mass: float
     points: Mapping[str, int]
     variants: Mapping[str, VariantShots]
+    schematic: str = ""
 
     @property
     def count(self) -> int:

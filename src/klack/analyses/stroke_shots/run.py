@@ -31,6 +31,7 @@ from klack.case.variants import Variant
 from klack.cores import available_cores
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.progress import Progress, silent
+from klack.schematic.picture import schematic_svg
 from klack.stages import StageClock, collected_warnings
 from klack.transient.spatial_run import SpatialValve
 from klack.units import format_si
@@ -117,6 +118,7 @@ def run_stroke_shots(
         mass=next(body.mass for body in setup.bodies if body.name == _body(case, roles)),
         points={name: b - a for name, a, b in setup.spatial.model.contacts},
         variants=found,
+        schematic=schematic_svg(case.network.network()),
         warnings=tuple(
             dict.fromkeys([*notes, *missing_notes(found), *_doubts(wanted, count, log)])
         ),

@@ -1,0 +1,1 @@
+"""Schematics of valve networks: symbols, their placement, wires, and the picture as SVG."""

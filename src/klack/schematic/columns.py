@@ -1,0 +1,177 @@
+"""Columns of a schematic: bodies in the middle, hydraulics to their left, magnets to their right.
+
+The middle column 0 has the bodies, column 1 what pushes them without fluid, column 2 drivers of
+coils.  Column -1 has what joins fluid and bodies: seats, gaps, faces under pressure.  Further left
+the hydraulics follow in steps of one node: column -2 has the chambers that column -1 meets, -3 the
+restrictions and lines to those chambers, and so on, so that the sources come to the far left.  A
+wire then leads from one column to the next, and seldom through one.
+"""
+
+from collections import deque
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from klack.network.network import Network
+from klack.network.nodes import Joint, Node
+from klack.network.port import Role
+from klack.schematic.cells import PlannedPort, Side
+from klack.schematic.shapes import Domain
+
+__all__ = ["Plan", "plan_of"]
+
+_RULERS = (Role.MOTION, Role.COMPLIANCE, Role.PRESSURE, Role.VOLTAGE)
+_BODIES, _PUSHING, _DRIVING = 0, 1, 2
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """Where everything of a network goes, before it has a size.
+
+    Parameters
+    ----------
+    columns : mapping of str to int
+        Of every component.
+    ports : mapping of str to tuple of PlannedPort
+        Of every component, in the order of its class.
+    nodes : mapping of int to Node
+        Those that are drawn as wires.
+    homes : mapping of int to int
+        Column of the component that rules a node, to which its wires lead.
+    """
+
+    columns: Mapping[str, int]
+    ports: Mapping[str, tuple[PlannedPort, ...]]
+    nodes: Mapping[int, Node]
+    homes: Mapping[int, int]
+
+
+def plan_of(network: Network) -> Plan:
+    """Give every component a column, and every port the sides on which it is joined."""
+    nodes = {node.index: node for node in network.nodes if not node.word}
+    words = {str(joint): node.word for node in network.nodes for joint in node.joints if node.word}
+    at = {str(joint): index for index, node in nodes.items() for joint in node.joints}
+    columns, homes = _columns(network, nodes)
+    rulers = {index: _ruler(node) for index, node in nodes.items()}
+    ends: dict[int, set[int]] = {
+        index: {columns[joint.component] for joint in node.joints if joint is not rulers[index]}
+        for index, node in nodes.items()
+    }
+    ports = {}
+    for name, part in network.components.items():
+        planned = []
+        for port, kind in part.port_kinds().items():
+            joint, column = f"{name}.{port}", columns[name]
+            domain: Domain = kind.domain  # type: ignore[assignment]
+            if joint not in at:
+                side: Side = "left" if column in (_BODIES, _PUSHING) or column < -1 else "right"
+                if kind.domain == "hydraulic":
+                    side = "left"
+                mark = words.get(joint, "open")
+                planned.append(PlannedPort(port, domain, (side,), None, mark))
+                continue
+            node = at[joint]
+            ruler = rulers[node]
+            sides: tuple[Side, ...]
+            if ruler is not None and str(ruler) == joint:
+                sides = _sides(column, ends[node])
+            else:
+                sides = ("right",) if homes[node] > column else ("left",)
+            planned.append(PlannedPort(port, domain, sides, node))
+        ports[name] = tuple(planned)
+    return Plan(columns, ports, nodes, homes)
+
+
+def _sides(column: int, ends: Iterable[int]) -> tuple[Side, ...]:
+    """Sides on which a ruler meets the others; left as well for those of its own column."""
+    ends = tuple(ends)
+    found: list[Side] = []
+    if any(end < column for end in ends) or not ends:
+        found.append("left")
+    if any(end > column for end in ends):
+        found.append("right")
+    if any(end == column for end in ends) and "left" not in found:
+        found.append("left")
+    return tuple(found)
+
+
+def _ruler(node: Node) -> Joint | None:
+    """The port that the node is about: of a body, volume, source or driver."""
+    for role in _RULERS:
+        if found := node.having(role):
+            return found[0]
+    return None
+
+
+def _columns(network: Network, nodes: Mapping[int, Node]) -> tuple[dict[str, int], dict[int, int]]:
+    columns: dict[str, int] = {}
+    fluid: list[str] = []
+    for name, part in network.components.items():
+        kinds = part.port_kinds().values()
+        domains = {kind.domain for kind in kinds}
+        if any(kind.role is Role.MOTION for kind in kinds):
+            columns[name] = _BODIES
+        elif "hydraulic" in domains and len(domains) > 1:
+            columns[name] = -1
+        elif "hydraulic" in domains:
+            fluid.append(name)
+        else:
+            columns[name] = _DRIVING if domains == {"electric"} else _PUSHING
+    homes = {}
+    for index, node in nodes.items():
+        if node.domain != "hydraulic":
+            ruler = _ruler(node)
+            rest = max(columns[joint.component] for joint in node.joints)
+            homes[index] = rest + 1 if ruler is None else columns[ruler.component]
+    _spread(fluid, nodes, columns, homes)
+    return columns, homes
+
+
+def _spread(
+    fluid: Iterable[str],
+    nodes: Mapping[int, Node],
+    columns: dict[str, int],
+    homes: dict[int, int],
+) -> None:
+    """Step from the bodies through the hydraulics; adds their columns and those of their nodes."""
+    wet = {index: node for index, node in nodes.items() if node.domain == "hydraulic"}
+    meets: dict[str, list[int]] = {}
+    for index, node in wet.items():
+        for joint in node.joints:
+            meets.setdefault(joint.component, []).append(index)
+    todo: deque[int] = deque()
+
+    def reach(index: int, column: int) -> None:
+        if index not in homes:
+            homes[index] = column
+            todo.append(index)
+
+    for name, column in list(columns.items()):
+        for index in meets.get(name, ()):
+            reach(index, min(column, -1) - 1)
+    left = [index for index in wet if index not in homes]
+    while todo or left:
+        if not todo:  # a part of the hydraulics that meets no body
+            reach(_far_end(left[0], wet, meets), -2)
+        index = todo.popleft()
+        ruler = _ruler(wet[index])
+        for joint in wet[index].joints:
+            if joint.component not in columns:
+                columns[joint.component] = homes[index] - (joint is not ruler)
+                for other in meets[joint.component]:
+                    reach(other, homes[index] - 2)
+        left = [index for index in left if index not in homes]
+    for name in fluid:
+        columns.setdefault(name, -2)
+
+
+def _far_end(start: int, wet: Mapping[int, Node], meets: Mapping[str, list[int]]) -> int:
+    """The node farthest from a node."""
+    seen, todo = {start: 0}, deque([start])
+    while todo:
+        index = todo.popleft()
+        for joint in wet[index].joints:
+            for other in meets[joint.component]:
+                if other not in seen:
+                    seen[other] = seen[index] + 1
+                    todo.append(other)
+    return max(seen, key=lambda index: seen[index])

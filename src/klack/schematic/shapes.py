@@ -1,0 +1,132 @@
+"""What a schematic consists of, in px: boxes, labels, symbols made of strokes, wires."""
+
+from dataclasses import dataclass, replace
+from typing import Literal, Self
+
+from klack.schematic.lettering import text_width
+
+__all__ = ["Box", "Domain", "Label", "Lead", "Point", "Stroke", "Symbol", "Wire", "bounds"]
+
+Domain = Literal["hydraulic", "mechanical", "electric"]
+Point = tuple[float, float]
+Ink = Literal["line", "thin", "heavy", "solid", "fluid", "metal", "paper", "unknown"]
+_ASCENT, _DESCENT = 0.8, 0.25  # of the size: letters above and below their line
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Upright rectangle; y points down."""
+
+    x: float
+    y: float
+    width: float
+    height: float
+
+    def meets(self, other: "Box", gap: float = 0.0) -> bool:
+        """Whether both have a common area, or are closer than ``gap``."""
+        return (
+            self.x < other.x + other.width + gap
+            and other.x < self.x + self.width + gap
+            and self.y < other.y + other.height + gap
+            and other.y < self.y + self.height + gap
+        )
+
+    def moved(self, dx: float, dy: float) -> "Box":
+        """The same box at another place."""
+        return Box(self.x + dx, self.y + dy, self.width, self.height)
+
+
+def bounds(boxes: "list[Box]") -> Box:
+    """Smallest box round all of them."""
+    left, top = min(box.x for box in boxes), min(box.y for box in boxes)
+    right = max(box.x + box.width for box in boxes)
+    bottom = max(box.y + box.height for box in boxes)
+    return Box(left, top, right - left, bottom - top)
+
+
+@dataclass(frozen=True, slots=True)
+class Label:
+    """One line of text; ``y`` is the line that the letters stand on."""
+
+    text: str
+    x: float
+    y: float
+    size: float
+    anchor: Literal["start", "middle", "end"] = "start"
+    bold: bool = False
+    soft: bool = False
+
+    @property
+    def box(self) -> Box:
+        """Space that it takes at most."""
+        width = text_width(self.text, self.size, bold=self.bold)
+        shift = {"start": 0.0, "middle": 0.5, "end": 1.0}[self.anchor]
+        top = self.y - _ASCENT * self.size
+        return Box(self.x - shift * width, top, width, (_ASCENT + _DESCENT) * self.size)
+
+    def moved(self, dx: float, dy: float) -> Self:
+        """The same label at another place."""
+        return replace(self, x=self.x + dx, y=self.y + dy)
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """SVG path data, in the coordinates of its symbol."""
+
+    path: str
+    ink: Ink = "line"
+
+
+@dataclass(frozen=True, slots=True)
+class Symbol:
+    """Strokes round an origin, turned clockwise by ``turn`` degrees, and the box that they fill."""
+
+    strokes: tuple[Stroke, ...]
+    x: float
+    y: float
+    box: Box
+    turn: int = 0
+    component: str = ""
+
+    def moved(self, dx: float, dy: float) -> Self:
+        """The same symbol at another place."""
+        return replace(self, x=self.x + dx, y=self.y + dy, box=self.box.moved(dx, dy))
+
+
+@dataclass(frozen=True, slots=True)
+class Lead:
+    """Line from a port, ``component.port``, at the edge of a cell to its symbol.
+
+    ``node`` is None at a port that no wire leads to.
+    """
+
+    domain: Domain
+    points: tuple[Point, ...]
+    port: str
+    node: int | None = None
+
+    def moved(self, dx: float, dy: float) -> Self:
+        """The same lead at another place."""
+        return replace(self, points=tuple((x + dx, y + dy) for x, y in self.points))
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """Lines of one node of the network, all upright or level, and the points where they branch.
+
+    ``joints`` are the ports that it joins, as ``component.port``.
+    """
+
+    node: int
+    domain: Domain
+    lines: tuple[tuple[Point, Point], ...]
+    branches: tuple[Point, ...]
+    joints: tuple[str, ...]
+
+    def moved(self, dx: float, dy: float) -> Self:
+        """The same wire at another place."""
+        return replace(
+            self,
+            lines=tuple(((a + dx, b + dy), (c + dx, d + dy)) for (a, b), (c, d) in self.lines),
+            branches=tuple((a + dx, b + dy) for a, b in self.branches),
+        )

@@ -1,0 +1,163 @@
+"""``klack show``: truth = the network of the case, and the exit codes and files it promises."""
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from json_schema_check import require_documented
+
+from klack.case.valve_reader import load_valve_case
+from klack.cli.main import main
+from klack.network.catalogue import type_words
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+VALVE = HOW_TO / "small_valve.yaml"
+
+
+@pytest.fixture(autouse=True)
+def _elsewhere(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+
+def components_in(file: Path) -> list[str]:
+    root = ElementTree.parse(file).getroot()
+    return sorted(item.get("data-name") for item in root.iter() if item.get("data-name"))
+
+
+def test_it_draws_a_case_into_the_current_folder(tmp_path, capsys):
+    assert main(["show", str(VALVE)]) == 0
+
+    said = capsys.readouterr()
+    network = load_valve_case(VALVE).network.network()
+    assert [path.name for path in tmp_path.iterdir()] == ["small_valve.svg"]
+    assert components_in(tmp_path / "small_valve.svg") == sorted(network.components)
+    assert said.out.split() == "8 components, 6 connections. Picture: small_valve.svg".split()
+    assert said.err == ""
+
+
+def test_a_shipped_case_and_a_file_of_any_name(tmp_path, capsys):
+    assert main(["show", "stairs", "--out", "Valve.SVG", "-q"]) == 0
+
+    assert [path.name for path in tmp_path.iterdir()] == ["Valve.SVG"]
+    assert capsys.readouterr().out == ""
+
+
+def test_its_json_has_every_connection(capsys):
+    assert main(["show", str(VALVE), "--json", "-"]) == 0
+
+    found = json.loads(capsys.readouterr().out)
+    require_documented(found)
+    assert found["components"]["spring"] == "spring"
+    assert {"domain": "hydraulic", "ports": ["bores.b"], "fixed": "ambient"} in found["nodes"]
+    assert len(found["nodes"]) == 6
+
+
+def test_a_picture_is_replaced_by_the_new_one(tmp_path):
+    file = tmp_path / "valve.svg"
+    file.write_text("an older one")
+
+    assert main(["show", str(VALVE), "--out", str(file)]) == 0
+
+    assert components_in(file)
+
+
+def test_a_file_that_cannot_be_written_is_one_error_and_no_file(tmp_path, capsys, monkeypatch):
+    def full(*_: object, **__: object) -> int:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+
+    assert main(["show", str(VALVE), "--out", "valve.svg"]) == 2
+
+    assert "No space left" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["demo-valve"], "a case of an impact, expected a case of a whole valve"),
+        (["missing.yaml"], "neither a file nor a shipped case"),
+        ([str(VALVE), "--out", "valve.png"], "the ending '.png', expected .svg"),
+        ([str(VALVE), "--out", "valve"], "a name without an ending, expected .svg"),
+        ([str(VALVE), "--out", "nowhere/valve.svg"], "a folder that does not exist"),
+        ([str(VALVE), "--out", "folder.svg"], "a folder, expected the name of a file"),
+        ([], "CASE: got nothing, expected the case of a valve, or --components"),
+        ([str(VALVE), "--components"], "it beside --components"),
+        (["--components", "--out", "valve.svg"], "it beside --components"),
+    ],
+)
+def test_bad_input_is_one_error_and_no_file(words, said, tmp_path, capsys):
+    (tmp_path / "folder.svg").mkdir()
+
+    assert main(["show", *words]) == 2
+
+    shown = capsys.readouterr()
+    assert said in shown.err
+    assert shown.err.startswith("klack show: ")
+    assert shown.err.count("Try: ") == 1
+    assert shown.out == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["folder.svg"]
+
+
+def test_a_wrong_connection_is_the_error_of_the_reader(tmp_path, capsys):
+    case = tmp_path / "case.yaml"
+    case.write_text(VALVE.read_text().replace("[seat.lower, ground]", "[seat.lowest, ground]"))
+
+    assert main(["show", str(case)]) == 2
+
+    assert "'seat' has no port 'lowest'" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["case.yaml"]
+
+
+def test_an_own_component_is_drawn_where_it_is_let_in(tmp_path, capsys, monkeypatch):
+    monkeypatch.syspath_prepend(HOW_TO)
+    case = tmp_path / "case.yaml"
+    brake = '    brake: {type: "eddy_brake:EddyBrake", damping: 2 N*s/m, critical_speed: 0.5 m/s}\n'
+    text = VALVE.read_text().replace("  connections:\n", f"{brake}  connections:\n")
+    case.write_text(text.replace("[needle.top, ", "[needle.top, brake.disc, "))
+
+    assert main(["show", str(case)]) == 2
+    assert "--component eddy_brake:EddyBrake" in capsys.readouterr().err
+    assert main(["show", str(case), "--component", "eddy_brake:EddyBrake"]) == 0
+
+    picture = (tmp_path / f"{load_name(tmp_path)}.svg").read_text(encoding="utf-8")
+    assert "own: eddy-brake" in picture
+    assert "damping 2 N·s/m" in picture
+
+
+def load_name(folder: Path) -> str:
+    (picture,) = folder.glob("*.svg")
+    return picture.stem
+
+
+def test_it_lists_every_component_type(tmp_path, capsys):
+    assert main(["show", "--components", "--json", "types.json"]) == 0
+
+    said = capsys.readouterr().out
+    found = json.loads((tmp_path / "types.json").read_text(encoding="utf-8"))
+    require_documented(found)
+    assert list(found["types"]) == list(type_words())
+    assert all(f" {word} " in said for word in type_words())
+    spring = found["types"]["spring"]
+    assert spring["ports"]["base"] == {"domain": "mechanical", "optional": True}
+    assert spring["keys"]["stiffness"]["unit"] == "N/m"
+    assert spring["keys"]["stiffness"]["required"]
+    assert not spring["keys"]["damping"]["required"]
+    assert found["types"]["chamber"]["source"] == "Merritt 1967, sec. 3-8"
+    assert found["types"]["orifice"]["source"] == "Nurick 1976; Sampson 1891; Wuest 1954"
+    assert found["types"]["gravity"]["equation"] == r"F = -m g \cos\vartheta"
+    assert "F = -m g cos θ" in said
+    assert not [path for path in tmp_path.iterdir() if path.suffix == ".svg"]
+
+
+def test_an_own_type_is_listed_last(capsys, monkeypatch):
+    monkeypatch.syspath_prepend(HOW_TO)
+    words = ["--components", "--component", "eddy_brake:EddyBrake", "--json", "-"]
+
+    assert main(["show", *words]) == 0
+
+    *_, (word, last) = json.loads(capsys.readouterr().out)["types"].items()
+    assert word == "eddy_brake:EddyBrake"
+    assert set(last["keys"]) == {"damping", "critical_speed"}
