@@ -38,6 +38,12 @@ COMPONENTS = (
     ("annulus", "klack.hydraulics.annulus.Annulus"),
     ("inertance", "klack.hydraulics.inertance.Inertance"),
     ("line", "klack.hydraulics.line.Line"),
+    ("check-valve", "klack.hydraulics.check_valve.CheckValve"),
+    ("relief-valve", "klack.hydraulics.relief_valve.ReliefValve"),
+    ("accumulator", "klack.hydraulics.accumulator.Accumulator"),
+    ("variable-orifice", "klack.hydraulics.variable_orifice.VariableOrifice"),
+    ("pump", "klack.hydraulics.pump.Pump"),
+    ("pulsating-flow", "klack.hydraulics.pulsating_flow.PulsatingFlow"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),
