@@ -10,10 +10,12 @@ from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_loss import PressureLoss
 from klack.hydraulics.pulsating_flow import PulsatingFlow
 from klack.hydraulics.pump import Pump
 from klack.hydraulics.relief_valve import ReliefValve
 from klack.hydraulics.seat import Seat
+from klack.hydraulics.spool_edge import SpoolEdge
 from klack.hydraulics.variable_orifice import VariableOrifice
 from klack.network.rows import Ambient, Rows
 from klack.network.step_function import evaluate
@@ -41,11 +43,15 @@ PARTS = {
         time_constant=1e-6,
         leak_area=1e-9,
     ),
+    "spool edge": SpoolEdge(
+        diameter=4e-3, radial_clearance=3e-6, overlap=20e-6, direction="closing", flow_force={}
+    ),
+    "pressure loss": PressureLoss(diameter=1e-3, coefficient=0.3, reverse_coefficient=2.0),
     "variable orifice": VariableOrifice(lift=[0.0, 40e-6], area=[1e-8, 1e-6]),
     "pump of pistons": Pump(displacement=1e-6, speed=20.0, pistons=7),
     "pulsation": PulsatingFlow(mean=3e-6, harmonics=[{"frequency": 1e3, "amplitude": 1e-6}]),
 }
-HANDLES = {"a": 1, "b": 2, "needle": 0, "body": 1}
+HANDLES = {"a": 1, "b": 2, "needle": 0, "spool": 0, "body": 1}
 
 
 def balance(part, fluid, rng, count=300):

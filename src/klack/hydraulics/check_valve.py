@@ -26,11 +26,11 @@ def check_valve_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """
     p_a, p_b = inp[2], inp[3]
     s, slope = ramp(p_a - p_b, par[4], par[5])
-    area = par[6] + par[7] * s * s * (3.0 - 2.0 * s)
+    area = par[6] + par[7] * s
     flow, by_a, by_b, by_area = opening_flow(
         p_a, p_b, inp[4], inp[5], area, par[0], par[1], par[2], par[3]
     )
-    more = by_area * par[7] * 6.0 * s * (1.0 - s) * slope  # zero unless the flow runs forward
+    more = by_area * par[7] * slope  # zero unless the flow runs forward
     out[0], out[1], out[2] = flow, by_a + more, by_b - more
     out[3] = area
     return 0
@@ -39,13 +39,14 @@ def check_valve_step(par: Any, state: Any, inp: Any, out: Any) -> int:
 class CheckValve(OpeningComponent):
     r"""Valve that lets the fluid pass from a to b only; its poppet has no mass.
 
-    .. math:: A = A_l + (A_1 - A_l)\,s^2(3 - 2s), \qquad
+    .. math:: A = A_l + (A_1 - A_l)\,s, \qquad
               s = \frac{(p_a - p_b) - p_c}{p_1 - p_c}\ \text{within}\ 0 \dots 1
 
     with the flow of an orifice of that area.  The spring holds the poppet shut up to the cracking
-    pressure ``p_c``; from ``p_1`` on it is fully open.  The cubic gives the law a continuous slope
-    (a straight spring has the corner at ``p_c`` that implicit solvers stumble over).  Flow and
-    pressure drop always have the same sign, so the valve only dissipates.
+    pressure ``p_c`` and lets it lift in proportion beyond; from ``p_1`` on it is fully open.  Flow
+    and pressure drop always have the same sign, so the valve only dissipates.  The area is
+    straight, not rounded where it begins: rounded, the flow would have a double zero there, which
+    no static equilibrium of a closed volume behind the valve is found from.
 
     Limits: no inertia of the poppet, no impact and no chatter; for these take a ``rigid-mass`` with
     ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.  Pressures of the spring are

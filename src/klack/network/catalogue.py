@@ -44,6 +44,8 @@ COMPONENTS = (
     ("variable-orifice", "klack.hydraulics.variable_orifice.VariableOrifice"),
     ("pump", "klack.hydraulics.pump.Pump"),
     ("pulsating-flow", "klack.hydraulics.pulsating_flow.PulsatingFlow"),
+    ("spool-edge", "klack.hydraulics.spool_edge.SpoolEdge"),
+    ("pressure-loss", "klack.hydraulics.pressure_loss.PressureLoss"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),

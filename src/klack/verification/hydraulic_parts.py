@@ -1,11 +1,9 @@
 """Valves by characteristic, accumulators, pumps: closed formulas, and networks written apart."""
 
-from collections.abc import Sequence
 from functools import partial
 from math import exp, pi, sqrt, tan
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from klack.hydraulics.accumulator import Accumulator
@@ -16,10 +14,10 @@ from klack.hydraulics.pulsating_flow import FlowHarmonic, PulsatingFlow
 from klack.hydraulics.pump import Pump
 from klack.hydraulics.relief_valve import ReliefValve
 from klack.hydraulics.variable_orifice import VariableOrifice
-from klack.network.component import Component
-from klack.network.rows import Ambient, BranchRow, Rows
-from klack.network.step_function import evaluate
+from klack.network.rows import Ambient
+from klack.verification.branch_step import branch_of, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.hydraulic_edges import edges
 from klack.verification.supply_networks import OIL, supply_networks
 
 __all__ = ["checks"]
@@ -30,12 +28,11 @@ RHO = float(OIL.density(AMBIENT.pressure))
 MU = float(OIL.viscosity(AMBIENT.pressure))
 BAR = 1e5
 
-Vector = NDArray[np.float64]
 _check = partial(compare, GROUP)
 
 
 def checks() -> list[Check]:
-    """Openings, check valve, relief valve, accumulator, table of areas, pump; then networks."""
+    """Valves by characteristic, accumulator, areas, pump, edges, walls; then networks."""
     return [
         *_check_valve(),
         *_relief_valve(),
@@ -43,43 +40,20 @@ def checks() -> list[Check]:
         *_variable_orifice(),
         *_pump(),
         _pulsation(),
+        *edges(),
         *supply_networks(),
     ]
-
-
-def row_of(part: Component, number: int = 0) -> BranchRow:
-    """One branch of a part between two nodes, a needle and the ground."""
-    handles = {"a": 1, "b": 2, "fluid": 1, "needle": 0, "spool": 0, "body": -1}
-    rows = Rows(ambient=AMBIENT, fluid=OIL, component="part", handles=handles)
-    part.add_rows(rows)
-    return rows.branches[number]
-
-
-def step(
-    row: BranchRow,
-    p_a: float,
-    p_b: float,
-    *,
-    t: float = 0.0,
-    h: float = 1e-6,
-    state: Sequence[float] | Vector | None = None,
-    ports: Sequence[float] = (),
-) -> Vector:
-    """One step of it; what it gives out."""
-    size = 3 + len(row.ports) + row.state.size + len(row.books)
-    start = row.state if state is None else state
-    return evaluate(row.step, row.parameters, start, [t, h, p_a, p_b, RHO, RHO, *ports], size)[1]
 
 
 def _check_valve() -> list[Check]:
     part = CheckValve(
         cracking_pressure=0.5 * BAR, open_pressure=2.5 * BAR, diameter=6e-3, cavitation=None
     )
-    row, whole = row_of(part), pi / 4 * 36e-6
+    row, whole = branch_of(part), pi / 4 * 36e-6
     drops = np.linspace(0.0, 4.0, 81) * BAR
     s = np.clip((drops - 0.5 * BAR) / (2.0 * BAR), 0.0, 1.0)
-    known = 0.7 * whole * s**2 * (3.0 - 2.0 * s) * np.sqrt(2.0 * drops / RHO) * 6e4
-    found = np.array([step(row, 50e5 + drop, 50e5)[0] for drop in drops]) / RHO * 6e4
+    known = 0.7 * whole * s * np.sqrt(2.0 * drops / RHO) * 6e4
+    found = np.array([branch_step(row, 50e5 + drop, 50e5)[0] for drop in drops]) / RHO * 6e4
     curve = ComparedCurve(
         x_label="pressure drop [bar]",
         y_label="flow [l/min]",
@@ -87,23 +61,23 @@ def _check_valve() -> list[Check]:
         computed=(drops / BAR, found),
     )
     law = "Merritt 1967, sec. 3-3: C_q A sqrt(2 rho dp)"
-    reverse = step(row, 1e5, 300e5)
-    up, down = (step(row, 50e5 + x, 50e5)[0] for x in (1.2e5 + 20.0, 1.2e5 - 20.0))
-    choked = step(row_of(part.model_copy(update={"cavitation": 0.6})), 3e5, 1e3)
+    reverse = branch_step(row, 1e5, 300e5)
+    up, down = (branch_step(row, 50e5 + x, 50e5)[0] for x in (1.2e5 + 20.0, 1.2e5 - 20.0))
+    choked = branch_step(branch_of(part.model_copy(update={"cavitation": 0.6})), 3e5, 1e3)
     throat = 0.6 * whole * sqrt(2 * RHO * (3e5 - OIL.vapour_pressure))
     return [
         _check(
             "check valve half open at 1.5 bar, mass flow [kg/s]",
             0.7 * 0.5 * whole * sqrt(2 * RHO * 1.5 * BAR),
-            float(step(row, 50e5 + 1.5 * BAR, 50e5)[0]),
+            float(branch_step(row, 50e5 + 1.5 * BAR, 50e5)[0]),
             5e-14,
-            law + "; cubic opening",
+            law + "; half of the area",
             curve,
         ),
         _check(
             "check valve fully open at 4 bar, mass flow [kg/s]",
             0.7 * whole * sqrt(2 * RHO * 4 * BAR),
-            float(step(row, 54e5, 50e5)[0]),
+            float(branch_step(row, 54e5, 50e5)[0]),
             5e-14,
             law,
         ),
@@ -117,7 +91,7 @@ def _check_valve() -> list[Check]:
         _check(
             "check valve opening, slope of its flow [kg/(s Pa)]",
             float(up - down) / 40.0,
-            float(step(row, 50e5 + 1.2e5, 50e5)[1]),
+            float(branch_step(row, 50e5 + 1.2e5, 50e5)[1]),
             1e-7,
             "central difference over 40 Pa",
         ),
@@ -134,33 +108,33 @@ def _check_valve() -> list[Check]:
 def _relief_valve() -> list[Check]:
     rated = {"set_pressure": 100 * BAR, "rated_pressure": 110 * BAR, "rated_flow": 40 / 6e4}
     part = ReliefValve(**rated, diameter=3e-3, cavitation=None)
-    row, tau = row_of(part), 2e-3
+    row, tau = branch_of(part), 2e-3
     drops = np.linspace(95.0, 130.0, 71) * BAR
     line = 40.0 * np.maximum(drops / BAR - 100.0, 0.0) / 10.0
     hole = 0.7 * pi / 4 * 9e-6 * np.sqrt(2.0 * drops / RHO) * 6e4
-    found = np.array([step(row, BAR + drop, BAR)[0] for drop in drops]) / RHO * 6e4
+    found = np.array([branch_step(row, BAR + drop, BAR)[0] for drop in drops]) / RHO * 6e4
     curve = ComparedCurve(
         x_label="pressure drop [bar]",
         y_label="flow [l/min]",
         expected=(drops / BAR, np.minimum(line, hole)),
         computed=(drops / BAR, found),
     )
-    sticky = row_of(part.model_copy(update={"hysteresis": 3 * BAR}))
-    state = step(sticky, BAR + 108 * BAR, BAR)[3:6]
-    held = step(sticky, BAR + 106 * BAR, BAR, state=state)
-    closing = step(sticky, BAR + 103 * BAR, BAR, state=state)
-    slow = row_of(part.model_copy(update={"time_constant": tau}))
-    late = step(slow, BAR + 104 * BAR, BAR)[3:6]
+    sticky = branch_of(part.model_copy(update={"hysteresis": 3 * BAR}))
+    state = branch_step(sticky, BAR + 108 * BAR, BAR)[3:6]
+    held = branch_step(sticky, BAR + 106 * BAR, BAR, state=state)
+    closing = branch_step(sticky, BAR + 103 * BAR, BAR, state=state)
+    slow = branch_of(part.model_copy(update={"time_constant": tau}))
+    late = branch_step(slow, BAR + 104 * BAR, BAR)[3:6]
     first = float(late[1])
     for _ in range(10):
-        late = step(slow, BAR + 108 * BAR, BAR, h=0.2 * tau, state=late)[3:6]
+        late = branch_step(slow, BAR + 108 * BAR, BAR, h=0.2 * tau, state=late)[3:6]
     k = 40 / 6e4 / (10 * BAR) * sqrt(0.5 * RHO) / 0.7
     area = {drop: k * (drop - 100) * BAR / sqrt(drop * BAR) for drop in (106, 108)}
     return [
         _check(
             "relief valve 7.5 bar above its set pressure, flow [m^3/s]",
             30 / 6e4,
-            float(step(row, BAR + 107.5 * BAR, BAR)[0]) / RHO,
+            float(branch_step(row, BAR + 107.5 * BAR, BAR)[0]) / RHO,
             5e-14,
             "characteristic: straight through the rated point",
             curve,
@@ -168,14 +142,14 @@ def _relief_valve() -> list[Check]:
         _check(
             "relief valve 0.5 bar below its set pressure, flow [m^3/s]",
             0.0,
-            float(step(row, BAR + 99.5 * BAR, BAR)[0]),
+            float(branch_step(row, BAR + 99.5 * BAR, BAR)[0]),
             0.0,
             "closed",
         ),
         _check(
             "relief valve fully open at 130 bar, flow [m^3/s]",
             0.7 * pi / 4 * 9e-6 * sqrt(2 * 130 * BAR / RHO),
-            float(step(row, BAR + 130 * BAR, BAR)[0]) / RHO,
+            float(branch_step(row, BAR + 130 * BAR, BAR)[0]) / RHO,
             5e-14,
             "Merritt 1967, sec. 3-3: orifice of the largest area",
         ),
@@ -216,7 +190,7 @@ def _accumulator() -> list[Check]:
     work = -quad(gas_pressure, whole, gas, epsrel=1e-13)[0]
     isothermal = p0 * whole * np.log(200 / 60) - AMBIENT.pressure * whole * (1 - 60 / 200)
     part = Accumulator(volume=whole, precharge=p0)
-    row, p = row_of(part), np.geomspace(60.0, 400.0, 60) * BAR
+    row, p = branch_of(part), np.geomspace(60.0, 400.0, 60) * BAR
     volumes = np.array([held(x, 1.4)[0] for x in p])
     curve = ComparedCurve(
         x_label="fluid inside [l]",
@@ -224,9 +198,9 @@ def _accumulator() -> list[Check]:
         expected=(volumes * 1e3, p0 * (whole / (whole - volumes)) ** 1.4 / BAR),
         computed=(volumes * 1e3, p / BAR),
     )
-    in_100 = step(row, 100 * BAR, BAR, h=1e-3, state=[90 * BAR, 0.0, 0.0, 1.0])
+    in_100 = branch_step(row, 100 * BAR, BAR, h=1e-3, state=[90 * BAR, 0.0, 0.0, 1.0])
     mass = [float(OIL.density(x)) * held(x, 1.4)[0] for x in (90 * BAR, 100 * BAR)]
-    empty = step(row, 40 * BAR, BAR, state=[50 * BAR, 0.0, 0.0, 1.0])
+    empty = branch_step(row, 40 * BAR, BAR, state=[50 * BAR, 0.0, 0.0, 1.0])
     full = held(p0 * 10**1.4 * 1.5, 1.4)
     return [
         _check(
@@ -277,10 +251,10 @@ def _accumulator() -> list[Check]:
 
 def _variable_orifice() -> list[Check]:
     areas = (0.0, 1e-6, 3e-6)
-    by_lift = row_of(VariableOrifice(lift=(0.0, 1e-4, 2e-4), area=areas, cavitation=None))
-    by_time = row_of(VariableOrifice(time=(0.0, 1e-3, 2e-3), area=areas, cavitation=None))
-    at_lift = step(by_lift, 50e5, 20e5, ports=(1.4e-4, 1.6e-4, 0.0, 0.0))
-    at_time = step(by_time, 50e5, 20e5, t=0.5e-3 - 5e-7)
+    by_lift = branch_of(VariableOrifice(lift=(0.0, 1e-4, 2e-4), area=areas, cavitation=None))
+    by_time = branch_of(VariableOrifice(time=(0.0, 1e-3, 2e-3), area=areas, cavitation=None))
+    at_lift = branch_step(by_lift, 50e5, 20e5, ports=(1.4e-4, 1.6e-4, 0.0, 0.0))
+    at_time = branch_step(by_time, 50e5, 20e5, t=0.5e-3 - 5e-7)
     number = 2.0 / (MU * 100.0)
     forward = opening_flow(50e5, 20e5, RHO, RHO, 2e-6, 0.7, number, 0.0, 0.0)
     return [
@@ -312,11 +286,11 @@ def _pump() -> list[Check]:
     out = []
     turns, n = 25.0, 5040
     for z in (7, 10):
-        row = row_of(Pump(displacement=10e-6, speed=turns, pistons=z))
+        row = branch_of(Pump(displacement=10e-6, speed=turns, pistons=z))
         times = np.arange(n) / (turns * n)
         h = 1.0 / (turns * n)
-        flow = np.array([step(row, BAR, BAR, t=t, h=h)[5] for t in times])
-        now = np.array([step(row, BAR, BAR, t=t, h=0.0)[5] for t in times])
+        flow = np.array([branch_step(row, BAR, BAR, t=t, h=h)[5] for t in times])
+        now = np.array([branch_step(row, BAR, BAR, t=t, h=0.0)[5] for t in times])
         order = 2 * z if z % 2 else z
         share = pi / (2 * z) * tan(pi / (4 * z)) if z % 2 else pi / z * tan(pi / (2 * z))
         whole = np.sum(
@@ -354,7 +328,7 @@ def _pump() -> list[Check]:
             ),
         ]
     leaking = Pump(displacement=10e-6, speed=25.0, volumetric_efficiency=0.9, rated_pressure=2e7)
-    leak = step(row_of(leaking, 1), BAR, BAR + 1e7)
+    leak = branch_step(branch_of(leaking, 1), BAR, BAR + 1e7)
     out.append(
         _check(
             "pump of 90 % volumetric efficiency at 200 bar, leakage at 100 bar [m^3/s]",
@@ -369,7 +343,7 @@ def _pump() -> list[Check]:
 
 def _pulsation() -> Check:
     sine = FlowHarmonic(frequency=1750.0, amplitude=1e-5, phase=0.3)
-    row = row_of(PulsatingFlow(mean=3e-4, harmonics=(sine,)))
+    row = branch_of(PulsatingFlow(mean=3e-4, harmonics=(sine,)))
 
     def flow(t: float) -> float:
         return 3e-4 + 1e-5 * float(np.sin(2 * pi * 1750.0 * t + 0.3))
@@ -377,7 +351,7 @@ def _pulsation() -> Check:
     return _check(
         "pulsation of 1.75 kHz over a step of 0.4 ms, mean flow [m^3/s]",
         quad(flow, 1e-3, 1.4e-3, epsrel=1e-13)[0] / 0.4e-3,
-        float(step(row, BAR, 90 * BAR, t=1e-3, h=0.4e-3)[0]) / RHO,
+        float(branch_step(row, BAR, 90 * BAR, t=1e-3, h=0.4e-3)[0]) / RHO,
         1e-13,
         "quadrature of the sine",
     )
