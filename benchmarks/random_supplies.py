@@ -145,7 +145,7 @@ def _chamber(rng: Rng, bore: float, level: float) -> Part:
 
 
 def _link(rng: Rng, parts: dict[str, Part], bore: float, level: float) -> None:
-    kind = rng.choice(["check-valve", "pressure-loss", "line", "orifice"])
+    kind = rng.choice(["check-valve", "pressure-loss", "line", "pipe-friction"])
     if kind == "check-valve":
         crack = level * _log(rng, 1e-4, 0.3)
         parts["link"] = {
@@ -174,7 +174,12 @@ def _link(rng: Rng, parts: dict[str, Part], bore: float, level: float) -> None:
         if rng.random() < 0.5:
             parts["link"]["wall"] = {"bulk_modulus": f"{_log(rng, 1e8, 1e10)} Pa"}
     else:
-        parts["link"] = {"type": "orifice", "diameter": f"{bore} m"}
+        parts["link"] = {
+            "type": "pipe-friction",
+            "length": f"{_log(rng, 0.01, 3.0)} m",
+            "diameter": f"{bore} m",
+            "roughness": f"{_log(rng, 1e-6, 0.05) * bore} m",
+        }
 
 
 def _relief(rng: Rng, level: float, flow: float) -> Part:

@@ -10,6 +10,7 @@ from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pipe_friction import PipeFriction
 from klack.hydraulics.pressure_loss import PressureLoss
 from klack.hydraulics.pulsating_flow import PulsatingFlow
 from klack.hydraulics.pump import Pump
@@ -47,6 +48,7 @@ PARTS = {
         diameter=4e-3, radial_clearance=3e-6, overlap=20e-6, direction="closing", flow_force={}
     ),
     "pressure loss": PressureLoss(diameter=1e-3, coefficient=0.3, reverse_coefficient=2.0),
+    "pipe friction": PipeFriction(length=0.3, diameter=1e-3, roughness=2e-6),
     "variable orifice": VariableOrifice(lift=[0.0, 40e-6], area=[1e-8, 1e-6]),
     "pump of pistons": Pump(displacement=1e-6, speed=20.0, pistons=7),
     "pulsation": PulsatingFlow(mean=3e-6, harmonics=[{"frequency": 1e3, "amplitude": 1e-6}]),

@@ -1,14 +1,17 @@
-"""Truth: closed formulas of spool edges, pressure losses of fittings, and elastic walls."""
+"""Truth: closed formulas of spool edges, fittings and pipes, and of elastic walls."""
 
-from math import cos, pi, radians, sqrt
+from math import cos, log10, pi, radians, sqrt
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from klack.errors import InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
+from klack.hydraulics.line_friction import laminar_resistance
+from klack.hydraulics.pipe_friction import PipeFriction
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_loss import PressureLoss
 from klack.hydraulics.spool_edge import SpoolEdge
@@ -133,6 +136,52 @@ def test_a_sudden_expansion_recovers_what_borda_and_carnot_leave():
     assert RHO / 2 * (v1 - v2) ** 2 == pytest.approx(2e5, rel=1e-9)
 
 
+# ---- pipe friction --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("roughness", [0.0, 1e-5, 5e-4])
+@pytest.mark.parametrize("reynolds", [1e-3, 100.0, 2299.0, 4001.0, 1e5, 1e7])
+def test_pipe_friction_is_that_of_hagen_poiseuille_and_colebrook(reynolds, roughness):
+    D, L = 10e-3, 2.0
+    if reynolds < 2300:
+        f = 64 / reynolds
+    else:
+        f = brentq(
+            lambda f: 1 / sqrt(f) + 2 * log10(roughness / D / 3.7 + 2.51 / (reynolds * sqrt(f))),
+            1e-3,
+            1.0,
+            xtol=1e-16,
+            rtol=1e-14,
+        )
+    speed = reynolds * MU / (RHO * D)
+    drop = f * L / D * RHO / 2 * speed**2
+    part = PipeFriction(length=L, diameter=D, roughness=roughness)
+    for sign in (1.0, -1.0):
+        out = step(part, sign * drop, 0.0)
+        assert out[0] == pytest.approx(sign * RHO * speed * pi / 4 * D**2, rel=1e-10)
+        assert out[3] == pytest.approx(reynolds, rel=1e-10)
+        up, down = (step(part, sign * drop * s, 0.0)[0] for s in (1 + 1e-5, 1 - 1e-5))
+        assert out[1] == pytest.approx(sign * (up - down) / (2e-5 * drop), rel=1e-7)
+        assert out[2] == -out[1]
+
+
+def test_flow_of_a_pipe_rises_through_the_transition_without_a_jump():
+    part = PipeFriction(length=2.0, diameter=10e-3, roughness=1e-4)
+    drops = np.geomspace(1e4, 3e6, 3000)
+    flow = np.array([step(part, drop, 0.0)[0] for drop in drops])
+    reynolds = flow / (pi / 4 * 10e-3 * MU)
+
+    assert reynolds[0] < 2300 < 4000 < reynolds[-1]
+    assert np.all(np.diff(flow) > 0)
+    assert np.max(np.diff(np.log(flow)) / np.diff(np.log(drops))) < 1.001  # laminar is steepest
+
+
+def test_laminar_resistance_is_that_of_lines():
+    out = step(PipeFriction(length=2.0, diameter=3e-3), 10.0, 0.0)
+
+    assert 10.0 / (out[0] / RHO) == pytest.approx(laminar_resistance(2.0, 3e-3, MU), rel=1e-14)
+
+
 # ---- walls ----------------------------------------------------------------------------------
 
 
@@ -219,6 +268,7 @@ def test_a_hose_slows_the_waves_of_a_line():
         (lambda: Chamber(volume=1e-6, wall={"bulk_modulus": 1e9, "diameter": 1e-2}), "no diameter"),
         (lambda: Chamber(volume=1e-6, wall={"diameter": 1e-2, "thickness": 1e-3}), "no modulus"),
         (lambda: Chamber(volume=1e-6, wall={"bulk_modulus": 1e9, "poisson": 0.6}), "less than 0.5"),
+        (lambda: PipeFriction(length=1.0, diameter=1e-2, roughness=1e-3), "at most 0.05"),
         (lambda: PressureLoss(coefficient=0.5), "exactly one of diameter, area"),
         (lambda: PressureLoss(diameter=1e-2, coefficient=0.0), "greater than 0"),
         (lambda: SpoolEdge(**{**EDGE, "radial_clearance": 0.0}, direction="opening"), "greater"),

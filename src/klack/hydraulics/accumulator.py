@@ -32,7 +32,7 @@ class Accumulator(Component):
 
     At the start it is in equilibrium with its node.
 
-    The node needs a chamber (or a prescribed pressure, at which it only takes and gives fluid).
+    The node needs a chamber beside it, however small.
 
     Limits: one exponent, so no exchange of heat over time: ``n`` = 1 for slow, 1.4 for fast changes
     of nitrogen at moderate pressure; above 200 bar real gas is stiffer (n up to 1.8).  The

@@ -91,9 +91,9 @@ class ReliefValve(OpeningComponent):
     ``time_constant``: the area follows with a lag of first order, exact over each step for a
     constant pressure.  Both begin at the characteristic of rising pressure.
 
-    Limits: no mass, so it does not chatter; with the lag it may oscillate with the fluid before it.
-    For a poppet as a body take ``rigid-mass``, ``seat``, ``pressure-face``, ``spring`` and
-    ``end-stop``.
+    Limits: no mass, so it does not chatter.  The lag makes a chamber before it swing, damped: the
+    answer of the flow to the pressure has a positive real part at all frequencies.  For a poppet
+    as a body take ``rigid-mass``, ``seat``, ``pressure-face``, ``spring`` and ``end-stop``.
     Pressures are differences over the valve; ``Q`` counts at ambient density.
     Sources: characteristic as in ISO 6403 tests; play operator: Prandtl 1928.
     """

@@ -46,6 +46,7 @@ COMPONENTS = (
     ("pulsating-flow", "klack.hydraulics.pulsating_flow.PulsatingFlow"),
     ("spool-edge", "klack.hydraulics.spool_edge.SpoolEdge"),
     ("pressure-loss", "klack.hydraulics.pressure_loss.PressureLoss"),
+    ("pipe-friction", "klack.hydraulics.pipe_friction.PipeFriction"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),

@@ -2,13 +2,14 @@
 
 from functools import partial
 from itertools import pairwise
-from math import cos, pi, radians, sqrt
+from math import cos, log10, pi, radians, sqrt
 
 import numpy as np
 
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.line import Line
+from klack.hydraulics.pipe_friction import PipeFriction
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_loss import PressureLoss
 from klack.hydraulics.pressure_source import PressureSource, PressureStep
@@ -35,8 +36,8 @@ _check = partial(compare, "hydraulic-parts")
 
 
 def edges() -> list[Check]:
-    """Spool edge, pressure loss, walls, junction."""
-    return [*_spool(), *_loss(), *_walls(), *_swing(), *_junction()]
+    """Spool edge, pressure loss, friction of a pipe, walls, junction."""
+    return [*_spool(), *_loss(), *_pipe(), *_walls(), *_swing(), *_junction()]
 
 
 def _spool() -> list[Check]:
@@ -158,6 +159,72 @@ def _loss() -> list[Check]:
             reason="the laminar term is 1e-9, not zero",
         )
     ]
+
+
+def _pipe() -> list[Check]:
+    D, L = 10e-3, 2.0
+
+    def friction_factor(reynolds: float, rough: float) -> float:
+        """Colebrook's law by fixed-point iteration; laminar below 2300."""
+        if reynolds < 2300:
+            return 64 / reynolds
+        f = 0.02
+        for _ in range(100):
+            f = (2 * log10(rough / 3.7 + 2.51 / (reynolds * sqrt(f)))) ** -2
+        return f
+
+    def drop(reynolds: float, rough: float) -> float:
+        speed = reynolds * MU / (RHO * D)
+        return friction_factor(reynolds, rough) * L / D * RHO / 2 * speed**2
+
+    def found(reynolds: float, rough: float) -> float:
+        row = branch_of(PipeFriction(length=L, diameter=D, roughness=rough * D))
+        return float(branch_step(row, drop(reynolds, rough), 0.0)[3])
+
+    low, high = np.geomspace(300, 2250, 15), np.geomspace(4050, 1e7, 40)
+    numbers = np.concatenate((low, high))
+    curve = ComparedCurve(
+        x_label="Reynolds number [-]",
+        y_label="pressure drop [Pa]",
+        expected=(numbers, np.array([drop(x, 1e-3) for x in numbers])),
+        computed=(
+            np.array([found(x, 1e-3) for x in numbers]),
+            np.array([drop(x, 1e-3) for x in numbers]),
+        ),
+        x_log=True,
+        y_log=True,
+    )
+    out = [
+        _check(
+            f"pipe at the pressure drop of Re = {reynolds:.0f}, roughness {rough:g} D, Reynolds "
+            "number [-]",
+            reynolds,
+            found(reynolds, rough),
+            4e-14,
+            source,
+            curve,
+        )
+        for reynolds, rough, source in (
+            (1000.0, 0.0, "Hagen-Poiseuille: f = 64/Re"),
+            (1e5, 0.0, "Colebrook 1939, by iteration"),
+            (1e6, 1e-3, "Colebrook 1939, by iteration"),
+        )
+    ]
+    for reynolds, rough, moody in ((1e5, 0.0, 0.0180), (1e6, 1e-3, 0.0199)):
+        speed = reynolds * MU / (RHO * D)
+        row = branch_of(PipeFriction(length=L, diameter=D, roughness=rough * D))
+        pressure = moody * L / D * RHO / 2 * speed**2
+        out.append(
+            _check(
+                f"pipe at f = {moody:g} of the Moody diagram, roughness {rough:g} D, Reynolds "
+                "number [-]",
+                reynolds,
+                float(branch_step(row, pressure, 0.0)[3]),
+                5e-3,
+                "Moody 1944: read to three digits",
+            )
+        )
+    return out
 
 
 def _walls() -> list[Check]:

@@ -44,7 +44,7 @@ _check = partial(compare, "hydraulic-parts")
 
 def supply_networks() -> list[Check]:
     """Filling, a jump of the flow, a pulsation, and a compressor of fluid."""
-    return [*_filling(), *_pulsation(), *_one_way()]
+    return [*_filling(), *_pulsation(), *_one_way(), *_lagging_relief()]
 
 
 def _run(
@@ -304,5 +304,76 @@ def _one_way() -> list[Check]:
             result.books.relative_residual,
             5e-14,
             BALANCE,
+        ),
+    ]
+
+
+def _lagging_relief() -> list[Check]:
+    """A chamber before a relief valve with a lag swings about its equilibrium."""
+    volume, tau, above = 2e-3, 4e-3, 5 * BAR
+    drop = SET + above
+    p = AMBIENT.pressure + drop
+    density = float(OIL.density(p))
+    capacity = volume * _stiffness(p)
+    # A = k (dp - p_s)/sqrt(dp) and C_q A sqrt(2 rho dp): slopes at constant area, and with the area
+    mass_flow = GAIN * above * sqrt(RHO * density)
+    direct = 0.5 * mass_flow / drop
+    by_area = mass_flow * (1.0 / above - 0.5 / drop)
+    poles = np.roots([capacity * tau, capacity + direct * tau, direct + by_area])
+    pole = poles[np.argmax(poles.imag)]
+    result = _run(
+        {
+            "pump": FlowSource(
+                flow=mass_flow / RHO,
+                step=FlowStep(to=mass_flow / RHO * 1.0002, at=1e-3, rise=1e-6),
+            ),
+            "rail": Chamber(volume=volume, pressure=p),
+            "relief": ReliefValve(
+                set_pressure=SET,
+                rated_pressure=110 * BAR,
+                rated_flow=40 / 6e4,
+                diameter=8e-3,
+                critical_flow_number=1.0,
+                cavitation=None,
+                time_constant=tau,
+            ),
+        },
+        [["pump.b", "rail.fluid", "relief.a"], ["relief.b", "ambient"]],
+        60e-3,
+        10e-6,
+        10e-6,
+    )
+    time = result.time - 1e-3
+    swing = result.channels["rail pressure"].values - p
+    final = mass_flow * 0.0002 / (direct + by_area)
+    # answer of the second-order system to a step of the flow
+    decay, omega = -pole.real, pole.imag
+    slope = mass_flow * 0.0002 / capacity
+    wave = np.exp(-decay * time) * (
+        np.cos(omega * time) + (decay - slope / final) / omega * np.sin(omega * time)
+    )
+    known = np.where(time > 0, final * (1.0 - wave), 0.0)
+    curve = ComparedCurve(
+        x_label="time [ms]",
+        y_label="rise of pressure [Pa]",
+        expected=(result.time * 1e3, known),
+        computed=(result.time * 1e3, swing),
+    )
+    top = int(np.argmax(known))
+    return [
+        _check(
+            "relief valve with a lag of 4 ms on 2 l, first swing of the pressure [Pa]",
+            float(known[top]),
+            float(swing.max()),
+            2e-3,
+            "C tau s^2 + (C + G tau) s + G + G_A = 0",
+            curve,
+        ),
+        _check(
+            "relief valve with a lag of 4 ms on 2 l, time of that swing [s]",
+            float(time[top]),
+            float(time[int(np.argmax(swing))]),
+            1e-2,
+            "the same; records of 10 us",
         ),
     ]
