@@ -71,13 +71,15 @@ def pipe_friction_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     density = inp[4] if drop >= 0.0 else inp[5]
     viscosity, length, diameter, area = par[0], par[1], par[2], par[3]
     scale = 2.0 * diameter * density / length
-    x = diameter / viscosity * sqrt(scale * abs(drop))
-    reynolds, slope = reynolds_of(x, par[4], par[5])
+    square = (diameter / viscosity) ** 2 * scale * abs(drop)
     to_flow = viscosity * area / diameter
-    if x <= _LAST:  # no root where the flow reverses
+    if square <= _LAST * _LAST:  # no root where the flow reverses
+        reynolds = square / 64.0
         by = to_flow / 64.0 * (diameter / viscosity) ** 2 * scale
         out[0], out[1] = by * drop, by
     else:
+        x = sqrt(square)
+        reynolds, slope = reynolds_of(x, par[4], par[5])
         out[0] = to_flow * reynolds if drop >= 0.0 else -to_flow * reynolds
         out[1] = 0.5 * to_flow * slope * x / abs(drop)
     out[2] = -out[1]

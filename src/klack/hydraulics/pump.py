@@ -38,11 +38,14 @@ def swept_share(angle: float, turned: float, pistons: int) -> float:
         At the start, any; and by how much it turns, zero or more.
     pistons : int
     """
-    turns = turned // _TURN
+    turns = int(turned / _TURN)
     rest = turned - turns * _TURN
     total = 2.0 * turns * pistons
     for k in range(pistons):
-        begin = (angle + _TURN * k / pistons) % _TURN
+        begin = angle + _TURN * k / pistons
+        begin -= _TURN * int(begin / _TURN)
+        if begin < 0.0:
+            begin += _TURN
         end = begin + rest
         if begin < pi:
             half = 0.5 * (min(end, pi) - begin)
