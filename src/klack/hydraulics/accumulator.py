@@ -1,6 +1,6 @@
 r"""Accumulator: a closed volume of gas that takes fluid."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import inf, pi
 from typing import ClassVar
 
@@ -111,25 +111,26 @@ class Accumulator(Component):
         """Full, and empty after it held fluid."""
         node = rows.nodes.get(rows.port("fluid"))
         holds = node is not None and node.stated and node.at_start > self.precharge
-        least = self.full_at * self.volume
-        largest = self.volume * (1.0 - 1e-12) if holds else inf
-
-        def effect(volume: float) -> str:
-            if volume > self.volume * 0.5:
-                return "It is empty: it no longer holds the pressure."
-            return "It is full: it takes no more fluid, the pressure rises as without it."
-
+        full = "It is full: it takes no more fluid, the pressure rises as without it."
+        empty = "It is empty: it no longer holds the pressure."
+        limits = [("full", (self.full_at * self.volume * (1.0 + 1e-12), inf), full)]
+        if holds:
+            limits.append(("empty", (0.0, self.volume * (1.0 - 1e-12)), empty))
         return [
             LimitRow(
                 component=rows.component,
                 quantity="gas volume",
                 unit="m^3",
-                valid=(least * (1.0 + 1e-12), largest),
-                law=f"the accumulator '{rows.component}'",
-                source=f"full at {1e9 * least:.4g} mm^3, empty at {1e9 * self.volume:.4g} mm^3",
-                effect=effect,
+                valid=valid,
+                law=f"the accumulator '{rows.component}' before it is {word}",
+                effect=_saying(text),
                 advice=f"change volume or precharge of components.{rows.component}, or the "
                 "pressures around it.",
                 channel=f"{rows.component} gas volume",
             )
+            for word, valid, text in limits
         ]
+
+
+def _saying(text: str) -> Callable[[float], str]:
+    return lambda volume: text
