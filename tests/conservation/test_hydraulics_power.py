@@ -4,12 +4,20 @@ import numpy as np
 import pytest
 
 from klack.hydraulics.annulus import Annulus
+from klack.hydraulics.check_valve import CheckValve
 from klack.hydraulics.flow_source import FlowSource
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pressure_loss import PressureLoss
+from klack.hydraulics.pulsating_flow import PulsatingFlow
+from klack.hydraulics.pump import Pump
+from klack.hydraulics.relief_valve import ReliefValve
 from klack.hydraulics.seat import Seat
+from klack.hydraulics.spool_edge import SpoolEdge
+from klack.hydraulics.variable_orifice import VariableOrifice
 from klack.network.rows import Ambient, Rows
 from klack.network.step_function import evaluate
 
@@ -26,8 +34,26 @@ PARTS = {
     "annulus": Annulus(diameter=4e-3, length=8e-3, clearance=6e-6, eccentricity=0.4),
     "inertance": Inertance(length=5e-3, diameter=1e-3),
     "pump": FlowSource(flow=3e-6),
+    "check valve": CheckValve(cracking_pressure=1e4, open_pressure=3e5, area=1e-6, leak_area=1e-9),
+    "relief valve": ReliefValve(
+        set_pressure=3e5,
+        rated_pressure=4e5,
+        rated_flow=1e-5,
+        area=2e-6,
+        hysteresis=1e5,
+        time_constant=1e-6,
+        leak_area=1e-9,
+    ),
+    "spool edge": SpoolEdge(
+        diameter=4e-3, radial_clearance=3e-6, overlap=20e-6, direction="closing", flow_force={}
+    ),
+    "pressure loss": PressureLoss(diameter=1e-3, coefficient=0.3, reverse_coefficient=2.0),
+    "pipe friction": PipeFriction(length=0.3, diameter=1e-3, roughness=2e-6),
+    "variable orifice": VariableOrifice(lift=[0.0, 40e-6], area=[1e-8, 1e-6]),
+    "pump of pistons": Pump(displacement=1e-6, speed=20.0, pistons=7),
+    "pulsation": PulsatingFlow(mean=3e-6, harmonics=[{"frequency": 1e3, "amplitude": 1e-6}]),
 }
-HANDLES = {"a": 1, "b": 2, "needle": 0, "body": 1}
+HANDLES = {"a": 1, "b": 2, "needle": 0, "spool": 0, "body": 1}
 
 
 def balance(part, fluid, rng, count=300):
@@ -73,10 +99,11 @@ def test_loss_is_never_negative(name, fluid):
     assert np.all(lost >= -1e-12 * scale)
 
 
-def test_a_pump_and_a_column_without_friction_lose_nothing():
+def test_pumps_and_a_column_without_friction_lose_nothing():
     rng = np.random.default_rng(8)
     smooth = Inertance(length=5e-3, diameter=1e-3, friction="none")
-    for part in (PARTS["pump"], smooth):
+    pumps = [PARTS[name] for name in ("pump", "pump of pistons", "pulsation")]
+    for part in (*pumps, smooth):
         lost, scale = balance(part, FLUIDS["with gas"], rng)
 
         # differences of stores: 1e-16 of the largest kinetic energy

@@ -5,10 +5,13 @@ from typing import ClassVar
 
 from pydantic import Field
 
+from klack.hydraulics.fluid_store import WALL, fluid_store_step
+from klack.hydraulics.fluid_table import fluid_table
 from klack.hydraulics.network_fluid import network_fluid
+from klack.hydraulics.wall_compliance import Wall
 from klack.network.component import Component
 from klack.network.port import COMPLIANCE, Port
-from klack.network.rows import Rows
+from klack.network.rows import AMBIENT, Book, Rows
 from klack.units import Pressure, Volume
 
 __all__ = ["Chamber"]
@@ -25,6 +28,11 @@ class Chamber(Component):
     ``K`` changes in a step.  Walls are :class:`~klack.hydraulics.pressure_face.PressureFace`.  The
     hydraulic spring on a face is ``K A^2/V``, 1e6 to 1e8 N/m in a valve.
 
+    With a section ``wall`` its volume also grows with the pressure, ``dV = V_0 dp/K_wall`` from
+    that of the surroundings on; the strain energy of the wall is a store.  That share follows by
+    an implicit step of first order, whose loss is counted: damping ratios of ``omega h/4`` times
+    the share of the wall in the compliance.
+
     Limits: one pressure, so shorter than 1/20 of a wave; isothermal.  Choose the volume at y = 0
     large enough for every face that moves in: a volume that vanishes stops the run.
     Source: Merritt 1967, sec. 3-8.
@@ -39,8 +47,24 @@ class Chamber(Component):
         gt=0,
         description="Absolute, at the start; by default that of steady flow, or ambient.",
     )
+    wall: Wall | None = Field(default=None, description="Elastic wall; rigid without it.")
 
     def add_rows(self, rows: Rows) -> None:
         """Make the node a chamber."""
-        network_fluid(rows)
+        fluid = network_fluid(rows)
         rows.chamber(rows.port("fluid"), volume=self.volume, pressure=self.pressure)
+        if self.wall is None:
+            return
+        ambient = rows.ambient.pressure
+        no_inlet = (0.0, 0.0, 0.0, fluid.vapour_pressure)
+        law = (WALL, ambient, self.volume * self.wall.compliance, 0.0, 0.0, 0.0)
+        numbers = [*law, *no_inlet, *fluid_table(fluid, ambient)]
+        rows.branch(
+            fluid_store_step,
+            a=rows.port("fluid"),
+            b=AMBIENT,
+            parameters=[len(numbers) + 1, *numbers],
+            state=(self.pressure or 0.0, 0.0, 0.0, 0.0 if self.pressure is None else 1.0),
+            books=(Book("energy", "store"),),
+            label="wall",
+        )

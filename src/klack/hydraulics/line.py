@@ -11,6 +11,7 @@ from klack.errors import InputError
 from klack.hydraulics.line_friction import KAGAWA, laminar_resistance, unsteady_terms
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.network_fluid import network_fluid
+from klack.hydraulics.wall_compliance import Wall
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.network.component import Component
@@ -48,7 +49,7 @@ class Line(Component):
     Limits: one sound speed and density, those at ``pressure`` (steps of some 10 bar change them by
     a few per cent, free gas by far more: a run in which the pressure at an end makes more than 10 %
     of either says so, with both speeds); laminar friction, which fits transients of ms from rest
-    also above Re = 2300; bends and fittings belong into an orifice.  A line needs a chamber or a
+    also above Re = 2300; bends and fittings are a pressure-loss.  A line needs a chamber or a
     pressure at each end; a tiny chamber closes it.
     Sources: Wylie & Streeter 1993, ch. 1 (speed in a thin-walled tube that may lengthen), 3 and 8;
     Krus et al. (transmission-line modelling); Kagawa et al. 1983.
@@ -71,6 +72,10 @@ class Line(Component):
     wall_modulus: Modulus | None = Field(
         default=None, gt=0, description="Young's modulus of a tube."
     )
+    wall: Wall | None = Field(
+        default=None,
+        description="Hose by its bulk modulus, or a tube of any thickness; instead of both above.",
+    )
     friction: Literal["none", "steady", "kagawa"] = Field(
         default="kagawa", description="none, steady laminar, or with memory after Kagawa."
     )
@@ -91,6 +96,15 @@ class Line(Component):
                 expected="wall_thickness and wall_modulus together, or none of them",
                 hint=f"add {missing[0]}; leave both out for a bore in a thick body.",
             )
+        if self.wall is not None:
+            self._refuse_with(tuple(given), "wall", "the wall is given twice")
+            if self.wall.diameter not in (None, self.diameter):
+                raise CaseProblem(
+                    ("wall", "diameter"),
+                    got=f"{self.wall.diameter:g} m in a line of {self.diameter:g} m",
+                    expected="the diameter of the line",
+                    hint="give both the same.",
+                )
         return self
 
     @property
@@ -122,6 +136,8 @@ class Line(Component):
         if self.wall_modulus is not None and self.wall_thickness is not None:
             stretch = self.diameter / (self.wall_modulus * self.wall_thickness)
             slowness = slowness + fluid.density(pressure) * stretch
+        if self.wall is not None:
+            slowness = slowness + fluid.density(pressure) * self.wall.area_compliance
         return np.asarray(1.0 / np.sqrt(slowness))
 
     def echo_time(self, fluid: NetworkFluid, pressure: float | None = None) -> float:

@@ -21,7 +21,7 @@ from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Angle, Area, Length, Ratio
 
-__all__ = ["Seat", "ball_opening", "cone_opening", "flat_opening", "gap_flow"]
+__all__ = ["Seat", "ball_opening", "cone_opening", "flat_opening", "gap_flow", "gap_pass"]
 
 _FLAT, _CONE, _BALL = 0.0, 1.0, 2.0
 _KINDS = {"flat": _FLAT, "cone": _CONE, "ball": _BALL}
@@ -84,12 +84,13 @@ def _opening(kind: float, x: float, r: float, g1: float, g2: float) -> tuple[flo
 
 
 @inner(error_model="numpy")
-def _pass(
+def gap_pass(
     par: Any, state: Any, inp: Any, out: Any, x: float, area: float, gap: float, cube: float
 ) -> None:
     """Flow through an opening at the lift ``x``, and the forces of the flow.
 
     ``area`` of the mantle, ``gap`` of its edge, ``cube`` that of the land to the third power.
+    ``par`` from 5 on and ``state`` are those of :func:`seat_step`.
     """
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
     area = min(area, par[5])
@@ -139,7 +140,7 @@ def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """
     x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
     area, gap = _opening(par[0], x, par[1], par[2], par[3])
-    _pass(par, state, inp, out, x, area, gap, gap * gap * gap)
+    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap)
     return 0
 
 
@@ -154,7 +155,7 @@ def off_axis_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     area, gap, cube = off_axis_opening(
         par[0], par[1], par[16], par[17], x, par[18], par[19], par[20], par[21]
     )
-    _pass(par, state, inp, out, max(x, 0.0), area, gap, cube)
+    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube)
     return 0
 
 

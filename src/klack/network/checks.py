@@ -125,10 +125,10 @@ def _refuse_forced_flow(components: Mapping[str, Component], node: Node, pressur
 
 def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
     """Whether the component forces a flow with this port alone."""
-    needed = [
-        port for port in components[joint.component].port_kinds().values() if not port.optional
-    ]
-    return needed == [joint.port] and joint.port.role is Role.FLOW
+    ports = components[joint.component].port_kinds().values()
+    needed = [port for port in ports if not port.optional]
+    two = len(ports) > 1  # a store of fluid has one alone
+    return two and needed == [joint.port] and joint.port.role is Role.FLOW
 
 
 def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProblem:

@@ -431,7 +431,10 @@ def end_ends(fluid: Any, H: float) -> None:
         i = nodes.end_node[e]
         q = flows.q[e]
         if i < nodes.volumes:
-            q += nodes.density / trial.rho_end[i] / flows.Z[e] * trial.r[i]
+            # as the pressure energy follows it: the line gets what the volume gives
+            last, rho = trial.r[i] / trial.theta[i], trial.rho_end[i]
+            change = last / rho * (1.0 - 0.5 * last * trial.slope[i] / rho)
+            q += nodes.density / flows.Z[e] * trial.theta[i] * change
         flows.q[e] = q
         trial.inflow[i] -= H * nodes.density * q
 

@@ -59,7 +59,7 @@ def checks() -> list[Check]:
     valve = whole_valve(damping=0.0, driver=peak_and_hold(end=0.6e-3))
     wet, dry = (_run(network, 1.6e-3, coarse=16) for network in (valve, valve.dry()))
     return [
-        _ledger("wet", wet, 2e-12),
+        _ledger("wet", wet, 5e-13),
         _ledger("dry", dry, 1.5e-13),
         _sac(valve, wet),
         _momentum(dry),

@@ -41,6 +41,8 @@ COVERS = {
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "
     "the table of the kernel.",
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
+    "hydraulic-parts": "Check and relief valves, accumulators, pumps, spool edges, fittings, "
+    "walls: formulas, and small networks integrated apart.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "
     "compliance, order.",

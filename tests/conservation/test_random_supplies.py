@@ -1,0 +1,35 @@
+"""Truth: energy is conserved, in any sensible supply; and any sensible supply runs.
+
+The draws are those of ``benchmarks/random_supplies.py``, which runs as many as wanted.
+"""
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from klack.simulation.network_result import IncompleteRunError
+
+ROOT = Path(__file__).parents[2]
+DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_supplies.py"))
+
+# 52, 80: a volume that boils at the end of a line; 217: closed behind a check valve
+SAMPLE = (*range(8), 52, 80, 217)
+OWN = ("link", "relief", "accumulator", "wall", "inlet", "source leak")
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("seed", SAMPLE)
+def test_a_random_supply_runs_and_keeps_its_energy(seed):
+    books = DRAWS["run"](DRAWS["draw"](seed)).books
+
+    assert books.relative_residual <= 1e-11
+    for name, loss in books.losses.items():
+        if any(word in name for word in OWN):
+            assert loss >= -1e-13 * books.scale, name
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_pump_that_nothing_relieves_ends_the_run_with_volume_and_pressure():
+    with pytest.raises(IncompleteRunError, match=r"outlet: the pressure is 40\d\d.* bar at"):
+        DRAWS["run"](DRAWS["draw"](10))
