@@ -16,6 +16,7 @@ from pydantic import (
 
 from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
+from klack.case.parameters import PARAMETERS, ParameterName, Written
 from klack.errors import InputError
 from klack.hardening import (
     HARDNESS_SPREAD,
@@ -439,6 +440,9 @@ class CaseFile(Section):
     title: Text = Field(min_length=1, description="One line.")
     description: Text = Field(
         default="", description="What the case shows, and the source of its numbers."
+    )
+    parameters: Mapping[ParameterName, Written] = Field(
+        default_factory=dict, description=PARAMETERS
     )
     materials: Mapping[Name, CaseMaterial] = Field(
         default_factory=dict, description="name: properties."

@@ -8,6 +8,7 @@ from pydantic import BeforeValidator, PlainValidator, TypeAdapter, ValidationErr
 from pydantic.fields import FieldInfo
 
 from klack.case.distribution import Distribution
+from klack.case.parameters import ParameterValue
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
@@ -110,6 +111,8 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
         node = found[part]
         if isinstance(node, Distribution):
             node = node.written
+        elif isinstance(node, ParameterValue):
+            node, field = node.value, node.field
     return node, field
 
 

@@ -1,0 +1,70 @@
+"""Where the sections of an expanded case are written: in the case, or in the file of a part."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+from klack.case.case_text import Lines
+from klack.input.problem import Key, key_text
+
+__all__ = ["ExpandedCase", "Origin"]
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a section of an expanded case is written.
+
+    Parameters
+    ----------
+    path : Path
+    lines : Lines
+    key : tuple of str and int
+        In that file.
+    copy : str
+        Name of the included part; empty for the case itself.
+    """
+
+    path: Path
+    lines: Lines
+    key: Key = ()
+    copy: str = ""
+
+    def where(self, rest: Key = (), *, on_key: bool = False) -> str:
+        """File, line and key of something in this section, as a message names them."""
+        key = (*self.key, *rest)
+        line = self.lines.find(key, on_key=on_key)
+        name = f": {key_text(key)}" if key else ""
+        return f"{self.path}:{line}{name}" + (f" (of '{self.copy}')" if self.copy else "")
+
+    def below(self, *rest: str | int) -> Self:
+        """Origin of a section inside this one."""
+        return replace(self, key=(*self.key, *rest))
+
+
+@dataclass(frozen=True, slots=True)
+class ExpandedCase:
+    """Plain data of a case without expressions and parts.
+
+    Parameters
+    ----------
+    data : mapping
+    origins : mapping of key to Origin
+        Of the case itself, under the empty key, and of all that comes from parts.
+    expressions : mapping of key to str
+        What stands in a file in place of a value.
+    """
+
+    data: Any
+    origins: Mapping[Key, Origin]
+    expressions: Mapping[Key, str] = field(default_factory=dict)
+
+    @classmethod
+    def plain(cls, data: Any, lines: Lines, path: Path) -> Self:
+        """Data of a file as they are."""
+        return cls(data, {(): Origin(path, lines)})
+
+    def origin(self, key: Key) -> Origin:
+        """Where a place of the expanded case is written."""
+        length = next(n for n in range(len(key), -1, -1) if key[:n] in self.origins)
+        return self.origins[key[:length]].below(*key[length:])
