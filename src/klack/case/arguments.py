@@ -55,7 +55,9 @@ def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin
         if isinstance(text, list):
             _require_count(item, text, origin.where(key))
             key, text = (*key, number - 1), text[number - 1]
-        found[name] = parameter_value(text, scope, origin.where(key))
+        # an argument inside a part is no key of the case
+        own = () if origin.copy else (*origin.key, *key)
+        found[name] = parameter_value(text, scope, origin.where(key), own)
     return found
 
 

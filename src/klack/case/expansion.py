@@ -15,7 +15,7 @@ from klack.case.case_text import Lines
 from klack.case.filling import filled, has_expression
 from klack.case.first_error import first_error
 from klack.case.merging import Merging
-from klack.case.origin import ExpandedCase, Origin
+from klack.case.origin import ExpandedCase, Filled, Origin
 from klack.case.parameters import parameters_of_text
 from klack.case.part_sections import CaseHead
 from klack.input.problem import Key
@@ -46,9 +46,10 @@ def expanded(data: Any, lines: Lines, path: Path) -> ExpandedCase:
         return written
     origin = written.origins[()]
     head = _checked(CaseHead, {name: data[name] for name in _HEAD if name in data}, origin)
-    scope = parameters_of_text(head.parameters, origin.below("parameters").where)
+    own = origin.below("parameters")
+    scope = parameters_of_text(head.parameters, own.where, section=own.key)
     origins: dict[Key, Origin] = {(): origin}
-    expressions: dict[Key, str] = {}
+    expressions: dict[Key, Filled] = {}
     result = filled(data, (), scope, origin, expressions)
     if "parameters" in data:
         result["parameters"] = scope

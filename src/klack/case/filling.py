@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from klack.case.origin import Origin
+from klack.case.origin import Filled, Origin
 from klack.case.parameters import Scope, evaluated, is_expression
 from klack.input.problem import Key
 
@@ -26,7 +26,7 @@ def has_expression(data: Any, key: Key = ()) -> bool:
     return is_expression(data)
 
 
-def filled(data: Any, key: Key, scope: Scope, origin: Origin, expressions: dict[Key, str]) -> Any:
+def filled(data: Any, key: Key, scope: Scope, origin: Origin, found: dict[Key, Filled]) -> Any:
     """Copy of plain data with values in place of expressions.
 
     Parameters
@@ -38,7 +38,7 @@ def filled(data: Any, key: Key, scope: Scope, origin: Origin, expressions: dict[
         Names that expressions may use.
     origin : Origin
         Of the data.
-    expressions : dict
+    found : dict
         Takes the expressions by their keys in the expanded case.
 
     Raises
@@ -50,18 +50,18 @@ def filled(data: Any, key: Key, scope: Scope, origin: Origin, expressions: dict[
         return {
             name: value
             if _is_literal((*key, name))
-            else filled(value, (*key, name), scope, origin.below(name), expressions)
+            else filled(value, (*key, name), scope, origin.below(name), found)
             for name, value in data.items()
         }
     if isinstance(data, list):
         return [
-            filled(value, (*key, i), scope, origin.below(i), expressions)
-            for i, value in enumerate(data)
+            filled(value, (*key, i), scope, origin.below(i), found) for i, value in enumerate(data)
         ]
     if not is_expression(data):
         return data
-    expressions[key] = data.strip()
-    return evaluated(data, scope, origin.where())
+    value, sources = evaluated(data, scope, origin.where())
+    found[key] = Filled(data.strip(), sources)
+    return value
 
 
 def _is_literal(key: Key) -> bool:

@@ -26,9 +26,9 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
     hint = problem.hint
     if more:
         hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
-    got, written = problem.got, found.expressions.get(key, "")
-    if written and written not in got:
-        got += f", from '{written}'"
+    got, written = problem.got, found.expressions.get(key)
+    if written and written.text not in got:
+        got += f", from '{written.text}'"
     where = found.origin(key).where(on_key=problem.on_key)
     return InputError(where, got=got, expected=problem.expected, hint=hint)
 

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 from klack.case.arguments import argument_values, copy_names
 from klack.case.case_text import parse
 from klack.case.filling import filled
-from klack.case.origin import Origin
+from klack.case.origin import Filled, Origin
 from klack.case.parameters import Scope, parameters_of_text
 from klack.case.part_sections import CaseInclude, PartFile
 from klack.case.parts import DEEPEST, part_name
@@ -65,7 +65,7 @@ class Merging:
     folder: Path
     checked: Checked
     origins: dict[Key, Origin]
-    expressions: dict[Key, str]
+    expressions: dict[Key, Filled]
     _nodes: list[_Node] = field(default_factory=list)
     _copies: int = 0
 

@@ -8,7 +8,7 @@ from typing import Any, Self
 from klack.case.case_text import Lines
 from klack.input.problem import Key, key_text
 
-__all__ = ["ExpandedCase", "Origin"]
+__all__ = ["ExpandedCase", "Filled", "Origin"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,6 +43,22 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
+class Filled:
+    """What a file has in place of a value.
+
+    Parameters
+    ----------
+    text : str
+        Expression.
+    sources : frozenset of Key
+        Parameters of the case, and arguments of its includes, that the value follows from.
+    """
+
+    text: str
+    sources: frozenset[Key]
+
+
+@dataclass(frozen=True, slots=True)
 class ExpandedCase:
     """Plain data of a case without expressions and parts.
 
@@ -51,13 +67,12 @@ class ExpandedCase:
     data : mapping
     origins : mapping of key to Origin
         Of the case itself, under the empty key, and of all that comes from parts.
-    expressions : mapping of key to str
-        What stands in a file in place of a value.
+    expressions : mapping of key to Filled
     """
 
     data: Any
     origins: Mapping[Key, Origin]
-    expressions: Mapping[Key, str] = field(default_factory=dict)
+    expressions: Mapping[Key, Filled] = field(default_factory=dict)
 
     @classmethod
     def plain(cls, data: Any, lines: Lines, path: Path) -> Self:
@@ -68,3 +83,10 @@ class ExpandedCase:
         """Where a place of the expanded case is written."""
         length = next(n for n in range(len(key), -1, -1) if key[:n] in self.origins)
         return self.origins[key[:length]].below(*key[length:])
+
+    def behind(self, key: Key) -> tuple[Key, ...]:
+        """Keys whose values follow from a parameter or an argument; of any other key, itself."""
+        is_argument = key[:1] == ("include",) and key[2:3] == ("with",)
+        if key[:1] != ("parameters",) and not is_argument:
+            return (key,)
+        return tuple(place for place, item in self.expressions.items() if key in item.sources)

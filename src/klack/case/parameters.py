@@ -1,7 +1,7 @@
 """Parameters of a case and expressions of them, evaluated before the case is checked."""
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, Any
 
@@ -52,11 +52,14 @@ class ParameterValue:
     dimension : Dimension
     text : str
         As the case has it: ``1.3 mm``, ``2 * d_seat``.
+    sources : frozenset of Key
+        Parameters of the case, and arguments of its includes, that it follows from; its own.
     """
 
     value: float
     dimension: Dimension
     text: str
+    sources: frozenset[Key] = frozenset()
 
     @property
     def kind(self) -> Kind:
@@ -83,7 +86,10 @@ def is_expression(value: object) -> bool:
 
 
 def parameters_of_text(
-    written: Mapping[str, Any], where: Callable[[Key], str], given: Scope | None = None
+    written: Mapping[str, Any],
+    where: Callable[[Key], str],
+    given: Scope | None = None,
+    section: Key = (),
 ) -> dict[str, ParameterValue]:
     """Evaluate parameters in the order in which they need each other.
 
@@ -94,6 +100,8 @@ def parameters_of_text(
         File, line and name of a parameter, for errors.
     given : mapping, optional
         Values that replace those of the text; of the same dimension where the text has one.
+    section : tuple
+        Key of the parameters of a case, whose values follow from themselves; empty for a part.
 
     Raises
     ------
@@ -117,15 +125,21 @@ def parameters_of_text(
             expressions[name] = _read(text, written, where((name,)))
     for name in ordered(expressions, tuple(values)):
         own = _value(expressions[name], values, str(written[name]))
+        if section:
+            own = replace(own, sources=own.sources | {(*section, name)})
         if name in given:
             own = _replaced(own, given[name], name, where((name,)))
         values[name] = own
     return {name: values[name] for name in written}
 
 
-def parameter_value(text: object, scope: Scope, where: str) -> ParameterValue:
-    """Value of one quantity, number or expression of the names of a scope."""
-    return _value(_read(text, scope, where), scope, str(text))
+def parameter_value(text: object, scope: Scope, where: str, key: Key = ()) -> ParameterValue:
+    """Value of one quantity, number or expression of the names of a scope.
+
+    With a key, that of an argument in the case, it follows from itself.
+    """
+    found = _value(_read(text, scope, where), scope, str(text))
+    return replace(found, sources=found.sources | {key}) if key else found
 
 
 def _read(text: object, known: Collection[str], where: str) -> Expression:
@@ -164,8 +178,10 @@ def _replaced(
     return given
 
 
-def evaluated(text: str, scope: Scope, where: str) -> Computed | float | int:
-    """Value of an expression; a plain number where it has no unit, whole where it is whole.
+def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | int, frozenset[Key]]:
+    """Value of an expression, and what it follows from.
+
+    A plain number where it has no unit, whole where it is whole.
 
     Raises
     ------
@@ -177,7 +193,7 @@ def evaluated(text: str, scope: Scope, where: str) -> Computed | float | int:
     found = _value(expression, scope, text)
     value, dimension = found.value, found.dimension
     if not (dimension.number and len(dimension.turns) == 1):
-        return Computed(value, dimension, text.strip())
+        return Computed(value, dimension, text.strip()), found.sources
     if abs(value) > LARGEST_NUMBER:
         raise InputError(
             where,
@@ -185,7 +201,7 @@ def evaluated(text: str, scope: Scope, where: str) -> Computed | float | int:
             expected="a number below 1e15 in size",
             hint="check the power of ten.",
         )
-    return int(value) if value.is_integer() else value
+    return (int(value) if value.is_integer() else value), found.sources
 
 
 @lru_cache(maxsize=4000)
@@ -199,7 +215,8 @@ def _value(expression: Expression, scope: Scope, text: str) -> ParameterValue:
     dimension = expression.dimension({name: known.dimension for name, known in scope.items()})
     value = expression.value({name: known.value for name, known in scope.items()})
     zero = value == 0 and dimension == NUMBER
-    return ParameterValue(value, ANYTHING if zero else dimension, text.strip())
+    sources = frozenset().union(*(scope[name].sources for name in expression.names))
+    return ParameterValue(value, ANYTHING if zero else dimension, text.strip(), sources)
 
 
 @lru_cache(maxsize=200)

@@ -87,6 +87,7 @@ def validated(
         "folder": path.parent,
         "source": text,
         "components": components or {},
+        "expanded": found,
     }
     try:
         return kind.model_validate(found.data, context=context)
