@@ -99,8 +99,16 @@ _TYPES = {
 }
 
 
+_PLAIN_NAME = (
+    "a name of letters, digits and _, not starting with a digit",
+    "rename it here and where it is used: '-' is the sign of a difference.",
+)
+
+
 def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     """Expected value and advice for the built-in errors of pydantic."""
+    if kind == "string_pattern_mismatch" and "-" not in context["pattern"].split("]")[1]:
+        return _PLAIN_NAME
     if kind in _TYPES:
         return _TYPES[kind]
     if kind in _BOUNDS:

@@ -68,11 +68,16 @@ class ExpandedCase:
     origins : mapping of key to Origin
         Of the case itself, under the empty key, and of all that comes from parts.
     expressions : mapping of key to Filled
+
+    Notes
+    -----
+    Two of them never differ: checked cases with the same sections and the same text are equal,
+    though one was checked from parts that were made before.
     """
 
-    data: Any
-    origins: Mapping[Key, Origin]
-    expressions: Mapping[Key, Filled] = field(default_factory=dict)
+    data: Any = field(compare=False)
+    origins: Mapping[Key, Origin] = field(compare=False)
+    expressions: Mapping[Key, Filled] = field(default_factory=dict, compare=False)
 
     @classmethod
     def plain(cls, data: Any, lines: Lines, path: Path) -> Self:

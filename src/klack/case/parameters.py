@@ -14,7 +14,7 @@ from klack.expressions.dimension import ANYTHING, NUMBER, Dimension, dimension_o
 from klack.expressions.expression import RESERVED, Expression, ordered
 from klack.input.computed import Computed
 from klack.input.problem import Key
-from klack.units import KINDS, RATIO, Kind, format_si, typed
+from klack.units import KINDS, RATE, RATIO, Kind, format_si, typed
 
 __all__ = [
     "PARAMETERS",
@@ -226,7 +226,7 @@ def _kind_of(dimension: Dimension) -> Kind:
     for kind in KINDS:
         if dimension == dimension_of(kind.unit):
             return kind
-    for kind in KINDS:
+    for kind in (RATE, *KINDS):  # 2 * pi * frequency is shown in 1/s, 1 / time as well
         if dimension.fits(kind.unit):
             return kind
     unit = dimension.unit

@@ -10,6 +10,7 @@ from klack.expressions.unit_literal import CELSIUS, unit_literal, unit_words
 
 __all__ = ["Token", "UnreadableError", "tokens"]
 
+_LONGEST_UNIT = 60
 _NUMBER = re.compile(r"(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _ATOM = r"(?:[A-Za-zµμΩ]+|[%°]C?)(?:(?:\^|\*\*)-?\d(?:\.\d)?(?![\d.]))?(?![\w(.%°])"
 _UNIT = re.compile(rf" ?(?P<unit>(?:1/)?{_ATOM})", re.ASCII)
@@ -109,7 +110,10 @@ def _number(text: str, at: int, match: re.Match[str]) -> Token:
             at,
             "write * between a number and a name; upper and lower case of units matter.",
         )
-    while (more := _MORE.match(text, end)) and (longer := unit_literal(number, unit + more[0])):
+    while len(unit) < _LONGEST_UNIT and (more := _MORE.match(text, end)):
+        longer = unit_literal(number, unit + more[0])
+        if longer is None:
+            break
         unit, found, end = unit + more[0], longer, more.end()
     value, dimension = found
     if not math.isfinite(value):
