@@ -288,3 +288,19 @@ def test_reading_a_large_case_with_many_expressions_stays_quick(tmp_path):
     print(f"{without:.3f} s without, {with_them:.3f} s with expressions")
     case = read_valve_case(text, tmp_path / "b.yaml")
     assert case.network.components["s49"].preload == 1.0
+
+
+def test_bounds_of_studies_and_calibrations_can_be_expressions():
+    text = PARAMETRIC + CALIBRATION.format(key="parameters.k", lower="= 0.8 * k", upper="= 12 N/mm")
+    text += """
+study:
+  parameters:
+    parameters.lift: {from: = lift - 10 um, to: = 1.1 * lift}
+  measures: [opening_time]
+"""
+    case = read_valve_case(text, SMALL)
+
+    item = case.calibration.parameters["k"]
+    assert (item.lower, item.upper) == ("8000.0 N/m", "12000.0 N/m")
+    (spread,) = case.study.parameters.values()
+    assert float(spread.lowest.split()[0]) == pytest.approx(9e-5, rel=1e-14)

@@ -10,6 +10,8 @@ from klack.input.problem import Key, key_text
 
 __all__ = ["ExpandedCase", "Filled", "Origin"]
 
+_RANGES = ("study", "calibration")
+
 
 @dataclass(frozen=True, slots=True)
 class Origin:
@@ -90,8 +92,15 @@ class ExpandedCase:
         return self.origins[key[:length]].below(*key[length:])
 
     def behind(self, key: Key) -> tuple[Key, ...]:
-        """Keys whose values follow from a parameter or an argument; of any other key, itself."""
+        """Keys whose values follow from a parameter or an argument; of any other key, itself.
+
+        Ranges of a study and bounds of a calibration decide nothing of what is computed.
+        """
         is_argument = key[:1] == ("include",) and key[2:3] == ("with",)
         if key[:1] != ("parameters",) and not is_argument:
             return (key,)
-        return tuple(place for place, item in self.expressions.items() if key in item.sources)
+        return tuple(
+            place
+            for place, item in self.expressions.items()
+            if key in item.sources and place[0] not in _RANGES
+        )

@@ -22,6 +22,7 @@ __all__ = [
     "ParameterValue",
     "Scope",
     "Written",
+    "as_written",
     "evaluated",
     "is_expression",
     "parameter_value",
@@ -202,6 +203,14 @@ def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | i
             hint="check the power of ten.",
         )
     return (int(value) if value.is_integer() else value), found.sources
+
+
+def as_written(value: object) -> object:
+    """Text that a case could have in place of the value of an expression; all else as it is."""
+    if not isinstance(value, Computed) or not isinstance(value.dimension, Dimension):
+        return value
+    kind = _kind_of(value.dimension)
+    return value.value if kind.bare else f"{value.value!r} {kind.unit}"
 
 
 @lru_cache(maxsize=4000)
