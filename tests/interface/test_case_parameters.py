@@ -3,14 +3,18 @@
 import math
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import klack
+from klack.analyses.study.asked_points import groups_of
+from klack.analyses.study.strokes import STROKES
 from klack.case.calibration import CaseCalibration
 from klack.case.case_tree import tree_of
 from klack.case.key_path import quantity_at, split_path
+from klack.case.points import points_of
 from klack.case.reader import read_case
 from klack.case.rewriting import rewritten, written_quantity
 from klack.case.valve_reader import read_valve_case
@@ -304,3 +308,25 @@ study:
     assert (item.lower, item.upper) == ("8000.0 N/m", "12000.0 N/m")
     (spread,) = case.study.parameters.values()
     assert float(spread.lowest.split()[0]) == pytest.approx(9e-5, rel=1e-14)
+
+
+STROKE = IMPACT.with_name("stroke.yaml")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "builds"),
+    [
+        ("size: 1 mm", "size: = x", True),
+        ("young: 210 GPa", "young: = 210 GPa * x / 1 mm", True),
+        ("preload: ", "preload: = x * 1 N/mm + 0 * ", False),
+    ],
+)
+def test_a_study_builds_bodies_again_where_they_follow_from_a_parameter(old, new, builds):
+    text = STROKE.read_text(encoding="utf-8")
+    assert old in text
+    text = text.replace("materials:", "parameters: {x: 1 mm}\nmaterials:", 1).replace(old, new, 1)
+    case, tree = read_valve_case(text, STROKE), tree_of(text, STROKE)
+    points = points_of(case, tree, {"parameters.x": ["1 mm", "2 mm", "2 mm"]})
+    groups = groups_of(SimpleNamespace(points=points, case=case, kind=STROKES), range(3))
+
+    assert [group.places for group in groups] == ([(0,), (1, 2)] if builds else [(0, 1, 2)])

@@ -12,6 +12,7 @@ from ruamel.yaml import YAML
 import klack
 from klack.analyses.stroke.run import run_stroke
 from klack.case.case_tree import read_case_tree, tree_of
+from klack.case.expansion import expanded
 from klack.case.key_path import quantity_at
 from klack.case.parts import with_parts
 from klack.case.rewriting import moved_files, rewritten
@@ -448,3 +449,13 @@ def test_bodies_materials_and_stops_of_a_part_have_names_of_their_own(tmp_path):
     stop = case.stops["v_seat"]
     assert str(stop.upper) == "v_needle.tip"
     assert case.network.components["v_needle"].body == "v_needle"
+
+
+def test_files_of_a_part_are_named_from_its_own_folder(tmp_path):
+    (tmp_path / "parts").mkdir()
+    part = changed(MASS, "  spring: {", "  extra: {type: fmu, file: a/model.fmu}\n  spring: {")
+    (tmp_path / "parts" / "mass.yaml").write_text(part, encoding="utf-8")
+    tree = read_case_tree(written(tmp_path, changed(MAIN, "mass.yaml", "parts/mass.yaml")))
+
+    found = expanded(tree.data, tree.lines, tree.path)
+    assert found.data["network"]["components"]["left_extra"]["file"] == "parts/a/model.fmu"
