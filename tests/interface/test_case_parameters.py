@@ -132,6 +132,8 @@ def test_a_value_out_of_the_bounds_of_its_key_tells_its_expression():
         ("pi: 3", "'pi', which is a function or pi"),
         ("min: 3 mm", "'min', which is a function or pi"),
         ("a-b: 3 mm", ""),
+        ("µ: 3 mm", ""),
+        ("1: 3 mm", ""),
         ("a: ", "nothing"),
         ("a: [1 mm]", "['1 mm']"),
         ("a: true", "'True'"),
@@ -149,6 +151,13 @@ def test_a_wrong_parameter_is_one_error_at_its_line(parameters, got):
 
     assert got in caught.value.got
     assert caught.value.where.startswith(f"{SMALL}:4: parameters")
+
+
+def test_a_name_with_a_hyphen_would_be_a_difference():
+    with pytest.raises(InputError) as caught:
+        read_valve_case(with_parameters("a-b: 3 mm"), SMALL)
+
+    assert caught.value.expected == "a name of letters, digits and _, not starting with a digit"
 
 
 def test_a_chain_of_parameters_is_computed_in_any_order():

@@ -2,11 +2,14 @@
 
 import json
 import os
+import random
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
+from mutated_cases import NASTY, leaves, mutated
+from mutated_cases import changed as changed_value
 from ruamel.yaml import YAML
 
 import klack
@@ -372,9 +375,73 @@ def test_the_text_of_a_part_is_kept_to_the_letter(part, tmp_path):
     assert read_valve_case(text, path).parts == {"mass.yaml": MASS}
 
 
-def test_a_case_in_braces_cannot_keep_its_parts(tmp_path):
-    path = written(tmp_path, json.dumps(YAML(typ="safe").load(MAIN)))
-    with pytest.raises(InputError, match="a mapping in block style"):
+@pytest.mark.parametrize("end", ["", "\n# { a comment }\n"])
+def test_a_case_in_braces_keeps_its_parts(end, tmp_path):
+    path = written(tmp_path, json.dumps(YAML(typ="safe").load(MAIN)) + end)
+    case = load_valve_case(path)
+
+    assert case.network == load_valve_case(written(tmp_path)).network
+    assert read_valve_case(case.source, path).parts == {"mass.yaml": MASS}
+    assert case.source.endswith(end)
+
+
+@pytest.mark.parametrize("end", ["...\n", "---\nb: 3\n"])
+def test_a_case_that_ends_before_its_file_cannot_keep_its_parts(end, tmp_path):
+    with pytest.raises(InputError):
+        load_valve_case(written(tmp_path, MAIN + end))
+
+
+SEEDS = range(2)
+
+
+def outcome(path: Path) -> None:
+    """Read; only our own error may come out, with a place."""
+    said: InputError | None = None
+    try:
+        load_valve_case(path)
+    except InputError as error:
+        said = error
+    if said is not None:
+        assert all((said.where, said.got, said.expected, said.hint))
+        assert str(path.parent) in said.where, str(said)
+        assert len(str(said)) < 3000, str(said)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_damaged_files_are_a_case_or_one_clear_error(seed, tmp_path):
+    draw = random.Random(seed)
+    for _ in range(60):
+        files = {"main": MAIN, "mass": MASS}
+        name = draw.choice(list(files))
+        damaged = {name: mutated(files[name].encode(), draw)}
+        for each, text in files.items():
+            target = tmp_path / ("case.yaml" if each == "main" else f"{each}.yaml")
+            target.write_bytes(damaged.get(each, text.encode()))
+        outcome(tmp_path / "case.yaml")
+
+
+VALUES = [*NASTY, "= 2", "= k", "'= 1 mm'", "'='", "'= ' ", "= (", "= 1/0", "left.tip", "'*'"]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_nasty_values_in_case_and_part_are_a_case_or_one_clear_error(seed, tmp_path):
+    draw = random.Random(seed)
+    trees = {"main": YAML(typ="safe").load(MAIN), "mass": YAML(typ="safe").load(MASS)}
+    for _ in range(60):
+        name = draw.choice(list(trees))
+        place = draw.choice(list(leaves(trees[name])))
+        texts = {"main": MAIN, "mass": MASS} | {
+            name: changed_value(trees[name], place, draw.choice(VALUES))
+        }
+        path = written(tmp_path, texts["main"], mass=texts["mass"])
+        outcome(path)
+
+
+def test_texts_of_parts_without_an_include_are_refused(tmp_path):
+    include = "include:\n  - {file: mass.yaml, as: left, with: {k: k, m: 3 g}}\n"
+    path = written(tmp_path, changed(MAIN, include, "", "left.tip, ", "") + "parts: {a: b}\n")
+
+    with pytest.raises(InputError, match="texts of parts that nothing includes"):
         load_valve_case(path)
 
 

@@ -18,6 +18,7 @@ from klack.case.merging import Merging
 from klack.case.origin import ExpandedCase, Filled, Origin
 from klack.case.parameters import parameters_of_text
 from klack.case.part_sections import CaseHead
+from klack.errors import InputError
 from klack.input.problem import Key
 from klack.input.section import Section
 
@@ -46,6 +47,13 @@ def expanded(data: Any, lines: Lines, path: Path) -> ExpandedCase:
         return written
     origin = written.origins[()]
     head = _checked(CaseHead, {name: data[name] for name in _HEAD if name in data}, origin)
+    if head.parts and not head.include:
+        raise InputError(
+            origin.where(("parts",), on_key=True),
+            got="texts of parts that nothing includes",
+            expected="an include of each of them",
+            hint="add 'include: [{file: NAME, as: NAME}]', or remove 'parts'.",
+        )
     own = origin.below("parameters")
     scope = parameters_of_text(head.parameters, own.where, section=own.key)
     origins: dict[Key, Origin] = {(): origin}

@@ -107,7 +107,7 @@ _PLAIN_NAME = (
 
 def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     """Expected value and advice for the built-in errors of pydantic."""
-    if kind == "string_pattern_mismatch" and "-" not in context["pattern"].split("]")[1]:
+    if kind == "string_pattern_mismatch" and "_-]" not in context["pattern"]:
         return _PLAIN_NAME
     if kind in _TYPES:
         return _TYPES[kind]

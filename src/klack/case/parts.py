@@ -3,8 +3,11 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from io import StringIO
 from pathlib import Path, PurePosixPath
 from typing import Any
+
+from ruamel.yaml import YAML
 
 from klack.case.case_text import LARGEST_CASE, Lines, parse, text_of
 from klack.errors import InputError
@@ -116,7 +119,7 @@ def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
         body = text if text.endswith("\n") or not text else text + "\n"
     section = "parts:  # the included files as they were when this case was read\n"
     section += "".join(f"  {json.dumps(name)}: {_scalar(part)}" for name, part in texts.items())
-    whole = body + section
+    whole = _in_braces(text, texts) if text.lstrip().startswith("{") else body + section
     expected = {**data, "parts": dict(texts)}
     try:
         same = parse(whole, path)[0] == expected
@@ -127,10 +130,18 @@ def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
             str(path),
             got="a layout in which the included files cannot be kept with the case",
             expected="a mapping in block style: key: value, line by line",
-            hint="write the case without braces around all of it and without a line '...' at its "
-            "end.",
+            hint="write the case without a line '...' at its end.",
         )
     return whole
+
+
+def _in_braces(text: str, texts: Mapping[str, str]) -> str:
+    """Text of a case in braces, with the included files as its last key."""
+    root = YAML().compose(StringIO(text))
+    end = root.end_mark.index - 1
+    body, comma = text[:end].rstrip(), ", " if root.value else ""
+    comma = "" if body.endswith(",") else comma
+    return f'{body}{comma}"parts": {json.dumps(dict(texts), ensure_ascii=False)}{text[end:]}'
 
 
 def _without_parts(text: str, path: Path) -> str:
