@@ -228,7 +228,7 @@ MISTAKES = {
     "folder": (changed(MAIN, "mass.yaml", "."), MASS, "'.'"),
     "unknown argument": (changed(MAIN, "m: 3 g", "mas: 3 g"), MASS, "'mas', no parameter"),
     "argument of another kind": (changed(MAIN, "m: 3 g", "m: 3 mm"), MASS, "'3 mm' for 'm'"),
-    "argument missing": (changed(MAIN, "k: k, ", ""), MASS, "nothing"),
+    "argument missing": (changed(MAIN, "k: k, ", ""), MASS, "no 'k', a parameter of"),
     "argument unknown name": (changed(MAIN, "k: k,", "k: kk,"), MASS, "unknown name 'kk'"),
     "outer parameter inside": (MAIN, changed(MASS, "= m,", "= M,"), "unknown name 'M'"),
     "no such port": (changed(MAIN, "left.tip", "left.top"), MASS, "has no port 'top'"),
@@ -526,3 +526,15 @@ def test_files_of_a_part_are_named_from_its_own_folder(tmp_path):
 
     found = expanded(tree.data, tree.lines, tree.path)
     assert found.data["network"]["components"]["left_extra"]["file"] == "parts/a/model.fmu"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [("m: 3 g", "m: 3 mm", "include[0].with.m"), ("k: k, ", "", "include[0].with")],
+)
+def test_a_wrong_or_missing_argument_is_an_error_of_the_include(old, new, key, tmp_path):
+    path = written(tmp_path, changed(MAIN, old, new))
+
+    with pytest.raises(InputError) as caught:
+        load_valve_case(path)
+    assert caught.value.where == f"{path}:5: {key}"

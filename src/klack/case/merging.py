@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
@@ -136,8 +137,14 @@ class Merging:
                 given = argument_values(item, number, scope, here)
                 for argument in given:
                     _require_parameter(argument, part, here, name)
+                _require_given(given, part, here, name)
                 there = Origin(path, lines, (), f"{prefix}{copy}")
-                values = parameters_of_text(part.parameters, there.below("parameters").where, given)
+                values = parameters_of_text(
+                    part.parameters,
+                    there.below("parameters").where,
+                    given,
+                    where_given=partial(_where_given, here),
+                )
                 found[copy] = self._put(part, values, there, name, (*above, name))
         return found
 
@@ -329,6 +336,21 @@ def _require_parameter(name: str, part: PartFile, origin: Origin, file: str) -> 
             got=f"'{name}', no parameter of '{file}'",
             expected=f"one of: {one_of(part.parameters)}",
             hint=nearest(name, part.parameters, "add it to 'parameters' of the part."),
+        )
+
+
+def _where_given(origin: Origin, name: str) -> str:
+    return origin.where(("with", name))
+
+
+def _require_given(given: Scope, part: PartFile, origin: Origin, file: str) -> None:
+    missing = [name for name, text in part.parameters.items() if text is None and name not in given]
+    if missing:
+        raise InputError(
+            origin.where(("with",), on_key=True),
+            got=f"no '{missing[0]}', a parameter of '{file}' without default",
+            expected=f"with: {{{missing[0]}: its value}}",
+            hint="give it here, or a default in the part.",
         )
 
 

@@ -91,6 +91,7 @@ def parameters_of_text(
     where: Callable[[Key], str],
     given: Scope | None = None,
     section: Key = (),
+    where_given: Callable[[str], str] = str,
 ) -> dict[str, ParameterValue]:
     """Evaluate parameters in the order in which they need each other.
 
@@ -103,6 +104,8 @@ def parameters_of_text(
         Values that replace those of the text; of the same dimension where the text has one.
     section : tuple
         Key of the parameters of a case, whose values follow from themselves; empty for a part.
+    where_given : callable
+        File, line and name of a given value, for errors.
 
     Raises
     ------
@@ -129,7 +132,7 @@ def parameters_of_text(
         if section:
             own = replace(own, sources=own.sources | {(*section, name)})
         if name in given:
-            own = _replaced(own, given[name], name, where((name,)))
+            own = _replaced(own, given[name], name, where_given(name))
         values[name] = own
     return {name: values[name] for name in written}
 
@@ -150,9 +153,7 @@ def _read(text: object, known: Collection[str], where: str) -> Expression:
             where,
             got="nothing" if text is None else f"'{text}'"[:80],
             expected="a quantity such as 1.3 mm, a number, or an expression of parameters",
-            hint="a parameter of a part without default is given by 'with' of its include."
-            if text is None
-            else "write one value.",
+            hint="write one value.",
         )
     expression = _expression(_plain(text), where)
     if expression.names or is_expression(text):  # else '3 g' is three grams
