@@ -1,7 +1,6 @@
 """Parameters and expressions in cases; truth: the same case with plain values."""
 
 import math
-import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -276,14 +275,13 @@ def test_points_of_a_parameter_are_the_strokes_of_cases_written_out(tmp_path):
     assert len(set(table[measures[0]].tolist())) == 3
 
 
-def test_reading_a_large_case_with_many_expressions_stays_quick(tmp_path):
+def test_a_large_case_with_many_expressions_is_read(tmp_path):
     springs = [f"    s{i}: {{type: spring, stiffness: 1 N/mm, preload: 1 N}}" for i in range(100)]
     masses = [f"    m{i}: {{type: rigid-mass, mass: 3 g, points: [a]}}" for i in range(100)]
     nodes = [f"    - [m{i}.a, s{i}.end]" for i in range(100)]
     head = "klack: 1\ntitle: many\n"
     tail = "run: {duration: 1 ms, lift: m0.a}\n"
     body = ["network:", "  components:", *springs, *masses, "  connections:", *nodes, ""]
-    plain = head + "\n".join(body) + tail
     names = "parameters:\n  k0: 1 N/mm\n" + "".join(
         f"  k{i}: k{i - 1} * 1.0 + 0 N/m\n" for i in range(1, 50)
     )
@@ -291,16 +289,8 @@ def test_reading_a_large_case_with_many_expressions_stays_quick(tmp_path):
     for i in range(50):
         text = text.replace("preload: 1 N}", f"preload: = k{i} * 1 mm}}", 1)
 
-    def seconds(text: str, path: Path) -> float:
-        read_valve_case(text, path)  # units and classes are known
-        begin = time.process_time()
-        read_valve_case(text, path.with_name("again.yaml"))
-        return time.process_time() - begin
-
-    without, with_them = seconds(plain, tmp_path / "a.yaml"), seconds(text, tmp_path / "b.yaml")
-    print(f"{without:.3f} s without, {with_them:.3f} s with expressions")
-    case = read_valve_case(text, tmp_path / "b.yaml")
-    assert case.network.components["s49"].preload == 1.0
+    parts = read_valve_case(text, tmp_path / "b.yaml").network.components
+    assert [parts[f"s{i}"].preload for i in range(100)] == [1.0] * 100
 
 
 def test_bounds_of_studies_and_calibrations_can_be_expressions():

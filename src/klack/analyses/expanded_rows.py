@@ -7,9 +7,10 @@ from klack.case.key_path import kind_at, node_at, written_at
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
 from klack.case.valve import ValveCase
+from klack.errors import InputError
 from klack.input.computed import Computed
 from klack.input.problem import CaseProblem, Key, key_text
-from klack.units import format_si
+from klack.units import format_si, parse_quantity
 
 __all__ = ["expanded_rows"]
 
@@ -44,8 +45,16 @@ def _parameters(parameters: object) -> Iterator[Row]:
     for name, item in parameters.items():
         assert isinstance(item, ParameterValue)
         kind = "" if item.kind.bare else f", {item.kind.name}"
-        plain = item.text == str(item) or not any(sign in item.text for sign in "=+*/^( ")
-        yield "parameter", name, f"{item}{kind}" + ("" if plain else f", from '{item.text}'")
+        yield "parameter", name, f"{item}{kind}{_source(item)}"
+
+
+def _source(item: ParameterValue) -> str:
+    """Expression that a value comes from; empty for a quantity."""
+    try:
+        parse_quantity(item.text, item.kind)
+    except InputError:
+        return f", from '{item.text}'"
+    return ""
 
 
 def _value(case: CaseFile, found: ExpandedCase, key: Key) -> str:
