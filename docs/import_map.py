@@ -39,7 +39,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
         "held_folder",
         "cache",
     ),
-    ("folder_lock", "material_library", "stages"),
+    ("folder_lock", "material_library", "stages", "expressions"),
     ("compiling",),
     ("stage",),
     ("whole_file",),

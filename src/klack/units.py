@@ -16,6 +16,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
 from klack.errors import InputError
+from klack.input.computed import Computed
 
 __all__ = [
     "KINDS",
@@ -57,7 +58,10 @@ __all__ = [
     "format_si",
     "is_level",
     "parse_quantity",
+    "powers_of_unit",
+    "size_of_unit",
     "takes_prefix",
+    "typed",
 ]
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -248,8 +252,8 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
 
     Parameters
     ----------
-    value : str, int or float
-        What the user wrote.
+    value : str, int, float or Computed
+        What the user wrote, or what an expression gave.
     kind : Kind
     where : str
         Key or argument, for the error.
@@ -265,6 +269,8 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     >>> parse_quantity("7.85 g/cm^3", DENSITY)
     7850.0
     """
+    if isinstance(value, Computed):
+        return _of_expression(value, kind, where)
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         raise QuantityError(
             where, value, kind, f"write a number and its unit, e.g. {kind.example}."
@@ -284,6 +290,19 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     result = _in_range(number * _factor(value, unit, kind, where), value, kind, where)
     # a decimal input stays decimal: 80 * 1e-6 must read 8e-05, not 7.999999999999999e-05
     return result if kind.factors else float(f"{result:.15g}")
+
+
+def _of_expression(value: Computed, kind: Kind, where: str) -> float:
+    """Value of an expression whose dimension fits the kind, rounded as a written one is."""
+    if not value.dimension.fits(kind.unit):
+        raise InputError(
+            where,
+            got=str(value),
+            expected=kind.name if kind.bare else f"{kind.name} [{kind.unit}]",
+            hint="check the powers and the units in the expression.",
+        )
+    result = value.value if kind.factors else float(f"{value.value:.15g}")
+    return _in_range(result, value, kind, where)
 
 
 def _number(value: float) -> float:
@@ -390,6 +409,37 @@ def base_powers(unit: str) -> tuple[tuple[str, Fraction], ...]:
 
 
 @lru_cache(maxsize=1000)
+def powers_of_unit(unit: str) -> tuple[tuple[str, Fraction], ...] | None:
+    """Powers of the SI base units in any unit; None for an unknown one and one with an offset.
+
+    >>> [f"{base}^{power}" for base, power in powers_of_unit("bar")]
+    ['kg^1', 'm^-1', 's^-2']
+    """
+    registry = _registry()
+    try:
+        one = registry.Quantity(1.0, unit)
+        if not one._is_multiplicative or one.magnitude != 1.0:  # degC and dB; numbers
+            return None
+        dimension = registry.get_dimensionality(one.units)
+        powers = [(_BASE[name], Fraction(p).limit_denominator(12)) for name, p in dimension.items()]
+    except Exception:  # pint evaluates the text and lets errors of tokenize and others through
+        return None
+    return tuple(sorted(powers))
+
+
+@lru_cache(maxsize=1000)
+def size_of_unit(unit: str, si: str = "") -> float:
+    """Size of a unit that :func:`powers_of_unit` knows in another one, or in SI base units.
+
+    >>> size_of_unit("bar"), size_of_unit("N/mm", "N/m")
+    (100000.0, 1000.0)
+    """
+    if si:
+        return _in_si(unit, si)
+    return float(_registry().Quantity(1.0, unit).to_base_units().magnitude)
+
+
+@lru_cache(maxsize=1000)
 def _in_si(unit: str, si: str) -> float:
     """Size of one unit in another one; a case has few units, and a calibration reads it often."""
     return float(_registry().Quantity(1.0, unit).to(si).magnitude)
@@ -470,7 +520,7 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
     return f"{scaled:.{max(digits, 3)}g} {_PREFIXES[power]}{unit}"  # 450 nm, not 4.5e+02 nm
 
 
-def _typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
+def typed(kind: Kind) -> tuple[BeforeValidator, WithJsonSchema]:
     """Pydantic metadata of a field that takes this kind and holds SI."""
     schema = {
         "type": ["string", "number"],
@@ -518,37 +568,37 @@ def _length_unit(value: object) -> float:
     return parse_quantity(f"1 {value}", LENGTH)
 
 
-Length = Annotated[float, *_typed(LENGTH)]
-Speed = Annotated[float, *_typed(SPEED)]
-Time = Annotated[float, *_typed(TIME)]
-Force = Annotated[float, *_typed(FORCE)]
-Stiffness = Annotated[float, *_typed(STIFFNESS)]
-Pressure = Annotated[float, *_typed(PRESSURE)]
-Modulus = Annotated[float, *_typed(MODULUS)]
-Density = Annotated[float, *_typed(DENSITY)]
-Angle = Annotated[float, *_typed(ANGLE)]
-Frequency = Annotated[float, *_typed(FREQUENCY)]
-Rate = Annotated[float, *_typed(RATE)]
-Rotation = Annotated[float, *_typed(ROTATION)]
-Area = Annotated[float, *_typed(AREA)]
-Volume = Annotated[float, *_typed(VOLUME)]
-Mass = Annotated[float, *_typed(MASS)]
-Acceleration = Annotated[float, *_typed(ACCELERATION)]
-DampingCoefficient = Annotated[float, *_typed(DAMPING)]
-Compliance = Annotated[float, *_typed(COMPLIANCE)]
-VolumeFlow = Annotated[float, *_typed(VOLUME_FLOW)]
-DynamicViscosity = Annotated[float, *_typed(DYNAMIC_VISCOSITY)]
-KinematicViscosity = Annotated[float, *_typed(KINEMATIC_VISCOSITY)]
-Voltage = Annotated[float, *_typed(VOLTAGE)]
-Current = Annotated[float, *_typed(CURRENT)]
-Resistance = Annotated[float, *_typed(RESISTANCE)]
-Conductivity = Annotated[float, *_typed(CONDUCTIVITY)]
-FluxDensity = Annotated[float, *_typed(FLUX_DENSITY)]
-FieldStrength = Annotated[float, *_typed(FIELD_STRENGTH)]
-Permeance = Annotated[float, *_typed(PERMEANCE)]
-Flux = Annotated[float, *_typed(FLUX)]
+Length = Annotated[float, *typed(LENGTH)]
+Speed = Annotated[float, *typed(SPEED)]
+Time = Annotated[float, *typed(TIME)]
+Force = Annotated[float, *typed(FORCE)]
+Stiffness = Annotated[float, *typed(STIFFNESS)]
+Pressure = Annotated[float, *typed(PRESSURE)]
+Modulus = Annotated[float, *typed(MODULUS)]
+Density = Annotated[float, *typed(DENSITY)]
+Angle = Annotated[float, *typed(ANGLE)]
+Frequency = Annotated[float, *typed(FREQUENCY)]
+Rate = Annotated[float, *typed(RATE)]
+Rotation = Annotated[float, *typed(ROTATION)]
+Area = Annotated[float, *typed(AREA)]
+Volume = Annotated[float, *typed(VOLUME)]
+Mass = Annotated[float, *typed(MASS)]
+Acceleration = Annotated[float, *typed(ACCELERATION)]
+DampingCoefficient = Annotated[float, *typed(DAMPING)]
+Compliance = Annotated[float, *typed(COMPLIANCE)]
+VolumeFlow = Annotated[float, *typed(VOLUME_FLOW)]
+DynamicViscosity = Annotated[float, *typed(DYNAMIC_VISCOSITY)]
+KinematicViscosity = Annotated[float, *typed(KINEMATIC_VISCOSITY)]
+Voltage = Annotated[float, *typed(VOLTAGE)]
+Current = Annotated[float, *typed(CURRENT)]
+Resistance = Annotated[float, *typed(RESISTANCE)]
+Conductivity = Annotated[float, *typed(CONDUCTIVITY)]
+FluxDensity = Annotated[float, *typed(FLUX_DENSITY)]
+FieldStrength = Annotated[float, *typed(FIELD_STRENGTH)]
+Permeance = Annotated[float, *typed(PERMEANCE)]
+Flux = Annotated[float, *typed(FLUX)]
 Temperature = Annotated[float, *_temperature()]
-Ratio = Annotated[float, *_typed(RATIO)]
+Ratio = Annotated[float, *typed(RATIO)]
 LengthUnit = Annotated[
     float,
     BeforeValidator(_length_unit),

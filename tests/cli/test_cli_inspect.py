@@ -1,5 +1,6 @@
 """klack inspect through main(argv); truth: the drawing of the shipped needle."""
 
+import json
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -298,3 +299,22 @@ def test_a_support_on_a_node_set_is_refused_as_by_a_run(tmp_path: Path, capsys):
     assert "END_LOWER" in told
     assert main(["impact", str(path), "--out", str(tmp_path / "out")]) == 2
     assert "'FEET'" in capsys.readouterr().err
+
+
+def test_parameters_and_parts_of_a_case_are_shown(capsys, tmp_path):
+    """Truth: the files of the page on parameters and parts."""
+    case = Path(__file__).parents[2] / "docs" / "how-to" / "four_injectors.yaml"
+    out = tmp_path / "parts.json"
+
+    assert main(["inspect", str(case), "--json", str(out)]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "parameter lift 80 um, a length" in shown
+    assert "injector3_magnet.time[2] 900 us, from '= 500 us + delay'" in shown
+    assert "component injector4_nozzle seat, components.nozzle of injector.yaml" in shown
+    assert "connection 1 supply.b, rail.fluid, injector1_bore.a, injector2_bore.a" in shown
+    assert list(json.loads(out.read_text(encoding="utf-8"))["parts"]) == [
+        "case: parameters",
+        "case: values of expressions",
+        "case: components",
+        "case: connections",
+    ]

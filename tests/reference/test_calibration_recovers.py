@@ -4,11 +4,13 @@ A rigid valve of three components; truth is its own model, see ``rigid_valve``.
 """
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rigid_valve import NO_PROFILE, SCATTER, TEXT, TRUTH, measured, tree_of
 
+from klack.analyses.calibration.calibrated_case import calibrated_text
 from klack.analyses.calibration.run import _repeatable, run_calibration
 from klack.measurement.fit_window import FitWindow
 from klack.measurement.stroke_set import MeasuredStroke
@@ -118,3 +120,19 @@ def test_a_closing_that_the_last_bounces_decide_is_left_out(last, kept):
 
     assert len(found) == kept
     assert any("only the opening was fitted" in note for note in notes) == (kept == 1)
+
+
+def test_a_parameter_of_the_case_is_fitted_as_its_key_is():
+    """Truth: the fit of the key; the new text changes the parameter alone."""
+    strokes = measured(0)
+    text = NO_PROFILE.replace("network:", "parameters: {F: 11 N}  # today\nnetwork:", 1)
+    text = text.replace("preload: 11 N", "preload: = F")
+    text = text.replace("key: network.components.spring.preload", "key: parameters.F")
+    plain, found = calibrate(strokes, NO_PROFILE), calibrate(strokes, text)
+
+    for one, other in zip(plain.parameters, found.parameters, strict=True):
+        assert (one.value, one.standard_error) == (other.value, other.standard_error)
+    new = calibrated_text(tree_of(text), found, Path())
+    value = found.parameters[0].value
+    assert f"parameters: {{F: {value:.7g} N}}  # today" in new
+    assert "preload: = F" in new

@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from klack.errors import InputError
-from klack.studies.expression import Expression, ordered
+from klack.expressions.expression import Expression, ordered
 
 VALUES = {"a": 2.0, "b": 5.0, "c": 0.25}
 
@@ -105,7 +105,10 @@ def test_an_expression_goes_to_another_process():
         "   ",
         "2 *",
         "a b",
-        "8 N",
+        "8 Nn",
+        "8 N m",
+        "2 (3)",
+        "a (2)",
         "a.real",
         "network.spring.preload * 2",
         "a[0]",
@@ -120,7 +123,11 @@ def test_an_expression_goes_to_another_process():
         "None",
         "...",
         "1j",
-        "a ^ 2",
+        "a ^^ 2",
+        "2 mm^a",
+        "2 mm ^ 2",
+        "20 degC - 5 K",
+        "10 dB",
         "a // 2",
         "a % 2",
         "a @ b",
@@ -186,7 +193,7 @@ def test_any_text_is_read_or_refused(text):
 @pytest.mark.parametrize(
     ("text", "hint"),
     [
-        ("a^2", r"\*\*"),
+        ("2 a b", r"operator"),
         ("0,5*a", "point"),
         ("sqr(a)", "sqrt"),
         ("body.radius", "without points"),

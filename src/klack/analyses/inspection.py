@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from klack.analyses.expanded_rows import Row, expanded_rows
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.given_bodies import reduced_from_file
 from klack.case.bodies import CaseFile
@@ -23,10 +24,6 @@ from klack.model_files.system_matrix import SystemMatrix, WhichMatrixError
 from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]
-
-Row = tuple[str, str, str]
-"""What, its name, its numbers in words."""
-
 
 STEP_ENDINGS = (".step", ".stp")
 
@@ -75,9 +72,10 @@ def inspect_file(
 
 
 def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
-    """Files of other programs for the bodies of a case, checked as in a run.
+    """Parameters, parts and bodies of a case, their files checked as in a run.
 
-    Yields the name of each body and its rows.
+    Yields the rows of :func:`klack.analyses.expanded_rows.expanded_rows`, then the name of each
+    body and its rows.
 
     Raises
     ------
@@ -85,6 +83,7 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
         For files that cannot be read, for matrices and models that no body has, and, after the
         rows of all bodies, for a surface that the case names and its file does not have.
     """
+    yield from expanded_rows(case)
     known: dict[str, tuple[str, ...]] = {}
     for name, body in case.bodies.items():
         if body.reduced is not None:

@@ -98,7 +98,10 @@ class InspectionJson(TypedDict):
     file: str
     parts: Annotated[
         dict[str, list[InspectedRowJson]],
-        Field(description="By the name of the file, or of each body of a case."),
+        Field(
+            description="By the name of the file, or of each body of a case; also 'case: "
+            "parameters', 'case: values of expressions', 'case: components', 'case: connections'."
+        ),
     ]
 
 

@@ -16,6 +16,8 @@ from pydantic import (
 
 from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
+from klack.case.origin import ExpandedCase
+from klack.case.parameters import PARAMETERS, ParameterName, Written
 from klack.errors import InputError
 from klack.hardening import (
     HARDNESS_SPREAD,
@@ -24,7 +26,7 @@ from klack.hardening import (
     vickers_of_rockwell,
     yield_of_hardness,
 )
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Count, Name, NamedSection, Section, Text
 from klack.material_library import MATERIALS, find_material
 from klack.materials import Material
@@ -440,6 +442,9 @@ class CaseFile(Section):
     description: Text = Field(
         default="", description="What the case shows, and the source of its numbers."
     )
+    parameters: Mapping[ParameterName, Written] = Field(
+        default_factory=dict, description=PARAMETERS
+    )
     materials: Mapping[Name, CaseMaterial] = Field(
         default_factory=dict, description="name: properties."
     )
@@ -447,11 +452,13 @@ class CaseFile(Section):
 
     _path: Path | None = PrivateAttr(None)
     _source: str = PrivateAttr("")
+    _expanded: ExpandedCase | None = PrivateAttr(None)
 
     def model_post_init(self, context: Any, /) -> None:
         """Remember the file that the case was read from."""
         if context:
             self._path, self._source = context.get("path"), context.get("source", "")
+            self._expanded = context.get("expanded")
 
     @field_validator("klack", mode="before")
     @classmethod
@@ -479,6 +486,15 @@ class CaseFile(Section):
     def source(self) -> str:
         """Text of that file."""
         return self._source
+
+    @property
+    def expanded(self) -> ExpandedCase | None:
+        """Its plain data with expressions evaluated and parts in place; None in Python."""
+        return self._expanded
+
+    def behind(self, key: Key) -> tuple[Key, ...]:
+        """Keys whose values follow from a parameter or an argument; of any other key, itself."""
+        return self._expanded.behind(key) if self._expanded is not None else (key,)
 
     @property
     def own_components(self) -> Mapping[str, str]:

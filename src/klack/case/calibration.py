@@ -5,7 +5,8 @@ from typing import Any, Literal
 
 from pydantic import Field, field_validator
 
-from klack.input.section import Count, Name, Number, Section, Text
+from klack.case.study import Written
+from klack.input.section import Count, Name, Section, Text
 
 __all__ = ["CalibrationParameter", "CaseCalibration"]
 
@@ -21,8 +22,8 @@ class CalibrationParameter(Section):
         description="Path of the key in the case, e.g. network.components.spring.preload; a list "
         "of paths gets one value.",
     )
-    lower: Text | Number = Field(description="Lower bound, with the unit of the key.")
-    upper: Text | Number = Field(description="Upper bound.")
+    lower: Written = Field(description="Lower bound, with the unit of the key.")
+    upper: Written = Field(description="Upper bound.")
 
     @field_validator("key", mode="before")
     @classmethod

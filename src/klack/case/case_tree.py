@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from klack.case.any_case import AnyCase, case_kind
+from klack.case.parts import self_contained
 from klack.case.reader import Lines, parse, text_of, validated
 from klack.case.valve import ValveCase, require_valve
 from klack.input.problem import Key
@@ -70,6 +71,8 @@ def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> Ca
 def tree_of(text: str, path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
     """Parse the text of a case that lies (or will lie) at ``path``."""
     data, lines = parse(text, path)
+    if "network" in data and data.get("include"):
+        text, data, lines = self_contained(text, path, data, lines)
     own = {component_word(kind): kind for kind in components}
     return CaseTree(path=path, text=text, data=data, lines=lines, components=own)
 

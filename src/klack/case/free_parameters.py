@@ -92,7 +92,8 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
         at: Key = (*where, "key", i) if len(item.key) > 1 else (*where, "key")
         try:
             key = split_path(text)
-            _require_cheap(key, text)
+            for behind in case.behind(key):
+                _require_cheap(behind, text, direct=behind == key)
             places.append(quantity_at(case, key))
         except CaseProblem as problem:
             raise _moved(problem, at) from None
@@ -125,11 +126,14 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
     return FreeParameter(name, tuple(places), lower, upper, first.value)
 
 
-def _require_cheap(key: Key, text: str) -> None:
-    """Only what leaves meshes, modes and contact laws as they are can be fitted."""
+def _require_cheap(key: Key, text: str, *, direct: bool) -> None:
+    """Only what leaves meshes, modes and contact laws as they are can be fitted.
+
+    What the sensor shows is fitted apart from the motion, by its own keys (``direct``) alone.
+    """
     allowed = (
         key[:1] == ("network",)
-        or key[:2] == ("measurement", "sensor")
+        or (key[:2] == ("measurement", "sensor") and direct)
         or (key[:1] == ("bodies",) and key[2:3] == ("damping",))
     )
     if allowed:

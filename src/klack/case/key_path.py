@@ -8,6 +8,8 @@ from pydantic import BeforeValidator, PlainValidator, TypeAdapter, ValidationErr
 from pydantic.fields import FieldInfo
 
 from klack.case.distribution import Distribution
+from klack.case.origin import ExpandedCase
+from klack.case.parameters import ParameterValue
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
@@ -110,6 +112,8 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
         node = found[part]
         if isinstance(node, Distribution):
             node = node.written
+        elif isinstance(node, ParameterValue):
+            node, field = node.value, node.field
     return node, field
 
 
@@ -130,6 +134,7 @@ def quantity_at(case: Section, key: Key) -> Quantity:
         If a part of the path does not exist, or no such number stands there.
     """
     node, field = node_at(case, key)
+    _require_of_case(case, key)
     kind = kind_at(node, field)
     if kind is None or field is None or isinstance(node, bool) or not isinstance(node, float | int):
         got = "no value" if node is None else "no number with a unit"
@@ -140,6 +145,29 @@ def quantity_at(case: Section, key: Key) -> Quantity:
             hint=_advice(key, node),
         )
     return Quantity(key, kind, float(node), field)
+
+
+def _require_of_case(case: Section, key: Key) -> None:
+    """Refuse a key that comes from an included part, and a parameter that nothing follows from."""
+    found: ExpandedCase | None = getattr(case, "expanded", None)
+    if found is None:
+        return
+    place = ".".join(map(str, key))
+    copy = found.origin(key).copy
+    if copy:
+        raise CaseProblem(
+            (),
+            got=f"'{place}', which stands in the part '{copy}'",
+            expected="a key of the case itself",
+            hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
+        )
+    if not found.behind(key):
+        raise CaseProblem(
+            (),
+            got=f"'{place}', which no value of the case follows from",
+            expected="a parameter that the case uses",
+            hint="use it in an expression: '= ...'.",
+        )
 
 
 def _advice(key: Key, node: Any) -> str:

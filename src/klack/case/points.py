@@ -141,6 +141,8 @@ def checked_parts(tree: CaseTree, case: ValveCase, places: Iterable[Key]) -> Cas
         That points touch.
     """
     touched = set(places)
+    if any(place[0] in _EXPANDED for place in touched):  # any section may follow from it
+        return tree
     heads = {place[0] for place in touched}
     data = {
         name: value if name in heads or name not in _SECTIONS else getattr(case, name)
@@ -186,7 +188,8 @@ def case_at(
         return validated(kind, tree.text, tree.path, whole, tree.lines, tree.components)
 
 
-_SECTIONS = frozenset(ValveCase.model_fields)
+_EXPANDED = ("parameters", "include", "parts")
+_SECTIONS = frozenset(ValveCase.model_fields) - {*_EXPANDED}
 
 
 def _components(tree: CaseTree, case: ValveCase, touched: set[Key]) -> dict[str, Any]:

@@ -1,10 +1,12 @@
 """The text of a case with some values changed, and everything else as its author wrote it."""
 
+import json
 import os
 import re
 from collections.abc import Mapping
+from contextlib import suppress
 from io import StringIO
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -75,7 +77,8 @@ def written_quantity(tree: CaseTree, place: Quantity, value: float, digits: int 
     if unit in ("degC", "°C"):
         return f"{value - 273.15:.{digits}g}{rest}"
     if unit:
-        return f"{value / parse_quantity(f'1 {unit}', place.kind):.{digits}g}{rest}".rstrip()
+        with suppress(InputError):  # an expression, such as 2 * 0.3 mm
+            return f"{value / parse_quantity(f'1 {unit}', place.kind):.{digits}g}{rest}".rstrip()
     number = f"{value:.{digits}g}"
     return number if place.kind.bare else f"{number} {place.kind.unit}"
 
@@ -87,11 +90,20 @@ def moved_files(tree: CaseTree, folder: Path) -> dict[Key, str]:
     old, new = tree.path.resolve().parent, folder.resolve()
     result = {}
     for key, name in found.items():
+        if key[0] == "include":  # kept with the case
+            continue
         path = Path(name).expanduser()
         if path.is_absolute():
             continue
         moved = os.path.relpath(old / path, new)
         result[key] = '"' + moved.replace("\\", "/").replace('"', '\\"') + '"'
+    for name, text in (tree.data.get("parts") or {}).items():
+        place = tree.path.parent / name
+        data, lines = parse(text, place)
+        part = CaseTree(path=place, text=text, data=data, lines=lines)
+        inside = moved_files(part, folder / PurePosixPath(name).parent)
+        if inside:
+            result["parts", name] = json.dumps(rewritten(part, inside), ensure_ascii=False) + "\n"
     return result
 
 

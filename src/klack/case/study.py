@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, Strict, model_validator
+from pydantic import BeforeValidator, Field, Strict, model_validator
 
 from klack.case.levels import Level
+from klack.case.parameters import as_written
 from klack.case.variants import Variant
 from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, one_of
@@ -24,7 +25,7 @@ __all__ = [
     "Written",
 ]
 
-Written = Text | Number
+Written = Annotated[Text | Number, BeforeValidator(as_written)]
 
 
 class NormalRange(Section):

@@ -89,6 +89,8 @@ def _of_valve(case: ValveCase) -> Iterator[_Named]:
 
 def place_of(case: CaseFile, key: Key, *, on_key: bool) -> str:
     """File, line and key of a place in a case, for an error."""
+    if case.expanded is not None:
+        return case.expanded.origin(key).where(on_key=on_key)
     path = case.path or Path("case")
     if not case.source:
         return f"{path}: {key_text(key)}"

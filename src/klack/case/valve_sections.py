@@ -15,12 +15,13 @@ from klack.case.impact_sections import CaseWorn, Lumped
 from klack.case.measurement import CaseMeasurement
 from klack.case.motion_of_valve import ValveGuide, ValveMotion, ValvePlacement
 from klack.case.noise import CaseNoise
+from klack.case.part_sections import INCLUDE, PARTS, CaseInclude
 from klack.case.shots import StrokeShots
 from klack.case.study import CaseStudy
 from klack.case.variants import Variant
 from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem
-from klack.input.section import Count, Name, Section
+from klack.input.section import Count, Name, Section, Text
 from klack.network.accuracy import Accuracy, fine_step
 from klack.network.declaration import NetworkSection
 from klack.units import Force, Length, Ratio, Speed, Time, format_si
@@ -149,6 +150,8 @@ class StrokeRun(Section):
 class ValveSections(CaseFile):
     """All sections of a valve, not yet checked against each other."""
 
+    include: tuple[CaseInclude, ...] = Field(default=(), description=INCLUDE)
+    parts: Mapping[Text, Text] = Field(default_factory=dict, description=PARTS)
     materials: Mapping[Name, CaseMaterial] = Field(
         default_factory=dict, description="name: properties."
     )

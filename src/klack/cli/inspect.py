@@ -24,7 +24,8 @@ def inspect(
         Path,
         Parameter(
             name="FILE",
-            help="STEP, mesh, matrix or FMU of another program; or a case: its bodies are checked.",
+            help="STEP, mesh, matrix or FMU of another program; or a case: its parameters, parts "
+            "and bodies.",
         ),
     ],
     /,
@@ -42,7 +43,8 @@ def inspect(
 ) -> int:
     """Show surfaces and sets of CAD or a mesh, rows of a matrix, inputs and outputs of an FMU.
 
-    Of a case: the bodies that come from other programs, checked as a run checks them.
+    Of a case: its parameters and expressions in SI, the components of included parts, and the
+    bodies that come from other programs, checked as a run checks them.
     """
     from klack.analyses.inspection import STEP_ENDINGS, inspect_case, inspect_file
     from klack.case.shipped import find_case, shipped_cases

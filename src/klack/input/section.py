@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     GetJsonSchemaHandler,
@@ -15,11 +16,12 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from klack.input.computed import plain_number
 from klack.input.problem import CaseProblem, nearest, one_of
 
 __all__ = ["Count", "Name", "NamedSection", "Number", "Section", "Text"]
 
-Number = Annotated[float, Strict()]
+Number = Annotated[float, Strict(), BeforeValidator(plain_number)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict()]
 Name = Annotated[str, Strict(), StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]

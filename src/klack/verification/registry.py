@@ -51,6 +51,7 @@ COVERS = {
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
+    "cases": "Case files: units by their definitions, expressions, included parts of networks.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
     "FMI.",
 }

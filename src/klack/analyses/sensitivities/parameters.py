@@ -14,7 +14,7 @@ from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
 from klack.errors import InputError
-from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.studies.spread import Normal, Range, Spread
 from klack.units import RATIO, Kind
 
@@ -230,13 +230,22 @@ def _reason(case: AnyCase, item: VariedKey, linked: Sequence[Linked]) -> tuple[s
         place = split_path(name)
         if len(place) == 1:
             continue
-        if place[0] == "run":
-            return "a setting of the run", "klack advise tells what its steps change."
-        if not isinstance(case, ValveCase):
-            continue
-        if place[0] != "network" or STROKES.makes_bodies(case, place):
-            return (
-                "a key that meshes, modes, contact laws or the noise follow from",
-                "klack study with a few values of it computes the valve at each of them.",
-            )
+        for key in case.behind(place):
+            reason = _reason_at(case, key)
+            if reason is not None:
+                return reason
+    return None
+
+
+def _reason_at(case: AnyCase, place: Key) -> tuple[str, str] | None:
+    """Why there is no derivative with what stands at one key."""
+    if place[0] == "run":
+        return "a setting of the run", "klack advise tells what its steps change."
+    if not isinstance(case, ValveCase):
+        return None
+    if place[0] != "network" or STROKES.makes_bodies(case, place):
+        return (
+            "a key that meshes, modes, contact laws or the noise follow from",
+            "klack study with a few values of it computes the valve at each of them.",
+        )
     return None

@@ -222,9 +222,14 @@ def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ..
     found: dict[tuple[tuple[Key, PointValue], ...], list[int]] = {}
     for i in places:
         changes = asked.points.changes(i).items()
-        made = tuple(item for item in changes if asked.kind.makes_bodies(asked.case, item[0]))
+        made = tuple(item for item in changes if _makes_bodies(asked, item[0]))
         found.setdefault(made, []).append(i)
     return tuple(PointGroup(made=dict(made), places=tuple(at)) for made, at in found.items())
+
+
+def _makes_bodies(asked: AskedPoints, place: Key) -> bool:
+    """Whether bodies may follow from a key, or from what a parameter decides."""
+    return any(asked.kind.makes_bodies(asked.case, key) for key in asked.case.behind(place))
 
 
 def require_same_for_all(keys: Iterable[PointKey], section: Key, what: str, hint: str) -> None:

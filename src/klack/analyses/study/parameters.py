@@ -11,8 +11,8 @@ from klack.case.points import PointValue
 from klack.case.study import StudyParameter, Written
 from klack.case.study_source import StudySource
 from klack.errors import InputError
+from klack.expressions.expression import RESERVED
 from klack.input.problem import CaseProblem, Key
-from klack.studies.expression import RESERVED
 from klack.studies.spread import Listed, Normal, Range, Spread
 from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
 

@@ -23,9 +23,9 @@ from klack.case.points import PointValue
 from klack.case.reader import text_of
 from klack.case.study_source import StudySource
 from klack.errors import InputError
+from klack.expressions.expression import Expression, ordered
 from klack.input.problem import CaseProblem, one_of
 from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
-from klack.studies.expression import Expression, ordered
 from klack.studies.screening import morris_design
 from klack.studies.sensitivity import saltelli_design
 from klack.studies.spread import Range
@@ -251,6 +251,8 @@ def linked_of(
         expressions[name] = Expression.parse(text, source.where(("linked", name)))
     numbers = [item for item in parameters if item.kind is not None]
     words = short_names((*(item.name for item in numbers), *given))
+    for expression in expressions.values():
+        expression.require_clear(words)
     known = {word for word, name in words.items() if name not in given}
     named = {word: expressions[name] for word, name in words.items() if name in given}
     order = dict.fromkeys(words[word] for word in ordered(named, known))

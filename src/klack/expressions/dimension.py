@@ -6,7 +6,7 @@ from fractions import Fraction
 
 from klack.units import KINDS, base_powers
 
-__all__ = ["ANYTHING", "HALF_TURN", "NUMBER", "Dimension", "dimension_of"]
+__all__ = ["ANYTHING", "HALF_TURN", "NUMBER", "NUMBER_OR_ANGLE", "Dimension", "dimension_of"]
 
 Turns = frozenset[tuple[Fraction, Fraction]]
 """Powers of (rad, cycle) that a value can be read with."""
@@ -98,9 +98,11 @@ class Dimension:
         for kind in KINDS:
             if self.fits(kind.unit):
                 return f"{kind.name} [{kind.unit}]"
-        return f"a quantity in {self._in_base_units()}"
+        return f"a quantity in {self.unit}"
 
-    def _in_base_units(self) -> str:
+    @property
+    def unit(self) -> str:
+        """Product of base units: ``kg*m^2*s^-2``."""
         extra: tuple[tuple[str, Fraction], ...] = ()
         if self._turned:
             angle, cycle = min(self.turns)
@@ -151,5 +153,7 @@ NUMBER = Dimension()
 """A number without unit."""
 ANYTHING = Dimension(zero=True)
 """The number 0."""
+NUMBER_OR_ANGLE = Dimension(turns=frozenset({(_NONE, _NONE), (_ONE, _NONE)}))
+"""What asin, acos and atan give."""
 HALF_TURN = Dimension(turns=frozenset({(_NONE, _NONE), (_ONE, _NONE), (_NONE, -_ONE)}))
 """pi: a number, pi rad, or rad per cycle as in ``2 * pi * frequency``."""

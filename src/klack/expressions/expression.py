@@ -3,40 +3,37 @@
 The text is parsed and never run: what is not on the list of allowed parts is an error.
 """
 
-import ast
 import math
 import operator
-import warnings
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
 from typing import NoReturn
 
 from klack.errors import InputError
+from klack.expressions.dimension import (
+    ANYTHING,
+    HALF_TURN,
+    NUMBER,
+    NUMBER_OR_ANGLE,
+    Dimension,
+    dimension_of,
+)
+from klack.expressions.syntax import FUNCTIONS, Node, nodes, syntax_tree
+from klack.expressions.tokens import UnreadableError
 from klack.input.problem import nearest, one_of
-from klack.studies.dimension import ANYTHING, HALF_TURN, NUMBER, Dimension, dimension_of
 
 __all__ = ["RESERVED", "Expression", "ordered"]
 
 _LONGEST = 500  # characters
-_DEEPEST = 100
-_MOST_NODES = 200
 
-_BINARY: dict[type[ast.operator], str] = {
-    ast.Add: "+",
-    ast.Sub: "-",
-    ast.Mult: "*",
-    ast.Div: "/",
-    ast.Pow: "**",
-}
-_UNARY: dict[type[ast.unaryop], str] = {ast.UAdd: "plus", ast.USub: "minus"}
 _COMPUTE: dict[str, Callable[..., float]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
     "/": operator.truediv,
-    "**": operator.pow,
+    "^": operator.pow,
     "plus": operator.pos,
     "minus": operator.neg,
     "sqrt": math.sqrt,
@@ -44,35 +41,32 @@ _COMPUTE: dict[str, Callable[..., float]] = {
     "min": min,
     "max": max,
     "exp": math.exp,
+    "ln": math.log,
     "log": math.log,
+    "log10": math.log10,
     "sin": math.sin,
     "cos": math.cos,
     "tan": math.tan,
+    "asin": math.asin,
+    "acos": math.acos,
+    "atan": math.atan,
 }
-_FUNCTIONS = ("sqrt", "abs", "min", "max", "exp", "log", "sin", "cos", "tan")
 _ALIKE = ("+", "-", "min", "max")  # take values of one kind
+_OF_ANGLE = ("sin", "cos", "tan")
+_TO_ANGLE = ("asin", "acos", "atan")
 
-RESERVED = frozenset({*_FUNCTIONS, "pi"})
+RESERVED = frozenset({*FUNCTIONS, "pi"})
 """Names with a meaning of their own, which no parameter can have."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Node:
-    """A number, a name, or an operation (``symbol``) on other nodes."""
-
-    text: str
-    symbol: str = ""
-    arguments: tuple["_Node", ...] = ()
-    number: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Expression:
     """An arithmetic expression of parameters; :meth:`parse` makes it.
 
-    Numbers, names, ``+ - * / **``, parentheses, ``pi`` and the functions ``sqrt``, ``abs``,
-    ``min``, ``max``, ``exp``, ``log`` (natural), ``sin``, ``cos``, ``tan`` (of rad).  Values of
-    parameters are SI numbers, literals are numbers without unit.
+    Numbers, also with units (``0.3 mm``), names, ``+ - * / ^`` (``**`` is the same as ``^``),
+    parentheses, ``pi`` and the functions ``sqrt``, ``abs``, ``min``, ``max``, ``exp``, ``ln`` (also
+    ``log``), ``log10``, ``sin``, ``cos``, ``tan`` (of rad), ``asin``, ``acos``, ``atan``.  All
+    values are in SI.
 
     Parameters
     ----------
@@ -86,7 +80,7 @@ class Expression:
     text: str
     names: tuple[str, ...]
     where: str = field(compare=False)
-    _root: _Node = field(repr=False, compare=False)
+    _root: Node = field(repr=False, compare=False)
 
     @classmethod
     def parse(cls, text: str, where: str = "expression") -> "Expression":
@@ -116,17 +110,14 @@ class Expression:
             _refuse(
                 where,
                 f"{len(squeezed)} characters",
-                f"use at most {_LONGEST}, or link in several steps.",
+                f"use at most {_LONGEST}, or compute it in several steps.",
             )
-        root = _read(_syntax_tree(squeezed, where), squeezed, where, _DEEPEST)
-        nodes = list(_nodes(root))
-        if len(nodes) > _MOST_NODES:
-            _refuse(
-                where,
-                f"{len(nodes)} numbers, names and operations",
-                f"use at most {_MOST_NODES}, or link in several steps.",
-            )
-        names = dict.fromkeys(n.text for n in nodes if not n.symbol and n.number is None)
+        try:
+            root = syntax_tree(squeezed)
+        except UnreadableError as fault:
+            shown = f"{fault.got} at character {fault.place + 1} of '{squeezed}'"
+            _refuse(where, shown if squeezed else fault.got, fault.hint)
+        names = dict.fromkeys(n.text for n in nodes(root) if not n.symbol and n.number is None)
         return cls(squeezed, tuple(names), where, root)
 
     def value(self, values: Mapping[str, float]) -> float:
@@ -160,12 +151,12 @@ class Expression:
             raise InputError(
                 self.where,
                 got=f"'{self.text}', where {fault}" + (f" ({given}, SI units)" if given else ""),
-                expected="a finite number at every point of the study",
-                hint="change the range of a parameter, or guard the expression with max and min.",
+                expected="a finite number",
+                hint="change a value or its range, or guard the expression with max and min.",
             ) from None
 
     def unit(self, units: Mapping[str, str]) -> Dimension:
-        """Derive the dimension of the result.
+        """Derive the dimension of the result from the units of its names.
 
         Parameters
         ----------
@@ -190,13 +181,24 @@ class Expression:
         'a stiffness [N/m]'
         """
         self._require_names(units)
-        own = {name: dimension_of(units[name]) for name in self.names}
-        return _dimension(self._root, own, self)
+        return self.dimension({name: dimension_of(units[name]) for name in self.names})
+
+    def dimension(self, known: Mapping[str, Dimension]) -> Dimension:
+        """Derive the dimension of the result from those of its names; see :meth:`unit`."""
+        self._require_names(known)
+        return _dimension(self._root, known, self)
 
     def _require_names(self, known: Collection[str]) -> None:
         for name in self.names:
             if name not in known:
                 raise _unknown(self, name, known)
+
+    def require_clear(self, known: Collection[str]) -> None:
+        """Raise where a word behind a number can be a unit and one of the known names."""
+        for literal in nodes(self._root):
+            for word in literal.words:
+                if word in known:
+                    raise _unit_or_name(self, literal, word)
 
 
 def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tuple[str, ...]:
@@ -252,8 +254,9 @@ class _NotANumberError(Exception):
 
 
 def _refuse(where: str, got: str, hint: str) -> NoReturn:
-    expected = "arithmetic of parameters and numbers (+ - * / **, parentheses, "
-    raise InputError(where, got=got, expected=f"{expected}{', '.join(_FUNCTIONS)}, pi)", hint=hint)
+    expected = "arithmetic of parameters, numbers and quantities such as 0.3 mm (+ - * / ^, "
+    allowed = f"{expected}parentheses, {', '.join(FUNCTIONS)}, pi)"
+    raise InputError(where, got=got, expected=allowed, hint=hint)
 
 
 def _unknown(expression: Expression, name: str, known: Collection[str]) -> InputError:
@@ -267,6 +270,17 @@ def _unknown(expression: Expression, name: str, known: Collection[str]) -> Input
     )
 
 
+def _unit_or_name(expression: Expression, literal: Node, word: str) -> InputError:
+    return InputError(
+        expression.where,
+        got=f"'{literal.text}' at character {literal.place + 1} of '{expression.text}', where "
+        f"'{word}' is a unit and a parameter",
+        expected="one meaning",
+        hint=f"write blanks and the operator for the parameter ('2 * {word}', '2 / {word}'), or "
+        "rename it.",
+    )
+
+
 def _taken(expression: Expression, name: str, by: str) -> InputError:
     return InputError(
         expression.where,
@@ -276,80 +290,7 @@ def _taken(expression: Expression, name: str, by: str) -> InputError:
     )
 
 
-def _syntax_tree(text: str, where: str) -> ast.expr:
-    """Parse; nothing of the text is run."""
-    if "#" in text:  # the rest would be a comment
-        _refuse(where, f"'{text}'", "remove the # and what follows it.")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SyntaxWarning)  # of text that is refused below
-            return ast.parse(text, mode="eval").body
-    except (SyntaxError, ValueError, MemoryError, RecursionError):
-        _refuse(where, f"'{text}'", 'write it as "2 * tip_radius": no units, no words.')
-
-
-def _read(node: ast.expr, text: str, where: str, levels: int) -> _Node:
-    """Turn a node into one of ours, or refuse it."""
-    part = ast.get_source_segment(text, node) or text
-    if levels == 0:
-        _refuse(where, f"more than {_DEEPEST} levels of nesting", "link in several steps.")
-    match node:
-        case ast.Constant(value=bool()):
-            pass
-        case ast.Constant(value=int() | float() as number):
-            return _Node(part, number=_finite_literal(number, part, where))
-        case ast.Name(id="pi"):
-            return _Node("pi", number=math.pi)
-        case ast.Name(id=name) if name not in RESERVED:
-            return _Node(part)  # as written: the parser gives another letter for a micro sign
-        case ast.BinOp(op=op) if type(op) in _BINARY:
-            both = tuple(_read(side, text, where, levels - 1) for side in (node.left, node.right))
-            return _Node(part, _BINARY[type(op)], both)
-        case ast.UnaryOp(op=sign) if type(sign) in _UNARY:
-            inner = _read(node.operand, text, where, levels - 1)
-            return _Node(part, _UNARY[type(sign)], (inner,))
-        case ast.Call(func=ast.Name(id=name), args=args, keywords=[]) if name in _FUNCTIONS:
-            several = name in ("min", "max")
-            if (len(args) < 2) if several else (len(args) != 1):
-                count = "two or more values" if several else "one value"
-                _refuse(where, f"'{part}'", f"give {count} to {name}.")
-            return _Node(part, name, tuple(_read(a, text, where, levels - 1) for a in args))
-    _refuse(where, f"'{part}'" + ("" if part == text else f" in '{text}'"), _advice(node))
-
-
-def _advice(node: ast.expr) -> str:
-    """Remedy for what people write instead."""
-    match node:
-        case ast.BinOp(op=ast.BitXor()):
-            return "write a power with **: radius**2."
-        case ast.Tuple():
-            return "use a point as decimal sign: 0.5."
-        case ast.Attribute():
-            return "name a parameter by its short name, without points."
-        case ast.Call(func=ast.Name(id=name)):
-            return nearest(name, _FUNCTIONS, "use the functions listed.")
-        case ast.Name(id=name):
-            return f"'{name}' is a function; write {name}(...) or rename the parameter."
-    return "use only what is listed."
-
-
-def _finite_literal(number: float, part: str, where: str) -> float:
-    try:
-        value = float(number)
-    except OverflowError:
-        value = math.inf
-    if not math.isfinite(value):
-        _refuse(where, f"the number '{part}'", "write a number below 1e308.")
-    return value
-
-
-def _nodes(node: _Node) -> Iterator[_Node]:
-    yield node
-    for argument in node.arguments:
-        yield from _nodes(argument)
-
-
-def _value(node: _Node, values: Mapping[str, float]) -> float:
+def _value(node: Node, values: Mapping[str, float]) -> float:
     """Value of a node; every part must be finite, or 1 / (a * 1e308 * 10) would be 0."""
     if node.number is not None:
         return node.number
@@ -373,9 +314,11 @@ def _value(node: _Node, values: Mapping[str, float]) -> float:
     return result
 
 
-def _dimension(node: _Node, known: Mapping[str, Dimension], whole: Expression) -> Dimension:
+def _dimension(node: Node, known: Mapping[str, Dimension], whole: Expression) -> Dimension:
     """Dimension of a node, or the error that says what does not go together."""
     if node.number is not None:
+        if node.dimension is not None:
+            return node.dimension
         if node.text == "pi":
             return HALF_TURN
         return ANYTHING if node.number == 0 else NUMBER
@@ -391,17 +334,18 @@ def _dimension(node: _Node, known: Mapping[str, Dimension], whole: Expression) -
             return parts[0].over(parts[1])
         case "sqrt":
             return parts[0].to_the(Fraction(1, 2))
-        case "**":
+        case "^":
             return _power(node, parts, known, whole)
         case symbol if symbol in _ALIKE:
             return _alike(node, parts, whole)
     if not parts[0].plain:
-        taken = "a number" if node.symbol in ("exp", "log") else "an angle or a number"
-        _mismatch(whole, f"{parts[0]} in '{node.text}'", f"{taken} in {node.symbol}(...)")
-    return NUMBER
+        taken = "an angle or a number" if node.symbol in _OF_ANGLE else "a number"
+        got = f"{parts[0]} in '{node.text}'"
+        _mismatch(whole, node, got, f"{taken} in {node.symbol}(...)")
+    return NUMBER_OR_ANGLE if node.symbol in _TO_ANGLE else NUMBER
 
 
-def _alike(node: _Node, parts: list[Dimension], whole: Expression) -> Dimension:
+def _alike(node: Node, parts: list[Dimension], whole: Expression) -> Dimension:
     """Dimension that all parts share."""
     shared = parts[0]
     for argument, part in zip(node.arguments[1:], parts[1:], strict=True):
@@ -410,6 +354,7 @@ def _alike(node: _Node, parts: list[Dimension], whole: Expression) -> Dimension:
             first = node.arguments[0].text
             _mismatch(
                 whole,
+                node,
                 f"'{node.text}', where '{first}' is {shared} and '{argument.text}' is {part}",
                 "quantities of one kind",
             )
@@ -418,40 +363,44 @@ def _alike(node: _Node, parts: list[Dimension], whole: Expression) -> Dimension:
 
 
 def _power(
-    node: _Node, parts: list[Dimension], known: Mapping[str, Dimension], whole: Expression
+    node: Node, parts: list[Dimension], known: Mapping[str, Dimension], whole: Expression
 ) -> Dimension:
     """Dimension of a power: any exponent for a number, a constant one for a quantity."""
     base, exponent = parts
     if not exponent.number:
-        _mismatch(whole, f"{exponent} as exponent in '{node.text}'", "a number as exponent")
+        got = f"{exponent} as exponent in '{node.text}'"
+        _mismatch(whole, node, got, "a number as exponent")
     if base.plain and base.number:
         return NUMBER
     constant = node.arguments[1]
-    if any(not part.symbol and part.number is None for part in _nodes(constant)):
+    if any(not part.symbol and part.number is None for part in nodes(constant)):
         _mismatch(
             whole,
+            node,
             f"{base} with an exponent that is a parameter in '{node.text}'",
             "a constant exponent, or a number as base",
         )
     try:
         power = _value(constant, {})
     except _NotANumberError as fault:
-        _mismatch(whole, f"'{node.text}', where {fault}", "a constant exponent")
+        _mismatch(whole, node, f"'{node.text}', where {fault}", "a constant exponent")
     fraction = Fraction(power).limit_denominator(12)
     if abs(power) > 12 or abs(float(fraction) - power) > 1e-12:
         _mismatch(
             whole,
+            node,
             f"{base} to the power {power:g} in '{node.text}'",
             "an exponent of at most 12 that is a simple fraction (2, 0.5, 1/3)",
         )
     return base.to_the(fraction)
 
 
-def _mismatch(whole: Expression, got: str, expected: str) -> NoReturn:
+def _mismatch(whole: Expression, node: Node, got: str, expected: str) -> NoReturn:
+    place = "" if node.text == whole.text else f" (character {node.place + 1} of '{whole.text}')"
     raise InputError(
         whole.where,
-        got=got,
+        got=f"{got}{place}",
         expected=expected,
-        hint="literals are numbers without unit: make the parts one kind with a parameter or a "
-        "quotient of parameters.",
+        hint="a literal without unit is a number: give it its unit, or make the parts one kind "
+        "with a parameter or a quotient of parameters.",
     )

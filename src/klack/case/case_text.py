@@ -1,0 +1,202 @@
+"""The text of a case file: YAML 1.2 in, plain data and the line of each key out."""
+
+import re
+from copy import deepcopy
+from dataclasses import dataclass, field
+from functools import lru_cache
+from io import StringIO
+from math import inf
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+
+from klack.case.yaml_limits import UnboundedTree, bounded_yaml
+from klack.errors import InputError
+from klack.input.existing_file import instead_of_file
+from klack.input.problem import Key, key_text
+
+__all__ = ["LARGEST_CASE", "LARGEST_NUMBER", "Lines", "parse", "text_of"]
+
+LARGEST_CASE = 1_000_000  # bytes; a case of 5 kB is long, and the reader manages 0.3 MB/s
+LARGEST_NUMBER = 1e15  # nothing with a meaning comes near, and arithmetic ends far beyond
+_NO_TEXT = re.compile("[\\0\\ud800-\\udfff]")  # an escape such as "\\ud800" is half a letter
+
+
+@dataclass(slots=True)
+class Lines:
+    """Line of each key and each value of a file, by key path (lines count from 1)."""
+
+    keys: dict[Key, int] = field(default_factory=dict)
+    values: dict[Key, int] = field(default_factory=dict)
+
+    def find(self, path: Key, *, on_key: bool) -> int:
+        """Line of a value or key; of the nearest section around it if it does not exist."""
+        while path:
+            for table in (self.keys, self.values) if on_key else (self.values, self.keys):
+                if path in table:
+                    return table[path]
+            path, on_key = path[:-1], True
+        return 1
+
+
+def text_of(path: Path) -> str:
+    """Text of a case file, of reasonable size and in UTF-8."""
+    hint = "klack impact demo-valve runs a shipped case; its file is a good start."
+    if got := instead_of_file(path):
+        raise InputError(str(path), got=got, expected="a case file (YAML)", hint=hint)
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_CASE + 1)
+        if len(raw) > LARGEST_CASE:
+            hint = "is it a mesh or a result? A case names such files and stays small."
+            expected = f"a case file below {LARGEST_CASE / 1e6:g} MB"
+            raise InputError(str(path), got="a larger file", expected=expected, hint=hint)
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw[: error.start].count(b"\n") + 1
+        raise InputError(
+            f"{path}:{line}",
+            got=f"the byte 0x{raw[error.start]:02x}, which is not UTF-8",
+            expected="a text file in UTF-8",
+            hint="save the file as UTF-8; a binary file is not a case.",
+        ) from None
+    except OSError as error:
+        got = f"a file that cannot be read ({error.strerror})"
+        raise InputError(str(path), got=got, expected="a case file (YAML)", hint=hint) from None
+
+
+def parse(text: str, path: Path) -> tuple[Any, Lines]:
+    """Plain data of a YAML text, and the position of each key and value."""
+    data, lines = _parsed(text, path)
+    return deepcopy(data), lines
+
+
+@lru_cache(maxsize=4)
+def _parsed(text: str, path: Path) -> tuple[Any, Lines]:
+    """The last texts are kept: a changed case is parsed where it is written, checked and read."""
+    try:
+        data = bounded_yaml().load(StringIO(text))
+    except DuplicateKeyError as error:
+        raise _duplicate(error, path) from None
+    except UnboundedTree as error:
+        raise InputError(
+            f"{path}:{error.problem_mark.line + 1}",
+            got=str(error.problem),
+            expected="a plain tree of keys and values",
+            hint="close the brackets; write out aliases.",
+        ) from None
+    except MarkedYAMLError as error:
+        raise _syntax_error(error, path) from None
+    except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as error:
+        raise InputError(
+            str(path),
+            got=f"text that is not YAML ({_reason(error)})",
+            expected="a case file (YAML 1.2)",
+            hint="compare with the output of klack schema or with a shipped case.",
+        ) from None
+    if not isinstance(data, CommentedMap):
+        kind = "an empty file" if data is None else "a list or a single value"
+        raise InputError(
+            f"{path}:1",
+            got=kind,
+            expected="a mapping that starts with 'klack: 1'",
+            hint="a case has the sections materials, bodies, contact, motion and run.",
+        )
+    lines = Lines()
+    return _Plain(path, lines).of(data, ()), lines
+
+
+def _reason(error: Exception) -> str:
+    if isinstance(error, RecursionError):
+        return "brackets nested too deeply"
+    if isinstance(error, LookupError):  # the parser looks up the version of a late '%YAML'
+        return "a line '%YAML' of another version"
+    if isinstance(error, TypeError):
+        return "a list or a mapping as a key"
+    return (str(error).splitlines() or ["unreadable"])[0]
+
+
+class _Plain:
+    """Turn the nodes of ruamel.yaml into plain data and note their lines."""
+
+    def __init__(self, path: Path, lines: Lines) -> None:
+        self.path, self.lines = path, lines
+
+    def of(self, node: Any, key: Key) -> Any:
+        """Plain copy of a node."""
+        if isinstance(node, CommentedMap):
+            return {self._name(node, k, key): self.of(v, (*key, k)) for k, v in node.items()}
+        if isinstance(node, CommentedSeq):
+            result = []
+            for i, value in enumerate(node):
+                where = node.lc.data.get(i) if node.lc.data else None  # not of an !!omap
+                if where is not None:
+                    self.lines.values[(*key, i)] = where[0] + 1
+                result.append(self.of(value, (*key, i)))
+            return result
+        if node is None or isinstance(node, bool):
+            return node
+        if isinstance(node, str):
+            return self._text(str(node), key)
+        for plain in (int, float):
+            if isinstance(node, plain):
+                if LARGEST_NUMBER < abs(node) != inf:
+                    hint = "check the power of ten."
+                    self._refuse(key, f"{plain(node)}"[:40], "a number below 1e15 in size", hint)
+                return plain(node)
+        # a date, a set, or a value with a tag such as !!python/name
+        tag = getattr(getattr(node, "tag", None), "value", None) or type(node).__name__
+        self._refuse(key, f"a value of the kind {tag}", "text, a number, a list or a mapping")
+
+    def _name(self, node: CommentedMap, name: Any, key: Key) -> str:
+        where = node.lc.data.get(name) if node.lc.data else None
+        path = (*key, str(name))
+        if where is not None:
+            self.lines.keys[path] = where[0] + 1
+            self.lines.values[path] = where[2] + 1
+        if not isinstance(name, str):
+            self._refuse(path, f"the key {name}", "text as a key")
+        return self._text(str(name), path)
+
+    def _text(self, text: str, key: Key) -> str:
+        if _NO_TEXT.search(text):
+            self._refuse(key, f"the text {ascii(text)[:80]}", "text without such characters")
+        return text
+
+    def _refuse(
+        self, key: Key, got: str, expected: str, hint: str = 'put text into quotes: "...".'
+    ) -> None:
+        line = self.lines.find(key, on_key=False)
+        where = f"{self.path}:{line}: {key_text(key)}"
+        raise InputError(where, got=got, expected=expected, hint=hint)
+
+
+def _duplicate(error: DuplicateKeyError, path: Path) -> InputError:
+    line = error.problem_mark.line + 1 if error.problem_mark else 1
+    name = str(error.problem).split('"')[1] if '"' in str(error.problem) else "?"
+    first = f" (first in line {error.context_mark.line + 1})" if error.context_mark else ""
+    return InputError(
+        f"{path}:{line}: {name}",
+        got=f"the key '{name}' a second time in one mapping{first}",
+        expected="each key once",
+        hint="remove or rename one of them.",
+    )
+
+
+def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
+    mark = error.problem_mark or error.context_mark
+    where = f"{path}:{mark.line + 1}" if mark else str(path)
+    column = f" at column {mark.column + 1}" if mark else ""
+    context = f" {error.context}" if error.context else ""
+    hint = "check this line and the one before: indentation by spaces, 'key: value', brackets."
+    if "mapping values are not allowed" in str(error.problem):
+        hint = "put text with a colon into quotes; close the bracket or quote opened before."
+    return InputError(
+        where,
+        got=f"text that is not YAML{column}: {error.problem or 'unreadable'}{context}",
+        expected="a case file (YAML 1.2)",
+        hint=hint,
+    )

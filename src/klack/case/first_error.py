@@ -1,0 +1,157 @@
+"""The first mistake in a case, in words: where, what came, what was expected, what to try."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from klack.case.field_example import fitting_example
+from klack.case.origin import ExpandedCase
+from klack.errors import InputError
+from klack.input.computed import Computed
+from klack.input.problem import CaseProblem, Key, nearest
+from klack.input.section import Section
+from klack.units import QuantityError
+
+__all__ = ["first_error"]
+
+
+def first_error(case: type[Section], error: ValidationError, found: ExpandedCase) -> InputError:
+    """Convert the first error of pydantic, and count the others."""
+    details = error.errors(include_url=False)
+    first, more = details[0], len(details) - 1
+    problem = _problem(first, found.data, case)
+    key = _existing(found.data, first["loc"]) + problem.key
+    hint = problem.hint
+    if more:
+        hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
+    got, written = problem.got, found.expressions.get(key)
+    if written and written.text not in got:
+        got += f", from '{written.text}'"
+    where = found.origin(key).where(on_key=problem.on_key)
+    return InputError(where, got=got, expected=problem.expected, hint=hint)
+
+
+def _existing(data: Any, location: Sequence[str | int]) -> Key:
+    """Drop from a location of pydantic the parts that are not in the file (tags of unions)."""
+    key: list[str | int] = []
+    for part in location:
+        if isinstance(data, dict) and part in data:
+            data = data[part]
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            continue
+        key.append(part)
+    return tuple(key)
+
+
+def _problem(details: ErrorDetails, data: Any, case: type[Section]) -> CaseProblem:
+    """Message of klack for one error of pydantic."""
+    own = details.get("ctx", {}).get("error")
+    if isinstance(own, CaseProblem):
+        return own
+    if isinstance(own, InputError):
+        hint = own.hint
+        if isinstance(own, QuantityError):
+            example = fitting_example(case, data, _existing(data, details["loc"]), own.kind)
+            hint = hint.replace(own.kind.example, example)
+        return CaseProblem((), got=own.got, expected=own.expected, hint=hint)
+    value = _value_at(data, _existing(data, details["loc"]))
+    kind, context = details["type"], details.get("ctx", {})
+    key: Key = ()
+    if kind == "union_tag_invalid" and isinstance(value, dict):
+        name = _discriminator(context)
+        key, value = (name,), value.get(name)
+    expected, hint = _words(kind, context, value)
+    if not expected:
+        expected, hint = details["msg"], "klack schema describes every key."
+    return CaseProblem(key, got=_shown(value), expected=expected, hint=hint)
+
+
+def _discriminator(context: dict[str, Any]) -> str:
+    """Key that says which of several forms a section has."""
+    return str(context["discriminator"]).strip("'")
+
+
+_BOUNDS = {
+    "greater_than": ("gt", "above {}"),
+    "greater_than_equal": ("ge", "{} or more"),
+    "less_than": ("lt", "below {}"),
+    "less_than_equal": ("le", "{} or less"),
+}
+_TYPES = {
+    "int_type": ("a whole number", "write it without quotes and without a point."),
+    "int_from_float": ("a whole number", "write it without a point."),
+    "float_type": ("a number without unit", "write it without quotes."),
+    "finite_number": ("a finite number", "write plain digits."),
+    "string_type": ("text", 'put it into quotes: "...".'),
+    "bool_type": ("true or false", "write it without quotes."),
+    "tuple_type": ("a list", "write it in brackets: [value, value]."),
+    "model_attributes_type": ("a mapping", "write {kind: ...}."),
+    "mapping_type": ("a mapping", "write {name: value, ...}."),
+    "dict_type": ("a mapping", "write {name: value, ...}."),
+    "string_pattern_mismatch": (
+        "a name of letters, digits, _ and -, not starting with a digit",
+        "rename it here and where it is used.",
+    ),
+}
+
+
+_PLAIN_NAME = (
+    "a name of letters, digits and _, not starting with a digit",
+    "rename it here and where it is used: '-' is the sign of a difference.",
+)
+
+
+def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
+    """Expected value and advice for the built-in errors of pydantic."""
+    if kind == "string_pattern_mismatch" and "_-]" not in context["pattern"]:
+        return _PLAIN_NAME
+    if kind in _TYPES:
+        return _TYPES[kind]
+    if kind in _BOUNDS:
+        name, form = _BOUNDS[kind]
+        return (
+            f"a value {form.format(f'{context[name]:g}')}",
+            "check the sign, the unit and the size.",
+        )
+    if kind in ("literal_error", "union_tag_invalid"):
+        allowed = str(context.get("expected") or context.get("expected_tags"))
+        names = [
+            part for part in allowed.replace(" or ", ", ").replace("'", "").split(", ") if part
+        ]
+        return f"one of: {', '.join(names)}", nearest(str(value), names, f"write {names[0]}.")
+    if kind == "union_tag_not_found":
+        name = _discriminator(context)
+        example = "consistent" if name == "kind" else "..."
+        return f"a mapping with the key '{name}'", f"write {{{name}: {example}}}."
+    if kind == "too_short":
+        return f"at least {context['min_length']} of them", "add what is missing."
+    if kind == "too_long":
+        return f"at most {context['max_length']} of them", "remove the surplus value."
+    if kind == "missing":
+        return "a list with one more value", "a point is [r, z], a pair is [first, second]."
+    if kind == "string_too_short":
+        return "some text", "write one line."
+    return "", ""
+
+
+def _value_at(data: Any, key: Key) -> Any:
+    for part in key:
+        data = data[part]
+    return data
+
+
+def _shown(value: Any) -> str:
+    """Short form of the value found."""
+    if isinstance(value, dict):
+        return f"a mapping with the keys: {', '.join(map(str, value)) or 'none'}"[:100]
+    if isinstance(value, list):
+        return f"the list {value}"[:80]
+    if value is None:
+        return "nothing"
+    if isinstance(value, Computed):
+        return str(value)
+    return f"'{value}'"[:80] if isinstance(value, str) else str(value).lower()

@@ -1,0 +1,106 @@
+"""Where the sections of an expanded case are written: in the case, or in the file of a part."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+from klack.case.case_text import Lines
+from klack.input.problem import Key, key_text
+
+__all__ = ["ExpandedCase", "Filled", "Origin"]
+
+_RANGES = ("study", "calibration")
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where a section of an expanded case is written.
+
+    Parameters
+    ----------
+    path : Path
+    lines : Lines
+    key : tuple of str and int
+        In that file.
+    copy : str
+        Name of the included part; empty for the case itself.
+    """
+
+    path: Path
+    lines: Lines
+    key: Key = ()
+    copy: str = ""
+
+    def where(self, rest: Key = (), *, on_key: bool = False) -> str:
+        """File, line and key of something in this section, as a message names them."""
+        key = (*self.key, *rest)
+        line = self.lines.find(key, on_key=on_key)
+        name = f": {key_text(key)}" if key else ""
+        return f"{self.path}:{line}{name}" + (f" (of '{self.copy}')" if self.copy else "")
+
+    def below(self, *rest: str | int) -> Self:
+        """Origin of a section inside this one."""
+        return replace(self, key=(*self.key, *rest))
+
+
+@dataclass(frozen=True, slots=True)
+class Filled:
+    """What a file has in place of a value.
+
+    Parameters
+    ----------
+    text : str
+        Expression.
+    sources : frozenset of Key
+        Parameters of the case, and arguments of its includes, that the value follows from.
+    """
+
+    text: str
+    sources: frozenset[Key]
+
+
+@dataclass(frozen=True, slots=True)
+class ExpandedCase:
+    """Plain data of a case without expressions and parts.
+
+    Parameters
+    ----------
+    data : mapping
+    origins : mapping of key to Origin
+        Of the case itself, under the empty key, and of all that comes from parts.
+    expressions : mapping of key to Filled
+
+    Notes
+    -----
+    Two of them never differ: checked cases with the same sections and the same text are equal,
+    though one was checked from parts that were made before.
+    """
+
+    data: Any = field(compare=False)
+    origins: Mapping[Key, Origin] = field(compare=False)
+    expressions: Mapping[Key, Filled] = field(default_factory=dict, compare=False)
+
+    @classmethod
+    def plain(cls, data: Any, lines: Lines, path: Path) -> Self:
+        """Data of a file as they are."""
+        return cls(data, {(): Origin(path, lines)})
+
+    def origin(self, key: Key) -> Origin:
+        """Where a place of the expanded case is written."""
+        length = next(n for n in range(len(key), -1, -1) if key[:n] in self.origins)
+        return self.origins[key[:length]].below(*key[length:])
+
+    def behind(self, key: Key) -> tuple[Key, ...]:
+        """Keys whose values follow from a parameter or an argument; of any other key, itself.
+
+        Ranges of a study and bounds of a calibration decide nothing of what is computed.
+        """
+        is_argument = key[:1] == ("include",) and key[2:3] == ("with",)
+        if key[:1] != ("parameters",) and not is_argument:
+            return (key,)
+        return tuple(
+            place
+            for place, item in self.expressions.items()
+            if key in item.sources and place[0] not in _RANGES
+        )

@@ -1,0 +1,243 @@
+"""Parameters of a case and expressions of them, evaluated before the case is checked."""
+
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Annotated, Any
+
+from pydantic import StringConstraints, WithJsonSchema
+from pydantic.fields import FieldInfo
+
+from klack.case.case_text import LARGEST_NUMBER
+from klack.errors import InputError
+from klack.expressions.dimension import ANYTHING, NUMBER, Dimension, dimension_of
+from klack.expressions.expression import RESERVED, Expression, ordered
+from klack.input.computed import Computed
+from klack.input.problem import Key
+from klack.units import KINDS, RATE, RATIO, Kind, format_si, typed
+
+__all__ = [
+    "PARAMETERS",
+    "ParameterName",
+    "ParameterValue",
+    "Scope",
+    "Written",
+    "as_written",
+    "evaluated",
+    "is_expression",
+    "parameter_value",
+    "parameters_of_text",
+]
+
+ParameterName = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+Written = Annotated[
+    Any,
+    WithJsonSchema({"type": ["string", "number"], "examples": ["1.3 mm", "2 * d_seat", 4]}),
+]
+"""A quantity with its unit, a number, or an expression of other parameters."""
+
+PARAMETERS = (
+    "name: a quantity with its unit, a number, or an expression of other parameters; for values "
+    "that begin with '=', such as '= pi/4 * d_seat^2'."
+)
+"""Description of the key, which stands in two sections."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterValue:
+    """A value in a case with its dimension.
+
+    Parameters
+    ----------
+    value : float [SI]
+    dimension : Dimension
+    text : str
+        As the case has it: ``1.3 mm``, ``2 * d_seat``.
+    sources : frozenset of Key
+        Parameters of the case, and arguments of its includes, that it follows from; its own.
+    """
+
+    value: float
+    dimension: Dimension
+    text: str
+    sources: frozenset[Key] = frozenset()
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of quantity; one made for it where a case has no such key."""
+        return _kind_of(self.dimension)
+
+    @property
+    def field(self) -> FieldInfo:
+        """Field that takes other values of the same kind."""
+        info: FieldInfo = FieldInfo.from_annotation(Annotated[float, *typed(self.kind)])  # type: ignore[arg-type]
+        return info
+
+    def __str__(self) -> str:
+        return format_si(self.value, self.kind.unit, 7)
+
+
+Scope = Mapping[str, ParameterValue]
+"""Names that an expression may use."""
+
+
+def is_expression(value: object) -> bool:
+    """Whether a value of a case is an expression: a text that begins with ``=``."""
+    return isinstance(value, str) and value.lstrip().startswith("=")
+
+
+def parameters_of_text(
+    written: Mapping[str, Any],
+    where: Callable[[Key], str],
+    given: Scope | None = None,
+    section: Key = (),
+    where_given: Callable[[str], str] = str,
+) -> dict[str, ParameterValue]:
+    """Evaluate parameters in the order in which they need each other.
+
+    Parameters
+    ----------
+    written : mapping of str to str or number
+    where : callable
+        File, line and name of a parameter, for errors.
+    given : mapping, optional
+        Values that replace those of the text; of the same dimension where the text has one.
+    section : tuple
+        Key of the parameters of a case, whose values follow from themselves; empty for a part.
+    where_given : callable
+        File, line and name of a given value, for errors.
+
+    Raises
+    ------
+    InputError
+        For what is no expression, unknown names, circles, and parts that do not go together.
+    """
+    given = given or {}
+    expressions: dict[str, Expression] = {}
+    values: dict[str, ParameterValue] = {}
+    for name, text in written.items():
+        if name in RESERVED:
+            raise InputError(
+                where((name,)),
+                got=f"the name '{name}', which is a function or pi",
+                expected="a name of its own for every parameter",
+                hint="rename it.",
+            )
+        if text is None and name in given:
+            values[name] = given[name]
+        else:
+            expressions[name] = _read(text, written, where((name,)))
+    for name in ordered(expressions, tuple(values)):
+        own = _value(expressions[name], values, str(written[name]))
+        if section:
+            own = replace(own, sources=own.sources | {(*section, name)})
+        if name in given:
+            own = _replaced(own, given[name], name, where_given(name))
+        values[name] = own
+    return {name: values[name] for name in written}
+
+
+def parameter_value(text: object, scope: Scope, where: str, key: Key = ()) -> ParameterValue:
+    """Value of one quantity, number or expression of the names of a scope.
+
+    With a key, that of an argument in the case, it follows from itself.
+    """
+    found = _value(_read(text, scope, where), scope, str(text))
+    return replace(found, sources=found.sources | {key}) if key else found
+
+
+def _read(text: object, known: Collection[str], where: str) -> Expression:
+    """Expression in a value that may stand for a parameter."""
+    if isinstance(text, bool) or not isinstance(text, str | int | float):
+        raise InputError(
+            where,
+            got="nothing" if text is None else f"'{text}'"[:80],
+            expected="a quantity such as 1.3 mm, a number, or an expression of parameters",
+            hint="write one value.",
+        )
+    expression = _expression(_plain(text), where)
+    if expression.names or is_expression(text):  # else '3 g' is three grams
+        expression.require_clear(known)
+    return expression
+
+
+def _plain(text: str | float) -> str:
+    """Text of an expression without its sign, or of a number."""
+    return text.lstrip().removeprefix("=") if isinstance(text, str) else repr(text)
+
+
+def _replaced(
+    default: ParameterValue, given: ParameterValue, name: str, where: str
+) -> ParameterValue:
+    """Given value in place of the one of the text."""
+    if default.dimension.shared(given.dimension) is None:
+        raise InputError(
+            where,
+            got=f"'{given.text}' for '{name}', which is {given.dimension}",
+            expected=f"{default.dimension}, as the value '{default.text}' that it replaces",
+            hint="check the unit where the part is included.",
+        )
+    return given
+
+
+def evaluated(text: str, scope: Scope, where: str) -> tuple[Computed | float | int, frozenset[Key]]:
+    """Value of an expression, and what it follows from.
+
+    A plain number where it has no unit, whole where it is whole.
+
+    Raises
+    ------
+    InputError
+        With file, line and key, the expression and the place in it.
+    """
+    expression = _expression(_plain(text), where)
+    expression.require_clear(scope)
+    found = _value(expression, scope, text)
+    value, dimension = found.value, found.dimension
+    if not (dimension.number and len(dimension.turns) == 1):
+        return Computed(value, dimension, text.strip()), found.sources
+    if abs(value) > LARGEST_NUMBER:
+        raise InputError(
+            where,
+            got=f"'{text.strip()}', which is {value:.4g}",
+            expected="a number below 1e15 in size",
+            hint="check the power of ten.",
+        )
+    return (int(value) if value.is_integer() else value), found.sources
+
+
+def as_written(value: object) -> object:
+    """Text that a case could have in place of the value of an expression; all else as it is."""
+    if not isinstance(value, Computed) or not isinstance(value.dimension, Dimension):
+        return value
+    kind = _kind_of(value.dimension)
+    return value.value if kind.bare else f"{value.value!r} {kind.unit}"
+
+
+@lru_cache(maxsize=4000)
+def _expression(text: str, where: str) -> Expression:
+    """The last ones are kept: a case is checked again for every changed value."""
+    return Expression.parse(text, where)
+
+
+def _value(expression: Expression, scope: Scope, text: str) -> ParameterValue:
+    """Value and dimension of an expression."""
+    dimension = expression.dimension({name: known.dimension for name, known in scope.items()})
+    value = expression.value({name: known.value for name, known in scope.items()})
+    zero = value == 0 and dimension == NUMBER
+    sources = frozenset().union(*(scope[name].sources for name in expression.names))
+    return ParameterValue(value, ANYTHING if zero else dimension, text.strip(), sources)
+
+
+@lru_cache(maxsize=200)
+def _kind_of(dimension: Dimension) -> Kind:
+    if dimension.number:
+        return RATIO
+    for kind in KINDS:
+        if dimension == dimension_of(kind.unit):
+            return kind
+    for kind in (RATE, *KINDS):  # 2 * pi * frequency is shown in 1/s, 1 / time as well
+        if dimension.fits(kind.unit):
+            return kind
+    unit = dimension.unit
+    return Kind(str(dimension), unit, f"1 {unit}", (unit,), smallest=0.0, largest=1e300)

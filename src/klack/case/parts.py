@@ -1,0 +1,238 @@
+"""Files of included parts: found below the folder of the case, and kept with its text."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from klack.case.case_text import LARGEST_CASE, Lines, parse, text_of
+from klack.errors import InputError
+from klack.input.problem import Key, key_text
+
+__all__ = ["DEEPEST", "included_files", "part_name", "self_contained", "with_parts"]
+
+DEEPEST = 8
+"""Levels of parts inside parts."""
+_MOST_FILES = 100
+
+
+@dataclass(slots=True)
+class _Found:
+    """Texts of the parts by their names, as they are found."""
+
+    root: Path
+    texts: dict[str, str]
+    size: int
+    seen: set[str] = field(default_factory=set)
+
+
+def self_contained(text: str, path: Path, data: Any, lines: Lines) -> tuple[str, Any, Lines]:
+    """Text of a case with those of the files that it includes, as plain data and lines.
+
+    A result keeps that text, so that a file which changes later changes no earlier result.  Texts
+    that the case holds already replace the files.
+
+    Parameters
+    ----------
+    text : str
+    path : Path
+    data : mapping
+        Parsed text; values at some keys may have been exchanged since.
+    lines : Lines
+
+    Raises
+    ------
+    InputError
+        For an include that leads to no part below the folder of the case, that contains itself,
+        or that is nested too deeply.
+    """
+    kept = data.get("parts")
+    kept = dict(kept) if _is_texts(kept) else {}
+    found = _Found(path.parent, dict(kept), len(text.encode()))
+    _collect(found, data, (str(path),), "", lambda key: _where(path, lines, key))
+    new = {name: part for name, part in found.texts.items() if name not in kept}
+    if not new:
+        return text, data, lines
+    return with_parts(text, path, found.texts), {**data, "parts": found.texts}, lines
+
+
+def included_files(data: Any) -> list[tuple[Key, str]]:
+    """Names of included files in plain data, with their keys; what has no such form is left out."""
+    entries = data.get("include") if isinstance(data, Mapping) else None
+    return [
+        (("include", i, "file"), entry["file"])
+        for i, entry in enumerate(entries if isinstance(entries, list) else [])
+        if isinstance(entry, Mapping) and isinstance(entry.get("file"), str)
+    ]
+
+
+def part_name(folder: str, file: str, where: str) -> str:
+    """Name of an included file relative to the folder of the case, with slashes.
+
+    Parameters
+    ----------
+    folder : str
+        Of the file that includes it, relative to that of the case.
+    file : str
+    where : str
+        File, line and key of the include, for errors.
+
+    Raises
+    ------
+    InputError
+        For a name that leads out of the folder of the case, or is none.
+    """
+    parts: list[str] = []
+    bad = not file.strip() or "\\" in file or ":" in file or file.startswith(("/", "~"))
+    for part in PurePosixPath(folder, file).parts if not bad else ():
+        if part == "..":
+            bad = bad or not parts
+            parts = parts[:-1]
+        else:
+            parts.append(part)
+    if bad or not parts or len(file) > 300:
+        raise InputError(
+            where,
+            got=f"'{file[:100]}'",
+            expected="a file in the folder of the case or below, by its relative name with slashes",
+            hint="copy the part there: parts/injector.yaml.",
+        )
+    return "/".join(parts)
+
+
+def with_parts(text: str, path: Path, texts: Mapping[str, str]) -> str:
+    """Text of a case with the section ``parts`` that holds included files.
+
+    Raises
+    ------
+    InputError
+        For a case whose layout takes no further section at its end.
+    """
+    data, _ = parse(text, path)
+    if "parts" in data:
+        body = _without_parts(text, path)
+    else:
+        body = text if text.endswith("\n") or not text else text + "\n"
+    section = "parts:  # the included files as they were when this case was read\n"
+    section += "".join(f"  {json.dumps(name)}: {_scalar(part)}" for name, part in texts.items())
+    whole = _in_braces(text, texts) if text.lstrip().startswith("{") else body + section
+    expected = {**data, "parts": dict(texts)}
+    try:
+        same = parse(whole, path)[0] == expected
+    except InputError:
+        same = False
+    if not same:
+        raise InputError(
+            str(path),
+            got="a layout in which the included files cannot be kept with the case",
+            expected="a mapping in block style: key: value, line by line",
+            hint="write the case without a line '...' at its end.",
+        )
+    return whole
+
+
+def _in_braces(text: str, texts: Mapping[str, str]) -> str:
+    """Text of a case in braces, with the included files as its last key."""
+    root = YAML().compose(StringIO(text))
+    end = root.end_mark.index - 1
+    body, comma = text[:end].rstrip(), ", " if root.value else ""
+    comma = "" if body.endswith(",") else comma
+    return f'{body}{comma}"parts": {json.dumps(dict(texts), ensure_ascii=False)}{text[end:]}'
+
+
+def _without_parts(text: str, path: Path) -> str:
+    """Text up to the section ``parts``, which klack writes last."""
+    _, lines = parse(text, path)
+    line = lines.keys[("parts",)]
+    return "".join(text.splitlines(keepends=True)[: line - 1])
+
+
+def _scalar(text: str) -> str:
+    """A text as a block of lines where YAML can write it so, else in quotes."""
+    lines = text.split("\n")
+    plain = text.endswith("\n") and not text.endswith("\n\n") and all(map(_is_plain, lines))
+    if not plain:
+        return json.dumps(text, ensure_ascii=False) + "\n"
+    return "|2\n" + "".join(f"    {line}\n" if line else "\n" for line in lines[:-1])
+
+
+def _is_plain(line: str) -> bool:
+    return line.isprintable() and (not line or line.strip() != "")
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(isinstance(text, str) for text in value.values())
+
+
+def _where(path: Path, lines: Lines, key: Key) -> str:
+    return f"{path}:{lines.find(key, on_key=False)}: {key_text(key)}"
+
+
+def _collect(found: _Found, data: Any, above: tuple[str, ...], folder: str, where: Any) -> None:
+    """Read all files that plain data include, and what these include."""
+    for key, file in included_files(data):
+        name = part_name(folder, file, where(key))
+        if name in above or len(above) > DEEPEST:
+            circle = " includes ".join((*above[above.index(name) :], name)) if name in above else ""
+            raise InputError(
+                where(key),
+                got=circle or f"parts inside parts in more than {DEEPEST} levels",
+                expected="parts that do not contain themselves"
+                if circle
+                else f"at most {DEEPEST} levels",
+                hint="take this include out.",
+            )
+        if name not in found.texts:
+            found.texts[name] = _read(found, name, where(key))
+        if name in found.seen:
+            continue
+        found.seen.add(name)
+        place = found.root / name
+        inner, lines = parse(found.texts[name], place)
+        below = str(PurePosixPath(name).parent)
+        _collect(
+            found,
+            inner,
+            (*above, name),
+            "" if below == "." else below,
+            lambda at, place=place, lines=lines: _where(place, lines, at),
+        )
+
+
+def _read(found: _Found, name: str, where: str) -> str:
+    path = found.root / name
+    root = found.root.resolve()
+    try:
+        inside = path.resolve().is_relative_to(root)
+    except (OSError, RuntimeError, ValueError):  # links in a circle, a null character
+        inside = True  # reading it says so
+    if not inside:
+        raise InputError(
+            where,
+            got=f"'{name}', a link out of the folder of the case",
+            expected="a file in the folder of the case or below",
+            hint="copy the part there.",
+        )
+    try:
+        text = text_of(path)
+    except InputError as error:
+        raise InputError(
+            where,
+            got=f"'{name}': {error.got}",
+            expected="the file of a part (YAML), relative to the file that includes it",
+            hint="check the spelling and the folder.",
+        ) from None
+    found.size += len(text.encode())
+    if found.size > LARGEST_CASE or len(found.texts) >= _MOST_FILES:
+        raise InputError(
+            where,
+            got="included files of more than "
+            f"{LARGEST_CASE / 1e6:g} MB, or more than {_MOST_FILES} of them",
+            expected="a case that stays small with all its parts",
+            hint="use one part several times, by 'count' and 'with'.",
+        )
+    return text

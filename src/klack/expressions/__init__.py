@@ -1,0 +1,1 @@
+"""Arithmetic of quantities as text, with its dimensions; nothing of a text is ever run."""
