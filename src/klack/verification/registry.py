@@ -38,6 +38,8 @@ COVERS = {
     "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
     "motions.",
+    "mechanical-parts": "Nonlinear springs, surge, rubber, LuGre friction and levers "
+    "against closed and independent solutions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "
     "the table of the kernel.",
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
