@@ -28,6 +28,7 @@ COMPONENTS = (
     ("force-over-stroke", "klack.mechanics.force_over_stroke.ForceOverStroke"),
     ("guide-friction", "klack.mechanics.friction.GuideFriction"),
     ("lugre-friction", "klack.mechanics.lugre_friction.LuGreFriction"),
+    ("controlled-force", "klack.mechanics.controlled_force.ControlledForce"),
     ("gravity", "klack.mechanics.gravity.Gravity"),
     ("end-stop", "klack.mechanics.end_stop.EndStop"),
     ("rubber-stop", "klack.mechanics.rubber_stop.RubberStop"),
@@ -52,6 +53,7 @@ COMPONENTS = (
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),
+    ("controlled-voltage", "klack.magnetics.controlled_voltage.ControlledVoltage"),
 )
 """Type and dotted path of the class, for each component type."""
 

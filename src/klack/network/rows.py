@@ -28,6 +28,7 @@ __all__ = [
     "Book",
     "BranchRow",
     "Channel",
+    "ControllerRow",
     "ElementRow",
     "FilmRow",
     "InterfaceRow",
@@ -123,6 +124,35 @@ class ElementRow:
     failures: Mapping[int, str]
     at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ControllerRow:
+    """A controller that sets one number at its sampling instants.
+
+    Parameters
+    ----------
+    component : str
+    sensors, channels, units : tuple of str
+        Name of each sensor, what it reads, and the unit of its signal.
+    period : float [s]
+    begin : callable
+        Returns a fresh controller: output for a time [s] and the values of the channels, in the
+        units of the signals.
+    actuator : "voltage" or "force"
+        The output is the voltage of a coil [V], or the first parameter of an element [N].
+    handle : int
+        Electric node of the coil, or number of the element.
+    """
+
+    component: str
+    sensors: tuple[str, ...]
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    period: float
+    begin: Callable[[], Callable[[float, tuple[float, ...]], float]]
+    actuator: Literal["voltage", "force"]
+    handle: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -379,6 +409,8 @@ class Rows:
     lines: list[LineRow] = field(default_factory=list)
     limits: list[LimitRow] = field(default_factory=list)
     sides: list[SideRow] = field(default_factory=list)
+    controllers: list[ControllerRow] = field(default_factory=list)
+    coils: dict[int, str] = field(default_factory=dict)  # electric node -> component of its coil
 
     def port(self, name: str) -> int:
         """Handle of the node that the port ``name`` of the present component is joined to.

@@ -161,6 +161,15 @@ class Recorder:
             self._points[end - len(states) : end, 0] = states
         self._begun = True
 
+    def start_values(self) -> Vector:
+        """Return what is recorded at the start: means, then points."""
+        return np.concatenate([self._means[:, 0], self._points[:, 0]])
+
+    def values(self, look: int) -> Vector:
+        """Return what the present chunk recorded at its look of this number, from 1 on."""
+        at = self.recording
+        return np.concatenate([at.means[look - 1], at.points[look - 1]])
+
     def last(self, records: int) -> Vector:
         """Return the first values of a continued run: see :meth:`first`."""
         return np.concatenate([self._means[:, records], self._peaks[:, records]])

@@ -304,6 +304,13 @@ class _Running:
         record: float,
         start: Literal["rest", "free"],
     ) -> None:
+        if rows.controllers:
+            raise InputError(
+                f"components.{rows.controllers[0].component}",
+                got="derivatives of a run with a controller",
+                expected="a valve without controllers",
+                hint="take differences of runs (klack study), or a driver without signals.",
+            )
         self.rows, self.directions, self.sizes = rows, tuple(directions), sizes
         self.grid = grid_of(duration, sizes, record)
         network = compile_network(rows, sizes)

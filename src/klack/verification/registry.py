@@ -49,6 +49,8 @@ COVERS = {
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
     "ladders, a published lifting magnet.",
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
+    "control": "Sensors, PID, hysteresis, state machines and functions of the user, against exact "
+    "recursions.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
