@@ -15,6 +15,7 @@ from klack.errors import AccuracyWarning, InputError
 from klack.mechanics.lever import Lever
 from klack.mechanics.lugre_friction import LuGreFriction
 from klack.mechanics.nonlinear_spring import NonlinearSpring
+from klack.mechanics.prescribed_motion import PrescribedMotion
 from klack.mechanics.relaxation import relaxed
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.rubber_stop import MaxwellElement, RubberStop
@@ -297,12 +298,17 @@ def test_random_networks_keep_their_energy(seed):
                 arms={"a": 0.01, "b": float(rng.choice([-0.03, -0.004, 0.02]))},
             ),
         }
+        if rng.random() < 0.4:
+            lift = rng.uniform(-50e-6, 200e-6, 4)
+            bodies["driven"] = PrescribedMotion(
+                time=(0.0, 5e-5, 1.5e-4, 2.5e-4), displacement=tuple(lift.tolist())
+            )
         parts = {f"part{i}": _random_part(rng) for i in range(rng.integers(1, 6))}
-        points = ["needle.body", "lever.a", "lever.b"]
+        points = ["needle.body", "lever.a", "lever.b"] + ["driven.body"] * ("driven" in bodies)
         nodes = {point: [point] for point in points}
         for name, part in parts.items():
             first, second = part.port_kinds()
-            at, other = rng.choice(3, 2, replace=False)
+            at, other = rng.choice(len(points), 2, replace=False)
             nodes[points[at]].append(f"{name}.{first}")
             if rng.random() < 0.5:
                 nodes[points[other]].append(f"{name}.{second}")
@@ -336,11 +342,14 @@ def test_the_example_of_the_page_runs_and_keeps_its_energy():
     assert 150e-6 < lift.max() < 155e-6  # up to the stop, which gives way
 
 
-def test_components_shown_on_the_page_are_valid():
+def test_components_shown_on_the_page_are_valid(tmp_path):
+    (tmp_path / "lift.csv").write_text("time,lift\n0,0\n1,80\n2,0\n")
     page = Path(__file__).parents[2] / "docs" / "theory" / "mechanical-parts.md"
     shown = re.findall(r"```yaml-part\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
 
     assert shown
     for block in shown:
         for keys in yaml.safe_load(block).values():
-            component_class(keys.pop("type")).model_validate(keys, context={"path": page})
+            component_class(keys.pop("type")).model_validate(
+                keys, context={"path": tmp_path / "case.yaml"}
+            )

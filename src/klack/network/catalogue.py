@@ -20,6 +20,7 @@ COMPONENTS = (
     ("rigid-mass", "klack.mechanics.rigid_mass.RigidMass"),
     ("flexible-body", "klack.mechanics.flexible_body.FlexibleBody"),
     ("spring", "klack.mechanics.spring.Spring"),
+    ("prescribed-motion", "klack.mechanics.prescribed_motion.PrescribedMotion"),
     ("nonlinear-spring", "klack.mechanics.nonlinear_spring.NonlinearSpring"),
     ("surging-spring", "klack.mechanics.surging_spring.SurgingSpring"),
     ("lever", "klack.mechanics.lever.Lever"),

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 from klack.network.across import SideLaw
+from klack.network.motion_course import MotionCourse
 from klack.network.protocols import InterfaceLaw, NetworkFluid
 from klack.network.step_function import StepFunction
 
@@ -92,7 +93,8 @@ class BodyRow:
     ``names`` are what the component calls them.
 
     ``speed`` [m/s] along +z is that of the whole free body at the start, undeformed: the rigid
-    modal velocities are ``speed * rigid_axial``.
+    modal velocities are ``speed * rigid_axial``.  A body with a ``course`` follows it whatever
+    pushes it; it has one mode, of shape 1 at all its ports.
     """
 
     component: str
@@ -100,6 +102,7 @@ class BodyRow:
     ports: tuple[int, ...]
     names: tuple[str, ...]
     speed: float = 0.0
+    course: MotionCourse | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -424,11 +427,22 @@ class Rows:
         """Return the other components at the node of the port ``name``."""
         return self.partners.get(name, ())
 
-    def body(self, body: "ReducedBody", ports: Sequence[str], speed: float = 0.0) -> None:
+    def body(
+        self,
+        body: "ReducedBody",
+        ports: Sequence[str],
+        speed: float = 0.0,
+        course: MotionCourse | None = None,
+    ) -> None:
         """Add a body; ``ports`` are the component's ports, one per port of the body, in order."""
         handles = tuple(self.handles[name] for name in ports)
         row = BodyRow(
-            component=self.component, body=body, ports=handles, names=tuple(ports), speed=speed
+            component=self.component,
+            body=body,
+            ports=handles,
+            names=tuple(ports),
+            speed=speed,
+            course=course,
         )
         self.bodies.append(row)
 

@@ -11,18 +11,24 @@ from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.seat import Seat
 from klack.mechanics.force import ConstantForce, ForceOverTime
 from klack.mechanics.gravity import STANDARD_GRAVITY, Gravity
 from klack.mechanics.lever import Lever
 from klack.mechanics.lugre_friction import LuGreFriction
 from klack.mechanics.nonlinear_spring import NonlinearSpring
+from klack.mechanics.prescribed_motion import PrescribedMotion
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.rubber_stop import MaxwellElement, RubberStop
 from klack.mechanics.spring import Spring
 from klack.mechanics.surging_spring import SurgingSpring
 from klack.network.network import Network
+from klack.network.rows import Ambient
 from klack.network.step_function import evaluate
 from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.mechanics import run_parts
 
@@ -48,6 +54,7 @@ def checks() -> list[Check]:
         *_lugre(),
         *_elasto_plastic(),
         *_levers(),
+        *_prescribed(),
         *_balances(),
     ]
 
@@ -620,6 +627,72 @@ def _levers() -> list[Check]:
             "law of the lever",
         ),
         slope,
+    ]
+
+
+def _prescribed() -> list[Check]:
+    # a lift curve that stretches a damped spring, and opens a seat between two pressures
+    t = np.array([0.0, 0.2e-3, 0.5e-3, 1.2e-3, 1.6e-3])
+    y = np.array([0.0, 30e-6, 80e-6, 80e-6, 0.0])
+    curve = PchipInterpolator(t, y)
+    lift = PrescribedMotion(time=tuple(t.tolist()), displacement=tuple(y.tolist()))
+    k, c = 2e5, 20.0
+    parts = {"lift": lift, "spring": Spring(stiffness=k, preload=0.0, damping=c)}
+    run = run_parts(parts, [["lift.body", "spring.end"]], 1.6e-3)
+    time = run.time
+    middle = time[1:] - 50e-9  # of the last step before a record
+    known = k * curve(middle) + c * curve(middle, 1)
+    force = run.channels["lift drive force"].values[1:]
+    fine = np.linspace(0.0, 1.6e-3, 400_001)
+    heat = c * float(np.trapezoid(curve(fine, 1) ** 2, fine))
+    wet = {
+        "lift": lift,
+        "rail": PressureSource(pressure=6e5),
+        "seat": Seat(shape="flat", diameter=1.5e-3, critical_flow_number=1e-3, cavitation=None),
+    }
+    ends = [["lift.body", "seat.needle"], ["rail.fluid", "seat.a"], ["seat.b", "ambient"]]
+    ambient = Ambient(pressure=1e5, temperature=293.15)
+    fluid = library_fluid("n-heptane").at(293.15)
+    rows = Network(wet, ends, ambient=ambient, fluid=fluid).rows()
+    flown = simulate_network(rows, duration=1.6e-3, record=1e-6)
+    mass = float(np.sum(flown.channels["seat flow"].values[1:])) * float(flown.time[1])
+    density = float(fluid.density(6e5))
+    per_lift = 0.7 * pi * 1.5e-3 * sqrt(2.0 * density * 5e5)
+    return [
+        _check(
+            "prescribed motion, largest error of the displacement [m]",
+            0.0,
+            float(np.abs(_place(run, "lift.body") - curve(time)).max()),
+            1e-17,
+            "its curve in SciPy (PCHIP)",
+            ComparedCurve(
+                x_label="time [ms]",
+                y_label="displacement [um]",
+                expected=(time * 1e3, curve(time) * 1e6),
+                computed=(time * 1e3, _place(run, "lift.body") * 1e6),
+            ),
+        ),
+        _check(
+            "prescribed motion of a damped spring, largest error of its force [N]",
+            0.0,
+            float(np.abs(force - known).max()),
+            5e-5,
+            "k y + c y' in the middle of the last step",
+        ),
+        _check(
+            "prescribed motion there and back, its work [J]",
+            heat,
+            run.books.supplies["lift motion"],
+            1e-6,
+            "heat of the damper, integral of c y'^2",
+        ),
+        _check(
+            "seat driven by a lift curve, mass that flows through [kg]",
+            per_lift * float(curve.integrate(0.0, 1.6e-3)),
+            mass,
+            5e-5,
+            "turbulent flow through the mantle at every lift, integrated by SciPy",
+        ),
     ]
 
 
