@@ -14,12 +14,17 @@ from klack.control.pid import PidController, Setpoint
 from klack.control.sensor import Sensor
 from klack.control.state_machine import MachineState, StateMachine, Transition
 from klack.errors import InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.controlled_pressure import ControlledPressure
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.orifice import Orifice
 from klack.magnetics.controlled_voltage import ControlledVoltage
 from klack.mechanics.controlled_force import ControlledForce
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.catalogue import component_class
 from klack.network.network import Network
+from klack.network.rows import Ambient
 from klack.simulation.network_run import simulate_network
 from klack.verification.control import checks
 
@@ -202,3 +207,50 @@ def test_components_shown_on_the_page_are_valid():
     for block in shown:
         for keys in yaml.safe_load(block).values():
             component_class(keys.pop("type")).model_validate(keys, context={"path": page})
+
+
+def test_a_controlled_pressure_fills_a_chamber_through_an_orifice():
+    ambient, fluid = (
+        Ambient(pressure=1e5, temperature=293.15),
+        library_fluid("n-heptane").at(293.15),
+    )
+    law = HysteresisController(
+        kind="hysteresis", sensor="p", lower=4.0, upper=5.0, low=8e5, high=1e5
+    )
+    parts = {
+        "needle": RigidMass(mass=3e-3),
+        "spring": Spring(stiffness=1e4, preload=0.0),
+        "rail": ControlledPressure(
+            start=1e5,
+            sample_time=10e-6,
+            sensors={"p": Sensor(channel="room pressure", unit="bar")},
+            controller=law,
+        ),
+        "room": Chamber(volume=2e-6, pressure=1e5),
+        "hole": Orifice(diameter=0.3e-3),
+    }
+    ends = [["needle.body", "spring.end"], ["rail.fluid", "hole.a"], ["hole.b", "room.fluid"]]
+    rows = Network(parts, ends, ambient=ambient, fluid=fluid).rows()
+    run = simulate_network(rows, duration=10e-3)
+
+    rail, room = (run.channels[f"{name} pressure"].values for name in ("rail", "room"))
+    assert set(np.unique(rail[1:])) == {1e5, 8e5}
+    late = run.time > 5e-3
+    assert 3.5e5 < room[late].min() < 4.0e5
+    assert 5.0e5 < room[late].max() < 5.5e5
+    assert abs(run.books.residual) <= 1e-9 * run.books.scale
+
+
+def test_a_pressure_below_zero_is_refused():
+    ambient, fluid = Ambient(), library_fluid("n-heptane").at(293.15)
+    parts = {
+        "needle": RigidMass(mass=3e-3),
+        "spring": Spring(stiffness=1e4, preload=0.0),
+        "rail": ControlledPressure(start=1e5, sample_time=10e-6).by(lambda t, s: -1.0),
+        "room": Chamber(volume=2e-6, pressure=1e5),
+        "hole": Orifice(diameter=0.3e-3),
+    }
+    ends = [["needle.body", "spring.end"], ["rail.fluid", "hole.a"], ["hole.b", "room.fluid"]]
+
+    with pytest.raises(InputError, match="above 0 Pa"):
+        simulate_network(Network(parts, ends, ambient=ambient, fluid=fluid).rows(), duration=1e-4)

@@ -62,14 +62,17 @@ class Controlled(Component):
         ----------
         function : callable
             ``function(time, signals) -> output``: time [s], signals by the names of the sensors in
-            their units, output [V] or [N].  Called once at every sampling instant from time zero.
+            their units, output [V], [N] or [Pa].  Called once at every sampling instant from time
+            zero.
         """
         result = self.model_copy()
         result._function = function
         return result
 
-    def control(self, rows: Rows, actuator: Literal["voltage", "force"], handle: int) -> None:
-        """Add the controller of ``handle``: a node with a coil, or the number of an element."""
+    def control(
+        self, rows: Rows, actuator: Literal["voltage", "force", "pressure"], handle: int
+    ) -> None:
+        """Add the controller of ``handle``: a node, or the number of an element."""
         law, function = self.controller, self._function
         if (law is None) == (function is None):
             raise CaseProblem(

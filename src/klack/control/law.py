@@ -5,4 +5,4 @@ from collections.abc import Callable, Mapping
 __all__ = ["Law"]
 
 Law = Callable[[float, Mapping[str, float]], float]
-"""Output [V] or [N] for a time [s] and the signals by sensor, each in its unit."""
+"""Output [V], [N] or [Pa] for a time [s] and the signals by sensor, each in its unit."""

@@ -57,7 +57,7 @@ class PidController(Section):
     kind: Literal["pid"] = Field(description="Which law: pid.")
     sensor: Name = Field(description="Its signal.")
     setpoint: Number | Setpoint = Field(description="Wanted signal, or {time: ..., value: ...}.")
-    gain: Number = Field(description="K, output (V or N) per unit of the signal.")
+    gain: Number = Field(description="K, output (V, N or Pa) per unit of the signal.")
     integral_time: Time | None = Field(
         default=None, gt=0, description="T_i; default no integral action."
     )

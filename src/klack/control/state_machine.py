@@ -42,7 +42,7 @@ class MachineState(Section):
     """A state: its output, and the ways out of it in their order."""
 
     name: Name = Field(description="Name of the state.")
-    output: Number = Field(description="Output (V or N) in it.")
+    output: Number = Field(description="Output (V, N or Pa) in it.")
     transitions: tuple[Transition, ...] = Field(default=(), description="Ways out of it.")
 
 

@@ -37,6 +37,7 @@ COMPONENTS = (
     # hydraulics
     ("chamber", "klack.hydraulics.chamber.Chamber"),
     ("pressure-source", "klack.hydraulics.pressure_source.PressureSource"),
+    ("controlled-pressure", "klack.hydraulics.controlled_pressure.ControlledPressure"),
     ("flow-source", "klack.hydraulics.flow_source.FlowSource"),
     ("pressure-face", "klack.hydraulics.pressure_face.PressureFace"),
     ("land-face", "klack.hydraulics.land_face.LandFace"),

@@ -142,10 +142,11 @@ class ControllerRow:
     begin : callable
         Returns a fresh controller: output for a time [s] and the values of the channels, in the
         units of the signals.
-    actuator : "voltage" or "force"
-        The output is the voltage of a coil [V], or the first parameter of an element [N].
+    actuator : "voltage", "force" or "pressure"
+        The output is the voltage of a coil [V], the first parameter of an element [N], or a
+        prescribed pressure [Pa].
     handle : int
-        Electric node of the coil, or number of the element.
+        Electric node of the coil, number of the element, or hydraulic node.
     """
 
     component: str
@@ -154,7 +155,7 @@ class ControllerRow:
     units: tuple[str, ...]
     period: float
     begin: Callable[[], Callable[[float, tuple[float, ...]], float]]
-    actuator: Literal["voltage", "force"]
+    actuator: Literal["voltage", "force", "pressure"]
     handle: int
 
 

@@ -5,7 +5,7 @@ The time loop runs from one instant to the next; between them nothing knows of c
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,9 @@ class _Running:
     looks: int  # between two instants
     columns: tuple[int, ...]  # of what is recorded: means, then points
     scale: tuple[float, ...]  # SI per unit of a signal
-    place: int  # of the output among the parameters of all elements
+    target: NDArray[np.float64]  # what the output is written to, at this place
+    place: int
+    least: float  # smallest output that has a meaning
     restart: int  # state of the coil that begins anew with a voltage; -1 for none
     output: Callable[[float, tuple[float, ...]], float]
 
@@ -66,15 +68,16 @@ class ControlLoop:
                 continue
             signals = zip(running.columns, running.scale, strict=True)
             found = running.output(time, tuple(float(values[c]) / s for c, s in signals))
-            if not isinstance(found, int | float | np.floating) or not isfinite(found):
+            known = isinstance(found, int | float | np.floating) and isfinite(found)
+            if not known or not found > running.least:
                 raise InputError(
                     f"{running.row.component}: controller",
                     got=f"the output {found!r} at {format_si(time, 's', 8)}",
-                    expected="a finite number",
-                    hint="check the function, and what it does with its signals.",
+                    expected="a finite number" + (" above 0 Pa" if running.least == 0.0 else ""),
+                    hint="check its law or function, and what it does with its signals.",
                 )
-            if elements.parameters[running.place] != found:
-                elements.parameters[running.place] = found
+            if running.target[running.place] != found:
+                running.target[running.place] = found
                 if running.restart >= 0:
                     elements.state[running.restart] = 0.0
 
@@ -88,13 +91,15 @@ class ControlLoop:
                 hint="choose one, or another run.step, run.coarse or run.record.",
             )
         places = [self._column(row, i) for i in range(len(row.channels))]
-        place, restart = self._actuator(row)
+        target, place, restart = self._actuator(row)
         return _Running(
             row,
             looks,
             tuple(column for column, _ in places),
             tuple(scale for _, scale in places),
+            target,
             place,
+            0.0 if row.actuator == "pressure" else -inf,
             restart,
             row.begin(),
         )
@@ -128,16 +133,20 @@ class ControlLoop:
             )
         return column, size
 
-    def _actuator(self, row: ControllerRow) -> tuple[int, int]:
-        """Place of the output, and of a state that begins anew when it changes."""
+    def _actuator(self, row: ControllerRow) -> tuple[NDArray[np.float64], int, int]:
+        """Where the output goes, and the place of a state that begins anew when it changes."""
         network = self._network
         elements, parameters = network.elements, network.elements.parameters
         if row.actuator == "force":
-            return int(elements.parameter0[row.handle]), -1
+            return parameters, int(elements.parameter0[row.handle]), -1
+        if row.actuator == "pressure":
+            nodes = network.nodes
+            k = network.node_order.index(row.handle) - nodes.volumes
+            return nodes.pressure, int(nodes.table0[k]), -1
         coil = network.rows.coils[row.handle]
         k = next(i for i, part in enumerate(network.rows.elements) if part.component == coil)
         first = int(elements.parameter0[k])
         drive = first + int(parameters[first + 5])
         block = drive + int(parameters[drive + 1])
         source = block + 3 + 4 * int(parameters[block + 2])
-        return source, int(elements.state0[k]) + 7
+        return parameters, source, int(elements.state0[k]) + 7
