@@ -38,11 +38,12 @@ def test_it_follows_its_curve_against_impacts_and_friction(keys):
         "spring": Spring(stiffness=1e5, preload=10.0),
         "seat": EndStop(gap=0.0, law=LAW, restitution=0.5),
         "guide": GuideFriction(coulomb=2.0),
+        "link": Spring(stiffness=5e4, preload=2.0, damping=20.0),
     }
     # the driven body strikes the needle from below and rubs along it
     ends = [
-        ["lift.body", "stop.lower", "guide.guide"],
-        ["needle.body", "stop.upper", "spring.end", "seat.upper", "guide.body"],
+        ["lift.body", "stop.lower", "guide.guide", "link.base"],
+        ["needle.body", "stop.upper", "spring.end", "seat.upper", "guide.body", "link.end"],
         ["seat.lower", "ground"],
     ]
     run = simulate_network(Network(parts, ends).rows(), duration=1e-3, **keys)

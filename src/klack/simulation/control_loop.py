@@ -32,7 +32,6 @@ class _Running:
     target: NDArray[np.float64]  # what the output is written to, at this place
     place: int
     least: float  # smallest output that has a meaning
-    restart: int  # state of the coil that begins anew with a voltage; -1 for none
     output: Callable[[float, tuple[float, ...]], float]
 
 
@@ -62,7 +61,6 @@ class ControlLoop:
     def act(self, looked: int, values: NDArray[np.float64]) -> None:
         """Set the outputs of all controllers that are due, from the recorded values now."""
         time = looked * self._look
-        elements = self._network.elements
         for running in self._all:
             if looked % running.looks:
                 continue
@@ -76,10 +74,7 @@ class ControlLoop:
                     expected="a finite number" + (" above 0 Pa" if running.least == 0.0 else ""),
                     hint="check its law or function, and what it does with its signals.",
                 )
-            if running.target[running.place] != found:
-                running.target[running.place] = found
-                if running.restart >= 0:
-                    elements.state[running.restart] = 0.0
+            running.target[running.place] = found
 
     def _running(self, row: ControllerRow) -> _Running:
         looks = round(row.period / self._look)
@@ -91,7 +86,7 @@ class ControlLoop:
                 hint="choose one, or another run.step, run.coarse or run.record.",
             )
         places = [self._column(row, i) for i in range(len(row.channels))]
-        target, place, restart = self._actuator(row)
+        target, place = self._actuator(row)
         return _Running(
             row,
             looks,
@@ -100,7 +95,6 @@ class ControlLoop:
             target,
             place,
             0.0 if row.actuator == "pressure" else -inf,
-            restart,
             row.begin(),
         )
 
@@ -133,20 +127,20 @@ class ControlLoop:
             )
         return column, size
 
-    def _actuator(self, row: ControllerRow) -> tuple[NDArray[np.float64], int, int]:
-        """Where the output goes, and the place of a state that begins anew when it changes."""
+    def _actuator(self, row: ControllerRow) -> tuple[NDArray[np.float64], int]:
+        """Array that the output is written to, and the place in it."""
         network = self._network
         elements, parameters = network.elements, network.elements.parameters
         if row.actuator == "force":
-            return parameters, int(elements.parameter0[row.handle]), -1
+            return parameters, int(elements.parameter0[row.handle])
         if row.actuator == "pressure":
             nodes = network.nodes
             k = network.node_order.index(row.handle) - nodes.volumes
-            return nodes.pressure, int(nodes.table0[k]), -1
+            return nodes.pressure, int(nodes.table0[k])
         coil = network.rows.coils[row.handle]
         k = next(i for i, part in enumerate(network.rows.elements) if part.component == coil)
         first = int(elements.parameter0[k])
         drive = first + int(parameters[first + 5])
         block = drive + int(parameters[drive + 1])
         source = block + 3 + 4 * int(parameters[block + 2])
-        return parameters, source, int(elements.state0[k]) + 7
+        return parameters, source

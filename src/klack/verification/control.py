@@ -155,7 +155,7 @@ def _current() -> list[Check]:
             RECURSION,
             _curve(delayed.time, np.array(own), current, "current [A]"),
         ),
-        _check("the same, current after 3 ms [A]", own[-1], float(current[-1]), 1e-12, RECURSION),
+        _check("the same, current after 3 ms [A]", own[-1], float(current[-1]), 5e-13, RECURSION),
         _check(
             "energy residual of the controlled coil over throughput [-]",
             0.0,
