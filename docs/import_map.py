@@ -50,6 +50,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("plasticity",),
     # the valve as a network of components
     ("network",),
+    ("control",),
     ("hydraulics", "magnetics"),
     ("mechanics",),
     # in time, and what is made of it

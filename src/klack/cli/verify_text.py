@@ -26,9 +26,10 @@ _WIDTH = 100
 
 def print_groups() -> None:
     """One sentence per group."""
+    width = max(map(len, COVERS)) + 2
     for group, sentence in COVERS.items():
-        indent = " " * 14
-        print(fill(sentence, _WIDTH, initial_indent=f"{group:<14}", subsequent_indent=indent))
+        indent = " " * width
+        print(fill(sentence, _WIDTH, initial_indent=f"{group:<{width}}", subsequent_indent=indent))
 
 
 def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:

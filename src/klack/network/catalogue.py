@@ -20,16 +20,24 @@ COMPONENTS = (
     ("rigid-mass", "klack.mechanics.rigid_mass.RigidMass"),
     ("flexible-body", "klack.mechanics.flexible_body.FlexibleBody"),
     ("spring", "klack.mechanics.spring.Spring"),
+    ("prescribed-motion", "klack.mechanics.prescribed_motion.PrescribedMotion"),
+    ("nonlinear-spring", "klack.mechanics.nonlinear_spring.NonlinearSpring"),
+    ("surging-spring", "klack.mechanics.surging_spring.SurgingSpring"),
+    ("lever", "klack.mechanics.lever.Lever"),
     ("constant-force", "klack.mechanics.force.ConstantForce"),
     ("force-over-time", "klack.mechanics.force.ForceOverTime"),
     ("force-over-stroke", "klack.mechanics.force_over_stroke.ForceOverStroke"),
     ("guide-friction", "klack.mechanics.friction.GuideFriction"),
+    ("lugre-friction", "klack.mechanics.lugre_friction.LuGreFriction"),
+    ("controlled-force", "klack.mechanics.controlled_force.ControlledForce"),
     ("gravity", "klack.mechanics.gravity.Gravity"),
     ("end-stop", "klack.mechanics.end_stop.EndStop"),
+    ("rubber-stop", "klack.mechanics.rubber_stop.RubberStop"),
     ("fmu", "klack.mechanics.imported_fmu.ImportedFmu"),
     # hydraulics
     ("chamber", "klack.hydraulics.chamber.Chamber"),
     ("pressure-source", "klack.hydraulics.pressure_source.PressureSource"),
+    ("controlled-pressure", "klack.hydraulics.controlled_pressure.ControlledPressure"),
     ("flow-source", "klack.hydraulics.flow_source.FlowSource"),
     ("pressure-face", "klack.hydraulics.pressure_face.PressureFace"),
     ("land-face", "klack.hydraulics.land_face.LandFace"),
@@ -56,6 +64,7 @@ COMPONENTS = (
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),
+    ("controlled-voltage", "klack.magnetics.controlled_voltage.ControlledVoltage"),
 )
 """Type and dotted path of the class, for each component type."""
 

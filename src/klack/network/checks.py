@@ -207,9 +207,26 @@ def check_rows(rows: Rows) -> None:
                 expected="a gap of 0 or more",
                 hint="start in contact (gap 0): a preload then compresses the stop.",
             )
+    _check_driven(rows)
     _check_node_rows(rows)
     check_ranges(rows)
     _warn_of_loose_bodies(rows)
+
+
+def _check_driven(rows: Rows) -> None:
+    """Raise where a stop or a friction joins a prescribed motion to what cannot give way."""
+    driven = {port for row in rows.bodies if row.course is not None for port in row.ports}
+    fixed = driven | {GROUND}
+    joined = [(row.component, {row.upper, row.lower}) for row in rows.interfaces]
+    joined += [(row.component, {row.upper, row.lower}) for row in rows.sliders]
+    for component, sides in joined:
+        if driven & sides and sides <= fixed:
+            raise CaseProblem(
+                ("components", component),
+                got="a prescribed motion on one side, and nothing that gives way on the other",
+                expected="a body that its force can move",
+                hint="leave it out, or give the other side a mass on a spring.",
+            )
 
 
 def _check_node_rows(rows: Rows) -> None:

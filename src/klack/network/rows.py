@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 from klack.network.across import SideLaw
+from klack.network.motion_course import MotionCourse
 from klack.network.protocols import InterfaceLaw, NetworkFluid
 from klack.network.step_function import StepFunction
 
@@ -28,6 +29,7 @@ __all__ = [
     "Book",
     "BranchRow",
     "Channel",
+    "ControllerRow",
     "ElementRow",
     "FilmRow",
     "InterfaceRow",
@@ -91,7 +93,8 @@ class BodyRow:
     ``names`` are what the component calls them.
 
     ``speed`` [m/s] along +z is that of the whole free body at the start, undeformed: the rigid
-    modal velocities are ``speed * rigid_axial``.
+    modal velocities are ``speed * rigid_axial``.  A body with a ``course`` follows it whatever
+    pushes it; it has one mode, of shape 1 at all its ports.
     """
 
     component: str
@@ -99,6 +102,7 @@ class BodyRow:
     ports: tuple[int, ...]
     names: tuple[str, ...]
     speed: float = 0.0
+    course: MotionCourse | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -123,6 +127,36 @@ class ElementRow:
     failures: Mapping[int, str]
     at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class ControllerRow:
+    """A controller that sets one number at its sampling instants.
+
+    Parameters
+    ----------
+    component : str
+    sensors, channels, units : tuple of str
+        Name of each sensor, what it reads, and the unit of its signal.
+    period : float [s]
+    begin : callable
+        Returns a fresh controller: output for a time [s] and the values of the channels, in the
+        units of the signals.
+    actuator : "voltage", "force" or "pressure"
+        The output is the voltage of a coil [V], the first parameter of an element [N], or a
+        prescribed pressure [Pa].
+    handle : int
+        Electric node of the coil, number of the element, or hydraulic node.
+    """
+
+    component: str
+    sensors: tuple[str, ...]
+    channels: tuple[str, ...]
+    units: tuple[str, ...]
+    period: float
+    begin: Callable[[], Callable[[float, tuple[float, ...]], float]]
+    actuator: Literal["voltage", "force", "pressure"]
+    handle: int
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -379,6 +413,8 @@ class Rows:
     lines: list[LineRow] = field(default_factory=list)
     limits: list[LimitRow] = field(default_factory=list)
     sides: list[SideRow] = field(default_factory=list)
+    controllers: list[ControllerRow] = field(default_factory=list)
+    coils: dict[int, str] = field(default_factory=dict)  # electric node -> component of its coil
 
     def port(self, name: str) -> int:
         """Handle of the node that the port ``name`` of the present component is joined to.
@@ -392,11 +428,22 @@ class Rows:
         """Return the other components at the node of the port ``name``."""
         return self.partners.get(name, ())
 
-    def body(self, body: "ReducedBody", ports: Sequence[str], speed: float = 0.0) -> None:
+    def body(
+        self,
+        body: "ReducedBody",
+        ports: Sequence[str],
+        speed: float = 0.0,
+        course: MotionCourse | None = None,
+    ) -> None:
         """Add a body; ``ports`` are the component's ports, one per port of the body, in order."""
         handles = tuple(self.handles[name] for name in ports)
         row = BodyRow(
-            component=self.component, body=body, ports=handles, names=tuple(ports), speed=speed
+            component=self.component,
+            body=body,
+            ports=handles,
+            names=tuple(ports),
+            speed=speed,
+            course=course,
         )
         self.bodies.append(row)
 

@@ -121,6 +121,10 @@ class Bodies(NamedTuple):
     port1: Index
     first: Index  # (ports,) first port of the body of each port
     last: Index
+    driven: int  # bodies that follow a course
+    driven_block: Index  # (driven,) their block
+    course0: Index  # (driven,) where their course begins
+    course: Vector
     G: Vector  # (SIZES, PORTS, PORTS) displacement at the end of a step per unit force during it
     at: Vector  # (ROWS_AT, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 

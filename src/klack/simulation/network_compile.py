@@ -213,6 +213,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
     laid_out: tuple[list[Vector], ...] = tuple([] for _ in steps)
     start, count, port0, port1 = [0], list[int](), list[int](), list[int]()
     blocks = [0]
+    driven, course0, course = list[int](), list[int](), list[Vector]()
     first_port = 0
     ports = sum(len(row.ports) for row in rows)
     first, last = np.zeros(ports + 1, np.int64), np.zeros(ports + 1, np.int64)
@@ -250,15 +251,23 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
                 )
                 W[ROW_B1 : ROW_B1 + 2, :used] = P.B1, P.B2
                 W[ROW_K, :used] = body.omega[part] ** 2
+                if row.course is not None:  # no force moves it, a speed does
+                    W[ROW_A11 : ROW_K + 1] = 0.0
+                    W[ROW_A11, 0], W[ROW_A11 + 1, 0], W[ROW_A11 + 3, 0] = 1.0, h, 1.0
                 shapes = np.asarray(body.port_shapes)[part].T
                 W[FIXED_ROWS:-1, :used] = shapes
                 W[-1, :used] = cm[part]
-                G[level, here, here] += (shapes * P.B1) @ shapes.T
+                if row.course is None:
+                    G[level, here, here] += (shapes * P.B1) @ shapes.T
                 target.append(W.ravel())
             start.append(start[-1] + height * ROW)
             count.append(4 * ceil(used / 4))
             port0.append(first_port)
             port1.append(first_port + own)
+        if row.course is not None:
+            driven.append(len(count) - 1)
+            course0.append(sum(map(len, course)))
+            course.append(row.course.numbers())
         blocks.append(len(count))
         first_port += own
     bodies = Bodies(
@@ -272,6 +281,10 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
         port1=np.array(port1, dtype=np.int64),
         first=first,
         last=last,
+        driven=len(driven),
+        driven_block=np.array(driven, dtype=np.int64),
+        course0=np.array(course0, dtype=np.int64),
+        course=np.concatenate([*course, np.zeros(1)]),
         G=G.ravel(),
         at=np.zeros(ROWS_AT * PORTS),
     )

@@ -67,8 +67,13 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     interfaces, touching = network.interfaces, network.interface_state
     stores = {}
     unseen, place = _unseen_work(network), 0
-    unseen[0] += network.bodies.at[EXCESS]
+    counts = [row.course is None for row in rows.bodies for _ in row.ports]
+    if any(counts):
+        unseen[counts.index(True)] += network.bodies.at[EXCESS]
     for b, row in enumerate(rows.bodies):
+        if row.course is not None:  # what its motion needs is a supply
+            place += len(row.ports)
+            continue
         kinetic, strain = body_energy(row.body, *modal_state(network, b))
         ahead = float(unseen[place : place + len(row.ports)].sum())
         place += len(row.ports)
@@ -137,6 +142,8 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
     for row in rows.bodies:
         work = float(works[place : place + len(row.ports)].sum())
         place += len(row.ports)
+        if row.course is not None:
+            supplies[f"{row.component} motion"] = -work
         if np.any(row.body.damping > 0.0):
             name = f"{row.component} {BODY_STORE}"
             losses[f"{row.component} damping"] = work - (after[name] - before[name])

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
+from klack.simulation.driven_bodies import drive_bodies
 from klack.simulation.network_arrays import (
     ANSWER,
     COARSE,
@@ -416,6 +417,8 @@ def _act(
                 keep_for_cut(bodies, now.level)
         G = shift(bodies.G, now.level * PORTS * PORTS)
         if move:
+            if bodies.driven > 0:
+                drive_bodies(bodies, now.level, now.t, now.H)
             move_free(bodies, now.level)
             begin_sub_sliders(sliding, bodies, now.level)
         push_by_guess(contacts, sliding, bodies)

@@ -341,7 +341,7 @@ def repay(bodies: Any, G: Any) -> None:
     port, longest, largest = 0, 0.0, 0.0
     for p in range(bodies.ports):
         way = abs(S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p])
-        if way > longest:
+        if way > longest and G[p * PORTS + p] > 0.0:
             port, longest = p, way
         largest = max(largest, abs(S[ANSWER + p]))
     own = G[port * PORTS + port]
@@ -354,6 +354,12 @@ def repay(bodies: Any, G: Any) -> None:
         for i in range(bodies.first[port], bodies.last[port]):
             S[AHEAD + i] += G[i * PORTS + port] * force
         S[EXCESS] += force * (S[Y1 + port] + S[AHEAD + port] - S[BEGIN + port])
+
+
+@phase
+def _response(bodies: Any, level: int, port: int) -> float:
+    """Displacement of a port per unit force on it; 0 of a driven body."""
+    return bodies.G[(level * PORTS + port) * PORTS + port]
 
 
 @phase
@@ -377,6 +383,9 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
         bring(bodies, level, level)
         for k in range(bodies.blocks):
             energy = _kick_block(bodies, k, level, macro, MISSED)
+            if bodies.driven > 0 and _response(bodies, macro, bodies.port0[k]) == 0.0:
+                for p in range(bodies.port0[k], bodies.port1[k]):  # no speed, but work
+                    energy += S[MISSED + p] * (S[Y1 + p] - S[BEGIN + p])
             S[WORK + bodies.port0[k]] += energy
             excess += energy
         for p in range(bodies.ports):

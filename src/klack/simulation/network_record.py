@@ -4,6 +4,7 @@ from typing import Any
 
 from klack.compiling.jit import njit
 from klack.network.step_function import pointers
+from klack.simulation.driven_bodies import drive_force
 from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
 from klack.simulation.network_ports import port_speed
 from klack.simulation.phase import phase
@@ -36,7 +37,7 @@ def record_points(
     gaps: Any,
     interfaces: int,
 ) -> None:
-    """Columns: port displacements, port velocities, centres of mass, pressures, states, gaps.
+    """Columns: port displacements and velocities, centres of mass, pressures, states, gaps, drives.
 
     The modes are those of a size of step, with no force pending.
     """
@@ -62,6 +63,9 @@ def record_points(
     place += recording.branch_states.size
     for c in range(interfaces):
         out[place + c] = gaps[c]
+    place += interfaces
+    for d in range(bodies.driven):
+        out[place + d] = drive_force(bodies, d)
 
 
 @njit(_nrt=False, error_model="numpy")

@@ -67,6 +67,7 @@ class Recorder:
             for channel in row.channels
         ]
         free = [b for b, row in enumerate(rows.bodies) if row.body.rigid_count > 0]
+        driven = [row.component for row in rows.bodies if row.course is not None]
         blocks = network.body_blocks
         owner = [b for b, row in enumerate(rows.bodies) for _ in row.ports]
         place = [i for row in rows.bodies for i in range(len(row.ports))]
@@ -97,7 +98,9 @@ class Recorder:
             *(_Column(f"{node} pressure", "Pa") for node in nodes),
             *(_Column(name, unit) for _, name, unit in states + branch_states),
             *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
+            *(_Column(f"{name} drive force", "N") for name in driven),
         ]
+        self._driven = len(driven)
         self.peaks = [_Column(f"{row.component} peak force", "N") for row in rows.interfaces]
         self.moving = {rows.bodies[b].component: 2 * len(ports) + i for i, b in enumerate(free)}
         count = len(rows.interfaces)
@@ -157,9 +160,18 @@ class Recorder:
         """
         self._means[:, 0], self._peaks[:, 0] = np.split(acting, [len(self.means)])
         if states is not None:
-            end = len(self.points) - len(self._fine)
+            end = len(self.points) - len(self._fine) - self._driven
             self._points[end - len(states) : end, 0] = states
         self._begun = True
+
+    def start_values(self) -> Vector:
+        """Return what is recorded at the start: means, then points."""
+        return np.concatenate([self._means[:, 0], self._points[:, 0]])
+
+    def values(self, look: int) -> Vector:
+        """Return what the present chunk recorded at its look of this number, from 1 on."""
+        at = self.recording
+        return np.concatenate([at.means[look - 1], at.points[look - 1]])
 
     def last(self, records: int) -> Vector:
         """Return the first values of a continued run: see :meth:`first`."""
@@ -188,6 +200,8 @@ class Recorder:
         ):
             if columns is not self.points and not self._begun:  # state of an earlier version
                 values[:, 0] = values[:, 1]
+            if columns is self.points and self._driven and records:  # none before the first step
+                values[-self._driven :, 0] = values[-self._driven :, 1]
             for column, row in zip(columns, values, strict=True):
                 result[column.name] = ChannelData(unit=column.unit, values=row[: records + 1])
         return result
@@ -255,6 +269,7 @@ def recorded_columns(rows: Rows) -> int:
     states += sum(len(row.channels) for row in rows.branches)
     forces = sum(len(row.names) for row in rows.elements) + len(rows.branches)
     forces += 2 * len(rows.sliders)
+    free += sum(1 for row in rows.bodies if row.course is not None)
     return 2 * ports + free + len(rows.nodes) + states + forces + 4 * len(rows.interfaces)
 
 

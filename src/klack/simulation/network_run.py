@@ -17,6 +17,7 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.accuracy import Accuracy
 from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
@@ -153,8 +154,17 @@ def simulate_network(
         if value is not None:
             require_positive(f"simulate_network: {name}", value, "s")
     sizes = step_sizes(rows, accuracy, step=step, coarse=coarse)
+    if rows.controllers and state is not None:
+        raise InputError(
+            f"components.{rows.controllers[0].component}",
+            got="a run that continues from a stored state",
+            expected="a run from its start: the memory of a controller is not stored",
+            hint="compute the whole time in one run.",
+        )
     network = compile_network(rows, sizes)
     grid = grid_of(duration, sizes, record)
+    if rows.controllers and grid.look > 1:  # instants may lie at any macro step
+        grid = replace(grid, look=1, looks=grid.look * grid.looks)
     step = sizes.step
     chunk = _PYTHON_CHUNK if has_python_steps(rows) or spatial is not None else _CHUNK
     recorder = Recorder(
@@ -200,8 +210,12 @@ def simulate_network(
     if left is not None:
         raise left[1]
     _compile(network, recorder.recording, clock, grid)
+    control = None
+    if rows.controllers:
+        control = ControlLoop(network, recorder, step * grid.look_steps)
+        control.act(0, recorder.start_values())
     begin = perf_counter()
-    failure = _run(network, recorder, finder, limits, clock, grid, progress)
+    failure = _run(network, recorder, finder, limits, clock, grid, progress, control)
     wall_time = perf_counter() - begin
     records = recorder.looked // grid.looks
     if failure is not None and not records:
@@ -308,6 +322,7 @@ def _run(
     clock: NDArray[np.int64],
     grid: Grid,
     progress: Callable[[float], None],
+    control: ControlLoop | None,
 ) -> ConvergenceError | None:
     """Run chunk by chunk; the error that ended it early, with the record up to the look before."""
     looks = grid.records * grid.looks
@@ -317,6 +332,8 @@ def _run(
         # a chunk ends with a record if it can, wherever the run began
         to_record = grid.looks - recorder.looked % grid.looks
         count = min(chunk, looks - recorder.looked if chunk >= grid.looks else to_record)
+        if control is not None:
+            count = min(count, control.next(recorder.looked))
         kept = everything(network, clock)
         good, failure = _try_chunk(network, recorder, limits, clock, grid, count)
         if failure is not None:
@@ -326,6 +343,8 @@ def _run(
             times = np.asarray(grid.step * steps, dtype=float)
             limits.tell(recorder.recording.points[:good], times)
             recorder.take(times, finder)
+            if control is not None and failure is None:
+                control.act(recorder.looked, recorder.values(good))
         progress(recorder.looked / looks)
         if failure is not None:
             return failure

@@ -92,6 +92,7 @@ def _chosen(rows: Rows, macro: float, h: float) -> int:
     """Fine steps of a macro step: a power of two, unless an exchange interval asks for another."""
     longest = min([macro, *(_segment(line) for line in rows.lines)])
     intervals = [row.interval for row in rows.elements if row.interval is not None]
+    intervals += [row.period for row in rows.controllers]
     longest = min([longest, *intervals])
     most = min(int(longest / h * (1.0 + _WHOLE)), _MOST_COARSE)
     if most < 2:

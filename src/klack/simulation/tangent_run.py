@@ -304,6 +304,21 @@ class _Running:
         record: float,
         start: Literal["rest", "free"],
     ) -> None:
+        driven = [row.component for row in rows.bodies if row.course is not None]
+        if driven:
+            raise InputError(
+                f"components.{driven[0]}",
+                got="derivatives of a run with a prescribed motion",
+                expected="bodies that forces move",
+                hint="take differences of runs (klack study).",
+            )
+        if rows.controllers:
+            raise InputError(
+                f"components.{rows.controllers[0].component}",
+                got="derivatives of a run with a controller",
+                expected="a valve without controllers",
+                hint="take differences of runs (klack study), or a driver without signals.",
+            )
         self.rows, self.directions, self.sizes = rows, tuple(directions), sizes
         self.grid = grid_of(duration, sizes, record)
         network = compile_network(rows, sizes)

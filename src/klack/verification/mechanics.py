@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from functools import partial
 from math import exp, log, sqrt
+from typing import Literal
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -21,7 +22,7 @@ from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.verification.check import Check, ComparedCurve, compare
 
-__all__ = ["checks"]
+__all__ = ["checks", "run_parts"]
 
 GROUP = "mechanics"
 MASS = 3e-3  # [kg]
@@ -42,17 +43,19 @@ def checks() -> list[Check]:
     ]
 
 
-def _run(
+def run_parts(
     parts: Mapping[str, Component],
     connections: Sequence[Sequence[str]],
     duration: float,
     step: float = 100e-9,
+    start: Literal["rest", "free"] = "free",
 ) -> NetworkResult:
+    """Run a network of parts in fine steps alone."""
     with catch_warnings():  # most of these bodies fly freely, on purpose
         simplefilter("ignore", LooseBodyWarning)
         rows = Network(parts, connections).rows()
     return simulate_network(
-        rows, duration=duration, step=step, coarse=1, record=10 * step, start="free"
+        rows, duration=duration, step=step, coarse=1, record=10 * step, start=start
     )
 
 
@@ -62,7 +65,7 @@ def _alone(
     """Run a mass of 3 g with one component at it."""
     port = next(iter(part.port_kinds()))
     parts = {"mass": RigidMass(mass=MASS, speed=speed), "part": part}
-    return _run(parts, [["mass.body", f"part.{port}"]], duration, step)
+    return run_parts(parts, [["mass.body", f"part.{port}"]], duration, step)
 
 
 def _place(result: NetworkResult) -> NDArray[np.float64]:
@@ -143,7 +146,7 @@ def _rubs() -> list[Check]:
         "pull": ForceOverTime(time=(1e-3, 2e-3), force=(0.0, 0.4999)),
         "guide": GuideFriction(coulomb=0.3, breakaway=0.5),
     }
-    stopped = _run(parts, [["mass.body", "pull.end", "guide.body"]], 6e-3)
+    stopped = run_parts(parts, [["mass.body", "pull.end", "guide.body"]], 6e-3)
     held = _place(stopped)[stopped.time > 1e-3]
     return [
         _check(
@@ -187,7 +190,7 @@ def _two_bodies() -> list[Check]:
         "spring": Spring(stiffness=5e6, preload=0.0),
     }
     connections = [["mass.body", "spring.end"], ["housing.body", "spring.base"]]
-    run = _run(parts, connections, 1e-3)
+    run = run_parts(parts, connections, 1e-3)
     reduced = MASS * 0.1 / (MASS + 0.1)
     omega = sqrt(5e6 / reduced)
     exact = 0.5 / omega * np.sin(omega * run.time)
@@ -222,7 +225,7 @@ def _balances() -> list[Check]:
         "pull": ConstantForce(force=-2.0),
     }
     ports = ["spring.end", "magnet.end", "latch.end", "guide.body", "weight.body", "pull.end"]
-    run = _run(parts, [["mass.body", *ports]], 4e-3)
+    run = run_parts(parts, [["mass.body", *ports]], 4e-3)
     books = run.books
     return [
         _check(

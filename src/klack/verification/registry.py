@@ -38,6 +38,8 @@ COVERS = {
     "measured": "Measurements of others: strain pulses of struck bars, oblique impacts of spheres.",
     "mechanics": "Mass, spring, friction, gravity and forces in the time loop, against closed "
     "motions.",
+    "mechanical-parts": "Nonlinear springs, surge, rubber, LuGre friction and levers "
+    "against closed and independent solutions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "
     "the table of the kernel.",
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
@@ -49,6 +51,8 @@ COVERS = {
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
     "ladders, a published lifting magnet.",
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
+    "control": "Sensors, PID, hysteresis, state machines and functions of the user, against exact "
+    "recursions.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
     "cases": "Case files: units by their definitions, expressions, included parts of networks.",

@@ -1,0 +1,108 @@
+"""What every controlled component has: sample time, sensors and a law."""
+
+from collections.abc import Callable, Mapping
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from klack.control.hysteresis import HysteresisController
+from klack.control.law import Law
+from klack.control.pid import PidController
+from klack.control.sensor import Sensor
+from klack.control.state_machine import StateMachine
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.input.section import Name
+from klack.network.component import Component
+from klack.network.rows import ControllerRow, Rows
+from klack.units import Time
+
+__all__ = ["ControlLaw", "Controlled"]
+
+ControlLaw = Annotated[
+    PidController | HysteresisController | StateMachine, Field(discriminator="kind")
+]
+
+
+class Controlled(Component):
+    """A component with one output that a controller sets at its sampling instants.
+
+    The output is constant from one instant to the next; the first one is time zero.  No step is
+    longer than the sample time.  In Python a function can be the controller: :meth:`by`.  A case
+    file runs no code, so there it is one of the laws.
+
+    Limits: a run with a controller cannot continue from a stored state, and has no derivatives.
+    """
+
+    sample_time: Time = Field(
+        gt=0, description="Time between two sampling instants, in whole steps of the time loop."
+    )
+    sensors: Mapping[Name, Sensor] = Field(
+        default_factory=dict, description="Sensors by name: {channel: ..., unit: ...}."
+    )
+    controller: ControlLaw | None = Field(default=None, description="Law of the output.")
+
+    _function: Law | None = PrivateAttr(None)
+
+    @model_validator(mode="after")
+    def _known_sensors(self) -> Self:
+        for name in self.controller.used() if self.controller is not None else ():
+            if name not in self.sensors:
+                raise CaseProblem(
+                    ("controller",),
+                    got=f"the sensor '{name}'",
+                    expected=f"one of: {one_of(self.sensors) if self.sensors else 'no sensors'}",
+                    hint=nearest(name, self.sensors, "describe it under 'sensors'."),
+                )
+        return self
+
+    def by(self, function: Law) -> Self:
+        """Return this component with a function as its controller.
+
+        Parameters
+        ----------
+        function : callable
+            ``function(time, signals) -> output``: time [s], signals by the names of the sensors in
+            their units, output [V], [N] or [Pa].  Called once at every sampling instant from time
+            zero.
+        """
+        result = self.model_copy()
+        result._function = function
+        return result
+
+    def control(
+        self, rows: Rows, actuator: Literal["voltage", "force", "pressure"], handle: int
+    ) -> None:
+        """Add the controller of ``handle``: a node, or the number of an element."""
+        law, function = self.controller, self._function
+        if (law is None) == (function is None):
+            raise CaseProblem(
+                ("components", rows.component, "controller"),
+                got="no controller" if law is None else "a law and a function",
+                expected="one of: pid, hysteresis, state-machine; or a function in Python",
+                hint="add 'controller: {kind: pid, ...}', or use .by(function) in Python.",
+            )
+        names = tuple(self.sensors)
+
+        def begin() -> Callable[[float, tuple[float, ...]], float]:
+            act = function if law is None else law.begin(self.sample_time)
+            assert act is not None
+            read = [sensor.begin() for sensor in self.sensors.values()]
+
+            def output(time: float, values: tuple[float, ...]) -> float:
+                signals = [r(time, value) for r, value in zip(read, values, strict=True)]
+                return act(time, dict(zip(names, signals, strict=True)))
+
+            return output
+
+        rows.controllers.append(
+            ControllerRow(
+                component=rows.component,
+                sensors=names,
+                channels=tuple(sensor.channel for sensor in self.sensors.values()),
+                units=tuple(sensor.unit for sensor in self.sensors.values()),
+                period=self.sample_time,
+                begin=begin,
+                actuator=actuator,
+                handle=handle,
+            )
+        )

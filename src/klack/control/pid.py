@@ -1,0 +1,108 @@
+"""PID control in discrete time, with limits and anti-windup."""
+
+from collections.abc import Mapping
+from typing import Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from klack.control.law import Law
+from klack.input.problem import CaseProblem
+from klack.input.section import Name, Number, Section
+from klack.units import Time
+
+__all__ = ["PidController", "Setpoint"]
+
+
+class Setpoint(Section):
+    """Wanted signal over time, straight between points, constant beyond them."""
+
+    time: tuple[Time, ...] = Field(min_length=1, description="Times, not falling; a jump twice.")
+    value: tuple[Number, ...] = Field(min_length=1, description="Signal, in the sensor's unit.")
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Self:
+        if len(self.time) != len(self.value) or np.any(np.diff(self.time) < 0):
+            raise CaseProblem(
+                ("time",),
+                got=f"{len(self.time)} times for {len(self.value)} values, or falling times",
+                expected="one value for each time, in order",
+                hint="write a jump as the same time twice.",
+            )
+        return self
+
+    def at(self, time: float) -> float:
+        """Return the wanted signal at a time [s]; the later value at a jump."""
+        k = int(np.searchsorted(self.time, time, side="right"))
+        if k == 0 or k == len(self.time):
+            return self.value[min(k, len(self.value) - 1)]
+        share = (time - self.time[k - 1]) / (self.time[k] - self.time[k - 1])
+        return self.value[k - 1] + share * (self.value[k] - self.value[k - 1])
+
+
+class PidController(Section):
+    r"""Proportional, integral and derivative action on one signal.
+
+    .. math::
+
+        u_k = b + K\Bigl[e_k + \frac{T}{T_i}\sum_{j \le k} e_j
+              - \frac{T_d}{T}(s_k - s_{k-1})\Bigr], \qquad e_k = w(t_k) - s_k
+
+    in [lower, upper], with the sample time T.  The derivative acts on the signal alone, so that a
+    jump of the setpoint makes no pulse, through a first-order filter of ``derivative_filter``.
+    While the output is at a limit and the error would drive it further, the integral waits
+    (conditional integration; K. J. Astrom, T. Haegglund, Advanced PID Control, 2006, ch. 3.5).
+    """
+
+    kind: Literal["pid"] = Field(description="Which law: pid.")
+    sensor: Name = Field(description="Its signal.")
+    setpoint: Number | Setpoint = Field(description="Wanted signal, or {time: ..., value: ...}.")
+    gain: Number = Field(description="K, output (V, N or Pa) per unit of the signal.")
+    integral_time: Time | None = Field(
+        default=None, gt=0, description="T_i; default no integral action."
+    )
+    derivative_time: Time = Field(default=0.0, ge=0, description="T_d.")
+    derivative_filter: Time = Field(default=0.0, ge=0, description="Its time constant.")
+    bias: Number = Field(default=0.0, description="Output b without an error.")
+    lower: Number = Field(description="Smallest output.")
+    upper: Number = Field(description="Largest output.")
+    anti_windup: bool = Field(default=True, description="Whether the integral waits at a limit.")
+
+    @model_validator(mode="after")
+    def _limits(self) -> Self:
+        if not self.lower < self.upper:
+            raise CaseProblem(
+                ("lower",),
+                got=f"{self.lower:g}",
+                expected=f"below the upper limit, {self.upper:g}",
+                hint="a coil at a half bridge: lower: 0 and the supply as upper.",
+            )
+        return self
+
+    def used(self) -> tuple[str, ...]:
+        """Sensors that it reads."""
+        return (self.sensor,)
+
+    def begin(self, period: float) -> Law:
+        """Return a fresh controller for a sample time [s]."""
+        integral, slope, before = 0.0, 0.0, None
+        part = 0.0 if self.integral_time is None else self.gain * period / self.integral_time
+
+        def act(time: float, signals: Mapping[str, float]) -> float:
+            nonlocal integral, slope, before
+            signal = signals[self.sensor]
+            wanted = self.setpoint
+            error = (wanted.at(time) if isinstance(wanted, Setpoint) else wanted) - signal
+            change = 0.0 if before is None else signal - before
+            before = signal
+            slope = (self.derivative_filter * slope - self.gain * self.derivative_time * change) / (
+                self.derivative_filter + period
+            )
+            more = part * error
+            output = self.bias + self.gain * error + integral + more + slope
+            further = (output > self.upper and more > 0.0) or (output < self.lower and more < 0.0)
+            if not (self.anti_windup and further):
+                integral += more
+            return min(max(output, self.lower), self.upper)
+
+        return act

@@ -1,0 +1,37 @@
+"""Pressure that a controller sets."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from pydantic import Field
+
+from klack.control.controlled import Controlled
+from klack.hydraulics.network_fluid import network_fluid
+from klack.network.port import PRESSURE, Port
+from klack.network.rows import Rows
+from klack.units import Pressure
+
+__all__ = ["ControlledPressure"]
+
+
+class ControlledPressure(Controlled):
+    """Prescribed pressure that follows from signals, sampled and held.
+
+    The controller's output is the absolute pressure [Pa], constant over a sample time: a rail or a
+    pilot stage that is fast against the valve.  It gives and takes any flow.
+
+    Limits: the pressure jumps from one sample time to the next; a line or a chamber behind an
+    orifice makes it smooth.
+    """
+
+    type: ClassVar[str] = "controlled-pressure"
+    ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
+
+    start: Pressure = Field(gt=0, description="Absolute pressure at the start, before it acts.")
+
+    def add_rows(self, rows: Rows) -> None:
+        """Prescribe the pressure of the node, and add the controller."""
+        network_fluid(rows)
+        node = rows.port("fluid")
+        rows.pressure(node, time=[0.0], pressure=[self.start])
+        self.control(rows, "pressure", node)

@@ -1,0 +1,146 @@
+"""Controllers of a network: at their sampling instants they read channels and set one number.
+
+The time loop runs from one instant to the next; between them nothing knows of controllers.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isfinite
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, nearest
+from klack.network.rows import ControllerRow
+from klack.simulation.network_compile import CompiledNetwork
+from klack.simulation.network_recorder import Recorder
+from klack.units import KINDS, format_si, parse_quantity
+
+__all__ = ["ControlLoop"]
+
+_WHOLE = 1e-6  # of a look, to which a sample time must be a whole number
+_OTHER = {"kg/s": {"kg/s": 1.0, "g/s": 1e-3}, "-": {"-": 1.0, "1": 1.0}}
+
+
+@dataclass(frozen=True, slots=True)
+class _Running:
+    row: ControllerRow
+    looks: int  # between two instants
+    columns: tuple[int, ...]  # of what is recorded: means, then points
+    scale: tuple[float, ...]  # SI per unit of a signal
+    target: NDArray[np.float64]  # what the output is written to, at this place
+    place: int
+    least: float  # smallest output that has a meaning
+    output: Callable[[float, tuple[float, ...]], float]
+
+
+class ControlLoop:
+    """All controllers of a run.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+        Its parameters are overwritten.
+    recorder : Recorder
+    look : float [s]
+        Time between two looks at the network.
+    """
+
+    def __init__(self, network: CompiledNetwork, recorder: Recorder, look: float) -> None:
+        self._network, self._look = network, look
+        columns = [*recorder.means, *recorder.points]
+        self._names = [column.name for column in columns]
+        self._units = [column.unit for column in columns]
+        self._all = [self._running(row) for row in network.rows.controllers]
+
+    def next(self, looked: int) -> int:
+        """Looks until the next instant, after so many."""
+        return min(running.looks - looked % running.looks for running in self._all)
+
+    def act(self, looked: int, values: NDArray[np.float64]) -> None:
+        """Set the outputs of all controllers that are due, from the recorded values now."""
+        time = looked * self._look
+        for running in self._all:
+            if looked % running.looks:
+                continue
+            signals = zip(running.columns, running.scale, strict=True)
+            found = running.output(time, tuple(float(values[c]) / s for c, s in signals))
+            known = isinstance(found, int | float | np.floating) and isfinite(found)
+            if not known or not found > running.least:
+                raise InputError(
+                    f"{running.row.component}: controller",
+                    got=f"the output {found!r} at {format_si(time, 's', 8)}",
+                    expected="a finite number" + (" above 0 Pa" if running.least == 0.0 else ""),
+                    hint="check its law or function, and what it does with its signals.",
+                )
+            running.target[running.place] = found
+
+    def _running(self, row: ControllerRow) -> _Running:
+        looks = round(row.period / self._look)
+        if looks < 1 or abs(row.period / self._look - looks) > _WHOLE * max(looks, 1):
+            raise CaseProblem(
+                ("components", row.component, "sample_time"),
+                got=format_si(row.period, "s", 8),
+                expected=f"a whole number of steps of {format_si(self._look, 's', 8)}",
+                hint="choose one, or another run.step, run.coarse or run.record.",
+            )
+        places = [self._column(row, i) for i in range(len(row.channels))]
+        target, place = self._actuator(row)
+        return _Running(
+            row,
+            looks,
+            tuple(column for column, _ in places),
+            tuple(scale for _, scale in places),
+            target,
+            place,
+            0.0 if row.actuator == "pressure" else -inf,
+            row.begin(),
+        )
+
+    def _column(self, row: ControllerRow, i: int) -> tuple[int, float]:
+        key = ("components", row.component, "sensors", row.sensors[i])
+        name, unit = row.channels[i], row.units[i]
+        if name not in self._names:
+            raise CaseProblem(
+                (*key, "channel"),
+                got=f"'{name}'",
+                expected="a recorded channel: a displacement, velocity, force, pressure or current",
+                hint=nearest(name, self._names, f"there are: {', '.join(self._names)[:600]}."),
+            )
+        column = self._names.index(name)
+        si = self._units[column]
+        if si in _OTHER:
+            size = _OTHER[si].get(unit)
+        else:
+            kind = next(kind for kind in KINDS if kind.unit == si)
+            try:
+                size = parse_quantity(f"1 {unit}", kind, name)
+            except InputError:
+                size = None
+        if size is None:
+            raise CaseProblem(
+                (*key, "unit"),
+                got=f"'{unit}'",
+                expected=f"a unit of '{name}', which is in {si}",
+                hint=f"write {si}.",
+            )
+        return column, size
+
+    def _actuator(self, row: ControllerRow) -> tuple[NDArray[np.float64], int]:
+        """Array that the output is written to, and the place in it."""
+        network = self._network
+        elements, parameters = network.elements, network.elements.parameters
+        if row.actuator == "force":
+            return parameters, int(elements.parameter0[row.handle])
+        if row.actuator == "pressure":
+            nodes = network.nodes
+            k = network.node_order.index(row.handle) - nodes.volumes
+            return nodes.pressure, int(nodes.table0[k])
+        coil = network.rows.coils[row.handle]
+        k = next(i for i, part in enumerate(network.rows.elements) if part.component == coil)
+        first = int(elements.parameter0[k])
+        drive = first + int(parameters[first + 5])
+        block = drive + int(parameters[drive + 1])
+        source = block + 3 + 4 * int(parameters[block + 2])
+        return parameters, source

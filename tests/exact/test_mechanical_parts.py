@@ -1,0 +1,374 @@
+"""Nonlinear spring, surge, rubber, LuGre friction, lever: their formulas, ends and errors."""
+
+import re
+import warnings
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from klack.analyses.stroke.run import run_stroke
+from klack.case.valve_reader import load_valve_case
+from klack.control.pid import PidController
+from klack.control.sensor import Sensor
+from klack.errors import AccuracyWarning, InputError
+from klack.mechanics.controlled_force import ControlledForce
+from klack.mechanics.lever import Lever
+from klack.mechanics.lugre_friction import LuGreFriction
+from klack.mechanics.nonlinear_spring import NonlinearSpring
+from klack.mechanics.prescribed_motion import PrescribedMotion
+from klack.mechanics.relaxation import relaxed
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.rubber_stop import MaxwellElement, RubberStop
+from klack.mechanics.spring import Spring
+from klack.mechanics.surging_spring import SurgingSpring
+from klack.network.catalogue import component_class
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.step_function import evaluate
+from klack.simulation.network_run import simulate_network
+
+pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
+
+_H = 20e-9
+
+
+def step(part: Component, y0: float, y1: float, state: np.ndarray | None = None) -> np.ndarray:
+    """Outputs of a part at a mass for one step of 20 ns, its base at the ground."""
+    port = next(iter(part.port_kinds()))
+    parts = {"mass": RigidMass(mass=3e-3), "part": part}
+    row = Network(parts, [["mass.body", f"part.{port}"]]).rows().elements[0]
+    state = row.state if state is None else state
+    outputs = 2 + len(row.state) + len(row.books)
+    status, out = evaluate(row.step, row.parameters, state, [0, _H, y0, y1, 0, 0], outputs)
+    assert status == 0
+    return out
+
+
+def test_a_polynomial_has_its_force_and_energy():
+    part = NonlinearSpring(stiffness=2e4, higher=(0.5, 1.0), reference=1e-3, start=0.5e-3)
+
+    out = step(part, 1.5e-3, 1.5e-3)
+
+    # k s (1 + a1 s/r + a2 (s/r)^2) at s = 2 mm, and its integral
+    assert out[0] == pytest.approx(-2e4 * 2e-3 * (1 + 0.5 * 2 + 4.0), rel=1e-14)
+    energy = 2e4 * (2e-3**2 / 2 + 0.5e3 * 2e-3**3 / 3 + 1e6 * 2e-3**4 / 4)
+    assert out[2] == pytest.approx(energy, rel=1e-14)
+
+
+def test_a_table_meets_its_points_and_continues_straight():
+    part = NonlinearSpring(deflection=(-1e-3, 0.0, 1e-3, 2e-3), force=(-5.0, 0.0, 7.0, 8.0))
+
+    at_points = [-step(part, s, s)[0] for s in (-1e-3, 0.0, 1e-3, 2e-3)]
+    beyond = [-step(part, s, s)[0] for s in (2.1e-3, 2.2e-3, 2.3e-3)]
+
+    assert at_points == pytest.approx([-5.0, 0.0, 7.0, 8.0], rel=1e-13, abs=1e-13)
+    assert np.diff(beyond) == pytest.approx(np.diff(beyond)[:1].repeat(2), rel=1e-9)
+
+
+def test_two_points_are_a_linear_spring():
+    straight = NonlinearSpring(deflection=(0.0, 1e-3), force=(2.0, 7.0))
+    known = Spring(stiffness=5e3, preload=2.0)
+
+    for y0, y1 in ((-1e-3, -0.5e-3), (0.2e-3, 0.4e-3), (0.9e-3, 2.5e-3)):
+        assert step(straight, y0, y1)[0] == pytest.approx(step(known, y0, y1)[0], rel=1e-13)
+
+
+def test_leaving_the_table_of_a_spring_warns():
+    parts = {
+        "mass": RigidMass(mass=3e-3, speed=1.0),
+        "spring": NonlinearSpring(deflection=(0.0, 50e-6), force=(0.0, 1.0)),
+    }
+    rows = Network(parts, [["mass.body", "spring.end"]]).rows()
+
+    with pytest.warns(AccuracyWarning, match="leaves the range of the table of 'spring'"):
+        simulate_network(rows, duration=1e-4, start="free")
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({}, "neither stiffness nor table"),
+        ({"stiffness": 1e4, "deflection": (0.0, 1e-3), "force": (0.0, 1.0)}, "and a table"),
+        ({"stiffness": 1e4, "higher": (0.1,)}, "1 terms"),
+        ({"stiffness": 1e4, "reference": 1e-3}, "0 terms and a reference"),
+        ({"deflection": (0.0, 1e-3), "force": (1.0,)}, "1 forces for 2 deflections"),
+        ({"deflection": (1e-3, 0.0), "force": (1.0, 2.0)}, "do not increase"),
+    ],
+)
+def test_a_wrong_curve_is_one_clear_error(keys, words):
+    with pytest.raises(InputError, match=words):
+        NonlinearSpring(**keys)
+
+
+def test_modes_and_the_rest_have_the_whole_mass():
+    table = SurgingSpring(stiffness=2e4, preload=0.0, mass=2e-3, modes=3).oscillators()
+
+    # even and odd modes alike as seen from one end: a third of the mass (Rayleigh)
+    assert table[:, 2].sum() == pytest.approx(2e-3 / 3, rel=1e-13)
+    # moved as a whole only the odd ones count, with both ends
+    assert 4.0 * table[table[:, 3] > 0, 2].sum() == pytest.approx(2e-3, rel=1e-13)
+
+
+def test_a_spring_without_motion_pushes_as_one_without_mass():
+    heavy = SurgingSpring(stiffness=2e4, preload=5.0, mass=2e-3)
+
+    parts = {
+        "mass": RigidMass(mass=3e-3),
+        "spring": heavy,
+        "other": Spring(stiffness=1e4, preload=-8.0),
+    }
+    rows = Network(parts, [["mass.body", "spring.end", "other.end"]]).rows()
+    run = simulate_network(rows, duration=5e-5)
+
+    place = run.channels["mass.body displacement"].values
+    assert place == pytest.approx(3.0 / 3e4, rel=1e-9)
+
+
+def test_no_step_is_longer_than_a_twentieth_of_a_surge_period():
+    spring = SurgingSpring(stiffness=1e6, preload=0.0, mass=0.2e-3, modes=10)
+    parts = {"mass": RigidMass(mass=3e-3), "spring": spring}
+    run = simulate_network(
+        Network(parts, [["mass.body", "spring.end"]]).rows(), duration=1e-5, start="free"
+    )
+
+    assert run.sizes.coarse * run.sizes.step <= 1.0 / (20.0 * spring.frequencies()[-1])
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-9, 0.05, 0.0999, 0.1001, 3.0, 60.0, 1e6])
+def test_weights_of_a_relaxation_are_exact(x):
+    @np.vectorize
+    def weights(u):
+        return np.exp(-x * u)
+
+    decay, phi1, phi2 = relaxed.py_func(x)
+    u, w = np.polynomial.legendre.leggauss(60)
+    if x <= 60.0:
+        u, w = 0.5 * (u + 1.0), 0.5 * w
+        assert decay == pytest.approx(np.exp(-x), rel=1e-13, abs=1e-15)
+        assert phi1 == pytest.approx(np.sum(w * weights(u)), rel=1e-12)
+        assert phi2 == pytest.approx(np.sum(w * (1.0 - u) * weights(u)), rel=1e-12)
+    else:
+        assert (decay, phi1, phi2) == pytest.approx((0.0, 1.0 / x, 1.0 / x), rel=2e-6, abs=1e-300)
+
+
+def test_rubber_never_pulls_and_its_surface_stays_behind():
+    rubber = RubberStop(
+        gap=0.0, stiffness=1e5, maxwell=(MaxwellElement(stiffness=1e6, time=50e-6),)
+    )
+    state, force, left = np.zeros(3), [], []
+    way = np.concatenate((np.linspace(0.0, -50e-6, 200), np.linspace(-50e-6, 20e-6, 100)))
+    for y0, y1 in pairwise(way):
+        out = step(rubber, y0, y1, state)
+        force.append(out[0])
+        state = out[2:5].copy()
+        left.append(state[0] + y1)
+
+    assert min(force) >= 0.0
+    assert max(left) > 20e-6  # the indentation is still there when the body has gone
+    assert state[0] > 0.0
+
+
+def test_a_compressed_buffer_starts_relaxed():
+    rubber = RubberStop(
+        gap=-20e-6, stiffness=1e5, maxwell=(MaxwellElement(stiffness=1e6, time=50e-6),)
+    )
+    parts = {
+        "mass": RigidMass(mass=3e-3),
+        "stop": rubber,
+        "push": Spring(stiffness=1e4, preload=2.0),
+    }
+    rows = Network(parts, [["mass.body", "stop.upper", "push.end"]]).rows()
+    run = simulate_network(rows, duration=5e-5)
+
+    # 1e5 (20 um - y) = 2 + 1e4 y
+    assert run.channels["mass.body displacement"].values == pytest.approx(0.0, abs=1e-12)
+
+
+def test_rubber_that_softens_is_refused():
+    with pytest.raises(InputError, match="a negative term"):
+        RubberStop(gap=0.0, stiffness=1e5, higher=(-0.1,), reference=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.6])
+@pytest.mark.parametrize("way", [1e-9, 1e-6, 1e-2, 10.0])
+def test_bristles_stay_bounded_in_any_step(share, way):
+    part = LuGreFriction(coulomb=0.5, breakaway=0.8, bristle_stiffness=1e7, elastic_share=share)
+
+    out = step(part, 0.0, way)
+
+    assert 0.0 < out[2] <= 0.8 / 1e7 * (1.0 + 1e-12)
+    assert out[4] >= 0.0
+
+
+def test_friction_about_rest_is_a_spring():
+    part = LuGreFriction(coulomb=0.5, bristle_stiffness=1e6, elastic_share=0.9)
+
+    out = step(part, 0.0, 0.4e-6)
+
+    assert out[0] == pytest.approx(-1e6 * 0.2e-6, rel=1e-13)
+    assert out[4] == pytest.approx(0.0, abs=1e-20)
+
+
+def test_friction_below_sliding_is_refused():
+    with pytest.raises(InputError, match=r"300 mN|0\.3 N"):
+        LuGreFriction(coulomb=0.5, breakaway=0.3, bristle_stiffness=1e6)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"arms": {}}, "no arms"),
+        ({"arms": {"a": 0.0}}, "an arm of 0 m"),
+        ({"arms": {"a": 0.01}, "carried": {"b": 1e-3}}, "a mass at 'b'"),
+        ({"arms": {"a": 0.01}, "effective_mass": 0.0}, "moment of inertia of 0"),
+    ],
+)
+def test_a_lever_that_cannot_turn_is_refused(keys, words):
+    with pytest.raises(InputError, match=words):
+        Lever(**{"effective_mass": 1e-3, **keys})
+
+
+def _random_part(rng: np.random.Generator) -> Component:
+    """One of the parts with numbers as a valve could have them."""
+
+    def log(low: float, high: float) -> float:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+    kind = rng.integers(6)
+    if kind == 0:
+        return NonlinearSpring(
+            stiffness=log(1e3, 1e6),
+            higher=(float(rng.uniform(-0.2, 0.5)), log(0.01, 2.0)),
+            reference=log(50e-6, 2e-3),
+            start=float(rng.uniform(-1e-4, 1e-3)),
+            damping=float(rng.choice([0.0, 0.5])),
+        )
+    if kind == 1:
+        points = np.sort(rng.uniform(-3e-3, 3e-3, 6))
+        return NonlinearSpring(
+            deflection=tuple(points.tolist()),
+            force=tuple(np.cumsum(rng.uniform(-3, 8, 6)).tolist()),
+        )
+    if kind == 2:
+        return SurgingSpring(
+            stiffness=log(1e3, 1e6),
+            preload=float(rng.uniform(-10, 30)),
+            mass=log(1e-5, 1e-2),
+            modes=int(rng.integers(1, 12)),
+            damping=float(rng.choice([0.0, 0.02])),
+        )
+    if kind == 3:
+        return RubberStop(
+            gap=float(rng.uniform(-20e-6, 100e-6)),
+            stiffness=log(1e4, 1e8),
+            higher=(0.0, log(0.01, 3.0)),
+            reference=log(20e-6, 1e-3),
+            maxwell=tuple(
+                MaxwellElement(stiffness=log(1e4, 1e8), time=log(1e-8, 1e-2))
+                for _ in range(rng.integers(4))
+            ),
+        )
+    if kind == 4:
+        return ControlledForce(
+            sample_time=float(rng.choice([6.4e-6, 12.8e-6])),
+            sensors={
+                "x": Sensor(
+                    channel="needle.body displacement",
+                    unit="um",
+                    delay=float(rng.choice([0.0, 10e-6])),
+                    noise=float(rng.choice([0.0, 2.0])),
+                    quantisation=float(rng.choice([0.0, 0.5])),
+                )
+            },
+            controller=PidController(
+                kind="pid",
+                sensor="x",
+                setpoint=float(rng.uniform(-50, 50)),
+                gain=log(0.01, 2.0),
+                integral_time=log(1e-4, 1e-2),
+                derivative_time=float(rng.choice([0.0, 1e-4])),
+                derivative_filter=2e-5,
+                lower=-20.0,
+                upper=20.0,
+            ),
+        )
+    coulomb = log(0.01, 5.0)
+    return LuGreFriction(
+        coulomb=coulomb,
+        breakaway=coulomb * float(rng.uniform(1.0, 2.0)),
+        stribeck_speed=log(1e-4, 0.1),
+        bristle_stiffness=log(1e4, 1e9),
+        bristle_damping=float(rng.choice([0.0, log(0.1, 30.0)])),
+        viscous=float(rng.choice([0.0, log(0.01, 1.0)])),
+        elastic_share=float(rng.choice([0.0, 0.7])),
+    )
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_random_networks_keep_their_energy(seed):
+    rng = np.random.default_rng(seed)
+    worst, ended = 0.0, 0
+    for _ in range(40):
+        bodies = {
+            "needle": RigidMass(mass=float(rng.uniform(1e-3, 2e-2)), speed=float(rng.normal(0, 1))),
+            "lever": Lever(
+                effective_mass=float(rng.uniform(1e-3, 1e-2)),
+                arms={"a": 0.01, "b": float(rng.choice([-0.03, -0.004, 0.02]))},
+            ),
+        }
+        if rng.random() < 0.4:
+            lift = rng.uniform(-50e-6, 200e-6, 4)
+            bodies["driven"] = PrescribedMotion(
+                time=(0.0, 5e-5, 1.5e-4, 2.5e-4), displacement=tuple(lift.tolist())
+            )
+        parts = {f"part{i}": _random_part(rng) for i in range(rng.integers(1, 6))}
+        points = ["needle.body", "lever.a", "lever.b"] + ["driven.body"] * ("driven" in bodies)
+        nodes = {point: [point] for point in points}
+        for name, part in parts.items():
+            first, *second = part.port_kinds()
+            at, other = rng.choice(len(points), 2, replace=False)
+            nodes[points[at]].append(f"{name}.{first}")
+            if second and rng.random() < 0.5:
+                nodes[points[other]].append(f"{name}.{second[0]}")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            network = Network({**bodies, **parts}, [n for n in nodes.values() if len(n) > 1])
+            step, coarse = rng.choice([20e-9, 200e-9]), rng.choice([1, 16])
+            try:
+                rows = network.rows()
+                run = simulate_network(
+                    rows, duration=2e-4, step=float(step), coarse=int(coarse), start="free"
+                )
+            except InputError:
+                ended += 1
+                continue
+        worst = max(worst, abs(run.books.residual) / run.books.scale)
+        assert all(np.all(np.isfinite(c.values)) for c in run.channels.values())
+
+    assert worst <= 1e-9
+    assert ended <= 4
+
+
+def test_the_example_of_the_page_runs_and_keeps_its_energy():
+    docs = Path(__file__).parents[2] / "docs"
+    case = load_valve_case(docs / "how-to" / "mechanical_parts.yaml")
+
+    (variant,) = run_stroke(case).variants.values()
+
+    assert abs(variant.result.books.relative_residual) <= 1e-12
+    lift = variant.result.channels["lever.needle displacement"].values
+    assert 150e-6 < lift.max() < 155e-6  # up to the stop, which gives way
+
+
+def test_components_shown_on_the_page_are_valid(tmp_path):
+    (tmp_path / "lift.csv").write_text("time,lift\n0,0\n1,80\n2,0\n")
+    page = Path(__file__).parents[2] / "docs" / "theory" / "mechanical-parts.md"
+    shown = re.findall(r"```yaml-part\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+
+    assert shown
+    for block in shown:
+        for keys in yaml.safe_load(block).values():
+            component_class(keys.pop("type")).model_validate(keys, context={"folder": tmp_path})
