@@ -70,6 +70,7 @@ __all__ = [
     "grid_of",
     "has_python_steps",
     "put_back",
+    "read_rows",
     "simulate_network",
 ]
 
@@ -189,7 +190,7 @@ def simulate_network(
     recorder.start(step * first_step, finder, fresh=fresh)
     if state is None:
         short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()
-        _call_rows(network, -short, short, speeds)
+        read_rows(network, -short, short, speeds)
         recorder.first(*values_now(network, speeds, short))
     elif _LAST in state:
         recorder.first(np.asarray(state[_LAST], dtype=float))
@@ -568,7 +569,7 @@ def _numbers(values: Vector) -> str:
     return ", ".join(f"{value:.4g}" for value in values[:12]) or "none"
 
 
-def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row: int = Y0) -> None:
+def read_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row: int = Y0) -> None:
     """Ask all rows for a step that ends in the present state: see :func:`call_rows`.
 
     ``row`` of the ports holds their displacements.
@@ -587,7 +588,7 @@ def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row
 
 def _read_stores(network: CompiledNetwork) -> None:
     # where elements saw their ports last, a little behind the bodies
-    _call_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1), SEEN)
+    read_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1), SEEN)
     for rows in (network.elements, network.branches):
         for k in range(rows.rows):
             ports = rows.port0[k + 1] - rows.port0[k]

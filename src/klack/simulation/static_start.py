@@ -25,6 +25,7 @@ the same, and hold an armature where none can be.
 """
 
 import warnings
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +65,7 @@ from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si
 
-__all__ = ["RestState", "begin_at_rest"]
+__all__ = ["RestState", "SteadySlopes", "begin_at_rest", "begin_steady"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -112,6 +113,55 @@ class RestState:
     _enclosed: bool
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SteadySlopes:
+    """Linear equations about an equilibrium, as :mod:`klack.simulation.static_start` has them.
+
+    Ports ``n``, rigid modes ``r``, free volumes ``f``, columns of fluid ``c``.
+
+    Parameters
+    ----------
+    shapes : array, shape (r, n) [1/sqrt(kg)]
+    axial : array, shape (r,) [sqrt(kg)]
+        Coordinate of each rigid mode per metre of its body along +z.
+    body : tuple of str
+        Component of the body of each rigid mode.
+    moves : array of bool, shape (r,)
+        False for a body that is held.
+    compliance : array, shape (n, n) [m/N]
+        Static one of the elastic modes.
+    force_by_port, force_by_pressure : array, shapes (n, n) [N/m], (n, f) [m^2]
+    flow_by_port, flow_by_pressure : array, shapes (f, n) [kg/(s m)], (f, f) [kg/(s Pa)]
+        Of what flows into the free volumes, without columns.
+    volumes : tuple of str
+        Components of the free volumes.
+    density : array, shape (f,) [kg/m^3]
+    left : array, shape (f,) [kg/s]
+        What still flows into each of them.
+    ends : array of int, shape (c, 2)
+        Free volumes at the ends of columns; -1 for a known pressure.
+    friction : array, shape (c,) [J s/kg^2]
+    known : array of bool, shape (f,)
+        Volumes with a way for the fluid to a prescribed pressure; the others are enclosed.
+    """
+
+    shapes: Matrix
+    axial: Vector
+    body: tuple[str, ...]
+    moves: NDArray[np.bool_]
+    compliance: Matrix
+    force_by_port: Matrix
+    force_by_pressure: Matrix
+    flow_by_port: Matrix
+    flow_by_pressure: Matrix
+    volumes: tuple[str, ...]
+    density: Vector
+    left: Vector
+    ends: Index
+    friction: Vector
+    known: NDArray[np.bool_]
+
+
 class _RunawayError(Exception):
     """The bodies that go far, or the volumes whose pressure has no end."""
 
@@ -154,30 +204,82 @@ def begin_at_rest(
     AccuracyWarning
         For a volume whose pressure has no steady state; it starts from ambient pressure.
     """
+    problem, found, closed = _settled(network, step, near, shift=shift)
+    notes = [_no_pressure(network, i) for i in closed]
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+    notes += problem.held_by_friction()
+    return problem.put(found._state, tuple(notes)), found
+
+
+def begin_steady(
+    network: CompiledNetwork,
+    step: float,
+    *,
+    first: Mapping[str, float],
+    held: Collection[str] = (),
+) -> tuple[StaticStart, SteadySlopes]:
+    """Find the operating point of a network and put it there, in place: every volume is free.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+        No volume of it has a stated pressure: what it has at the start is where the search begins.
+    step : float [s]
+    first : mapping of str to float [m]
+        Displacements of free bodies from which the search begins; 0 where it names none.
+    held : collection of str
+        Bodies that stay at their ``first`` displacement: what is left on them holds them.
+
+    Raises
+    ------
+    InputError
+        If a body has no equilibrium, or a volume no steady pressure.
+    ConvergenceError
+        If none is found.
+    """
+    bodies = [row.component for row in network.rows.bodies]
+    fixed = frozenset(bodies.index(name) for name in held)
+    lifts = np.array([first.get(name, 0.0) for name in bodies])
+    problem, found, closed = _settled(network, step, None, fixed=fixed, lifts=lifts)
+    if closed:
+        raise _without_outlet(network, closed)
+    notes = problem.held_by_friction()
+    begun = problem.put(found._state, tuple(notes), tells_closed=False)
+    return begun, problem.steady_slopes(found._state)
+
+
+def _settled(
+    network: CompiledNetwork,
+    step: float,
+    near: RestState | None,
+    *,
+    shift: Vector | None = None,
+    fixed: frozenset[int] = frozenset(),
+    lifts: Vector | None = None,
+) -> tuple["_Balance", RestState, list[int]]:
+    """Equilibrium, and the volumes that have no steady pressure, which keep that of the start."""
     held = set(near._held) if near is not None else set[int]()
     stuck = set(near._stuck) if near is not None else set[int]()
-    notes: list[str] = []
+    closed: list[int] = []
     enclosed = near is not None and near._enclosed
     while True:
-        problem = _Balance(network, step, held, stuck, enclosed=enclosed, shift=shift)
+        problem = _Balance(
+            network, step, held, stuck, enclosed=enclosed, shift=shift, fixed=fixed, lifts=lifts
+        )
         try:
             state = _march(problem, None if near is None else near._state)
-            break
+            return problem, RestState(state, frozenset(held), frozenset(stuck), enclosed), closed
         except _RunawayError as away:
             if away.volumes:
                 held.update(away.volumes)
-                notes += [_no_pressure(network, i) for i in away.volumes]
+                closed += away.volumes
             elif not enclosed and problem.can_enclose(away.bodies):
                 enclosed = True
             elif all(problem.dry[b] > 0.0 for b in away.bodies):
                 stuck.update(away.bodies)
             else:
                 raise _unheld(network, away.bodies) from None
-    for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=3)
-    notes += problem.held_by_friction()
-    found = RestState(state, frozenset(held), frozenset(stuck), enclosed)
-    return problem.put(state, tuple(notes)), found
 
 
 def _march(problem: "_Balance", near: _State | None) -> _State:
@@ -217,9 +319,12 @@ class _Balance:
         *,
         enclosed: bool,
         shift: Vector | None = None,
+        fixed: frozenset[int] = frozenset(),
+        lifts: Vector | None = None,
     ) -> None:
         self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
         self.shift = 0.0 if shift is None else shift
+        self.lifts = np.zeros(len(network.rows.bodies)) if lifts is None else lifts
         self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
@@ -229,10 +334,15 @@ class _Balance:
         self.of_body = np.repeat(np.arange(len(rigid)), rigid)
         self.shapes = np.zeros((sum(rigid), count))
         self.compliance = np.zeros((count, count))
-        rests = [row.speed == 0.0 and b not in stuck for b, row in enumerate(rows.bodies)]
+        staying = fixed | stuck
+        rests = [row.speed == 0.0 and b not in staying for b, row in enumerate(rows.bodies)]
         self.moves = np.array(rests)[self.of_body]
         begin, mode = 0, 0
         self.along = along
+        sizes = [
+            size for row in rows.bodies if (size := float(np.linalg.norm(row.body.rigid_axial)))
+        ]
+        self.axial = np.array(sizes)
         for row, directions in zip(rows.bodies, along, strict=True):
             body, here = row.body, slice(begin, begin + len(row.ports))
             shapes = np.asarray(body.port_shapes)
@@ -377,7 +487,8 @@ class _Balance:
 
     def first(self) -> _State:
         """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
-        z, y = np.zeros(self.of_body.size), np.zeros(self.ports + 1)
+        z = self.axial * self.lifts[self.of_body]
+        y = np.append(self.shapes.T @ z, 0.0)
         return _State(z, y, self.network.node_state.p.copy(), np.zeros(len(self.ends)))
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
@@ -667,7 +778,55 @@ class _Balance:
             "start='free' skips the equilibrium."
         )
 
-    def put(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
+    def steady_slopes(self, state: _State) -> SteadySlopes:
+        """Equations about a state in which everything has been put."""
+        n, network = self.ports, self.network
+        place = {int(i): j for j, i in enumerate(self.free)}
+        flow = self.by_pressure[n + 1 :]
+        names = [network.rows.nodes[handle].component for handle in network.node_order]
+        return SteadySlopes(
+            shapes=self.shapes.copy(),
+            axial=self.axial.copy(),
+            body=tuple(network.rows.bodies[b].component for b in self.of_body),
+            moves=self.moves.copy(),
+            compliance=self.compliance.copy(),
+            force_by_port=self.by_port[:n].copy(),
+            force_by_pressure=self.by_pressure[:n].copy(),
+            flow_by_port=self.by_port[n + 1 :][self.free].copy(),
+            flow_by_pressure=flow[self.free].copy(),
+            volumes=tuple(names[i] for i in self.free),
+            density=self._fluid(state.p[self.free])[:, 0],
+            left=self._net(state),
+            ends=np.array([[place.get(int(i), -1) for i in pair] for pair in self.ends], np.int64)
+            .reshape(-1, 2)
+            .copy(),
+            friction=self.friction.copy(),
+            known=self._known(flow),
+        )
+
+    def _known(self, flow: Matrix) -> NDArray[np.bool_]:
+        """Free volumes from which fluid finds a way to a known pressure.
+
+        A pressure of one volume that changes the flow into another node leads there.
+        """
+        free = set(self.free.tolist())
+        links = [
+            (int(i), int(k))
+            for j, i in enumerate(self.free)
+            for k in np.flatnonzero(flow[:, j])
+            if k != i
+        ]
+        links += [(int(a), int(b)) for a, b in self.ends]
+        known = set(range(self.network.nodes.nodes)) - free
+        while True:
+            more = {a for a, b in links if b in known} | {b for a, b in links if a in known}
+            if more <= known:
+                return np.array([int(i) in known for i in self.free], dtype=bool)
+            known |= more
+
+    def put(
+        self, state: _State, notes: tuple[str, ...], *, tells_closed: bool = True
+    ) -> StaticStart:
         """Put the network into this state, and say where that is."""
         if not self.evaluate(state):
             raise self.failed()
@@ -676,7 +835,7 @@ class _Balance:
         if state.p.size:
             self._put_fluid(state)
         self._put_interfaces(state)
-        return self._told(state, notes)
+        return self._told(state, notes, tells_closed=tells_closed)
 
     def _check_stops(self, state: _State) -> None:
         """Refuse bodies that are pressed far deeper into a stop than they can move away."""
@@ -774,7 +933,7 @@ class _Balance:
             # 0 would be for "not touched yet"
             now.chi[c] = chi or (_UNDAMPED if damped else 0.0)
 
-    def _told(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
+    def _told(self, state: _State, notes: tuple[str, ...], *, tells_closed: bool) -> StaticStart:
         network = self.network
         nodes, rows = network.nodes, network.rows
         names = [rows.nodes[handle].component for handle in network.node_order]
@@ -797,7 +956,7 @@ class _Balance:
             stated={names[i]: bool(self.stated[i]) for i in range(nodes.volumes)},
             flow=flow,
             residual=self.left_on_bodies(),
-            notes=(*notes, *self._closed(names)),
+            notes=(*notes, *(self._closed(names) if tells_closed else ())),
         )
 
     def _closed(self, names: list[str]) -> tuple[str, ...]:
@@ -851,6 +1010,17 @@ def _no_pressure(network: CompiledNetwork, node: int) -> str:
     return (
         f"'{name}' has no steady pressure: the flow into it at time zero has no outlet. It "
         "starts at ambient pressure; give its 'pressure' if that differs."
+    )
+
+
+def _without_outlet(network: CompiledNetwork, nodes: list[int]) -> InputError:
+    names = [f"'{network.rows.nodes[network.node_order[i]].component}'" for i in nodes]
+    return InputError(
+        "operating point",
+        got=f"{' and '.join(names)} with a flow that is forced in or out and no way to balance it",
+        expected="a way for the fluid to a source or the surroundings that is open at rest",
+        hint="open the valve there (another current, or another start), or replace the flow-source "
+        "by a pressure-source.",
     )
 
 
