@@ -71,6 +71,7 @@ __all__ = [
     "has_python_steps",
     "put_back",
     "read_rows",
+    "saved_state",
     "simulate_network",
 ]
 
@@ -226,7 +227,7 @@ def simulate_network(
         sizes=sizes,
         steps=StepCounts(*(int(count) for count in clock[2:] - done_before)),
         wall_time=wall_time,
-        state=_save(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
+        state=saved_state(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
         failure="" if failure is None else str(failure),
         start=begun,
         faces=_pressed_faces(network),
@@ -665,7 +666,8 @@ def put_back(kept: Kept) -> None:
         array[...] = values
 
 
-def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
+def saved_state(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
+    """All that a run needs to continue from here; what its record holds beside is left out."""
     saved = {name: array.copy() for name, array in _changing(network, clock).items()}
     for row in (WORK, WORK_BEGIN):  # count from the start of each run
         saved["bodies.at"][row : row + PORTS] = 0.0

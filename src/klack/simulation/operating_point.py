@@ -19,9 +19,10 @@ from klack.network.travel import Travel
 from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.network_compile import CompiledNetwork, compile_network
+from klack.simulation.network_kernel import CLOCK
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import ChannelData, StaticStart
-from klack.simulation.network_run import read_rows
+from klack.simulation.network_run import read_rows, saved_state
 from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_start import SteadySlopes, begin_steady
 from klack.simulation.step_sizes import step_sizes
@@ -42,6 +43,9 @@ class OperatingPoint:
         Displacements, pressures, flows, and the force that is left on each free body.
     values : mapping of str to ChannelData
         Everything that a run records, one value each.
+    state : mapping of str to array
+        From which :func:`~klack.simulation.network_run.simulate_network` goes on with steps of the
+        usual size.
     inflow : mapping of str to float [m^3/s]
         What still flows into each volume, at its density.
     compliance : mapping of str to float [m/N]
@@ -57,6 +61,7 @@ class OperatingPoint:
 
     start: StaticStart
     values: Mapping[str, ChannelData]
+    state: Mapping[str, NDArray[np.generic]]
     inflow: Mapping[str, float]
     compliance: Mapping[str, float]
     friction: Mapping[str, float]
@@ -101,6 +106,7 @@ def operating_point(
     return OperatingPoint(
         start=begun,
         values=_recorded(network, sizes.step),
+        state=saved_state(network, _clock()),
         inflow=dict(zip(slopes.volumes, (slopes.left / slopes.density).tolist(), strict=True)),
         compliance=own,
         friction=_friction(network, own),
@@ -109,6 +115,12 @@ def operating_point(
         ),
         stable=stable,
     )
+
+
+def _clock() -> NDArray[np.int64]:
+    clock = np.zeros(CLOCK, dtype=np.int64)
+    clock[1] = -1
+    return clock
 
 
 def steady_rows(rows: Rows) -> Rows:

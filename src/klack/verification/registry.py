@@ -49,6 +49,8 @@ COVERS = {
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
+    "operating-point": "Where a valve rests: springs, magnets, restrictions and both together "
+    "against solutions by hand, networks of SciPy, and runs that stay there.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
     "FMI.",
 }
