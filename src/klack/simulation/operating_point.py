@@ -44,8 +44,8 @@ class OperatingPoint:
     values : mapping of str to ChannelData
         Everything that a run records, one value each.
     state : mapping of str to array
-        From which :func:`~klack.simulation.network_run.simulate_network` goes on with steps of the
-        usual size.
+        From which :func:`~klack.simulation.network_run.simulate_network` continues with steps of
+        the usual size.
     inflow : mapping of str to float [m^3/s]
         What still flows into each volume, at its density.
     compliance : mapping of str to float [m/N]
@@ -102,10 +102,11 @@ def operating_point(
     network = compile_network(free, sizes)
     begun, slopes = begin_steady(network, sizes.step, first=first or {}, held=held)
     compliance, stable = static_compliance(slopes)
+    values = _recorded(network, sizes.step)
     own = {name: float(compliance[b, b]) for b, name in enumerate(_moving(slopes))}
     return OperatingPoint(
         start=begun,
-        values=_recorded(network, sizes.step),
+        values=values,
         state=saved_state(network, _clock()),
         inflow=dict(zip(slopes.volumes, (slopes.left / slopes.density).tolist(), strict=True)),
         compliance=own,
@@ -211,13 +212,29 @@ def _friction(network: CompiledNetwork, compliance: Mapping[str, float]) -> dict
     return held
 
 
+def _put_states(network: CompiledNetwork, states: Vector) -> None:
+    """Write recorded states into the rows: some of them follow from what else is known."""
+    at = 0
+    channels = (
+        *((network.elements, k, row.channels) for k, row in enumerate(network.rows.elements)),
+        *((network.branches, k, row.channels) for k, row in enumerate(network.rows.branches)),
+    )
+    for data, k, recorded in channels:
+        for channel in recorded:
+            if channel.derived:
+                data.state[data.state0[k] + channel.index] = states[at]
+            at += 1
+
+
 def _recorded(network: CompiledNetwork, step: float) -> dict[str, ChannelData]:
     """Channels of a network that has been put to rest, as a run begins with them."""
     recorder = Recorder(network, records=1, looks=1, chunk=1, fine=1)
     recorder.start(0.0, ImpactFinder(network.rows, 0.0), fresh=True)
     short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()
     read_rows(network, -short, short, speeds)
-    recorder.first(*values_now(network, speeds, short))
+    acting, states = values_now(network, speeds, short)
+    recorder.first(acting, states)
+    _put_states(network, states)
     return {
         name: replace(data, values=data.values[:1].copy())
         for name, data in recorder.channels(0).items()

@@ -74,6 +74,8 @@ Index = NDArray[np.int64]
 _FIRST, _LONGEST, _SHORTEST = 2e2, 2e13, 2e-5  # steps of pseudo-time over the step of the run
 _GROWTH = 8.0  # from one to the next
 _MOST_NEWTON = 60
+_PLAIN_NEWTON = 15  # without a half step among them
+_MOST_BEYOND = 20  # steps that are shortened because a magnet would leave its range
 _HALVINGS = 12  # of a Newton step that leads where a part knows no answer
 _FALL = 0.1  # least share of a pressure that a Newton step leaves
 _FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
@@ -82,6 +84,7 @@ _LENGTH = 20.0  # [m/s] displacements are told apart to a share of what this cov
 _MOVE = 0.02  # [m/s] the same for the way by which a port is moved to see what changes
 _FAR = 2e9  # [m/s] ... and for what an unsupported body has gone
 _HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
+_MOST_STEADY = 1e9  # [Pa] the same of an operating point: no valve is meant for more
 _EMPTY = 1e-3  # [Pa] ... so low gets nothing
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
 _SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
@@ -290,12 +293,14 @@ def _march(problem: "_Balance", near: _State | None) -> _State:
     state, step = problem.first() if near is None else near.copy(), problem.step
     longest = _LONGEST * step
     tau = _FIRST * step if near is None else longest
-    while tau >= _SHORTEST * step:
+    beyond = 0
+    while tau >= _SHORTEST * step and beyond < _MOST_BEYOND:
         open_modes = problem.unbalanced(state)
         if open_modes is None:
             return state
         after = problem.advance(state, min(tau, longest), open_modes)
         if after is None:
+            beyond += problem.beyond is not None
             tau = min(tau, longest) / _GROWTH**1.5
             continue
         problem.check(after)
@@ -324,6 +329,7 @@ class _Balance:
     ) -> None:
         self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
         self.shift = 0.0 if shift is None else shift
+        self.high = _HIGH if lifts is None else _MOST_STEADY
         self.lifts = np.zeros(len(network.rows.bodies)) if lifts is None else lifts
         self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
@@ -522,11 +528,13 @@ class _Balance:
         state, before, self.beyond = start.copy(), np.inf, None
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
         mass = self._masses(start)[0]
-        for _ in range(_MOST_NEWTON):
+        for iteration in range(_MOST_NEWTON):
             if not self.evaluate(state):
                 return None
             change = self._newton(state, start, creep, mass, tau)
-            share, fall = 1.0, least_share(self.couplings, change, state.p)
+            # a root-like law about no drop lets Newton's method swing across for ever
+            swings = iteration >= _PLAIN_NEWTON and iteration % 3 == 0
+            share, fall = 0.5 if swings else 1.0, least_share(self.couplings, change, state.p)
             if np.isnan(fall):
                 return None
             if fall < _FALL:
@@ -549,7 +557,7 @@ class _Balance:
 
     def check(self, state: _State) -> None:
         """Raise :class:`_RunawayError` for what has gone where nothing real goes."""
-        volumes = self._unstated(state.p > _HIGH)
+        volumes = self._unstated(state.p > self.high)
         far = np.flatnonzero(np.abs(state.y[:-1]) > _FAR * self.step)
         bodies = sorted({int(self.body_of_port[port]) for port in far})
         if volumes or bodies:
@@ -1017,8 +1025,10 @@ def _without_outlet(network: CompiledNetwork, nodes: list[int]) -> InputError:
     names = [f"'{network.rows.nodes[network.node_order[i]].component}'" for i in nodes]
     return InputError(
         "operating point",
-        got=f"{' and '.join(names)} with a flow that is forced in or out and no way to balance it",
-        expected="a way for the fluid to a source or the surroundings that is open at rest",
+        got=f"{' and '.join(names)} with a flow that is forced in or out, which no pressure up to "
+        f"{format_si(_MOST_STEADY, 'Pa')} balances",
+        expected="a way for the fluid to a source or the surroundings that is open at rest and "
+        "wide enough",
         hint="open the valve there (another current, or another start), or replace the flow-source "
         "by a pressure-source.",
     )

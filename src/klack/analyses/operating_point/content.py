@@ -66,7 +66,7 @@ def operating_point_content(record: OperatingPoints) -> Content:
 def _answer(record: OperatingPoints) -> str:
     drive = ", ".join(f"'{name}' at {quantity(i, 'A')}" for name, i in record.drive.items())
     if record.swept:
-        names = " and ".join(item.name for item in record.swept)
+        names = " and ".join(item.short for item in record.swept)
         found = int(record.found.sum())
         return f"{found} of {record.count} operating points over {names} were found."
     lift = record.quantity(f"{record.needle.replace('.', ' ')} displacement")
@@ -100,7 +100,7 @@ def _points(record: OperatingPoints) -> tuple[Table, ...]:
         )
         for i in range(min(record.count, _LISTED))
     )
-    heads = (*(x.name for x in record.swept), *(x.name for x in shown))
+    heads = (*(x.short for x in record.swept), *(x.name for x in shown))
     return (Table(columns=heads, rows=rows),)
 
 
@@ -115,4 +115,4 @@ def _missing(record: OperatingPoints) -> tuple[Table, ...]:
         )
         for i in lost
     )
-    return (Table(columns=(", ".join(x.name for x in record.swept), "why"), rows=rows),)
+    return (Table(columns=(", ".join(x.short for x in record.swept), "why"), rows=rows),)

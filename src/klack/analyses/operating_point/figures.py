@@ -99,7 +99,7 @@ def _axis(label: str, values: Vector, unit: str) -> tuple[AxisSpec, float]:
 def _chart(
     record: OperatingPoints, x: SweptQuantity | PointQuantity, group: Sequence[PointQuantity]
 ) -> Chart:
-    spec, x_factor = _axis(x.name, x.values, x.unit)
+    spec, x_factor = _axis(x.short, x.values, x.unit)
     alone = len(group) == 1
     label = group[0].name if alone else group[0].quantity.split()[-1]
     label = "volume flow" if not alone and group[0].unit == "m^3/s" else label
@@ -118,8 +118,8 @@ def _chart(
         )
         curves.append(_dots(x_factor * x.values, factor * item.values, colour))
     return Chart(
-        name=_word(f"{label} over {x.name}"),
-        title=f"{label[:1].upper()}{label[1:]} over {x.name}",
+        name=_word(f"{label} over {x.short}"),
+        title=f"{label[:1].upper()}{label[1:]} over {x.short}",
         x=spec,
         panels=(Panel(y=y, curves=tuple(curves), share=1.3),),
         note=_note(record),
@@ -130,7 +130,7 @@ def _family(
     record: OperatingPoints, x: SweptQuantity | PointQuantity, item: PointQuantity
 ) -> Chart:
     second = record.swept[1]
-    spec, x_factor = _axis(x.name, x.values, x.unit)
+    spec, x_factor = _axis(x.short, x.values, x.unit)
     y, factor = _axis(item.name, item.values, item.unit)
     curves: list[Curve] = []
     levels = np.unique(second.values)
@@ -143,15 +143,15 @@ def _family(
             Curve(
                 x=x_factor * x.values[here],
                 y=factor * item.values[here],
-                label=f"{second.name} {quantity(float(level), unit)}",
+                label=f"{second.short} {quantity(float(level), unit)}",
                 colour=colour,
                 style=style,
             )
         )
         curves.append(_dots(x_factor * x.values[here], factor * item.values[here], colour))
     return Chart(
-        name=_word(f"{item.name} over {x.name}"),
-        title=f"{item.name} over {x.name}, for values of {second.name}",
+        name=_word(f"{item.name} over {x.short}"),
+        title=f"{item.name} over {x.short}, for values of {second.short}",
         x=spec,
         panels=(Panel(y=y, curves=tuple(curves), share=1.3),),
         note=_note(record),

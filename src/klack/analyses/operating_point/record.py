@@ -30,6 +30,11 @@ class SweptQuantity:
     unit: str
     values: Vector
 
+    @property
+    def short(self) -> str:
+        """Name without the sections that hold all components."""
+        return self.name.removeprefix("network.components.")
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PointQuantity:
@@ -53,6 +58,11 @@ class PointQuantity:
     def name(self) -> str:
         """Both words."""
         return f"{self.component} {self.quantity}"
+
+    @property
+    def short(self) -> str:
+        """The same."""
+        return self.name
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -196,8 +196,8 @@ def find_point(
     if origin == "far" and len(places) > 1:
         places = [places[1], places[0], *places[2:]]
     point, others = _searched(rows, places, held)
-    notes += [_other_note(rows, roles, point, other) for other in others]
     notes += _own_notes(point, rows, held)
+    notes += [_other_note(rows, roles, point, other) for other in others]
     return PointFound(
         point=point, network=network, rows=rows, currents=currents, notes=tuple(notes)
     )

@@ -130,7 +130,7 @@ def operating_point_told(record: OperatingPoints) -> Iterator[TextTable | str]:
         )
     else:
         shown = shown_quantities(record)[:_MAIN]
-        heads = [*(x.name for x in record.swept), *(x.name for x in shown)]
+        heads = [*(x.short for x in record.swept), *(x.name for x in shown)]
         yield TextTable(
             title=f"Operating points of {title}, at the first point",
             columns=("", *heads),
