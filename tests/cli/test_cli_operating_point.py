@@ -6,38 +6,18 @@ promised for what cannot be.
 
 import csv
 import json
+import re
 from math import pi
 from pathlib import Path
 
 import pytest
+from quoted_output import compare
 
 from klack.analyses.operating_point.analysis import OPERATING_POINT
 from klack.cli.main import main
 
-CASE = """
-klack: 1
-title: A needle between two stops, and a magnet
-network:
-  components:
-    needle: {type: rigid-mass, mass: 3 g, points: [tip]}
-    spring: {type: spring, stiffness: 10 N/mm, preload: 25 N}
-    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e9 N/m}, restitution: 0.5}
-    stop: {type: end-stop, gap: 100 um, law: {kind: linear, stiffness: 1e9 N/m}, restitution: 0.5}
-    coil:
-      type: solenoid
-      turns: 100
-      resistance: 2 ohm
-      gap: 100 um
-      residual_gap: 50 um
-      poles: [{outer_radius: 3 mm, fringing: none}]
-    driver: {type: voltage-step, voltage: 12 V}
-  connections:
-    - [needle.tip, spring.end, seat.upper, stop.lower, coil.armature]
-    - [ground, seat.lower]
-    - [ground, stop.upper]
-    - [driver.terminals, coil.terminals]
-run: {duration: 1 ms, variants: [dry]}
-"""
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+CASE = (HOW_TO / "held_open.yaml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(autouse=True)
@@ -54,7 +34,7 @@ def test_one_point_is_a_table_a_file_and_numbers(capsys):
     assert stroke("--steady", "--current", "1 A", "--json", "numbers.json", "--no-report") == 0
 
     told = capsys.readouterr().out
-    assert "Operating point of valve, dry: coil at 1 A" in told
+    assert "Operating point, dry: coil at 1 A" in told
     assert "static stiffness" in told
     assert "forces on each free body" in told
     numbers = json.loads(Path("numbers.json").read_text())
@@ -113,3 +93,27 @@ def test_what_cannot_be_is_one_message(words, said, capsys):
     assert stroke(*words) == 2
 
     assert said in capsys.readouterr().err
+
+
+def test_the_page_quotes_what_is_printed(capsys):
+    """The table, the note, and the currents between which the needle lifts and drops."""
+    page = (HOW_TO / "operating-point.md").read_text(encoding="utf-8")
+    table, note = re.findall(r"```\n((?:component|Note).*?)```", page, re.DOTALL)
+
+    assert stroke("--steady", "--current", "1.6 A", "--no-report") == 0
+    printed = capsys.readouterr().out
+    compare(table, printed, "operating-point.md")
+    compare(note, printed, "operating-point.md")
+    open_at = {}
+    for origin in ("start", "far"):
+        words = ("--sweep", "current", "0.5 A", "2.5 A", "9", "--from", origin, "--out", origin)
+        assert stroke("--steady", *words, "--no-report") == 0
+        rows = csv.DictReader(Path(origin, "operating-point.csv").open())
+        is_open = {
+            float(row["current [A]"]): float(row["needle tip displacement [m]"]) > 50e-6
+            for row in rows
+        }
+        open_at[origin] = min(current for current, opened in is_open.items() if opened)
+    assert open_at == {"start": 2.0, "far": 0.75}
+    assert "lifts between 1.75 A and 2 A" in " ".join(page.split()).replace("needle lifts", "lifts")
+    assert "stays open down to 0.75 A" in " ".join(page.split())

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from klack.analyses.operating_point.conditions import Conditions, asked_sweeps, stated_drive
+from klack.analyses.operating_point.figures import sweep_charts
 from klack.analyses.operating_point.record import OperatingPoints
 from klack.analyses.operating_point.run import find_point, run_operating_points
 from klack.analyses.operating_point.table import write_csv
@@ -34,34 +35,12 @@ from klack.simulation.operating_point import far_ends, operating_point, steady_r
 from klack.units import CURRENT
 
 VALVES = Path(__file__).parents[1] / "data" / "valves"
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 NOWHERE = Path("case.yaml")
 AMBIENT = 101325.0
 MU0 = 4e-7 * pi
 
-MAGNET = """
-klack: 1
-title: A needle between two stops, and a magnet
-network:
-  components:
-    needle: {type: rigid-mass, mass: 3 g, points: [tip]}
-    spring: {type: spring, stiffness: 10 N/mm, preload: 25 N}
-    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e9 N/m}, restitution: 0.5}
-    stop: {type: end-stop, gap: 100 um, law: {kind: linear, stiffness: 1e9 N/m}, restitution: 0.5}
-    coil:
-      type: solenoid
-      turns: 100
-      resistance: 2 ohm
-      gap: 100 um
-      residual_gap: 50 um
-      poles: [{outer_radius: 3 mm, fringing: none}]
-    driver: {type: voltage-step, voltage: 12 V}
-  connections:
-    - [needle.tip, spring.end, seat.upper, stop.lower, coil.armature]
-    - [ground, seat.lower]
-    - [ground, stop.upper]
-    - [driver.terminals, coil.terminals]
-run: {duration: 1 ms, variants: [dry]}
-"""
+MAGNET = (HOW_TO / "held_open.yaml").read_text(encoding="utf-8")
 
 SHUT = """
 klack: 1
@@ -359,6 +338,19 @@ def test_a_key_is_swept_as_if_the_case_said_so():
     assert force is not None
     for value, single in zip(force.values[[0, -1]], alone, strict=True):
         assert value == one(single, "seat contact force")
+
+
+def test_every_chart_of_a_sweep_has_its_own_name():
+    record = points(read_case_tree(VALVES / "brake_valve_hot.yaml"), ("lift", "0 um", "250 um", 3))
+
+    names = [chart.name for chart in sweep_charts(record)]
+
+    assert len(names) == len(set(names)) > 4
+    (chosen,) = sweep_charts(record, "feed volume flow", ["caliper pressure"])
+    assert chosen.x.text == "feed volume flow [l/min]"
+    assert chosen.panels[0].y.text == "caliper pressure [bar]"
+    curve = chosen.panels[0].curves[0]
+    assert curve.y[0] == pytest.approx(80.0, rel=1e-9)  # shut: the pressure of the source
 
 
 def test_points_that_do_not_settle_are_marked():

@@ -213,6 +213,8 @@ def answer(seed: int) -> str:
     except (InputError, ConvergenceError) as error:
         if "Try:" not in str(error):
             raise
+        # every valve here has two stops and an outlet: only a pump against a shut seat has no end
+        assert drawn.pump is not None or "magnet of 'coil'" in str(error), (seed, str(error))
         return "error" if isinstance(error, InputError) else "not found"
     # klack stops at 1e-14 of forces and flows, or at 1e-9 where round-off leaves no less
     for name, (left, size) in balances(drawn, point).items():
@@ -239,10 +241,10 @@ def tally(seeds: range) -> dict[str, int]:
 
 
 def test_random_valves_end_in_a_right_point_or_in_words():
-    found = tally(range(40))
+    found = tally(range(12))
 
-    assert found.get("point", 0) >= 20, found
-    assert found.get("not found", 0) <= 2, found
+    assert found.get("point", 0) >= 6, found
+    assert found.get("not found", 0) <= 1, found
 
 
 @pytest.mark.slow

@@ -73,6 +73,7 @@ Index = NDArray[np.int64]
 
 _FIRST, _LONGEST, _SHORTEST = 2e2, 2e13, 2e-5  # steps of pseudo-time over the step of the run
 _GROWTH = 8.0  # from one to the next
+_MOST_STATES = 64  # of elements that are kept for places which come again
 _MOST_NEWTON = 60
 _PLAIN_NEWTON = 15  # without a half step among them
 _MOST_BEYOND = 20  # steps that are shortened because a magnet would leave its range
@@ -397,6 +398,7 @@ class _Balance:
         )
         self.couplings = self._couplings(units)
         self.code = np.zeros(3, np.int64)
+        self.states: dict[tuple[int, bytes], Vector] = {}  # of elements, where they are asked again
         self.ranges = [limit for limit in rows.limits if limit.ports]
         self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
 
@@ -641,11 +643,17 @@ class _Balance:
         elements = self.network.elements
         for k, state_at in self.kept:
             ports = elements.ports[elements.port0[k] : elements.port0[k + 1]]
-            try:
-                state = state_at(y[ports])
-            except (ConvergenceError, np.linalg.LinAlgError):
-                self.code[:] = 0, k, 1
-                return False
+            place = k, y[ports].tobytes()
+            state = self.states.get(place)
+            if state is None:
+                try:
+                    state = state_at(y[ports])
+                except (ConvergenceError, np.linalg.LinAlgError):
+                    self.code[:] = 0, k, 1
+                    return False
+                if len(self.states) >= _MOST_STATES:
+                    self.states.clear()
+                self.states[place] = state
             elements.state[elements.state0[k] : elements.state0[k] + len(state)] = state
         return True
 

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -26,7 +27,7 @@ _LOOKS: tuple[tuple[Colour, Style], ...] = (
     ("sky", "long"),
     ("pink", "sparse"),
 )
-_MOST_CHARTS = 12
+_MOST_CHARTS = 8
 
 
 def sweep_charts(
@@ -57,13 +58,24 @@ def sweep_charts(
         item for item in shown_quantities(record) if item.name != over
     ]
     if len(record.swept) > 1:
-        return tuple(_family(record, x, item) for item in wanted[:_MOST_CHARTS])
+        return _told_apart([_family(record, x, item) for item in wanted[:_MOST_CHARTS]])
     groups: list[list[PointQuantity]] = []
     for _, items in groupby(sorted(wanted, key=_kind), key=_kind):
         found = list(items)
         groups += [found[i : i + len(_LOOKS)] for i in range(0, len(found), len(_LOOKS))]
     groups.sort(key=lambda group: min(wanted.index(item) for item in group))
-    return tuple(_chart(record, x, group) for group in groups[:_MOST_CHARTS])
+    return _told_apart([_chart(record, x, group) for group in groups[:_MOST_CHARTS]])
+
+
+def _told_apart(charts: Sequence[Chart]) -> tuple[Chart, ...]:
+    """Charts, numbered where several bear one name: each is a file."""
+    names = [chart.name for chart in charts]
+    return tuple(
+        replace(chart, name=f"{chart.name}-{names[: i + 1].count(chart.name)}")
+        if names.count(chart.name) > 1
+        else chart
+        for i, chart in enumerate(charts)
+    )
 
 
 def _kind(item: PointQuantity) -> str:

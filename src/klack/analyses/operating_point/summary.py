@@ -117,10 +117,10 @@ def _plain(values: NDArray[np.float64]) -> list[float | None]:
 def operating_point_told(record: OperatingPoints) -> Iterator[TextTable | str]:
     """What a terminal shows: the table of one point, or the main quantities along a sweep."""
     drive = ", ".join(f"{name} at {format_si(i, 'A')}" for name, i in record.drive.items())
-    title = f"{record.case}, {record.variant}: " + (drive or "no coil")
+    title = f"{record.variant}: " + (drive or "no coil")
     if not record.swept:
         yield TextTable(
-            title=f"Operating point of {title}",
+            title=f"Operating point, {title}",
             columns=("component", "quantity", "value"),
             rows=[
                 (item.component, item.quantity, number_text(float(item.values[0]), item.unit, 6))
@@ -132,7 +132,7 @@ def operating_point_told(record: OperatingPoints) -> Iterator[TextTable | str]:
         shown = shown_quantities(record)[:_MAIN]
         heads = [*(x.short for x in record.swept), *(x.name for x in shown)]
         yield TextTable(
-            title=f"Operating points of {title}, at the first point",
+            title=f"Operating points, {title} at the first one",
             columns=("", *heads),
             rows=[
                 (
