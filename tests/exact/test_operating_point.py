@@ -300,6 +300,29 @@ def test_a_sweep_that_cannot_be_is_refused(sweep, words):
         points(written(MAGNET), sweep)
 
 
+def test_a_law_out_of_its_range_is_told():
+    """A map that ends at 1 A, and a coil that carries 3 A."""
+    coil = """
+      type: force-map-solenoid
+      resistance: 2 ohm
+      gap: 200 um
+      current: [0 A, 0.5 A, 1 A]
+      gaps: [50 um, 100 um, 200 um, 300 um]
+      linkage:
+        - [0 mWb, 0 mWb, 0 mWb, 0 mWb]
+        - [2 mWb, 1.2 mWb, 0.8 mWb, 0.6 mWb]
+        - [4 mWb, 2.4 mWb, 1.6 mWb, 1.2 mWb]
+"""
+    head, tail = MAGNET.index("\n      type: solenoid"), MAGNET.index("    driver:")
+
+    record = points(
+        written(MAGNET[:head] + coil + MAGNET[tail:]), base=Conditions(current={"": 3.0})
+    )
+
+    assert one(record, "coil current") == pytest.approx(3.0, rel=1e-12)
+    assert any("leaves the range of the map of 'coil'" in text for text in record.warnings)
+
+
 def test_two_values_for_one_coil_are_refused():
     with pytest.raises(InputError, match="one value for each coil"):
         stated_drive(["coil=1 A", "coil=2 A"], "--current", CURRENT)

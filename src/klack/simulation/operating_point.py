@@ -18,6 +18,7 @@ from klack.network.rows import Rows
 from klack.network.travel import Travel
 from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
+from klack.simulation.limits import Limits
 from klack.simulation.network_compile import CompiledNetwork, compile_network
 from klack.simulation.network_kernel import CLOCK
 from klack.simulation.network_recorder import Recorder
@@ -27,7 +28,14 @@ from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_start import SteadySlopes, begin_steady
 from klack.simulation.step_sizes import step_sizes
 
-__all__ = ["OperatingPoint", "far_ends", "operating_point", "static_compliance"]
+__all__ = [
+    "OperatingPoint",
+    "far_ends",
+    "operating_point",
+    "static_compliance",
+    "steady_rows",
+    "without_guesses",
+]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -95,7 +103,12 @@ def operating_point(
     InputError
         If a body has no equilibrium, or a volume no steady pressure.
     ConvergenceError
-        If none is found.
+        If none is found, or only one in which a law cannot be evaluated.
+
+    Warns
+    -----
+    AccuracyWarning
+        For a quantity that is out of the range of its law.
     """
     free = steady_rows(rows)
     sizes = step_sizes(free, "normal")
@@ -116,6 +129,16 @@ def operating_point(
         ),
         stable=stable,
     )
+
+
+def without_guesses(rows: Rows) -> Rows:
+    """Rows in which the search begins with ambient pressure in every volume."""
+    ambient = np.array([rows.ambient.pressure])
+    nodes = {
+        handle: node if node.volume <= 0.0 else replace(node, pressure=ambient)
+        for handle, node in rows.nodes.items()
+    }
+    return replace(rows, nodes=nodes)
 
 
 def _clock() -> NDArray[np.int64]:
@@ -232,6 +255,11 @@ def _recorded(network: CompiledNetwork, step: float) -> dict[str, ChannelData]:
     recorder.start(0.0, ImpactFinder(network.rows, 0.0), fresh=True)
     short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()
     read_rows(network, -short, short, speeds)
+    limits = Limits(network, [column.name for column in recorder.points])
+    points, now = recorder.recording.points[:1], np.zeros(1)
+    limits.tell(points, now)
+    if left := limits.left(points, now):
+        raise left[1]
     acting, states = values_now(network, speeds, short)
     recorder.first(acting, states)
     _put_states(network, states)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter, process_time
+from warnings import WarningMessage
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,24 +30,33 @@ from klack.case.points import case_at
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
-from klack.errors import ConvergenceError, InputError, KlackError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
 from klack.magnetics.constant_drive import driven, start_currents
 from klack.network.checks import LooseBodyWarning
 from klack.network.network import Network
 from klack.network.rows import Rows
 from klack.network.travel import Travel
 from klack.progress import Progress, silent
-from klack.simulation.operating_point import OperatingPoint, far_ends, operating_point
+from klack.simulation.operating_point import (
+    OperatingPoint,
+    far_ends,
+    operating_point,
+    without_guesses,
+)
 from klack.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
-__all__ = ["PointFound", "find_point", "held_network", "run_operating_points"]
+__all__ = ["PointFound", "find_point", "held_network", "run_operating_points", "searched"]
 
 Vector = NDArray[np.float64]
 
 _SAME = 1e-3  # of the travel: two displacements are one
 _TRAVEL = 1e-5  # [m] of a body that no stop ends
 _FELT = 1e-2  # of the travel: friction that may hold a body away is worth a word
+_UNGUESSED = (
+    "the search from the pressures that the case states led to no point; this one is found from "
+    "ambient pressure in all volumes."
+)
 _BEYOND = 1e-9  # of the travel: a lift that lies on its stop
 
 
@@ -195,7 +205,8 @@ def find_point(
     places = [place for i, place in enumerate(places) if place not in places[:i]]
     if origin == "far" and len(places) > 1:
         places = [places[1], places[0], *places[2:]]
-    point, others = _searched(rows, places, held)
+    point, others, told = searched(rows, places, held)
+    notes += told
     notes += _own_notes(point, rows, held)
     notes += [_other_note(rows, roles, point, other) for other in others]
     return PointFound(
@@ -225,24 +236,40 @@ def _valve_at(
     return replace(valve, case=case, network=filled_network(case, valve.reduced, valve.laws))
 
 
-def _searched(
+def searched(
     rows: Rows, places: Sequence[Mapping[str, float]], held: set[str]
-) -> tuple[OperatingPoint, list[OperatingPoint]]:
-    """Point found from the first place that leads to one, and others that other places lead to."""
+) -> tuple[OperatingPoint, list[OperatingPoint], list[str]]:
+    """Point found from the first place that leads to one, others, and what is told of the first.
+
+    Where none leads to one, stated pressures may be too far from any: ambient ones are tried.
+    """
     found: list[OperatingPoint] = []
+    told = list[str]()
     first: KlackError | None = None
     for place in places:
         try:
-            point = operating_point(rows, first=place, held=held)
+            with trial() as caught:
+                point = operating_point(rows, first=place, held=held)
         except (ConvergenceError, InputError) as error:
             first = first or error
             continue
+        if not found:
+            told = _told_by(caught)
         if all(_differs(rows, point, other) for other in found):
             found.append(point)
-    if not found:
-        assert first is not None
-        raise first
-    return found[0], found[1:]
+    if found:
+        return found[0], found[1:], told
+    assert first is not None
+    try:
+        with trial() as caught:
+            point = operating_point(without_guesses(rows), first=places[0], held=held)
+    except (ConvergenceError, InputError):
+        raise first from None
+    return point, [], [_UNGUESSED, *_told_by(caught)]
+
+
+def _told_by(caught: Sequence[WarningMessage]) -> list[str]:
+    return [str(item.message) for item in caught if issubclass(item.category, AccuracyWarning)]
 
 
 def _differs(rows: Rows, one: OperatingPoint, other: OperatingPoint) -> bool:
