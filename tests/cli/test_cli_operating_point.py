@@ -95,6 +95,7 @@ def test_what_cannot_be_is_one_message(words, said, capsys):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_the_page_quotes_what_is_printed(capsys):
     """The table, the note, and the currents between which the needle lifts and drops."""
     page = (HOW_TO / "operating-point.md").read_text(encoding="utf-8")

@@ -203,6 +203,9 @@ def test_bodies_are_looked_for_at_their_far_stops():
     rows = written(MAGNET).case().network.network().rows()
 
     assert far_ends(rows) == [{"needle": pytest.approx(100e-6)}]
+    drawn_open = MAGNET.replace("gap: 0 um", "gap: 130 um")
+    rows = written(drawn_open).case().network.network().rows()
+    assert far_ends(rows) == [{"needle": pytest.approx(-130e-6)}]
 
 
 # --------------------------------------------------------------------------- doubts and errors
