@@ -228,6 +228,13 @@ def test_a_flow_without_a_way_out_is_an_error():
     assert "open the valve" in str(error.value)
 
 
+def test_a_chamber_that_is_pumped_empty_is_an_error():
+    text = SHUT.replace("flow: 0 l/min", "flow: 1 l/min").replace("pump.b,", "pump.a,")
+
+    with pytest.raises(InputError, match=r"'inlet' with a flow that is forced in or out"):
+        points(written(text.replace("- [valve.b, ambient]", "- [valve.b, pump.b, ambient]")))
+
+
 def test_a_needle_that_nothing_holds_is_an_error():
     parts = {
         "needle": RigidMass(mass=3e-3, points=("tip",)),

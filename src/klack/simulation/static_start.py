@@ -76,7 +76,7 @@ _GROWTH = 8.0  # from one to the next
 _MOST_STATES = 64  # of elements that are kept for places which come again
 _MOST_NEWTON = 60
 _PLAIN_NEWTON = 15  # without a half step among them
-_MOST_BEYOND = 20  # steps that are shortened because a magnet would leave its range
+_MOST_BEYOND = 20  # steps that are shortened because a magnet would leave its range, or for fluid
 _HALVINGS = 12  # of a Newton step that leads where a part knows no answer
 _FALL = 0.1  # least share of a pressure that a Newton step leaves
 _FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
@@ -301,7 +301,7 @@ def _march(problem: "_Balance", near: _State | None) -> _State:
             return state
         after = problem.advance(state, min(tau, longest), open_modes)
         if after is None:
-            beyond += problem.beyond is not None
+            beyond += problem.beyond is not None or bool(problem.emptied)
             tau = min(tau, longest) / _GROWTH**1.5
             continue
         problem.check(after)
@@ -310,6 +310,8 @@ def _march(problem: "_Balance", near: _State | None) -> _State:
         if tau > _GROWTH**8 * longest:
             break
         state, tau = after, tau * _GROWTH
+    if problem.emptied:
+        raise _RunawayError([], problem.emptied)
     raise problem.not_found(state)
 
 
@@ -330,7 +332,9 @@ class _Balance:
     ) -> None:
         self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
         self.shift = 0.0 if shift is None else shift
-        self.high = _HIGH if lifts is None else _MOST_STEADY
+        self.is_steady = lifts is not None
+        self.high = _MOST_STEADY if self.is_steady else _HIGH
+        self.emptied: list[int] = []  # volumes in the last step that failed for them
         self.lifts = np.zeros(len(network.rows.bodies)) if lifts is None else lifts
         self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
@@ -527,7 +531,7 @@ class _Balance:
 
     def advance(self, start: _State, tau: float, open_modes: NDArray[np.bool_]) -> _State | None:
         """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it."""
-        state, before, self.beyond = start.copy(), np.inf, None
+        state, before, self.beyond, self.emptied = start.copy(), np.inf, None, []
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
         mass = self._masses(start)[0]
         for iteration in range(_MOST_NEWTON):
@@ -553,7 +557,10 @@ class _Balance:
             if share == 1.0 and (last <= _FOUND or (last <= _STUCK and last >= 0.5 * before)):
                 return state
             if np.any(state.p[self.free] < _EMPTY):
-                raise _RunawayError([], self._unstated(state.p < _EMPTY))
+                self.emptied = self._unstated(state.p < _EMPTY)
+                if self.is_steady:  # perhaps a shorter step leaves something in it
+                    return None
+                raise _RunawayError([], self.emptied)
             before = last
         return None
 

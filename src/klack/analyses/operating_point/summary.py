@@ -56,7 +56,7 @@ class LeftJson(TypedDict):
 class OperatingPointJson(TypedDict):
     """``klack stroke --steady``."""
 
-    schema: Literal["klack-operating-point/1"]
+    schema: Literal["klack-stroke-steady/1"]
     case: str
     klack: Version
     own_components: OwnComponents
@@ -77,7 +77,7 @@ class OperatingPointJson(TypedDict):
 def operating_point_to_json(record: OperatingPoints) -> dict[str, Any]:
     """Plain numbers in SI."""
     return {
-        "schema": "klack-operating-point/1",
+        "schema": "klack-stroke-steady/1",
         "case": record.case,
         "klack": record.version,
         "own_components": dict(record.own_components),
