@@ -55,6 +55,7 @@ ANALYSES: tuple[Entry, ...] = (
         "klack stroke study",
         "klack stroke demo-stroke --variant wet,dry",
     ),
+    Entry("operating_point.analysis:OPERATING_POINT", "klack operating points"),
     Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
     Entry("stroke_shots.analysis:STROKE_SHOTS", "klack study of strokes"),
     Entry(

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.network_fluid import network_fluid
-from klack.hydraulics.time_table import check_table, step_table
+from klack.hydraulics.time_table import check_table, step_table, value_at_start
 from klack.input.section import Section
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
@@ -104,6 +104,11 @@ class FlowSource(Component):
         if self.step is None:
             return (0.0,), (start,)
         return step_table(start, self.step.to, self.step.at, self.step.rise)
+
+    def at_start(self) -> Component:
+        """Return a source of the flow at time zero."""
+        now = value_at_start(*self.history())
+        return self.model_copy(update={"flow": now, "step": None, "table": None})
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that supplies energy."""

@@ -6,7 +6,7 @@ from typing import ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.hydraulics.network_fluid import network_fluid
-from klack.hydraulics.time_table import check_table, step_table
+from klack.hydraulics.time_table import check_table, step_table, value_at_start
 from klack.input.section import Section
 from klack.network.component import Component
 from klack.network.port import PRESSURE, Port
@@ -66,6 +66,11 @@ class PressureSource(Component):
         if self.step is None:
             return (0.0,), (start,)
         return step_table(start, self.step.to, self.step.at, self.step.rise)
+
+    def at_start(self) -> Component:
+        """Return a source of the pressure at time zero."""
+        now = value_at_start(*self.history())
+        return self.model_copy(update={"pressure": now, "step": None, "table": None})
 
     def add_rows(self, rows: Rows) -> None:
         """Prescribe the pressure of the node."""

@@ -2,9 +2,11 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from klack.input.problem import CaseProblem
 
-__all__ = ["check_table", "step_table"]
+__all__ = ["check_table", "step_table", "value_at_start"]
 
 
 def check_table(time: Sequence[float], values: Sequence[float], name: str) -> None:
@@ -31,3 +33,12 @@ def step_table(
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Times [s] and values of a ramp from ``before`` to ``after`` that begins ``at``."""
     return (at, at + rise), (before, after)
+
+
+def value_at_start(times: Sequence[float], values: Sequence[float]) -> float:
+    """Value at time zero, straight between the points and constant beyond them.
+
+    >>> value_at_start((-1.0, 1.0), (2.0, 4.0))
+    3.0
+    """
+    return float(np.interp(0.0, times, values))

@@ -115,6 +115,10 @@ class ForceOverTime(Component):
             )
         return self
 
+    def at_start(self) -> Component:
+        """Return the constant force at time zero."""
+        return ConstantForce(force=float(np.interp(0.0, self.time, self.force)))
+
     def add_rows(self, rows: Rows) -> None:
         """Add one element."""
         rows.element(

@@ -63,6 +63,14 @@ class Component(Section):
         """
         return self
 
+    def at_start(self) -> "Component":
+        """Return this part with what it prescribes over time held at its value at time zero.
+
+        For whatever follows no time this is the part itself.  Drivers are a matter of their coils:
+        :mod:`klack.magnetics.constant_drive`.
+        """
+        return self
+
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
         """Return what of it acts across the axis of a needle in three dimensions as well."""
         return ()

@@ -192,6 +192,10 @@ class Network:
         }
         return self._changed(parts, "ground", self.fluid)
 
+    def at_start(self) -> Self:
+        """Return this valve with all sources and forces held at their value at time zero."""
+        return self.with_components({n: part.at_start() for n, part in self.components.items()})
+
     def _changed(
         self, parts: Mapping[str, Component | None], instead: str, fluid: NetworkFluid | None
     ) -> Self:

@@ -71,6 +71,8 @@ __all__ = [
     "grid_of",
     "has_python_steps",
     "put_back",
+    "read_rows",
+    "saved_state",
     "simulate_network",
 ]
 
@@ -199,7 +201,7 @@ def simulate_network(
     recorder.start(step * first_step, finder, fresh=fresh)
     if state is None:
         short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()
-        _call_rows(network, -short, short, speeds)
+        read_rows(network, -short, short, speeds)
         recorder.first(*values_now(network, speeds, short))
     elif _LAST in state:
         recorder.first(np.asarray(state[_LAST], dtype=float))
@@ -239,7 +241,7 @@ def simulate_network(
         sizes=sizes,
         steps=StepCounts(*(int(count) for count in clock[2:] - done_before)),
         wall_time=wall_time,
-        state=_save(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
+        state=saved_state(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
         failure="" if failure is None else str(failure),
         start=begun,
         faces=_pressed_faces(network),
@@ -587,7 +589,7 @@ def _numbers(values: Vector) -> str:
     return ", ".join(f"{value:.4g}" for value in values[:12]) or "none"
 
 
-def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row: int = Y0) -> None:
+def read_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row: int = Y0) -> None:
     """Ask all rows for a step that ends in the present state: see :func:`call_rows`.
 
     ``row`` of the ports holds their displacements.
@@ -606,7 +608,7 @@ def _call_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row
 
 def _read_stores(network: CompiledNetwork) -> None:
     # where elements saw their ports last, a little behind the bodies
-    _call_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1), SEEN)
+    read_rows(network, 0.0, 0.0, np.zeros(len(network.ports) + 1), SEEN)
     for rows in (network.elements, network.branches):
         for k in range(rows.rows):
             ports = rows.port0[k + 1] - rows.port0[k]
@@ -683,7 +685,8 @@ def put_back(kept: Kept) -> None:
         array[...] = values
 
 
-def _save(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
+def saved_state(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
+    """All that a run needs to continue from here; what its record holds beside is left out."""
     saved = {name: array.copy() for name, array in _changing(network, clock).items()}
     for row in (WORK, WORK_BEGIN):  # count from the start of each run
         saved["bodies.at"][row : row + PORTS] = 0.0

@@ -25,6 +25,7 @@ the same, and hold an armature where none can be.
 """
 
 import warnings
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,7 +65,7 @@ from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si
 
-__all__ = ["RestState", "begin_at_rest"]
+__all__ = ["RestState", "SteadySlopes", "begin_at_rest", "begin_steady"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -72,7 +73,10 @@ Index = NDArray[np.int64]
 
 _FIRST, _LONGEST, _SHORTEST = 2e2, 2e13, 2e-5  # steps of pseudo-time over the step of the run
 _GROWTH = 8.0  # from one to the next
+_MOST_STATES = 64  # of elements that are kept for places which come again
 _MOST_NEWTON = 60
+_PLAIN_NEWTON = 15  # without a half step among them
+_MOST_BEYOND = 20  # steps that are shortened because a magnet would leave its range, or for fluid
 _HALVINGS = 12  # of a Newton step that leads where a part knows no answer
 _FALL = 0.1  # least share of a pressure that a Newton step leaves
 _FOUND = 1e-13  # last Newton step over the largest displacement, and over each pressure
@@ -81,6 +85,7 @@ _LENGTH = 20.0  # [m/s] displacements are told apart to a share of what this cov
 _MOVE = 0.02  # [m/s] the same for the way by which a port is moved to see what changes
 _FAR = 2e9  # [m/s] ... and for what an unsupported body has gone
 _HIGH = 1e11  # [Pa] a volume that came so high lets nothing out
+_MOST_STEADY = 1e9  # [Pa] the same of an operating point: no valve is meant for more
 _EMPTY = 1e-3  # [Pa] ... so low gets nothing
 _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
 _SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
@@ -110,6 +115,55 @@ class RestState:
     _held: frozenset[int]
     _stuck: frozenset[int]
     _enclosed: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SteadySlopes:
+    """Linear equations about an equilibrium, as :mod:`klack.simulation.static_start` has them.
+
+    Ports ``n``, rigid modes ``r``, free volumes ``f``, columns of fluid ``c``.
+
+    Parameters
+    ----------
+    shapes : array, shape (r, n) [1/sqrt(kg)]
+    axial : array, shape (r,) [sqrt(kg)]
+        Coordinate of each rigid mode per metre of its body along +z.
+    body : tuple of str
+        Component of the body of each rigid mode.
+    moves : array of bool, shape (r,)
+        False for a body that is held.
+    compliance : array, shape (n, n) [m/N]
+        Static one of the elastic modes.
+    force_by_port, force_by_pressure : array, shapes (n, n) [N/m], (n, f) [m^2]
+    flow_by_port, flow_by_pressure : array, shapes (f, n) [kg/(s m)], (f, f) [kg/(s Pa)]
+        Of what flows into the free volumes, without columns.
+    volumes : tuple of str
+        Components of the free volumes.
+    density : array, shape (f,) [kg/m^3]
+    left : array, shape (f,) [kg/s]
+        What still flows into each of them.
+    ends : array of int, shape (c, 2)
+        Free volumes at the ends of columns; -1 for a known pressure.
+    friction : array, shape (c,) [J s/kg^2]
+    known : array of bool, shape (f,)
+        Volumes with a way for the fluid to a prescribed pressure; the others are enclosed.
+    """
+
+    shapes: Matrix
+    axial: Vector
+    body: tuple[str, ...]
+    moves: NDArray[np.bool_]
+    compliance: Matrix
+    force_by_port: Matrix
+    force_by_pressure: Matrix
+    flow_by_port: Matrix
+    flow_by_pressure: Matrix
+    volumes: tuple[str, ...]
+    density: Vector
+    left: Vector
+    ends: Index
+    friction: Vector
+    known: NDArray[np.bool_]
 
 
 class _RunawayError(Exception):
@@ -154,30 +208,82 @@ def begin_at_rest(
     AccuracyWarning
         For a volume whose pressure has no steady state; it starts from ambient pressure.
     """
+    problem, found, closed = _settled(network, step, near, shift=shift)
+    notes = [_no_pressure(network, i) for i in closed]
+    for note in notes:
+        warnings.warn(note, AccuracyWarning, stacklevel=3)
+    notes += problem.held_by_friction()
+    return problem.put(found._state, tuple(notes)), found
+
+
+def begin_steady(
+    network: CompiledNetwork,
+    step: float,
+    *,
+    first: Mapping[str, float],
+    held: Collection[str] = (),
+) -> tuple[StaticStart, SteadySlopes]:
+    """Find the operating point of a network and put it there, in place: every volume is free.
+
+    Parameters
+    ----------
+    network : CompiledNetwork
+        No volume of it has a stated pressure: what it has at the start is where the search begins.
+    step : float [s]
+    first : mapping of str to float [m]
+        Displacements of free bodies from which the search begins; 0 where it names none.
+    held : collection of str
+        Bodies that stay at their ``first`` displacement: what is left on them holds them.
+
+    Raises
+    ------
+    InputError
+        If a body has no equilibrium, or a volume no steady pressure.
+    ConvergenceError
+        If none is found.
+    """
+    bodies = [row.component for row in network.rows.bodies]
+    fixed = frozenset(bodies.index(name) for name in held)
+    lifts = np.array([first.get(name, 0.0) for name in bodies])
+    problem, found, closed = _settled(network, step, None, fixed=fixed, lifts=lifts)
+    if closed:
+        raise _without_outlet(network, closed)
+    notes = problem.held_by_friction()
+    begun = problem.put(found._state, tuple(notes), tells_closed=False)
+    return begun, problem.steady_slopes(found._state)
+
+
+def _settled(
+    network: CompiledNetwork,
+    step: float,
+    near: RestState | None,
+    *,
+    shift: Vector | None = None,
+    fixed: frozenset[int] = frozenset(),
+    lifts: Vector | None = None,
+) -> tuple["_Balance", RestState, list[int]]:
+    """Equilibrium, and the volumes that have no steady pressure, which keep that of the start."""
     held = set(near._held) if near is not None else set[int]()
     stuck = set(near._stuck) if near is not None else set[int]()
-    notes: list[str] = []
+    closed: list[int] = []
     enclosed = near is not None and near._enclosed
     while True:
-        problem = _Balance(network, step, held, stuck, enclosed=enclosed, shift=shift)
+        problem = _Balance(
+            network, step, held, stuck, enclosed=enclosed, shift=shift, fixed=fixed, lifts=lifts
+        )
         try:
             state = _march(problem, None if near is None else near._state)
-            break
+            return problem, RestState(state, frozenset(held), frozenset(stuck), enclosed), closed
         except _RunawayError as away:
             if away.volumes:
                 held.update(away.volumes)
-                notes += [_no_pressure(network, i) for i in away.volumes]
+                closed += away.volumes
             elif not enclosed and problem.can_enclose(away.bodies):
                 enclosed = True
             elif all(problem.dry[b] > 0.0 for b in away.bodies):
                 stuck.update(away.bodies)
             else:
                 raise _unheld(network, away.bodies) from None
-    for note in notes:
-        warnings.warn(note, AccuracyWarning, stacklevel=3)
-    notes += problem.held_by_friction()
-    found = RestState(state, frozenset(held), frozenset(stuck), enclosed)
-    return problem.put(state, tuple(notes)), found
 
 
 def _march(problem: "_Balance", near: _State | None) -> _State:
@@ -188,12 +294,14 @@ def _march(problem: "_Balance", near: _State | None) -> _State:
     state, step = problem.first() if near is None else near.copy(), problem.step
     longest = _LONGEST * step
     tau = _FIRST * step if near is None else longest
-    while tau >= _SHORTEST * step:
+    beyond = 0
+    while tau >= _SHORTEST * step and beyond < _MOST_BEYOND:
         open_modes = problem.unbalanced(state)
         if open_modes is None:
             return state
         after = problem.advance(state, min(tau, longest), open_modes)
         if after is None:
+            beyond += problem.beyond is not None or bool(problem.emptied)
             tau = min(tau, longest) / _GROWTH**1.5
             continue
         problem.check(after)
@@ -202,6 +310,8 @@ def _march(problem: "_Balance", near: _State | None) -> _State:
         if tau > _GROWTH**8 * longest:
             break
         state, tau = after, tau * _GROWTH
+    if problem.emptied:
+        raise _RunawayError([], problem.emptied)
     raise problem.not_found(state)
 
 
@@ -217,9 +327,15 @@ class _Balance:
         *,
         enclosed: bool,
         shift: Vector | None = None,
+        fixed: frozenset[int] = frozenset(),
+        lifts: Vector | None = None,
     ) -> None:
         self.network, self.step, self.enclosed, self.stuck = network, step, enclosed, sorted(stuck)
         self.shift = 0.0 if shift is None else shift
+        self.is_steady = lifts is not None
+        self.high = _MOST_STEADY if self.is_steady else _HIGH
+        self.emptied: list[int] = []  # volumes in the last step that failed for them
+        self.lifts = np.zeros(len(network.rows.bodies)) if lifts is None else lifts
         self.h, self.move = SHARE_OF_STEP * step, _MOVE * step
         rows, nodes = network.rows, network.nodes
         count = network.bodies.first.size - 1
@@ -229,10 +345,15 @@ class _Balance:
         self.of_body = np.repeat(np.arange(len(rigid)), rigid)
         self.shapes = np.zeros((sum(rigid), count))
         self.compliance = np.zeros((count, count))
-        rests = [row.speed == 0.0 and b not in stuck for b, row in enumerate(rows.bodies)]
+        staying = fixed | stuck
+        rests = [row.speed == 0.0 and b not in staying for b, row in enumerate(rows.bodies)]
         self.moves = np.array(rests)[self.of_body]
         begin, mode = 0, 0
         self.along = along
+        sizes = [
+            size for row in rows.bodies if (size := float(np.linalg.norm(row.body.rigid_axial)))
+        ]
+        self.axial = np.array(sizes)
         for row, directions in zip(rows.bodies, along, strict=True):
             body, here = row.body, slice(begin, begin + len(row.ports))
             shapes = np.asarray(body.port_shapes)
@@ -281,6 +402,7 @@ class _Balance:
         )
         self.couplings = self._couplings(units)
         self.code = np.zeros(3, np.int64)
+        self.states: dict[tuple[int, bytes], Vector] = {}  # of elements, where they are asked again
         self.ranges = [limit for limit in rows.limits if limit.ports]
         self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
 
@@ -377,7 +499,8 @@ class _Balance:
 
     def first(self) -> _State:
         """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
-        z, y = np.zeros(self.of_body.size), np.zeros(self.ports + 1)
+        z = self.axial * self.lifts[self.of_body]
+        y = np.append(self.shapes.T @ z, 0.0)
         return _State(z, y, self.network.node_state.p.copy(), np.zeros(len(self.ends)))
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
@@ -408,14 +531,16 @@ class _Balance:
 
     def advance(self, start: _State, tau: float, open_modes: NDArray[np.bool_]) -> _State | None:
         """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it."""
-        state, before, self.beyond = start.copy(), np.inf, None
+        state, before, self.beyond, self.emptied = start.copy(), np.inf, None, []
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
         mass = self._masses(start)[0]
-        for _ in range(_MOST_NEWTON):
+        for iteration in range(_MOST_NEWTON):
             if not self.evaluate(state):
                 return None
             change = self._newton(state, start, creep, mass, tau)
-            share, fall = 1.0, least_share(self.couplings, change, state.p)
+            # a root-like law about no drop lets Newton's method swing across for ever
+            swings = iteration >= _PLAIN_NEWTON and iteration % 3 == 0
+            share, fall = 0.5 if swings else 1.0, least_share(self.couplings, change, state.p)
             if np.isnan(fall):
                 return None
             if fall < _FALL:
@@ -432,13 +557,16 @@ class _Balance:
             if share == 1.0 and (last <= _FOUND or (last <= _STUCK and last >= 0.5 * before)):
                 return state
             if np.any(state.p[self.free] < _EMPTY):
-                raise _RunawayError([], self._unstated(state.p < _EMPTY))
+                self.emptied = self._unstated(state.p < _EMPTY)
+                if self.is_steady:  # perhaps a shorter step leaves something in it
+                    return None
+                raise _RunawayError([], self.emptied)
             before = last
         return None
 
     def check(self, state: _State) -> None:
         """Raise :class:`_RunawayError` for what has gone where nothing real goes."""
-        volumes = self._unstated(state.p > _HIGH)
+        volumes = self._unstated(state.p > self.high)
         far = np.flatnonzero(np.abs(state.y[:-1]) > _FAR * self.step)
         bodies = sorted({int(self.body_of_port[port]) for port in far})
         if volumes or bodies:
@@ -522,11 +650,17 @@ class _Balance:
         elements = self.network.elements
         for k, state_at in self.kept:
             ports = elements.ports[elements.port0[k] : elements.port0[k + 1]]
-            try:
-                state = state_at(y[ports])
-            except (ConvergenceError, np.linalg.LinAlgError):
-                self.code[:] = 0, k, 1
-                return False
+            place = k, y[ports].tobytes()
+            state = self.states.get(place)
+            if state is None:
+                try:
+                    state = state_at(y[ports])
+                except (ConvergenceError, np.linalg.LinAlgError):
+                    self.code[:] = 0, k, 1
+                    return False
+                if len(self.states) >= _MOST_STATES:
+                    self.states.clear()
+                self.states[place] = state
             elements.state[elements.state0[k] : elements.state0[k] + len(state)] = state
         return True
 
@@ -667,7 +801,55 @@ class _Balance:
             "start='free' skips the equilibrium."
         )
 
-    def put(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
+    def steady_slopes(self, state: _State) -> SteadySlopes:
+        """Equations about a state in which everything has been put."""
+        n, network = self.ports, self.network
+        place = {int(i): j for j, i in enumerate(self.free)}
+        flow = self.by_pressure[n + 1 :]
+        names = [network.rows.nodes[handle].component for handle in network.node_order]
+        return SteadySlopes(
+            shapes=self.shapes.copy(),
+            axial=self.axial.copy(),
+            body=tuple(network.rows.bodies[b].component for b in self.of_body),
+            moves=self.moves.copy(),
+            compliance=self.compliance.copy(),
+            force_by_port=self.by_port[:n].copy(),
+            force_by_pressure=self.by_pressure[:n].copy(),
+            flow_by_port=self.by_port[n + 1 :][self.free].copy(),
+            flow_by_pressure=flow[self.free].copy(),
+            volumes=tuple(names[i] for i in self.free),
+            density=self._fluid(state.p[self.free])[:, 0],
+            left=self._net(state),
+            ends=np.array([[place.get(int(i), -1) for i in pair] for pair in self.ends], np.int64)
+            .reshape(-1, 2)
+            .copy(),
+            friction=self.friction.copy(),
+            known=self._known(flow),
+        )
+
+    def _known(self, flow: Matrix) -> NDArray[np.bool_]:
+        """Free volumes from which fluid finds a way to a known pressure.
+
+        A pressure of one volume that changes the flow into another node leads there.
+        """
+        free = set(self.free.tolist())
+        links = [
+            (int(i), int(k))
+            for j, i in enumerate(self.free)
+            for k in np.flatnonzero(flow[:, j])
+            if k != i
+        ]
+        links += [(int(a), int(b)) for a, b in self.ends]
+        known = set(range(self.network.nodes.nodes)) - free
+        while True:
+            more = {a for a, b in links if b in known} | {b for a, b in links if a in known}
+            if more <= known:
+                return np.array([int(i) in known for i in self.free], dtype=bool)
+            known |= more
+
+    def put(
+        self, state: _State, notes: tuple[str, ...], *, tells_closed: bool = True
+    ) -> StaticStart:
         """Put the network into this state, and say where that is."""
         if not self.evaluate(state):
             raise self.failed()
@@ -676,7 +858,7 @@ class _Balance:
         if state.p.size:
             self._put_fluid(state)
         self._put_interfaces(state)
-        return self._told(state, notes)
+        return self._told(state, notes, tells_closed=tells_closed)
 
     def _check_stops(self, state: _State) -> None:
         """Refuse bodies that are pressed far deeper into a stop than they can move away."""
@@ -774,7 +956,7 @@ class _Balance:
             # 0 would be for "not touched yet"
             now.chi[c] = chi or (_UNDAMPED if damped else 0.0)
 
-    def _told(self, state: _State, notes: tuple[str, ...]) -> StaticStart:
+    def _told(self, state: _State, notes: tuple[str, ...], *, tells_closed: bool) -> StaticStart:
         network = self.network
         nodes, rows = network.nodes, network.rows
         names = [rows.nodes[handle].component for handle in network.node_order]
@@ -797,7 +979,7 @@ class _Balance:
             stated={names[i]: bool(self.stated[i]) for i in range(nodes.volumes)},
             flow=flow,
             residual=self.left_on_bodies(),
-            notes=(*notes, *self._closed(names)),
+            notes=(*notes, *(self._closed(names) if tells_closed else ())),
         )
 
     def _closed(self, names: list[str]) -> tuple[str, ...]:
@@ -851,6 +1033,19 @@ def _no_pressure(network: CompiledNetwork, node: int) -> str:
     return (
         f"'{name}' has no steady pressure: the flow into it at time zero has no outlet. It "
         "starts at ambient pressure; give its 'pressure' if that differs."
+    )
+
+
+def _without_outlet(network: CompiledNetwork, nodes: list[int]) -> InputError:
+    names = [f"'{network.rows.nodes[network.node_order[i]].component}'" for i in nodes]
+    return InputError(
+        "operating point",
+        got=f"{' and '.join(names)} with a flow that is forced in or out, which no pressure up to "
+        f"{format_si(_MOST_STEADY, 'Pa')} balances",
+        expected="a way for the fluid to a source or the surroundings that is open at rest and "
+        "wide enough",
+        hint="open the valve there (another current, or another start), or replace the flow-source "
+        "by a pressure-source.",
     )
 
 

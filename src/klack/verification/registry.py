@@ -56,6 +56,8 @@ COVERS = {
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
     "cases": "Case files: units by their definitions, expressions, included parts of networks.",
+    "operating-point": "Where a valve rests: springs, magnets, restrictions and both together "
+    "against solutions by hand, networks of SciPy, and runs that stay there.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
     "FMI.",
 }

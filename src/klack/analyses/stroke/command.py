@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.analyses.operating_point.asked import STEADY, SteadyAsked
 from klack.network.accuracy import Accuracy
 from klack.terminal.options import CaseArgument, Components, imported
 from klack.terminal.progress import show_progress
@@ -64,9 +65,18 @@ def stroke(
     accuracy: _Accuracy = None,
     continued: _Continue = None,
     component: Components = None,
+    at_rest: SteadyAsked = STEADY,
     asked: WantedResult = WANTED_RESULT,
 ) -> int:
-    """Compute one actuation: voltage, current, force, lift, and the impacts on both stops."""
+    """Compute one actuation: voltage, current, force, lift, and the impacts on both stops.
+
+    With --steady: the operating point instead, or characteristic curves of it.
+    """
+    at_rest.require_fitting(duration=duration, step=step, accuracy=accuracy, continued=continued)
+    if at_rest.steady:
+        from klack.analyses.operating_point.command import show_operating_points
+
+        return show_operating_points(case, variant or (), at_rest, component, asked)
     from klack.case.shipped import find_case
 
     with show_progress(asked.quiet):

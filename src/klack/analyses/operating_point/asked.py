@@ -1,0 +1,122 @@
+"""Options of ``klack stroke --steady``."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from cyclopts import Parameter
+
+from klack.errors import InputError
+
+__all__ = ["STEADY", "SteadyAsked"]
+
+_Texts = list[str] | None
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class SteadyAsked:
+    """Operating point in place of an actuation."""
+
+    steady: Annotated[
+        bool,
+        Parameter(
+            name="--steady",
+            negative="",
+            help="The operating point at the start instead, everything that drives it constant.",
+        ),
+    ] = False
+    current: Annotated[
+        _Texts,
+        Parameter(
+            name="--current",
+            negative="",
+            help='With --steady: of all coils, "3 A", or of one, "coil=3 A". [default: that of '
+            "the start of a run]",
+        ),
+    ] = None
+    voltage: Annotated[
+        _Texts,
+        Parameter(name="--voltage", negative="", help="With --steady: instead of a current."),
+    ] = None
+    lift: Annotated[
+        str | None,
+        Parameter(
+            name="--lift", help='With --steady: hold the needle at this displacement, "40 um".'
+        ),
+    ] = None
+    sweep: Annotated[
+        list[tuple[str, str, str, int]] | None,
+        Parameter(
+            name="--sweep",
+            negative="",
+            help="With --steady: a key of the case, or lift, current or voltage, then from, to "
+            'and the number of values: --sweep lift "0 um" "80 um" 9. Twice for two of them.',
+        ),
+    ] = None
+    origin: Annotated[
+        Literal["start", "far"],
+        Parameter(
+            name="--from",
+            help="With --steady: begin the search with the bodies where they are drawn, or at the "
+            "stops far from there.",
+        ),
+    ] = "start"
+    over: Annotated[
+        str | None,
+        Parameter(
+            name="--over",
+            help='With --sweep: quantity on the x axis, "tank volume flow". [default: what is '
+            "swept first]",
+        ),
+    ] = None
+    show: Annotated[
+        _Texts,
+        Parameter(
+            name="--show",
+            negative="",
+            help='With --sweep: quantity to draw, "coil armature force"; several times. [default: '
+            "the main ones]",
+        ),
+    ] = None
+
+    def require_fitting(self, **others: object) -> None:
+        """Refuse options of an actuation beside --steady, and those of --steady without it.
+
+        Raises
+        ------
+        InputError
+        """
+        names = {"continued": "continue"}
+        if self.steady:
+            given = [f"--{names.get(name, name)}" for name, x in others.items() if x is not None]
+            if given:
+                raise InputError(
+                    given[0],
+                    got="a value beside --steady",
+                    expected="none: an operating point has no time",
+                    hint=f"leave {given[0]} out, or --steady.",
+                )
+        own = {
+            "--current": self.current,
+            "--voltage": self.voltage,
+            "--lift": self.lift,
+            "--sweep": self.sweep,
+            "--from": None if self.origin == "start" else self.origin,
+        }
+        drawn = {"--over": self.over, "--show": self.show}
+        for needed, present, options in (
+            ("--steady", self.steady, own),
+            ("--sweep", bool(self.sweep), drawn),
+        ):
+            alone = [name for name, value in options.items() if value]
+            if alone and not present:
+                raise InputError(
+                    alone[0],
+                    got=f"a value without {needed}",
+                    expected=f"{needed} beside it",
+                    hint=f"add {needed}, or leave {alone[0]} out.",
+                )
+
+
+STEADY = SteadyAsked()
+"""Without any of them."""

@@ -1,0 +1,80 @@
+"""``klack stroke --steady``: options to record, files and tables."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from klack.analyses.ending import Ending
+from klack.analyses.operating_point.asked import SteadyAsked
+from klack.errors import InputError
+from klack.terminal.options import Components, imported
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WantedResult
+
+__all__ = ["show_operating_points"]
+
+
+def show_operating_points(
+    path: Path,
+    variants: Sequence[str],
+    at_rest: SteadyAsked,
+    component: Components,
+    asked: WantedResult,
+) -> int:
+    """Find the operating points that were asked for, write and print them; the exit code."""
+    with show_progress(asked.quiet):
+        from klack.analyses.operating_point.analysis import OPERATING_POINT
+        from klack.analyses.operating_point.conditions import (
+            Conditions,
+            asked_sweeps,
+            stated_drive,
+        )
+        from klack.analyses.operating_point.figures import sweep_charts
+        from klack.analyses.operating_point.run import run_operating_points
+        from klack.analyses.operating_point.table import CSV_NAME, write_csv
+        from klack.case.case_tree import read_case_tree
+        from klack.case.shipped import find_case
+        from klack.units import CURRENT, LENGTH, VOLTAGE, parse_quantity
+
+        tree = read_case_tree(find_case(path), imported(component))
+        case = tree.case()
+    wanted = [name for item in variants for name in item.split(",") if name]
+    if len(wanted) > 1:
+        raise InputError(
+            "--variant",
+            got=f"{len(wanted)} variants beside --steady",
+            expected="one",
+            hint="find the operating point of each in its own call.",
+        )
+    base = Conditions(
+        current=stated_drive(at_rest.current or (), "--current", CURRENT),
+        voltage=stated_drive(at_rest.voltage or (), "--voltage", VOLTAGE),
+        lift=None if at_rest.lift is None else parse_quantity(at_rest.lift, LENGTH, "--lift"),
+    )
+    sweeps = asked_sweeps(case, tree, at_rest.sweep or ())
+    ending = Ending.of(asked, f"{case.name}-steady")
+    with show_progress(asked.quiet) as progress:
+        record = run_operating_points(
+            case,
+            tree,
+            variant=wanted[0] if wanted else None,
+            base=base,
+            sweeps=sweeps,
+            origin=at_rest.origin,
+            threads=asked.threads,
+            progress=progress,
+        )
+    charts = sweep_charts(record, at_rest.over or "", at_rest.show or ())
+
+    def beside(folder: Path) -> tuple[str, ...]:
+        from klack.report.printed import png_chart, svg_chart
+
+        write_csv(record, folder / CSV_NAME)
+        names = [CSV_NAME]
+        for chart in charts:
+            for end, draw in (("svg", svg_chart), ("png", png_chart)):
+                name = f"{chart.name}.{end}"
+                (folder / name).write_bytes(draw(chart))
+                names.append(name)
+        return tuple(names)
+
+    return ending.end(OPERATING_POINT, record, beside=beside)

@@ -1,0 +1,123 @@
+"""Record of operating points: one, or those along one or two swept quantities."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.record import CaseRecord
+
+__all__ = ["OperatingPoints", "PointQuantity", "SweptQuantity"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class SweptQuantity:
+    """What a sweep changes.
+
+    Parameters
+    ----------
+    name : str
+        Key of the case, or ``lift``, ``current``, ``voltage``.
+    unit : str
+        SI; ``"1"`` for a pure number.
+    values : array, shape (points,)
+    """
+
+    name: str
+    unit: str
+    values: Vector
+
+    @property
+    def short(self) -> str:
+        """Name without the sections that hold all components."""
+        return self.name.removeprefix("network.components.")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class PointQuantity:
+    """One quantity of a component at every point.
+
+    Parameters
+    ----------
+    component, quantity : str
+    unit : str
+        SI.
+    values : array, shape (points,)
+        nan at a point that was not found, or that does not have it.
+    """
+
+    component: str
+    quantity: str
+    unit: str
+    values: Vector
+
+    @property
+    def name(self) -> str:
+        """Both words."""
+        return f"{self.component} {self.quantity}"
+
+    @property
+    def short(self) -> str:
+        """The same."""
+        return self.name
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OperatingPoints(CaseRecord):
+    """Operating points of a valve.
+
+    Parameters
+    ----------
+    variant : str
+    needle : str
+        ``component.point`` whose displacement is the lift.
+    origin : str
+        Where the search begins: ``"start"``, or ``"far"`` stops.
+    drive : mapping of str to float [A]
+        Current of each coil, of the first point.
+    swept : tuple of SweptQuantity
+        None, one or two of them.
+    quantities : tuple of PointQuantity
+    force_left : array, shape (points,) [N]
+        Largest force that is left on a free body.
+    flow_left : array, shape (points,) [m^3/s]
+        Largest flow that is left of a volume.
+    voltage_left : array, shape (points,) [V]
+        Largest voltage that the steady fluxes of a coil leave.
+    failures : tuple of str
+        Why there is no point; empty where there is one.
+    doubts : tuple of str
+        What has to be known of each point, one line each.
+    cpu_time : float [s]
+        Processor time of all points, without bodies and contact laws.
+    """
+
+    variant: str
+    needle: str
+    origin: str
+    drive: Mapping[str, float]
+    swept: tuple[SweptQuantity, ...]
+    quantities: tuple[PointQuantity, ...]
+    force_left: Vector
+    flow_left: Vector
+    voltage_left: Vector
+    failures: tuple[str, ...]
+    doubts: tuple[str, ...]
+    cpu_time: float
+
+    @property
+    def count(self) -> int:
+        """Number of points, found or not."""
+        return len(self.failures)
+
+    @property
+    def found(self) -> NDArray[np.bool_]:
+        """Points that were found, shape (points,)."""
+        return np.array([not text for text in self.failures], dtype=bool)
+
+    def quantity(self, name: str) -> PointQuantity | None:
+        """Quantity by ``"component quantity"``; None if there is none."""
+        return next((item for item in self.quantities if item.name == name), None)
