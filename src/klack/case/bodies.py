@@ -17,7 +17,7 @@ from pydantic import (
 from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.case.origin import ExpandedCase
-from klack.case.parameters import PARAMETERS, ParameterName, Written
+from klack.case.parameters import PARAMETERS, Written
 from klack.errors import InputError
 from klack.hardening import (
     HARDNESS_SPREAD,
@@ -27,7 +27,7 @@ from klack.hardening import (
     yield_of_hardness,
 )
 from klack.input.problem import CaseProblem, Key, nearest, one_of
-from klack.input.section import Count, Name, NamedSection, Section, Text
+from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
 from klack.material_library import MATERIALS, find_material
 from klack.materials import Material
 from klack.units import Density, Frequency, Modulus, Rate, Ratio, Time, format_si
@@ -442,9 +442,7 @@ class CaseFile(Section):
     description: Text = Field(
         default="", description="What the case shows, and the source of its numbers."
     )
-    parameters: Mapping[ParameterName, Written] = Field(
-        default_factory=dict, description=PARAMETERS
-    )
+    parameters: Mapping[PlainName, Written] = Field(default_factory=dict, description=PARAMETERS)
     materials: Mapping[Name, CaseMaterial] = Field(
         default_factory=dict, description="name: properties."
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Annotated, Any
 
-from pydantic import StringConstraints, WithJsonSchema
+from pydantic import WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from klack.case.case_text import LARGEST_NUMBER
@@ -18,7 +18,6 @@ from klack.units import KINDS, RATE, RATIO, Kind, format_si, typed
 
 __all__ = [
     "PARAMETERS",
-    "ParameterName",
     "ParameterValue",
     "Scope",
     "Written",
@@ -29,7 +28,6 @@ __all__ = [
     "parameters_of_text",
 ]
 
-ParameterName = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Written = Annotated[
     Any,
     WithJsonSchema({"type": ["string", "number"], "examples": ["1.3 mm", "2 * d_seat", 4]}),

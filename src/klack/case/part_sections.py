@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, WithJsonSchema
 
-from klack.case.parameters import PARAMETERS, ParameterName, Written
-from klack.input.section import Count, Name, Section, Text
+from klack.case.parameters import PARAMETERS, Written
+from klack.input.section import Count, Name, PlainName, Section, Text
 
 __all__ = ["INCLUDE", "PARTS", "CaseHead", "CaseInclude", "PartFile"]
 
@@ -42,7 +42,7 @@ class CaseInclude(Section):
     count: Count | None = Field(
         default=None, le=1000, description="Several of them: injector1, injector2, ..."
     )
-    arguments: Mapping[ParameterName, _Values] = Field(
+    arguments: Mapping[PlainName, _Values] = Field(
         default_factory=dict,
         alias="with",
         description="Parameters of the part: a value or an expression of the parameters of this "
@@ -53,9 +53,7 @@ class CaseInclude(Section):
 class CaseHead(Section):
     """Sections of a case that are read before all others."""
 
-    parameters: Mapping[ParameterName, Written] = Field(
-        default_factory=dict, description=PARAMETERS
-    )
+    parameters: Mapping[PlainName, Written] = Field(default_factory=dict, description=PARAMETERS)
     include: tuple[CaseInclude, ...] = Field(default=(), description=INCLUDE)
     parts: Mapping[Text, Text] = Field(default_factory=dict, description=PARTS)
 
@@ -66,7 +64,7 @@ class PartFile(Section):
     klack: Literal[1] = Field(description="Format version of the file: 1.")
     part: Text = Field(min_length=1, description="What it is; one line.")
     description: Text = Field(default="", description="Its limits, and the source of its numbers.")
-    parameters: Mapping[ParameterName, Written | None] = Field(
+    parameters: Mapping[PlainName, Written | None] = Field(
         default_factory=dict,
         description="name: default; none (nothing after the colon): to be given by 'with'.",
     )

@@ -19,11 +19,13 @@ from pydantic_core import CoreSchema
 from klack.input.computed import plain_number
 from klack.input.problem import CaseProblem, nearest, one_of
 
-__all__ = ["Count", "Name", "NamedSection", "Number", "Section", "Text"]
+__all__ = ["Count", "Name", "NamedSection", "Number", "PlainName", "Section", "Text"]
 
 Number = Annotated[float, Strict(), BeforeValidator(plain_number)]
 Count = Annotated[int, Strict(), Field(ge=1)]
 Text = Annotated[str, Strict()]
+PlainName = Annotated[str, Strict(), StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
+"""A name without the sign of a difference, for names in expressions."""
 Name = Annotated[str, Strict(), StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_-]*$")]
 
 
