@@ -46,6 +46,8 @@ COVERS = {
     "compliance, order.",
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
     "ladders, a published lifting magnet.",
+    "magnetic-parts": "Parts of a magnetic circuit: hysteresis of the iron, permanent magnets, "
+    "maps from files.",
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
