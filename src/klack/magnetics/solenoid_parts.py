@@ -236,8 +236,10 @@ class IronPart(Section):
         try:
             self.width()
         except InputError as error:
+            key = error.where.rpartition(": ")[2]
+            place = ("hysteresis", key) if key in Hysteresis.model_fields else ("hysteresis",)
             raise CaseProblem(
-                ("hysteresis",), got=error.got, expected=error.expected, hint=error.hint
+                place, got=error.got, expected=error.expected, hint=error.hint
             ) from None
         return self
 
