@@ -115,7 +115,7 @@ def test_magnet_holds_the_armature_by_its_recoil_line():
         ({"initial_permeability": 300.0}, CURVE, "coercivity"),
         ({**LOOP, "initial_permeability": 3e4}, CURVE, "initial_permeability"),
         ({**LOOP, "remanence": 1.8}, CURVE, "remanence"),
-        ({**LOOP, "remanence": 0.01}, CURVE, "remanence|initial_permeability"),
+        ({**LOOP, "remanence": 0.01}, CURVE, r"remanence|initial_permeability"),
         (
             LOOP,
             {
@@ -145,7 +145,7 @@ def test_impossible_loops_are_refused(hysteresis, material, told):
 )
 def test_unusable_loops_are_refused(flux_density, field_strength):
     loop = {"flux_density": flux_density, "field_strength": field_strength}
-    with pytest.raises((InputError, ValueError), match="loop|flux_density"):
+    with pytest.raises((InputError, ValueError), match=r"loop|flux_density"):
         coil(iron=[{**IRON, "material": {"loop": loop}}])
 
 
