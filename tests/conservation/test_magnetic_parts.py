@@ -4,15 +4,21 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.hysteresis import falling_width
+from klack.magnetics.iron import VACUUM_PERMEABILITY, froehlich
+from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.solenoid_parts import PermanentMagnet
 from klack.magnetics.static import static_state
 from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
 from klack.simulation.network_run import simulate_network
+from klack.verification.single_coil import run_coil
 
 CURVE = {"froehlich": {"saturation": 1.9, "permeability": 20000.0}}
 LOOP = {"coercivity": 400.0, "initial_permeability": 300.0}
@@ -158,3 +164,34 @@ def test_too_many_hysteretic_parts_are_refused():
     solenoid = coil(iron=[{**IRON, "hysteresis": LOOP}] * 9)
     with pytest.raises(InputError, match="at most 8"):
         hold_and_release(solenoid, 0.5)
+
+
+@pytest.mark.parametrize("step", [1e-8, 1e-6, 2e-5], ids=["fine", "usual", "coarse"])
+@pytest.mark.parametrize("closing", [1.0, 1e-5], ids=["with a gap", "closed core"])
+def test_any_course_of_voltage_and_gap_balances_and_loses_energy(step, closing):
+    rng = np.random.default_rng(3)
+    width = falling_width(froehlich(1.9, 20000.0), 100.0, 0.9, 300.0)
+    slope = closing * 2.0 / (VACUUM_PERMEABILITY * 12e-6)
+    gap = GapReluctance([0.0, 1e-3], [closing * 1e3, closing * 1e3 + slope * 1e-3], [slope] * 2)
+    circuit = MagneticCircuit(
+        branches=(
+            MagneticBranch(name="gap", law=gap, turns=60.0),
+            MagneticBranch(
+                name="iron",
+                law=froehlich(1.9, 20000.0).law(60e-3, 12e-6),
+                stops=width.stops(60e-3, 12e-6),
+            ),
+            MagneticBranch(name="leakage", law=LinearReluctance(2e8), turns=60.0),
+        ),
+        loops=np.array([[1, 0], [1, 0], [0, 1]]),
+        main="gap",
+    )
+    driver = VoltageTable(
+        time=tuple(np.sort(rng.uniform(0.0, 400 * step, 8))), voltage=tuple(rng.uniform(-40, 40, 8))
+    ).program()
+    lift = np.clip(np.cumsum(rng.normal(0.0, 1e-7, 401)), -20e-6, 60e-6)
+
+    run = run_coil(circuit, driver, resistance=0.5, gap=80e-6, step=step, lift=lift - lift[0])
+
+    assert run.residual < 1e-12
+    assert run.hysteresis >= 0.0
