@@ -27,8 +27,8 @@ _WIDTH = 100
 def print_groups() -> None:
     """One sentence per group."""
     for group, sentence in COVERS.items():
-        indent = " " * 14
-        print(fill(sentence, _WIDTH, initial_indent=f"{group:<14}", subsequent_indent=indent))
+        indent = " " * 16
+        print(fill(sentence, _WIDTH, initial_indent=f"{group:<16}", subsequent_indent=indent))
 
 
 def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:
