@@ -8,8 +8,8 @@ and the coil sees the linkage :math:`\psi = N_b^T C \varphi`.  ``x`` is the work
 for the whole circuit; ``C`` is :attr:`MagneticCircuit.loops`.  Loop fluxes as unknowns satisfy
 Kirchhoff's node law by construction, and make the stored energy a convex function of the unknowns.
 
-Limits: lumped flux tubes, no hysteresis (a constant magnetomotive force stands for remanence),
-one coil, one moving direction.
+Limits: lumped flux tubes, one coil, one moving direction.  At rest iron follows its mean curve;
+hysteresis acts in the time step only.
 """
 
 from dataclasses import dataclass
@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError, require_nonnegative
+from klack.magnetics.hysteresis import IronStops
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance, ReluctanceLaw
 
 __all__ = ["MOST_LOOPS", "BranchKind", "MagneticBranch", "MagneticCircuit"]
@@ -49,6 +50,8 @@ class MagneticBranch:
     remanence : float [A]
         :math:`\Theta_0`: constant magnetomotive force along the branch (remanence of the iron, a
         magnet).  It belongs to the stored energy: ``law.energy - remanence * flux``.
+    stops : IronStops, optional
+        Hysteresis of iron, beside ``law`` as its mean curve.
     """
 
     name: str
@@ -56,6 +59,7 @@ class MagneticBranch:
     eddy: float = 0.0
     turns: float = 0.0
     remanence: float = 0.0
+    stops: IronStops | None = None
 
     def __post_init__(self) -> None:
         require_nonnegative(f"MagneticBranch '{self.name}': eddy", self.eddy, "S")

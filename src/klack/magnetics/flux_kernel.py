@@ -27,17 +27,24 @@ from numba.extending import intrinsic
 from klack.compiling.jit import inner
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
+from klack.magnetics.flux_table import MOST_TUBES
+from klack.magnetics.stop_kernel import stops_end, stops_energy, stops_mean, stops_move
 
 __all__ = [
     "circuit_current",
     "circuit_energy",
     "circuit_flux",
     "circuit_gaps",
+    "circuit_heat",
     "circuit_loss_and_force",
     "circuit_step",
     "linked",
     "stack",
 ]
+
+
+_CAREFUL = 20  # Newton steps; then halved, should they go to and fro between kinks of the stops
+_STOPS = 2 * MOST_TUBES  # of what a circuit keeps: places in tables, then the stops
 
 
 @intrinsic(prefer_literal=True)
@@ -251,6 +258,12 @@ def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: A
             mmf = end[k] * b - par[p + 2]
             if par[p + 4] != 0.0:
                 mmf += iron_mmf(par, at + int(par[p + 4]), int(hints[2 * k + 1]), b)
+            if par[p + 6] != 0.0:
+                first = _STOPS + int(par[p + 7])
+                db = par[row] * change[0]
+                for j in range(1, loops):
+                    db += par[row + j] * change[j]
+                mmf += stops_end(par, at, at + int(par[p + 6]), hints, first, b - db, db)
             current += weight * mmf
         p += _SIZE + loops
     return current
@@ -273,6 +286,8 @@ def circuit_energy(par: Any, at: int, hints: Any, phi: Any, end: Any) -> float:
             hints[2 * k + 1] = i
             row = table + 1 + 6 * i
             energy += par[row + 5] + _cubic_integral(par, row, abs(b) - par[row])
+        if par[p + 6] != 0.0:
+            energy += stops_energy(par, at + int(par[p + 6]), hints, _STOPS + int(par[p + 7]))
         p += _SIZE + loops
     return energy
 
@@ -296,6 +311,19 @@ def circuit_loss_and_force(
         force -= 0.25 * slope[k] * (b0 * b0 + b1 * b1)
         p += _SIZE + loops
     return loss, force
+
+
+@inner(error_model="numpy")
+def circuit_heat(par: Any, at: int, hints: Any, phi: Any, change: Any) -> float:
+    """Move the stops of hysteretic iron with a change of the loop fluxes; return the heat [J]."""
+    heat = 0.0
+    for k in range(int(par[at + 1])):
+        p = _tube(par, at, k)
+        if par[p + 6] != 0.0:
+            b0, db = circuit_flux(par, at, k, phi), circuit_flux(par, at, k, change)
+            first = _STOPS + int(par[p + 7])
+            heat += stops_move(par, at, at + int(par[p + 6]), hints, first, b0, db)
+    return heat
 
 
 @inner(error_model="numpy")
@@ -357,7 +385,7 @@ def circuit_step(
     turns = at + _HEADER
     most = int(par[at + 2])
     current = 0.0
-    for _ in range(most):
+    for turn in range(most):
         for i in range(loops):
             g[i] = 0.0
             z[i] = par[turns + i]
@@ -375,6 +403,13 @@ def circuit_step(
                 iron, iron_slope = _iron_mean(par, table, hint, b0, b0 + db)
                 mmf += iron
                 slope += iron_slope
+                if par[p + 6] != 0.0:
+                    first = _STOPS + int(par[p + 7])
+                    iron, iron_slope = stops_mean(
+                        par, at, at + int(par[p + 6]), hints, first, b0, db
+                    )
+                    mmf += iron
+                    slope += iron_slope
             row = p + _SIZE
             for i in range(loops):
                 c = par[row + i]
@@ -392,6 +427,8 @@ def circuit_step(
         largest = 0.0
         for i in range(loops):
             move = g[i] + z[i] * current
+            if turn >= _CAREFUL:
+                move *= 0.5
             change[i] += move
             largest = max(largest, abs(move))
         if most == 1 or largest <= par[at + 5]:

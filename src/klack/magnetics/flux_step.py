@@ -38,13 +38,14 @@ from klack.magnetics.flux_kernel import (
     circuit_energy,
     circuit_flux,
     circuit_gaps,
+    circuit_heat,
     circuit_loss_and_force,
     circuit_step,
     linked,
     stack,
 )
 from klack.magnetics.flux_map import FluxMap
-from klack.magnetics.flux_table import MAP, MOST_TUBES, circuit_numbers
+from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES, STOPS, circuit_numbers
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.map_kernel import (
     map_current,
@@ -62,6 +63,7 @@ __all__ = [
     "BOOKS",
     "CHANNELS",
     "FAILURES",
+    "HYSTERESIS",
     "flux_numbers",
     "flux_rows",
     "flux_state",
@@ -74,6 +76,9 @@ BOOKS = (
     Book("eddy", "loss"),
     Book("magnetic", "store"),
 )
+
+HYSTERESIS = Book("hysteresis", "loss")
+"""One entry more, of iron with hysteresis."""
 
 CHANNELS = (
     Channel("voltage", "V", 5, derived=True),
@@ -101,6 +106,7 @@ _MAP_ADVICE = (
 )
 
 _TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
+_KEPT = 2 * MOST_TUBES + MOST_STOPS
 _MOST_EVENTS = 30
 _LOCATED = 1e-12
 _TELLS = 1e-6  # of a step: shorter pieces say nothing of the rates of the fluxes
@@ -258,7 +264,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     is_open, current, last = state[3] != 0.0, state[4], state[7]
     # on the stack, where nothing else can be meant: the compiler keeps what it has read
     phi, rate, bend = stack(out, 6), stack(out, 6), stack(out, 6)
-    change, told_of, hints = stack(out, 6), stack(out, 6), stack(out, _SPOTS)
+    change, told_of, hints = stack(out, 6), stack(out, 6), stack(out, _KEPT)
     middle, final, slope = stack(out, _TUBES), stack(out, _TUBES), stack(out, _TUBES)
     for j in range(loops):
         phi[j] = state[_FRONT + j]
@@ -266,8 +272,11 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         bend[j] = state[_FRONT + 2 * loops + j]
     for j in range(spots):
         hints[j] = state[_FRONT + 3 * loops + j]
+    stops = int(par[at + STOPS])
+    for j in range(stops):
+        hints[_SPOTS + j] = state[_FRONT + 3 * loops + spots + j]
 
-    supply = ohmic = eddy = push = pulse = 0.0
+    supply = ohmic = eddy = push = pulse = hysteresis = 0.0
     done = 0.0
     events = 0
     blocked = False  # the diode has blocked at this very instant
@@ -382,6 +391,8 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if par[at + _MAP] != 0.0:
             force = map_force(par, at, phi[0], change[0], middle[0], final[0])
         eddy += loss * per_time
+        if stops > 0:
+            hysteresis += circuit_heat(par, at, hints, phi, change)
         push += force * piece
         curve = 0.0
         if last == piece:
@@ -426,9 +437,13 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         out[2 + _FRONT + 2 * loops + j] = bend[j]
     for j in range(spots):
         out[2 + _FRONT + 3 * loops + j] = hints[j]
+    for j in range(stops):
+        out[2 + _FRONT + 3 * loops + spots + j] = hints[_SPOTS + j]
     books = 2 + size
     out[books - 1] = largest
     out[books], out[books + 1], out[books + 2], out[books + 3] = supply, ohmic, eddy, energy
+    if stops > 0:
+        out[books + 4] = hysteresis
     return 0
 
 
@@ -444,7 +459,7 @@ def flux_numbers(
     require_positive("coil resistance", resistance, "ohm")
     numbers = map_numbers(plant) if isinstance(plant, FluxMap) else circuit_numbers(plant)
     program = driver.numbers()
-    size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1]) + 1
+    size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1]) + int(numbers[STOPS]) + 1
     head = [0.0, resistance, gap, -1.0 if closing else 1.0]
     head += [_HEADER, _HEADER + numbers.size, size, 0.0]
     return np.concatenate((head, numbers, program))
@@ -520,7 +535,7 @@ def flux_rows(
         parameters=parameters,
         state=state,
         at_rest=at_rest if np.any(state[_FRONT:]) else None,
-        books=BOOKS,
+        books=(*BOOKS, HYSTERESIS) if parameters[_HEADER + STOPS] else BOOKS,
         channels=CHANNELS,
         failures=FAILURES,
     )

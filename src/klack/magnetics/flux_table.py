@@ -19,9 +19,19 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.hysteresis import STOPS_PER_PART, IronStops
 from klack.magnetics.reluctance import GapReluctance, IronReluctance, LinearReluctance
 
-__all__ = ["BRANCH_SIZE", "HEADER", "MAP", "MOST_TUBES", "circuit_numbers", "current_weights"]
+__all__ = [
+    "BRANCH_SIZE",
+    "HEADER",
+    "MAP",
+    "MOST_STOPS",
+    "MOST_TUBES",
+    "STOPS",
+    "circuit_numbers",
+    "current_weights",
+]
 
 Vector = NDArray[np.float64]
 
@@ -36,6 +46,12 @@ BRANCH_SIZE = 8
 
 MOST_TUBES = 18
 """Most different branch fluxes."""
+
+MOST_STOPS = 64
+"""Most stops of hysteretic iron."""
+
+STOPS = 8
+"""Number of the header that counts the stops."""
 
 CLOSE = 1e-8
 """Newton step, over the flux at which the iron's curve ends, that leaves round-off: its square."""
@@ -57,6 +73,7 @@ class _Tube:
     gap: Vector
     iron: Vector
     weight: float
+    stops: tuple[IronStops, ...]
 
 
 def current_weights(circuit: MagneticCircuit) -> Vector:
@@ -92,10 +109,11 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     """Flat circuit for :mod:`klack.magnetics.flux_kernel`.
 
     ``[loops, tubes, most iterations (1 if linear), main tube, sign of its flux, accepted change of
-    a loop flux, whether two loops share one gap, whether it is a map, 4 spare]``,
+    a loop flux, whether two loops share one gap, whether it is a map, number of stops, 3 spare]``,
     the turns of each loop, then per tube ``eddy, reluctance, remanence, gap table, iron table,
-    weight in the current, 2 spare`` and its row of loops, then the tables.  Offsets of
-    tables count from the start; 0 says that there is none.
+    weight in the current, table of stops, its first stop`` and its row of loops, then the tables
+    (of stops: :mod:`klack.magnetics.stop_kernel`).  Offsets of tables count from the start; 0 says
+    that there is none.
     """
     tubes, main, sign = _tubes(circuit)
     if len(tubes) > MOST_TUBES:
@@ -105,6 +123,14 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
             expected=f"at most {MOST_TUBES}",
             hint="put branches that carry the same flux in series in one loop.",
         )
+    stops = sum(part.share.size for tube in tubes for part in tube.stops)
+    if stops > MOST_STOPS:
+        raise InputError(
+            "magnetic circuit: hysteresis",
+            got=f"{sum(len(tube.stops) for tube in tubes)} parts of iron with hysteresis",
+            expected=f"at most {MOST_STOPS // STOPS_PER_PART}",
+            hint="join parts of one material, or give hysteresis to the largest parts only.",
+        )
     loops = circuit.loops.shape[1]
     head = np.zeros(HEADER)
     linear = all(tube.iron.size == 0 for tube in tubes)
@@ -112,10 +138,12 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     head[6] = loops == 2 and [tube.gap.size > 0 for tube in tubes] == [True] + [False] * (
         len(tubes) - 1
     )
+    if stops:
+        head[6], head[STOPS] = 0.0, stops
     limits = [tube.iron[-1, 0] / np.sum(np.abs(tube.row)) for tube in tubes if tube.iron.size]
     head[5] = CLOSE * min(limits, default=0.0)
     offset = HEADER + loops + len(tubes) * (BRANCH_SIZE + loops)
-    blocks, tables = [], []
+    blocks, tables, first = [], [], 0
     for tube in tubes:
         starts = []
         for rows in (tube.gap, tube.iron):
@@ -123,7 +151,19 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
             if rows.size:
                 tables.append(np.append(float(rows.shape[0]), rows.ravel()))
                 offset += tables[-1].size
-        numbers = [tube.eddy, tube.reluctance, tube.remanence, *starts, tube.weight, 0.0, 0.0]
+        hysteresis = [0.0, 0.0]
+        if tube.stops:
+            hysteresis = [float(offset + sum(part.width.size for part in tube.stops)), float(first)]
+            parts = [float(len(tube.stops))]
+            for part in tube.stops:
+                parts += [float(part.share.size), float(offset)]
+                parts += np.column_stack((part.stiffness, part.share)).ravel().tolist()
+                tables.append(part.width)
+                offset += part.width.size
+                first += part.share.size
+            tables.append(np.array(parts))
+            offset += len(parts)
+        numbers = [tube.eddy, tube.reluctance, tube.remanence, *starts, tube.weight, *hysteresis]
         blocks.append(np.concatenate((numbers, tube.row)))
     return np.concatenate((head, circuit.loop_turns, *blocks, *tables))
 
@@ -168,6 +208,7 @@ def _tube(row: Vector, branches: list[tuple[float, MagneticBranch]], weight: flo
         gap=_sum_of_cubics(gaps),
         iron=_sum_of_cubics(irons),
         weight=weight,
+        stops=tuple(branch.stops for _, branch in branches if branch.stops is not None),
     )
 
 

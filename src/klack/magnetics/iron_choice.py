@@ -7,11 +7,12 @@ from pydantic import Field, model_validator
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import NamedSection, Number, Section, Text
+from klack.magnetics.hysteresis import measured_loop
 from klack.magnetics.iron import IronCurve, brauer, froehlich, measured, tanh_curve
 from klack.magnetics.iron_library import iron_curve
 from klack.units import FieldStrength, FluxDensity
 
-__all__ = ["BrauerNumbers", "IronChoice", "IronPoints", "SaturationNumbers"]
+__all__ = ["BrauerNumbers", "IronChoice", "IronPoints", "LoopPoints", "SaturationNumbers"]
 
 
 class SaturationNumbers(Section):
@@ -36,6 +37,13 @@ class IronPoints(Section):
     field_strength: tuple[FieldStrength, ...] = Field(min_length=1, description="H, increasing.")
 
 
+class LoopPoints(Section):
+    """Measured major loop: its falling branch, from the positive tip to the negative one."""
+
+    flux_density: tuple[FluxDensity, ...] = Field(min_length=5, description="B, falling.")
+    field_strength: tuple[FieldStrength, ...] = Field(min_length=5, description="H, falling.")
+
+
 class IronChoice(NamedSection):
     """Magnetisation curve of a part; a bare text is a name of the library."""
 
@@ -44,10 +52,15 @@ class IronChoice(NamedSection):
     tanh: SaturationNumbers | None = Field(default=None, description="Curve with a sharp knee.")
     brauer: BrauerNumbers | None = Field(default=None, description="Exponential curve.")
     table: IronPoints | None = Field(default=None, description="Measured points.")
+    loop: LoopPoints | None = Field(
+        default=None, description="Measured major loop; its mean curve, and hysteresis if given."
+    )
 
     @model_validator(mode="after")
     def _one(self) -> Self:
-        chosen = self._exactly_one(("name", "froehlich", "tanh", "brauer", "table"), "which iron")
+        chosen = self._exactly_one(
+            ("name", "froehlich", "tanh", "brauer", "table", "loop"), "which iron"
+        )
         try:
             self.curve()
         except InputError as error:
@@ -66,5 +79,7 @@ class IronChoice(NamedSection):
             return tanh_curve(self.tanh.saturation, self.tanh.permeability)
         if self.brauer is not None:
             return brauer(self.brauer.k1, self.brauer.k2, self.brauer.k3)
+        if self.loop is not None:
+            return measured_loop(self.loop.flux_density, self.loop.field_strength)
         assert self.table is not None
         return measured(self.table.flux_density, self.table.field_strength)

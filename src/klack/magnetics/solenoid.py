@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from functools import lru_cache
 from itertools import pairwise
 from math import cos, inf, sin
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
+from klack.input.problem import CaseProblem
 from klack.input.section import Number
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import driver_of
@@ -16,7 +17,13 @@ from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.side_pull import ArmaturePull, ArmatureRing
-from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
+from klack.magnetics.solenoid_parts import (
+    EddyPart,
+    IronPart,
+    ParasiticGap,
+    PermanentMagnet,
+    PoleGap,
+)
 from klack.magnetics.tabulation import hermite_grid
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.across import OffAxisPart
@@ -51,7 +58,9 @@ class Solenoid(Component):
 
     ``residual_gap`` is what stays open when iron would touch: coating, shim, roughness.
     ``residual_flux`` sets a constant remanence such that this flux passes the closed gap without
-    current; it lets an armature stick.
+    current; it lets an armature stick. Instead, ``hysteresis`` of an iron part follows its loop
+    from the demagnetised state at the start: remanence depends on what the iron has been through.
+    ``magnets`` are permanent ones in series with the main flux.
 
     The stops have to end the stroke before the working gap is closed: a case in which they let the
     armature pass through its pole is refused, and a run stops where contacts give way by half of
@@ -62,7 +71,7 @@ class Solenoid(Component):
 
     Limits: one-dimensional flux tubes; flux between armature side and housing (large strokes)
     is a matter of a :class:`~klack.magnetics.circuit.MagneticCircuit` of your own, as
-    :mod:`klack.magnetics.lifting_magnet` shows; no hysteresis.
+    :mod:`klack.magnetics.lifting_magnet` shows.
     Sources: Woodson & Melcher 1968; Roters 1941; Stoll 1974 (eddy currents).
     """
 
@@ -92,6 +101,9 @@ class Solenoid(Component):
         default=(), description="Further gaps in series, independent of the stroke."
     )
     iron: tuple[IronPart, ...] = Field(default=(), description="Iron parts in series.")
+    magnets: tuple[PermanentMagnet, ...] = Field(
+        default=(), description="Permanent magnets in series with the main flux."
+    )
     leakage: Permeance | None = Field(
         default=None, gt=0, description="Permeance of the coil's own leakage; see leakage_share."
     )
@@ -108,6 +120,17 @@ class Solenoid(Component):
     start_current: Current = Field(
         default=0.0, ge=0, description="Steady current before the start: holding."
     )
+
+    @model_validator(mode="after")
+    def _one_remanence(self) -> Self:
+        if self.residual_flux > 0.0 and any(part.hysteresis for part in self.iron):
+            raise CaseProblem(
+                ("residual_flux",),
+                got="a residual flux beside iron with hysteresis",
+                expected="one of them: the iron has its own remanence",
+                hint="remove residual_flux, or the sections 'hysteresis'.",
+            )
+        return self
 
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the gap without the residual gap."""
@@ -224,8 +247,18 @@ def _circuit(solenoid: Solenoid) -> MagneticCircuit:
     if parasitic > 0.0:
         branches.append(MagneticBranch(name="parasitic", law=LinearReluctance(parasitic)))
     branches += [
-        MagneticBranch(name=f"iron {k + 1}", law=part.material.curve().law(part.length, part.area))
+        MagneticBranch(
+            name=f"iron {k + 1}",
+            law=part.material.curve().law(part.length, part.area),
+            stops=part.stops(),
+        )
         for k, part in enumerate(solenoid.iron)
+    ]
+    branches += [
+        MagneticBranch(
+            name=f"magnet {k + 1}", law=LinearReluctance(part.reluctance), remanence=part.mmf
+        )
+        for k, part in enumerate(solenoid.magnets)
     ]
     loops = [[1, 0] for _ in branches]
     branches.append(

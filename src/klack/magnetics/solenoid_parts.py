@@ -7,8 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
-from klack.input.section import Count, Section
+from klack.input.section import Count, Number, Section
 from klack.magnetics.air_gap import (
     edge_on_plane,
     edges_beside_wall,
@@ -17,12 +18,37 @@ from klack.magnetics.air_gap import (
     ring_permeance,
 )
 from klack.magnetics.eddy import MOST_TERMS, EddyLadder, cylinder_ladder, sheet_ladder
+from klack.magnetics.hysteresis import (
+    IronStops,
+    LoopWidth,
+    constant_width,
+    falling_width,
+    measured_width,
+)
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 from klack.magnetics.iron_choice import IronChoice
 from klack.magnetics.off_axis_gap import eccentric_ring
-from klack.units import Angle, Area, Conductivity, Length, Permeance, Ratio, format_si
+from klack.units import (
+    Angle,
+    Area,
+    Conductivity,
+    FieldStrength,
+    FluxDensity,
+    Length,
+    Permeance,
+    Ratio,
+    format_si,
+)
 
-__all__ = ["ArmatureBore", "EddyPart", "IronPart", "ParasiticGap", "PoleGap"]
+__all__ = [
+    "ArmatureBore",
+    "EddyPart",
+    "Hysteresis",
+    "IronPart",
+    "ParasiticGap",
+    "PermanentMagnet",
+    "PoleGap",
+]
 
 Vector = NDArray[np.float64]
 
@@ -159,12 +185,114 @@ class ParasiticGap(Section):
         return 1.0 / ring_permeance(self.radius, outer, self.length)
 
 
+class Hysteresis(Section):
+    """Hysteresis of a part: its major loop; see :mod:`klack.magnetics.hysteresis`."""
+
+    coercivity: FieldStrength | None = Field(
+        default=None, gt=0, description="H_c of the major loop; not with material: loop."
+    )
+    remanence: FluxDensity | None = Field(
+        default=None,
+        gt=0,
+        description="B_r of the closed ring; without it the loop is as wide everywhere.",
+    )
+    initial_permeability: Number = Field(
+        gt=1, description="Relative permeability of the demagnetised iron for small changes."
+    )
+
+
 class IronPart(Section):
     """A piece of iron that the main flux passes, of constant section."""
 
     material: IronChoice = Field(description="Name of a library material, or a curve.")
     length: Length = Field(gt=0, description="Mean path of the flux in the part.")
     area: Area = Field(gt=0, description="Cross-section across the flux.")
+    hysteresis: Hysteresis | None = Field(
+        default=None, description="Remanence and hysteresis loss; the material is the mean curve."
+    )
+
+    @model_validator(mode="after")
+    def _one_loop(self) -> Self:
+        given = self.hysteresis
+        if given is None:
+            return self
+        if self.material.loop is None:
+            if given.coercivity is None:
+                raise CaseProblem(
+                    ("hysteresis",),
+                    got="no key 'coercivity'",
+                    expected="the coercivity of the iron",
+                    hint="add coercivity, or measure the loop: material: {loop: ...}.",
+                )
+        else:
+            for name in ("coercivity", "remanence"):
+                if getattr(given, name) is not None:
+                    raise CaseProblem(
+                        ("hysteresis", name),
+                        got=f"{name} beside material: loop",
+                        expected="one of them",
+                        hint=f"remove {name}; the loop holds it.",
+                    )
+        try:
+            self.width()
+        except InputError as error:
+            key = error.where.rpartition(": ")[2]
+            place = ("hysteresis", key) if key in Hysteresis.model_fields else ("hysteresis",)
+            raise CaseProblem(
+                place, got=error.got, expected=error.expected, hint=error.hint
+            ) from None
+        return self
+
+    def width(self) -> LoopWidth | None:
+        """Return half the width of the loop; None without hysteresis."""
+        given = self.hysteresis
+        if given is None:
+            return None
+        mu, loop = float(given.initial_permeability), self.material.loop
+        if loop is not None:
+            return measured_width(loop.flux_density, loop.field_strength, mu)
+        assert given.coercivity is not None
+        curve = self.material.curve()
+        if given.remanence is None:
+            return constant_width(curve, given.coercivity, mu)
+        return falling_width(curve, given.coercivity, given.remanence, mu)
+
+    def stops(self) -> IronStops | None:
+        """Return the stops of the part; None without hysteresis."""
+        width = self.width()
+        return None if width is None else width.stops(self.length, self.area)
+
+
+class PermanentMagnet(Section):
+    r"""A magnet in series with the main flux, on its straight recoil line.
+
+    .. math:: B = B_r + \mu_0\mu_r H, \qquad
+              \Theta = \frac{l}{\mu_0\mu_r A}\,\varphi - \frac{B_r l}{\mu_0\mu_r}
+
+    Limits: no knee. Whether the working point stays above it is for the user to check.
+    """
+
+    remanence: FluxDensity = Field(gt=0, description="B_r at its temperature; NdFeB 1.0 to 1.4 T.")
+    recoil_permeability: Number = Field(
+        ge=1,
+        description="mu_r of the recoil line; NdFeB and SmCo 1.03 to 1.1, ferrite 1.05 to 1.2.",
+    )
+    length: Length = Field(gt=0, description="Along its magnetisation.")
+    area: Area = Field(gt=0, description="Cross-section across it.")
+    polarity: Literal["with-coil", "against-coil"] = Field(
+        description="Whether its flux adds to that of a positive current."
+    )
+
+    @property
+    def reluctance(self) -> float:
+        """Reluctance of the recoil line [A/Wb]."""
+        return self.length / (VACUUM_PERMEABILITY * self.recoil_permeability * self.area)
+
+    @property
+    def mmf(self) -> float:
+        """Magnetomotive force [A], positive with the coil."""
+        size = self.remanence * self.length / (VACUUM_PERMEABILITY * self.recoil_permeability)
+        return size if self.polarity == "with-coil" else -size
 
 
 class EddyPart(Section):

@@ -50,6 +50,8 @@ COVERS = {
     "compliance, order.",
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
     "ladders, a published lifting magnet.",
+    "magnetic-parts": "Parts of a magnetic circuit: hysteresis of the iron, permanent magnets, "
+    "maps from files.",
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
     "control": "Sensors, PID, hysteresis, state machines and functions of the user, against exact "
     "recursions.",

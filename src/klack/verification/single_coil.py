@@ -34,7 +34,7 @@ class CoilRun:
     state : array, shape (n + 1,)
         Number of the driver's state.
     fluxes : array, shape (n + 1, loops) [Wb]
-    electric, ohmic, eddy, work : float [J]
+    electric, ohmic, eddy, hysteresis, work : float [J]
         Supply, losses, and work done on the armature.
     stored : array, shape (2,) [J]
         Magnetic energy before and after.
@@ -52,6 +52,7 @@ class CoilRun:
     electric: float
     ohmic: float
     eddy: float
+    hysteresis: float
     work: float
     stored: Vector
     most_stored: float
@@ -60,7 +61,7 @@ class CoilRun:
     def residual(self) -> float:
         """Energy that does not balance, over the largest of the amounts [-]."""
         parts = [self.electric, -self.ohmic, -self.eddy, -self.work, self.stored[0]]
-        parts.append(-self.stored[1])
+        parts += [-self.hysteresis, -self.stored[1]]
         largest = max(self.most_stored, *(abs(part) for part in parts))
         return abs(sum(parts)) / largest if largest else 0.0
 
@@ -74,7 +75,7 @@ def _march(
     address: int, par: Vector, state: Vector, y: Vector, h: float, log: Vector, sums: Vector
 ) -> int:
     size, steps = state.size - 1, y.size - 1
-    inp, out = np.zeros(6), np.zeros(2 + state.size + 4)
+    inp, out = np.zeros(6), np.zeros(2 + state.size + 5)
     for k in range(-1, steps):
         inp[0], inp[1] = max(k, 0) * h, h if k >= 0 else 0.0
         inp[2], inp[3] = y[max(k, 0)], y[k + 1]
@@ -93,6 +94,8 @@ def _march(
         else:
             sums[4] = out[5 + size]
         sums[5] = out[5 + size]
+        if k >= 0:
+            sums[7] += out[6 + size]
         sums[6] = max(sums[6], out[5 + size])
     return 0
 
@@ -130,7 +133,7 @@ def run_coil(
     y = np.array(lift, dtype=float)
     par = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap)
     start = flux_state(par, fluxes)
-    log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(7)
+    log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(8)
     status = _march(address_of(magnet_step), par, np.append(start, 0.0), y, step, log, sums)
     if status != 0:
         raise ConvergenceError(f"coil: {FAILURES[status]}.")
@@ -146,6 +149,7 @@ def run_coil(
         electric=sums[0],
         ohmic=sums[1],
         eddy=sums[2],
+        hysteresis=sums[7],
         work=sums[3],
         stored=sums[4:6],
         most_stored=float(sums[6]),

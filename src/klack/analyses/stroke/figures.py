@@ -510,8 +510,8 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
         flows=flows,
         note=(
             "Without the circuit: the work of the magnet is what its supply brought in, less "
-            "ohmic and eddy losses and the change of the field's energy. Entries of one kind are "
-            "added up; the table holds each."
+            "ohmic, eddy and hysteresis losses and the change of the field's energy. Entries of "
+            "one kind are added up; the table holds each."
         ),
     )
 
