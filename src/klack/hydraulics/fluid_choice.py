@@ -1,7 +1,8 @@
 """The fluid of a case file: a name of the library, a few numbers, or a table."""
 
+from dataclasses import replace
 from math import inf
-from typing import Self
+from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -10,6 +11,7 @@ from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
 from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
+from klack.hydraulics.pressure_viscosity import PressureViscosity
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import NamedSection, Section, Text
 from klack.units import (
@@ -93,6 +95,11 @@ class FluidChoice(NamedSection):
         gt=0,
         description="Pressure over which the viscosity grows by e = 2.72; fuels 1000 bar.",
     )
+    viscosity_law: Literal["ambient", "barus", "roelands"] = Field(
+        default="ambient",
+        description="Viscosity over pressure in orifices, seats, annuli and channels: that at "
+        "ambient pressure, or a law, which lines and films then follow too.",
+    )
     vapour_pressure: Pressure | None = Field(
         examples=["5 kPa"],
         default=None,
@@ -170,7 +177,7 @@ class FluidChoice(NamedSection):
 
     def at(self, temperature: float) -> Fluid:
         """Fluid with its gas at a temperature [K]."""
-        return self.definition().at(
+        fluid = self.definition().at(
             temperature,
             gas_fraction=self.gas_fraction,
             gas_exponent=self.gas_exponent,
@@ -178,6 +185,24 @@ class FluidChoice(NamedSection):
             saturation_pressure=self.saturation_pressure,
             boiling_half_width=self.boiling_half_width,
         )
+        law = self._law(fluid)
+        return fluid if law is None else replace(fluid, viscosity_law=law)
+
+    def _law(self, fluid: Fluid) -> PressureViscosity | None:
+        """Return the law of the viscosity over pressure that was chosen."""
+        if self.viscosity_law == "ambient":
+            return None
+        if fluid.pressure_viscosity == 0.0:
+            raise InputError(
+                f"fluid '{self.name}': viscosity_law",
+                got=f"{self.viscosity_law} for a fluid without a pressure-viscosity coefficient",
+                expected="a coefficient",
+                hint="give a fluid of your own viscosity_pressure, e.g. 500 bar for oil, or "
+                "leave viscosity_law out.",
+            )
+        if self.viscosity_law == "barus":
+            return PressureViscosity.barus(fluid.pressure_viscosity)
+        return PressureViscosity.roelands(fluid.base_viscosity, fluid.pressure_viscosity)
 
     def _own(self) -> FluidDefinition:
         liquid = self.table.liquid() if self.table is not None else self._murnaghan()

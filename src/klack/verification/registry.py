@@ -40,6 +40,8 @@ COVERS = {
     "motions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "
     "the table of the kernel.",
+    "fluid-data": "Fluids against published values over temperature and pressure, and their "
+    "viscosity under pressure.",
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "
