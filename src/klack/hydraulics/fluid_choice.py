@@ -2,9 +2,10 @@
 
 from dataclasses import replace
 from math import inf
-from typing import Literal, Self
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, model_validator
 
 from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
@@ -12,6 +13,8 @@ from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
 from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
 from klack.hydraulics.pressure_viscosity import PressureViscosity
+from klack.hydraulics.property_table import PropertyTable, read_property_table
+from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import NamedSection, Section, Text
 from klack.units import (
@@ -61,19 +64,34 @@ class DensityTable(Section):
         return TabulatedLiquid(self.pressure, self.density)
 
 
+def _table(value: Any, info: ValidationInfo) -> Any:
+    """Return a curve of densities, or the path of a file of properties."""
+    if isinstance(value, str | Path):
+        return TypeAdapter(InputPath).validate_python(value, context=info.context)
+    if value is None or isinstance(value, DensityTable):
+        return value
+    return DensityTable.model_validate(value, context=info.context)
+
+
 class FluidChoice(NamedSection):
     """The fluid of a network: a name of the library alone, or a fluid of your own.
 
     Your own needs ``viscosity`` or ``kinematic_viscosity``, and either ``density`` with
     ``bulk_modulus`` or ``sound_speed``, or a ``table``; these numbers hold at the temperature of
-    the run and one atmosphere.  ``fluid: n-heptane`` is short for ``fluid: {name: n-heptane}``.
+    the run and one atmosphere.  A file of properties over temperature and pressure, ``fluid:
+    {table: my_fluid.csv}``, has all of these numbers.  ``fluid: n-heptane`` is short for ``fluid:
+    {name: n-heptane}``.
     """
 
     name: Text = Field(description="Name in the library, or of your own fluid.")
     density: Density | None = Field(
         examples=["750 kg/m^3"], default=None, gt=0, description="At one atmosphere."
     )
-    table: DensityTable | None = Field(default=None, description="Instead of density: a curve.")
+    table: Annotated[DensityTable | Path | None, BeforeValidator(_table)] = Field(
+        default=None,
+        description="Instead of density: a curve; or a file with all properties over temperature "
+        "and pressure, relative to the folder of the case.",
+    )
     bulk_modulus: Modulus | None = Field(
         examples=["1.5 GPa"],
         default=None,
@@ -150,6 +168,11 @@ class FluidChoice(NamedSection):
                 expected="a name alone, or your own values under another name",
                 hint=f"remove the values, or call it e.g. my-{self.name.replace(' ', '-')}.",
             )
+        if isinstance(self.table, Path):
+            others = tuple(name for name in _NUMBERS if name != "table")
+            self._refuse_with(others, "a file of properties", "the file has them")
+            self._file()
+            return self
         self._exactly_one(("density", "table"), "the density")
         self._exactly_one(("viscosity", "kinematic_viscosity"), "the viscosity")
         if self.table is not None:
@@ -172,8 +195,32 @@ class FluidChoice(NamedSection):
 
     def definition(self) -> FluidDefinition:
         """Return the fluid over temperature, without gas."""
+        if isinstance(self.table, Path):
+            return self._file().definition(self.name)
         found = find_fluid(self.name)
         return library_fluid(self.name) if found is not None else self._own()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named_by_its_file(cls, value: Any) -> Any:
+        """A file of properties alone names the fluid."""
+        if isinstance(value, dict) and "name" not in value:
+            file = value.get("table")
+            if isinstance(file, str | Path) and str(file).strip():
+                return {"name": Path(file).stem, **value}
+        return value
+
+    def _file(self) -> PropertyTable:
+        assert isinstance(self.table, Path)
+        try:
+            return read_property_table(self.table)
+        except InputError as error:
+            raise CaseProblem(
+                ("table",),
+                got=f"{error.where}: {error.got}",
+                expected=error.expected,
+                hint=error.hint,
+            ) from None
 
     def at(self, temperature: float) -> Fluid:
         """Fluid with its gas at a temperature [K]."""
@@ -205,6 +252,7 @@ class FluidChoice(NamedSection):
         return PressureViscosity.roelands(fluid.base_viscosity, fluid.pressure_viscosity)
 
     def _own(self) -> FluidDefinition:
+        assert not isinstance(self.table, Path)
         liquid = self.table.liquid() if self.table is not None else self._murnaghan()
         viscosity = self.viscosity
         if viscosity is None:

@@ -11,6 +11,7 @@ from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE
 from klack.hydraulics.pressure_viscosity import PressureViscosity, mean_viscosity_ratio
+from klack.hydraulics.property_table import PropertyTable
 from klack.network.step_function import evaluate
 from klack.verification.check import Check, compare
 
@@ -27,7 +28,7 @@ _BETWEEN = "cubic splines between the columns of the library, 20 K apart"
 
 def checks() -> list[Check]:
     """Water over temperature, alkanes over temperature, and viscosity under pressure."""
-    return [*_water(), *_alkanes(), *_laws(), *_gap()]
+    return [*_water(), *_alkanes(), *_laws(), *_gap(), *_file()]
 
 
 def _water() -> list[Check]:
@@ -160,5 +161,48 @@ def _gap() -> list[Check]:
             "guide with oil, drag at 1 m/s and 2000 bar [N]", drag,
             float(0.5 * (held[3] - moved[3] - held[4] + moved[4])), 1e-6,
             "int mu dx over the pressure of that equation", reason="Gauss with five points",
+        ),
+    ]  # fmt: skip
+
+
+def _file() -> list[Check]:
+    """A table of a liquid of Murnaghan with the viscosity of Barus, against both laws."""
+    T, p = np.array([293.15, 313.15]), np.array([1.0, 100.0, 300.0, 700.0, 1200.0, 2000.0]) * 1e5
+    rise, m = p - p[0], 11.0
+    K = np.array([[1.6e9], [1.4e9]]) + m * rise
+    rho = np.array([[860.0], [845.0]]) * (K / K[:, :1]) ** (1.0 / m)
+    mu = np.array([[0.04], [0.02]]) * np.exp(18e-9 * (p - ATMOSPHERE))
+    table = PropertyTable(
+        name="oil.csv", temperature=T, pressure=p, density=rho, viscosity=mu, bulk_modulus=K
+    )
+    liquid = table.definition("oil").at(293.15)
+    at = 950e5
+    middle = 1.6e9 + m * (at - p[0])
+    strain = log(float(liquid.liquid.density(2000e5) / liquid.liquid.density(1e5)))
+    points = list(p[1:-1])
+    area = quad(lambda x: 1.0 / float(liquid.liquid.bulk_modulus(x)), 1e5, 2000e5, points=points)[0]
+    law, curve = "Murnaghan 1944, K = K_0 + m (p - p_0)", "monotone cubic through six pressures"
+    return [
+        _check(
+            "table of a liquid, density at 950 bar between its rows [kg/m^3]",
+            860.0 * (middle / 1.6e9) ** (1.0 / m), float(liquid.density(at)), 1e-4, law,
+            reason=curve,
+        ),
+        _check(
+            "table of a liquid, bulk modulus at 950 bar between its rows [Pa]", middle,
+            float(liquid.bulk_modulus(at)), 1e-2, law, reason=curve,
+        ),
+        _check(
+            "table of a liquid, ln of its densities from 1 to 2000 bar [-]", area, strain, 1e-10,
+            "int dp/K by quadrature",
+        ),
+        _check(
+            "table of a liquid, viscosity at 950 bar [Pa s]", 0.04 * exp(18e-9 * (at - ATMOSPHERE)),
+            float(liquid.viscosity(at)), 1e-12, "Barus 1893",
+        ),
+        _check(
+            "table of a liquid, c^2 rho/K at 950 bar [-]", 1.0,
+            float(liquid.sound_speed(at) ** 2 * liquid.density(at) / liquid.bulk_modulus(at)),
+            1e-14, "Newton and Laplace, c^2 = K/rho",
         ),
     ]  # fmt: skip
