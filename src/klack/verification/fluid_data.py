@@ -28,7 +28,7 @@ _BETWEEN = "cubic splines between the columns of the library, 20 K apart"
 
 def checks() -> list[Check]:
     """Water over temperature, alkanes over temperature, and viscosity under pressure."""
-    return [*_water(), *_alkanes(), *_laws(), *_gap(), *_file()]
+    return [*_water(), *_alkanes(), *_laws(), *_gap(), *_file(), *_grades()]
 
 
 def _water() -> list[Check]:
@@ -204,5 +204,23 @@ def _file() -> list[Check]:
             "table of a liquid, c^2 rho/K at 950 bar [-]", 1.0,
             float(liquid.sound_speed(at) ** 2 * liquid.density(at) / liquid.bulk_modulus(at)),
             1e-14, "Newton and Laplace, c^2 = K/rho",
+        ),
+    ]  # fmt: skip
+
+
+def _grades() -> list[Check]:
+    """Oils and fuels of the library at the values that their standards state."""
+    glycol, atf = library_fluid("water-glycol").at(313.15), library_fluid("ATF").at(373.15)
+    petrol = library_fluid("petrol").at(310.95)
+    nu = [float(f.viscosity(ATMOSPHERE) / f.liquid.density(ATMOSPHERE)) for f in (glycol, atf)]
+    return [
+        _check(
+            "water-glycol, kinematic viscosity at 40 degC [m^2/s]", 46e-6, nu[0], 0.1,
+            "ISO 3448, VG 46", reason="the band of the grade is 10 %",
+        ),
+        _check("ATF, kinematic viscosity at 100 degC [m^2/s]", 6.0e-6, nu[1], 2e-3, "DEXRON-VI"),
+        _check(
+            "petrol, vapour pressure at 37.8 degC [Pa]", 52.5e3, petrol.vapour_pressure,
+            7.5 / 52.5, "EN 228, class A, 45 to 60 kPa", reason="the band of the standard",
         ),
     ]  # fmt: skip
