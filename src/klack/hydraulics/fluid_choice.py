@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, model_validator
 
 from klack.errors import InputError
+from klack.hydraulics.coolprop_fluid import coolprop_fluid, is_coolprop_name
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
 from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
@@ -83,7 +84,10 @@ class FluidChoice(NamedSection):
     {name: n-heptane}``.
     """
 
-    name: Text = Field(description="Name in the library, or of your own fluid.")
+    name: Text = Field(
+        description="Name in the library, of your own fluid, or CoolProp:FLUID with the extra "
+        "coolprop."
+    )
     density: Density | None = Field(
         examples=["750 kg/m^3"], default=None, gt=0, description="At one atmosphere."
     )
@@ -161,12 +165,13 @@ class FluidChoice(NamedSection):
             )
         if not any(getattr(self, name) is not None for name in _NUMBERS):
             return self._in_library()
-        if find_fluid(self.name) is not None:
+        if find_fluid(self.name) is not None or is_coolprop_name(self.name):
+            own = "my-" + self.name.replace(" ", "-").replace(":", "-")
             raise CaseProblem(
                 ("name",),
-                got=f"'{self.name}' of the library together with your own values",
+                got=f"'{self.name}' together with your own values",
                 expected="a name alone, or your own values under another name",
-                hint=f"remove the values, or call it e.g. my-{self.name.replace(' ', '-')}.",
+                hint=f"remove the values, or call it e.g. {own}.",
             )
         if isinstance(self.table, Path):
             others = tuple(name for name in _NUMBERS if name != "table")
@@ -183,6 +188,14 @@ class FluidChoice(NamedSection):
         return self
 
     def _in_library(self) -> Self:
+        if is_coolprop_name(self.name):
+            try:
+                coolprop_fluid(self.name)
+            except InputError as error:
+                raise CaseProblem(
+                    ("name",), got=error.got, expected=error.expected, hint=error.hint
+                ) from None
+            return self
         if find_fluid(self.name) is None:
             hint = "for your own fluid add density, viscosity and bulk_modulus."
             raise CaseProblem(
@@ -197,6 +210,8 @@ class FluidChoice(NamedSection):
         """Return the fluid over temperature, without gas."""
         if isinstance(self.table, Path):
             return self._file().definition(self.name)
+        if is_coolprop_name(self.name):
+            return coolprop_fluid(self.name)
         found = find_fluid(self.name)
         return library_fluid(self.name) if found is not None else self._own()
 
