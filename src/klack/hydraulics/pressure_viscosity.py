@@ -78,7 +78,7 @@ class PressureViscosity:
         if not log(viscosity) + _UNIT > 0.1:
             raise InputError(
                 "PressureViscosity.roelands: viscosity",
-                got=f"{viscosity:g} Pa s",
+                got=f"viscosity_law roelands with {viscosity:g} Pa s",
                 expected="more than 0.07 mPa s, where the lines of Roelands meet",
                 hint="check the unit, or take viscosity_law: barus.",
             )
@@ -87,8 +87,8 @@ class PressureViscosity:
         if power > 1.0:
             raise InputError(
                 "PressureViscosity.roelands: coefficient",
-                got=f"{1e9 * coefficient:.3g} per GPa with {1e3 * viscosity:.3g} mPa s, an "
-                f"exponent Z of {power:.3g}",
+                got=f"viscosity_law roelands with {1e9 * coefficient:.3g} per GPa and "
+                f"{1e3 * viscosity:.3g} mPa s, an exponent Z of {power:.3g}",
                 expected="an exponent Z of at most 1, as of the oils that Roelands measured",
                 hint="take viscosity_law: barus; thin and hot fuels are outside this law.",
             )
