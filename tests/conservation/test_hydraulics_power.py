@@ -6,6 +6,7 @@ import pytest
 from klack.hydraulics.annulus import Annulus
 from klack.hydraulics.check_valve import CheckValve
 from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.inertance import Inertance
@@ -25,6 +26,8 @@ AMBIENT = Ambient()
 FLUIDS = {
     "liquid": library_fluid("n-heptane").at(293.15),
     "with gas": library_fluid("n-heptane").at(293.15, gas_fraction=2e-3),
+    "with Barus": FluidChoice(name="ISO VG 46", viscosity_law="barus").at(313.15),
+    "with Roelands": FluidChoice(name="ISO VG 46", viscosity_law="roelands").at(313.15),
 }
 PARTS = {
     "orifice": Orifice(diameter=0.4e-3),

@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from klack.errors import AccuracyWarning
 from klack.hydraulics.accumulator import Accumulator
 from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_store import gas_store
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.opening import opening_flow
 from klack.hydraulics.orifice import Orifice, orifice_step
+from klack.hydraulics.pipe_friction import PipeFriction
 from klack.hydraulics.pulsating_flow import PulsatingFlow
 from klack.hydraulics.pump import Pump, swept_share
 from klack.hydraulics.relief_valve import ReliefValve
@@ -62,6 +65,13 @@ def slopes_by_differences(row, p_a, p_b, state=None, change=10.0, **numbers):
         down = step(row, p_a - da, p_b - db, state=state, **numbers)[0]
         by.append((up - down) / (2 * change))
     return by
+
+
+def test_parts_without_a_viscosity_law_say_so():
+    oil = FluidChoice(name="ISO VG 46", viscosity_law="barus").at(313.15)
+    rows = Rows(ambient=AMBIENT, fluid=oil, component="pipe", handles=HANDLES)
+    with pytest.warns(AccuracyWarning, match="pipe: its laminar flow has the viscosity at one"):
+        PipeFriction(diameter=3e-3, length=1.0).add_rows(rows)
 
 
 # ---- openings -------------------------------------------------------------------------------

@@ -164,7 +164,7 @@ def test_a_definition_can_be_written_in_python():
 
 def test_the_fluids_of_the_documentation_can_be_read():
     page = (Path(__file__).parents[2] / "docs" / "theory" / "fluids.md").read_text()
-    block = page.split("```yaml\n")[1].split("```")[0]
+    block = page.split("## The library")[1].split("```yaml\n")[1].split("```")[0]
     texts = ["fluid:" + part for part in block.split("fluid:")[1:]]
     fluids = [read(YAML(typ="safe").load(text)["fluid"]).at(293.15) for text in texts]
     assert [fluid.name for fluid in fluids] == ["n-heptane", "ISO 4113", "ours", "ours"]

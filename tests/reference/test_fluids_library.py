@@ -94,6 +94,9 @@ def test_generic_oil_is_the_published_one():
         ("diesel", 40, 2.0, 4.5),  # EN 590
         ("DOT 4", 100, 1.5, np.inf),  # FMVSS 116
         ("DOT 4", -40, 0.0, 1800.0),
+        ("water-glycol", 40, 41.4, 50.6),  # ISO 3448
+        ("ATF", 100, 5.5, 6.4),  # DEXRON-VI: 6.4 at most, fresh
+        ("ATF", -40, 0.0, 15000.0 / 0.889),  # DEXRON-VI: 15 Pa s at most
     ],
 )
 def test_oils_lie_in_the_band_of_their_standard(name, celsius, low, high):
@@ -104,12 +107,22 @@ def test_oils_lie_in_the_band_of_their_standard(name, celsius, low, high):
 def test_densities_lie_in_the_band_of_their_standard():
     assert 820.0 <= library_fluid("ISO 4113").at(288.15).density(ATMOSPHERE) <= 830.0
     assert 820.0 <= library_fluid("diesel").at(288.15).density(ATMOSPHERE) <= 845.0
+    assert 720.0 <= library_fluid("petrol").at(288.15).density(ATMOSPHERE) <= 775.0  # EN 228
 
 
 def test_every_constant_has_a_source_and_a_flag():
-    assert len(FLUIDS) == 10
+    assert len(FLUIDS) == 13
     for fluid in FLUIDS.values():
         assert len(fluid.constants) >= 7
         assert all(len(c.source) > 10 and c.label and c.unit for c in fluid.constants)
     verified = {name for name, fluid in FLUIDS.items() if fluid.verified}
     assert verified == {"n-heptane", "n-decane", "n-dodecane", "water"}
+
+
+def test_volatile_fluids_boil_later_when_cold():
+    """EN 228, class A: 45 to 60 kPa at 37.8 degC; water: IAPWS-95, 2339.3 and 12352 Pa."""
+    assert 45e3 <= library_fluid("petrol").at(310.95).vapour_pressure <= 60e3
+    mixture = library_fluid("water-glycol")
+    ratio = mixture.at(323.15).vapour_pressure / mixture.at(293.15).vapour_pressure
+    assert ratio == pytest.approx(12352.0 / 2339.3, rel=1e-2)  # one heat of vaporisation
+    assert library_fluid("diesel").at(353.15).vapour_pressure == 50.0  # held

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from klack.hydraulics.fluid_store import GAS, fluid_store_step, gas_store
 from klack.hydraulics.fluid_table import fluid_table
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.orifice import NOT_CHOKED
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
@@ -67,7 +67,7 @@ class Accumulator(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that stores energy."""
-        fluid, viscosity = ambient_viscosity(rows)
+        fluid, viscosity = fixed_viscosity(rows)
         table = fluid_table(fluid, rows.ambient.pressure)
         inlet = (0.0, 0.0)
         if self.inlet_diameter is not None:

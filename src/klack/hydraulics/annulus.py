@@ -6,7 +6,8 @@ from typing import Any, ClassVar
 
 from pydantic import Field
 
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
+from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.network.component import Component
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Rows
@@ -47,6 +48,28 @@ def annulus_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     return 0
 
 
+@step_function
+def annulus_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`annulus_step` with ``par`` behind it: the two numbers of the viscosity law."""
+    h, p_a, p_b = inp[1], inp[2], inp[3]
+    rho_a, rho_b = inp[4], inp[5]
+    needle = body = 0.0
+    if h > 0.0:
+        needle = (inp[7] - inp[6]) / h
+        body = (inp[9] - inp[8]) / h
+    ratio, by_a, by_b = mean_viscosity_ratio(p_a, p_b, par[3], par[4])
+    density = rho_a if p_a >= p_b else rho_b
+    carried = par[1] * (needle + body)
+    slope = density * par[0] / ratio
+    flow = slope * (p_a - p_b)
+    out[0] = flow + (rho_a if carried >= 0.0 else rho_b) * carried
+    out[1], out[2] = slope - flow * by_a / ratio, -slope - flow * by_b / ratio
+    drag = par[2] * ratio * (needle - body)
+    push = par[1] * (p_a - p_b)
+    out[3], out[4] = push - drag, push + drag
+    return 0
+
+
 class Annulus(Component):
     r"""Narrow annular gap between a needle and its guide: leakage flow and viscous drag.
 
@@ -63,6 +86,9 @@ class Annulus(Component):
     Port a is the lower end: positive flow runs along +z.  A body that is not joined rests.  Face
     areas beside the gap: that of the needle is ``pi/4 d^2``, the strip ``pi d c`` belongs to this
     component.
+
+    With ``viscosity_law`` of the fluid, ``mu`` is the mean that acts between both pressures, exact
+    for flow and drag (:mod:`~klack.hydraulics.pressure_viscosity`).
 
     Limits: laminar, fully developed, ``c << d``, parallel axes; no side force.
     Sources: Blackburn, Reethof & Shearer 1960, ch. 4; Merritt 1967, sec. 3-3.
@@ -96,8 +122,9 @@ class Annulus(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
         _, viscosity = ambient_viscosity(rows)
+        law = viscosity_law(rows)
         rows.branch(
-            annulus_step,
+            annulus_step if law is None else annulus_under_pressure_step,
             a=rows.port("a"),
             b=rows.port("b"),
             ports=(rows.port("needle"), rows.port("body")),
@@ -105,5 +132,6 @@ class Annulus(Component):
                 self.conductance(viscosity),
                 0.5 * pi * self.diameter * self.clearance,
                 self.drag(viscosity),
+                *(law.numbers if law is not None else ()),
             ),
         )

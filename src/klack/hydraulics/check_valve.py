@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow, ramp
 from klack.input.problem import CaseProblem
 from klack.network.port import FLOW, Port
@@ -96,7 +96,7 @@ class CheckValve(OpeningComponent):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
-        fluid, viscosity = ambient_viscosity(rows)
+        fluid, viscosity = fixed_viscosity(rows)
         rows.branch(
             check_valve_step,
             a=rows.port("a"),

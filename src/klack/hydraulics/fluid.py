@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError, require_nonnegative, require_positive
 from klack.hydraulics.liquid import ATMOSPHERE, LiquidLaw, PressureRange, barus_viscosity
 from klack.hydraulics.mixture import LOWEST_PRESSURE, EntrainedGas, Vapour
+from klack.hydraulics.pressure_viscosity import PressureViscosity
 
 __all__ = ["Fluid"]
 
@@ -43,6 +44,9 @@ class Fluid:
     vapour : Vapour
     known_range : PressureRange, optional
         Where more is known of it than what the liquid's law says of itself.
+    viscosity_law : PressureViscosity, optional
+        With one, orifices, seats, annuli and channels follow the viscosity over pressure, as do
+        lines and films; without, the former keep that at ambient pressure.
 
     Examples
     --------
@@ -60,6 +64,7 @@ class Fluid:
     gas: EntrainedGas = field(default_factory=EntrainedGas)
     pressure_viscosity: float = 0.0
     known_range: PressureRange | None = None
+    viscosity_law: PressureViscosity | None = None
 
     def __post_init__(self) -> None:
         require_positive("Fluid.temperature", self.temperature, "K")
@@ -112,6 +117,8 @@ class Fluid:
 
     def viscosity(self, pressure: ArrayLike) -> Values:
         """Dynamic viscosity [Pa s] of the liquid at the absolute pressure [Pa]."""
+        if self.viscosity_law is not None:
+            return self.base_viscosity * self.viscosity_law.ratio(pressure)
         return barus_viscosity(self.base_viscosity, self.pressure_viscosity, pressure, ATMOSPHERE)
 
     def specific_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:

@@ -1,15 +1,21 @@
 """The fluid of a case file: a name of the library, a few numbers, or a table."""
 
+from dataclasses import replace
 from math import inf
-from typing import Self
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationInfo, model_validator
 
 from klack.errors import InputError
+from klack.hydraulics.coolprop_fluid import coolprop_fluid, is_coolprop_name
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties, FluidDefinition
 from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
+from klack.hydraulics.pressure_viscosity import PressureViscosity
+from klack.hydraulics.property_table import PropertyTable, read_property_table
+from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import NamedSection, Section, Text
 from klack.units import (
@@ -59,19 +65,37 @@ class DensityTable(Section):
         return TabulatedLiquid(self.pressure, self.density)
 
 
+def _table(value: Any, info: ValidationInfo) -> Any:
+    """Return a curve of densities, or the path of a file of properties."""
+    if isinstance(value, str | Path):
+        return TypeAdapter(InputPath).validate_python(value, context=info.context)
+    if value is None or isinstance(value, DensityTable):
+        return value
+    return DensityTable.model_validate(value, context=info.context)
+
+
 class FluidChoice(NamedSection):
     """The fluid of a network: a name of the library alone, or a fluid of your own.
 
     Your own needs ``viscosity`` or ``kinematic_viscosity``, and either ``density`` with
     ``bulk_modulus`` or ``sound_speed``, or a ``table``; these numbers hold at the temperature of
-    the run and one atmosphere.  ``fluid: n-heptane`` is short for ``fluid: {name: n-heptane}``.
+    the run and one atmosphere.  A file of properties over temperature and pressure, ``fluid:
+    {table: my_fluid.csv}``, has all of these numbers.  ``fluid: n-heptane`` is short for ``fluid:
+    {name: n-heptane}``.
     """
 
-    name: Text = Field(description="Name in the library, or of your own fluid.")
+    name: Text = Field(
+        description="Name in the library, of your own fluid, or CoolProp:FLUID with the extra "
+        "coolprop."
+    )
     density: Density | None = Field(
         examples=["750 kg/m^3"], default=None, gt=0, description="At one atmosphere."
     )
-    table: DensityTable | None = Field(default=None, description="Instead of density: a curve.")
+    table: Annotated[DensityTable | Path | None, BeforeValidator(_table)] = Field(
+        default=None,
+        description="Instead of density: a curve; or a file with all properties over temperature "
+        "and pressure, relative to the folder of the case.",
+    )
     bulk_modulus: Modulus | None = Field(
         examples=["1.5 GPa"],
         default=None,
@@ -92,6 +116,11 @@ class FluidChoice(NamedSection):
         default=None,
         gt=0,
         description="Pressure over which the viscosity grows by e = 2.72; fuels 1000 bar.",
+    )
+    viscosity_law: Literal["ambient", "barus", "roelands"] = Field(
+        default="ambient",
+        description="Viscosity over pressure in orifices, seats, annuli and channels: that at "
+        "ambient pressure, or a law, which lines and films then follow too.",
     )
     vapour_pressure: Pressure | None = Field(
         examples=["5 kPa"],
@@ -136,13 +165,19 @@ class FluidChoice(NamedSection):
             )
         if not any(getattr(self, name) is not None for name in _NUMBERS):
             return self._in_library()
-        if find_fluid(self.name) is not None:
+        if find_fluid(self.name) is not None or is_coolprop_name(self.name):
+            own = "my-" + self.name.replace(" ", "-").replace(":", "-")
             raise CaseProblem(
                 ("name",),
-                got=f"'{self.name}' of the library together with your own values",
+                got=f"'{self.name}' together with your own values",
                 expected="a name alone, or your own values under another name",
-                hint=f"remove the values, or call it e.g. my-{self.name.replace(' ', '-')}.",
+                hint=f"remove the values, or call it e.g. {own}.",
             )
+        if isinstance(self.table, Path):
+            others = tuple(name for name in _NUMBERS if name != "table")
+            self._refuse_with(others, "a file of properties", "the file has them")
+            self._file()
+            return self
         self._exactly_one(("density", "table"), "the density")
         self._exactly_one(("viscosity", "kinematic_viscosity"), "the viscosity")
         if self.table is not None:
@@ -153,6 +188,14 @@ class FluidChoice(NamedSection):
         return self
 
     def _in_library(self) -> Self:
+        if is_coolprop_name(self.name):
+            try:
+                coolprop_fluid(self.name)
+            except InputError as error:
+                raise CaseProblem(
+                    ("name",), got=error.got, expected=error.expected, hint=error.hint
+                ) from None
+            return self
         if find_fluid(self.name) is None:
             hint = "for your own fluid add density, viscosity and bulk_modulus."
             raise CaseProblem(
@@ -165,12 +208,38 @@ class FluidChoice(NamedSection):
 
     def definition(self) -> FluidDefinition:
         """Return the fluid over temperature, without gas."""
+        if isinstance(self.table, Path):
+            return self._file().definition(self.name)
+        if is_coolprop_name(self.name):
+            return coolprop_fluid(self.name)
         found = find_fluid(self.name)
         return library_fluid(self.name) if found is not None else self._own()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _named_by_its_file(cls, value: Any) -> Any:
+        """A file of properties alone names the fluid."""
+        if isinstance(value, dict) and "name" not in value:
+            file = value.get("table")
+            if isinstance(file, str | Path) and str(file).strip():
+                return {"name": Path(file).stem, **value}
+        return value
+
+    def _file(self) -> PropertyTable:
+        assert isinstance(self.table, Path)
+        try:
+            return read_property_table(self.table)
+        except InputError as error:
+            raise CaseProblem(
+                ("table",),
+                got=f"{error.where}: {error.got}",
+                expected=error.expected,
+                hint=error.hint,
+            ) from None
+
     def at(self, temperature: float) -> Fluid:
         """Fluid with its gas at a temperature [K]."""
-        return self.definition().at(
+        fluid = self.definition().at(
             temperature,
             gas_fraction=self.gas_fraction,
             gas_exponent=self.gas_exponent,
@@ -178,8 +247,27 @@ class FluidChoice(NamedSection):
             saturation_pressure=self.saturation_pressure,
             boiling_half_width=self.boiling_half_width,
         )
+        law = self._law(fluid)
+        return fluid if law is None else replace(fluid, viscosity_law=law)
+
+    def _law(self, fluid: Fluid) -> PressureViscosity | None:
+        """Return the law of the viscosity over pressure that was chosen."""
+        if self.viscosity_law == "ambient":
+            return None
+        if fluid.pressure_viscosity == 0.0:
+            raise InputError(
+                f"fluid '{self.name}': viscosity_law",
+                got=f"{self.viscosity_law} for a fluid without a pressure-viscosity coefficient",
+                expected="a coefficient",
+                hint="give a fluid of your own viscosity_pressure, e.g. 500 bar for oil, or "
+                "leave viscosity_law out.",
+            )
+        if self.viscosity_law == "barus":
+            return PressureViscosity.barus(fluid.pressure_viscosity)
+        return PressureViscosity.roelands(fluid.base_viscosity, fluid.pressure_viscosity)
 
     def _own(self) -> FluidDefinition:
+        assert not isinstance(self.table, Path)
         liquid = self.table.liquid() if self.table is not None else self._murnaghan()
         viscosity = self.viscosity
         if viscosity is None:

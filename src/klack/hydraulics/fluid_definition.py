@@ -141,8 +141,10 @@ class MineralOil:
     walther_a, walther_b : float [-]
     pressure_viscosity : float [1/Pa]
     vapour_pressure : float [Pa]
-        Held over temperature.
+        Held over temperature, unless it has ``boiling``: then that at 20 degC.
     molar_mass : float [kg/mol]
+    boiling : float [K]
+        Heat of vaporisation over the gas constant, ``p_v ~ exp(-boiling/T)``; 0 holds it.
     """
 
     density: float
@@ -155,12 +157,15 @@ class MineralOil:
     pressure_viscosity: float
     vapour_pressure: float
     molar_mass: float
+    boiling: float = 0.0
 
     def at(self, temperature: float) -> FluidState:
         """Properties at a temperature [K]."""
         T = temperature
         rho = self.density * (1.0 - self.expansion * (T - _FIFTEEN))
         K = self.bulk_modulus * float(np.exp(-self.softening * (T - _REFERENCE_TEMPERATURE)))
+        steps = self.boiling * (1.0 / _REFERENCE_TEMPERATURE - 1.0 / T)
+        boiling = self.vapour_pressure * float(np.exp(steps))
         return FluidState(
             liquid=Murnaghan(
                 density_at_reference=rho,
@@ -169,8 +174,8 @@ class MineralOil:
             ),
             viscosity=rho * float(walther_viscosity(T, self.walther_a, self.walther_b)),
             pressure_viscosity=self.pressure_viscosity,
-            vapour_pressure=self.vapour_pressure,
-            vapour_density=_vapour_density(self.vapour_pressure, T, self.molar_mass),
+            vapour_pressure=boiling,
+            vapour_density=_vapour_density(boiling, T, self.molar_mass),
         )
 
 

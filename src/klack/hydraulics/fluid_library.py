@@ -29,6 +29,7 @@ _BARUS = "above it the viscosity of Barus is too steep"
 _FITTED = "Walther line through the two viscosities of the grade"
 
 _FUEL_PRESSURES = PressureRange(highest=2000e5, source=_LIKE_ALKANES)
+_PETROL_PRESSURES = PressureRange(highest=500e5, source="n-heptane, along isentropes")
 _OIL_PRESSURES = PressureRange(highest=1000e5, source=_BARUS)
 
 # column of MeasuredProperties: label, unit
@@ -53,6 +54,12 @@ _OIL = {
     "pressure_viscosity": ("slope of ln viscosity over pressure", "1/Pa"),
     "vapour_pressure": ("vapour pressure", "Pa"),
     "molar_mass": ("mean molar mass", "kg/mol"),
+}
+
+_VOLATILE = {
+    **_OIL,
+    "vapour_pressure": ("vapour pressure at 20 degC", "Pa"),
+    "boiling": ("heat of vaporisation over the gas constant", "K"),
 }
 
 _TAIT = {
@@ -287,6 +294,65 @@ DOT_4 = _from_constants(
     molar_mass=(0.22, _GUIDE, False),
 )
 
+PETROL = _from_constants(
+    "petrol",
+    MineralOil,
+    _VOLATILE,
+    253.15,
+    323.15,
+    _PETROL_PRESSURES,
+    density=(745.0, "within the band of EN 228, 720 to 775 kg/m^3", False),
+    expansion=(1.2e-3, f"{_GUIDE}; 1.1e-3 to 1.3e-3", False),
+    bulk_modulus=(1.05e9, f"{_GUIDE}, uncertain by 10 %; n-heptane 0.91, aromatics 1.5 GPa", False),
+    bulk_modulus_slope=(11.9, "n-heptane, taken over", False),
+    softening=(0.0087, "n-heptane from 20 to 40 degC, taken over", False),
+    walther_a=(8.0829, f"{_FITTED}: 0.62 mm^2/s at 20, 0.43 at 60 degC, +- 15 %", False),
+    walther_b=(3.6224, f"{_FITTED}: 0.62 mm^2/s at 20, 0.43 at 60 degC, +- 15 %", False),
+    pressure_viscosity=(9.6e-9, "n-heptane, taken over", False),
+    vapour_pressure=(29e3, f"{_GUIDE}: 55 kPa at 37.8 degC (EN 228 class A 45 to 60 kPa)", False),
+    molar_mass=(0.068, f"{_GUIDE}: of its vapour, 0.062 to 0.072 kg/mol", False),
+    boiling=(3300.0, f"{_GUIDE}: 27 kJ/mol, +- 10 %", False),
+)
+
+ATF = _from_constants(
+    "ATF",
+    MineralOil,
+    _OIL,
+    233.15,
+    413.15,
+    _OIL_PRESSURES,
+    density=(848.0, f"{_GUIDE}; 830 to 870 kg/m^3", False),
+    expansion=(7.5e-4, f"{_GUIDE}; 7e-4 to 8e-4", False),
+    bulk_modulus=(1.55e9, f"{_GUIDE}, uncertain by 10 %", False),
+    bulk_modulus_slope=(10.9, f"{_GENERIC_OIL}, taken over for a lighter grade", False),
+    softening=(0.0058, f"{_GENERIC_OIL}, taken over for a lighter grade", False),
+    walther_a=(8.4722, f"{_FITTED}: 29.5 mm^2/s at 40, 6.0 at 100 degC, of DEXRON-VI", False),
+    walther_b=(3.3264, f"{_FITTED}: 29.5 mm^2/s at 40, 6.0 at 100 degC, of DEXRON-VI", False),
+    pressure_viscosity=(1.6e-8, f"{_GUIDE}; 1.4e-8 to 2e-8", False),
+    vapour_pressure=(1.0, f"{_GUIDE}: practically none", False),
+    molar_mass=(0.4, _GUIDE, False),
+)
+
+WATER_GLYCOL = _from_constants(
+    "water-glycol",
+    MineralOil,
+    _VOLATILE,
+    253.15,
+    338.15,
+    _OIL_PRESSURES,
+    density=(1085.0, f"{_GUIDE}, class HFC of ISO 6743-4; 1040 to 1090 kg/m^3", False),
+    expansion=(6.5e-4, f"{_GUIDE}; 6e-4 to 7e-4", False),
+    bulk_modulus=(3.1e9, f"{_GUIDE}, uncertain by 15 %", False),
+    bulk_modulus_slope=(7.0, f"{_GUIDE}: between water (6) and oils (11)", False),
+    softening=(0.002, f"{_GUIDE}; 0 to 0.004", False),
+    walther_a=(6.5589, f"{_FITTED}: 46 mm^2/s at 40 (ISO 3448), 26 at 60 degC, +- 20 %", False),
+    walther_b=(2.5389, f"{_FITTED}: 46 mm^2/s at 40 (ISO 3448), 26 at 60 degC, +- 20 %", False),
+    pressure_viscosity=(4e-9, f"{_GUIDE}; 2e-9 to 6e-9", False),
+    vapour_pressure=(1.9e3, f"{_GUIDE}: 0.8 of that of water, +- 15 %", False),
+    molar_mass=(0.018, "of its vapour: water", False),
+    boiling=(5280.0, "water from 20 to 50 degC, IAPWS-95", False),
+)
+
 FLUIDS: Mapping[str, FluidDefinition] = {
     fluid.name: fluid
     for fluid in (
@@ -300,6 +366,9 @@ FLUIDS: Mapping[str, FluidDefinition] = {
         VG_46,
         GENERIC_OIL,
         DOT_4,
+        PETROL,
+        ATF,
+        WATER_GLYCOL,
     )
 }
 """All library fluids by name."""

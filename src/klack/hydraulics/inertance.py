@@ -8,7 +8,8 @@ from numba import carray
 from pydantic import Field, model_validator
 
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
+from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
 from klack.network.rows import Book, Channel, Rows
@@ -27,6 +28,26 @@ def inertance_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     size, inertia, friction = int(par[0]), par[1], par[2]
     h, before = inp[1], state[0]
     table = carray(par, (size,))[3:]
+    _, _, g_a, hint_a = fluid_at(table, inp[2], int(state[1]))
+    _, _, g_b, hint_b = fluid_at(table, inp[3], int(state[2]))
+    gain = 0.5 * h / (inertia + 0.5 * h * friction)
+    rise = gain * (g_a - g_b - friction * before)
+    mean = before + rise
+    after = mean + rise
+    out[0], out[1], out[2] = mean, gain / inp[4], -gain / inp[5]
+    out[3], out[4], out[5] = after, hint_a, hint_b
+    out[6] = 0.5 * inertia * after * after
+    return 0
+
+
+@step_function
+def inertance_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`inertance_step`, ``par`` with the viscosity law in front of the table."""
+    size, inertia = int(par[0]), par[1]
+    ratio, _, _ = mean_viscosity_ratio(inp[2], inp[3], par[3], par[4])
+    friction = par[2] * ratio
+    h, before = inp[1], state[0]
+    table = carray(par, (size,))[5:]
     _, _, g_a, hint_a = fluid_at(table, inp[2], int(state[1]))
     _, _, g_b, hint_b = fluid_at(table, inp[3], int(state[2]))
     gain = 0.5 * h / (inertia + 0.5 * h * friction)
@@ -93,11 +114,13 @@ class Inertance(Component):
         density = float(fluid.density(rows.ambient.pressure))
         table = fluid_table(fluid, rows.ambient.pressure)
         friction = self.resistance(viscosity) / density**2
+        law = viscosity_law(rows)
+        numbers = [self.inertia(density), friction, *(law.numbers if law is not None else ())]
         rows.branch(
-            inertance_step,
+            inertance_step if law is None else inertance_under_pressure_step,
             a=rows.port("a"),
             b=rows.port("b"),
-            parameters=[len(table) + 3, self.inertia(density), friction, *table],
+            parameters=[len(table) + len(numbers) + 1, *numbers, *table],
             state=(0.0, 0.0, 0.0),
             books=(Book("kinetic", "store"),),
             channels=(Channel("mass flow", "kg/s", 0),),

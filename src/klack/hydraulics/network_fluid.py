@@ -1,10 +1,14 @@
 """Fluid of a network for restrictions at set-up."""
 
-from klack.errors import InputError
+import warnings
+
+from klack.errors import AccuracyWarning, InputError
+from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.pressure_viscosity import PressureViscosity
 from klack.network.protocols import NetworkFluid
 from klack.network.rows import Rows
 
-__all__ = ["ambient_viscosity", "network_fluid"]
+__all__ = ["ambient_viscosity", "fixed_viscosity", "network_fluid", "viscosity_law"]
 
 
 def network_fluid(rows: Rows) -> NetworkFluid:
@@ -22,8 +26,29 @@ def network_fluid(rows: Rows) -> NetworkFluid:
 def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
     """Fluid and its dynamic viscosity [Pa s] at the ambient pressure.
 
-    Restrictions keep this one: the rise with pressure is 0.1 to 0.2 % per bar in oils and less in
-    fuels, below the accuracy of their flow coefficients.
+    Restrictions keep this one unless the fluid has a :func:`viscosity_law`, and then that at one
+    atmosphere, which the law refers to.  The rise with pressure is 0.1 to 0.2 % per bar in oils and
+    less in fuels: below the accuracy of flow coefficients up to some tens of bar.
     """
     fluid = network_fluid(rows)
+    if isinstance(fluid, Fluid) and fluid.viscosity_law is not None:
+        return fluid, fluid.base_viscosity
     return fluid, float(fluid.viscosity(rows.ambient.pressure))
+
+
+def fixed_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
+    """As :func:`ambient_viscosity`, for a restriction that follows no viscosity law and says so."""
+    if viscosity_law(rows) is not None:
+        warnings.warn(
+            f"{rows.component}: its laminar flow has the viscosity at one atmosphere. The law of "
+            "the fluid for viscosity acts in orifices, seats, annuli, inertances, lines and films.",
+            AccuracyWarning,
+            stacklevel=2,
+        )
+    return ambient_viscosity(rows)
+
+
+def viscosity_law(rows: Rows) -> PressureViscosity | None:
+    """How the viscosity of the fluid rises with pressure in restrictions; None: not at all."""
+    fluid = network_fluid(rows)
+    return fluid.viscosity_law if isinstance(fluid, Fluid) else None

@@ -8,7 +8,8 @@ from pydantic import Field, model_validator
 
 from klack.compiling.constant import with_slope_of
 from klack.compiling.jit import njit
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
+from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.network.component import Component
@@ -17,7 +18,14 @@ from klack.network.rows import Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Ratio
 
-__all__ = ["NOT_CHOKED", "Orifice", "choked_flow", "orifice_flow", "orifice_step"]
+__all__ = [
+    "NOT_CHOKED",
+    "Orifice",
+    "choked_flow",
+    "orifice_flow",
+    "orifice_flow_under_pressure",
+    "orifice_step",
+]
 
 NOT_CHOKED = 0.0
 """Contraction that switches the cavitation limit off."""
@@ -146,6 +154,49 @@ def orifice_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     return 0
 
 
+@njit(error_model="numpy")
+def orifice_flow_under_pressure(
+    p_a: float,
+    p_b: float,
+    rho_a: float,
+    rho_b: float,
+    conductance: float,
+    number: float,
+    throat: float,
+    vapour: float,
+    exponent: float,
+    power: float,
+) -> tuple[float, float, float]:
+    """Flow of :func:`orifice_flow` with the viscosity that acts between both pressures.
+
+    ``number`` is that with the viscosity at one atmosphere; ``exponent`` and ``power`` are those of
+    :class:`~klack.hydraulics.pressure_viscosity.PressureViscosity`.
+    """
+    ratio, by_a, by_b = mean_viscosity_ratio(p_a, p_b, exponent, power)
+    acting = number / ratio
+    flow, up, down = orifice_flow(p_a, p_b, rho_a, rho_b, conductance, acting, throat, vapour)
+    forward = p_a >= p_b
+    density = rho_a if forward else rho_b
+    root = sqrt(2.0 * density * abs(p_a - p_b))
+    t, _ = _tanh(acting * root)
+    if throat <= 0.0 or abs(flow) >= conductance * root * t:  # not choked
+        lost = conductance * root * (1.0 - t * t) * acting * root / ratio
+        if not forward:
+            lost = -lost
+        up -= lost * by_a
+        down -= lost * by_b
+    return flow, up, down
+
+
+@step_function
+def orifice_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`orifice_step` with the two numbers of the viscosity law behind ``par``."""
+    out[0], out[1], out[2] = orifice_flow_under_pressure(
+        inp[2], inp[3], inp[4], inp[5], par[0], par[1], par[2], par[3], par[4], par[5]
+    )
+    return 0
+
+
 class Orifice(Component):
     r"""Short restriction of constant area, laminar at small and turbulent at large flow.
 
@@ -161,7 +212,8 @@ class Orifice(Component):
     Positive flow runs from a to b; density and limit are those before the orifice.
 
     Limits: a thin circular hole has ``lambda_c`` = 53 at rest (Sampson 1891) or 35 (Wuest 1954);
-    1000 stands for a long rough one.  Viscosity is that at ambient pressure.
+    1000 stands for a long rough one.  Viscosity is that at ambient pressure or, with
+    ``viscosity_law`` of the fluid, the mean that acts between both pressures.
     """
 
     type: ClassVar[str] = "orifice"
@@ -221,9 +273,11 @@ class Orifice(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
         fluid, viscosity = ambient_viscosity(rows)
+        law = viscosity_law(rows)
+        parameters = self.parameters(viscosity, fluid.vapour_pressure)
         rows.branch(
-            orifice_step,
+            orifice_step if law is None else orifice_under_pressure_step,
             a=rows.port("a"),
             b=rows.port("b"),
-            parameters=self.parameters(viscosity, fluid.vapour_pressure),
+            parameters=parameters if law is None else (*parameters, *law.numbers),
         )

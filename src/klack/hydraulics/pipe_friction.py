@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import njit
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.input.problem import CaseProblem
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
@@ -137,7 +137,7 @@ class PipeFriction(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
-        _, viscosity = ambient_viscosity(rows)
+        _, viscosity = fixed_viscosity(rows)
         rows.branch(
             pipe_friction_step,
             a=rows.port("a"),

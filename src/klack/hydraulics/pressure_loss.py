@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.seat import gap_flow
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
@@ -74,7 +74,7 @@ class PressureLoss(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
-        _, viscosity = ambient_viscosity(rows)
+        _, viscosity = fixed_viscosity(rows)
         area = self.bore_area
         back = self.coefficient if self.reverse_coefficient is None else self.reverse_coefficient
         rows.branch(

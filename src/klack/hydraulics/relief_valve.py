@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import njit
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
 from klack.input.problem import CaseProblem
 from klack.network.port import FLOW, Port
@@ -151,7 +151,7 @@ class ReliefValve(OpeningComponent):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch; its rated point has to lie below the area when fully open."""
-        fluid, viscosity = ambient_viscosity(rows)
+        fluid, viscosity = fixed_viscosity(rows)
         slope = self.area_slope(float(fluid.density(rows.ambient.pressure)))
         rated = slope * (self.rated_pressure - self.set_pressure) / sqrt(self.rated_pressure)
         if rated > self.open_area:

@@ -8,10 +8,16 @@ from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.flow_force import FlowForce
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.off_axis_opening import off_axis_opening
 from klack.hydraulics.off_axis_seat import SeatFace, SeatShape
-from klack.hydraulics.orifice import NOT_CHOKED, choked_flow, orifice_flow
+from klack.hydraulics.orifice import (
+    NOT_CHOKED,
+    choked_flow,
+    orifice_flow,
+    orifice_flow_under_pressure,
+)
+from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.hydraulics.seat_across import SeatAcross, SeatPlace
 from klack.input.problem import CaseProblem
 from klack.network.across import OffAxisPart
@@ -85,12 +91,21 @@ def _opening(kind: float, x: float, r: float, g1: float, g2: float) -> tuple[flo
 
 @inner(error_model="numpy")
 def gap_pass(
-    par: Any, state: Any, inp: Any, out: Any, x: float, area: float, gap: float, cube: float
+    par: Any,
+    state: Any,
+    inp: Any,
+    out: Any,
+    x: float,
+    area: float,
+    gap: float,
+    cube: float,
+    law: int,
 ) -> None:
     """Flow through an opening at the lift ``x``, and the forces of the flow.
 
-    ``area`` of the mantle, ``gap`` of its edge, ``cube`` that of the land to the third power.
-    ``par`` from 5 on and ``state`` are those of :func:`seat_step`.
+    ``area`` of the mantle, ``gap`` of its edge, ``cube`` that of the land to the third power;
+    ``par`` from 5 on and ``state`` are those of :func:`seat_step`; ``law`` is the place in ``par``
+    of the two numbers of the viscosity law, 0 without one.
     """
     p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
     area = min(area, par[5])
@@ -101,12 +116,20 @@ def gap_pass(
         conductance = par[6] * area
         linear = par[7] / cube + par[8] / (conductance * gap)
         square = 0.5 * density / (conductance * conductance)
-        volume, slope = gap_flow(abs(p_a - p_b), linear, square)
+        more_up = more_down = 1.0
+        if law > 0:
+            p_up, p_down = (p_a, p_b) if forward else (p_b, p_a)
+            ratio, by_up, by_down = mean_viscosity_ratio(p_up, p_down, par[law], par[law + 1])
+            volume, slope = gap_flow(abs(p_a - p_b), ratio * linear, square)
+            more_up = 1.0 - linear * volume * by_up
+            more_down = 1.0 + linear * volume * by_down
+        else:
+            volume, slope = gap_flow(abs(p_a - p_b), linear, square)
         slope *= density
         flow, up, down = choked_flow(
             density * volume,
-            slope,
-            -slope,
+            slope * more_up,
+            -slope * more_down,
             p_a if forward else p_b,
             density,
             par[9] * area,
@@ -123,7 +146,15 @@ def gap_pass(
     out[3], out[4] = push, -push
     out[5], out[6], out[7], out[8], out[9] = x, area, jet, out[0], 1.0
     if par[11] > 0.0:
-        flow, up, down = orifice_flow(p_a, p_b, rho_a, rho_b, par[11], par[12], par[13], par[10])
+        if law > 0:
+            flow, up, down = orifice_flow_under_pressure(
+                p_a, p_b, rho_a, rho_b,
+                par[11], par[12], par[13], par[10], par[law], par[law + 1],
+            )  # fmt: skip
+        else:
+            flow, up, down = orifice_flow(
+                p_a, p_b, rho_a, rho_b, par[11], par[12], par[13], par[10]
+            )
         out[0] += flow
         out[1] += up
         out[2] += down
@@ -140,7 +171,16 @@ def seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """
     x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
     area, gap = _opening(par[0], x, par[1], par[2], par[3])
-    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap)
+    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap, 0)
+    return 0
+
+
+@step_function
+def seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`seat_step` with ``par``: 16-17 the numbers of the viscosity law."""
+    x = max(par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9]), 0.0)
+    area, gap = _opening(par[0], x, par[1], par[2], par[3])
+    gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap, 16)
     return 0
 
 
@@ -155,7 +195,18 @@ def off_axis_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     area, gap, cube = off_axis_opening(
         par[0], par[1], par[16], par[17], x, par[18], par[19], par[20], par[21]
     )
-    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube)
+    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube, 0)
+    return 0
+
+
+@step_function
+def off_axis_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`off_axis_seat_step` with ``par``: 16-17 law, 18-23 what were 16-21."""
+    x = par[4] + 0.5 * (inp[6] + inp[7] - inp[8] - inp[9])
+    area, gap, cube = off_axis_opening(
+        par[0], par[1], par[18], par[19], x, par[20], par[21], par[22], par[23]
+    )
+    gap_pass(par, state, inp, out, max(x, 0.0), area, gap, cube, 16)
     return 0
 
 
@@ -187,6 +238,8 @@ class Seat(Component):
     With a section ``off_axis``, of a needle that moves in three dimensions, area and gap are those
     between edge and face where the needle is (:mod:`~klack.hydraulics.off_axis_seat`), and the
     pressure pushes it across the axis.
+
+    With ``viscosity_law`` of the fluid, ``mu`` is the mean that acts between both pressures.
 
     Limits: concentric without that section, quasi-steady (no inertia of
     the fluid in the gap), both surfaces rigid.
@@ -305,10 +358,13 @@ class Seat(Component):
         """Add one branch that pushes needle and body."""
         fluid, viscosity = ambient_viscosity(rows)
         parameters, step = self.parameters(viscosity, fluid.vapour_pressure), seat_step
+        law = viscosity_law(rows)
+        if law is not None:
+            parameters, step = (*parameters, *law.numbers), seat_under_pressure_step
         if self.off_axis is not None:
             beta = self.surface_angle
             parameters = (*parameters, sin(beta), cos(beta), 0.0, 0.0, 0.0, 0.0)
-            step = off_axis_seat_step
+            step = off_axis_seat_step if law is None else off_axis_seat_under_pressure_step
         rows.branch(
             step,
             a=rows.port("a"),

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from klack.hydraulics.annulus import eccentricity_factor
 from klack.hydraulics.flow_force import FlowForce
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent
 from klack.hydraulics.orifice import NOT_CHOKED
 from klack.hydraulics.seat import gap_pass
@@ -36,7 +36,7 @@ def spool_edge_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     slot = max(x, 0.0)
     gap = sqrt(slot * slot + par[3] * par[3])
     covered = -x if x < 0.0 else 0.0
-    gap_pass(par, state, inp, out, x, par[2] * gap, gap, 1.0 / covered if covered > 0.0 else inf)
+    gap_pass(par, state, inp, out, x, par[2] * gap, gap, 1.0 / covered if covered > 0.0 else inf, 0)
     jet = out[7] * par[0] * slot / gap
     out[3] += jet - out[7]
     out[4] -= jet - out[7]
@@ -129,7 +129,7 @@ class SpoolEdge(OpeningComponent):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes spool and body."""
-        fluid, viscosity = ambient_viscosity(rows)
+        fluid, viscosity = fixed_viscosity(rows)
         rows.branch(
             spool_edge_step,
             a=rows.port("a"),

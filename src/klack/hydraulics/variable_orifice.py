@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner
-from klack.hydraulics.network_fluid import ambient_viscosity
+from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
 from klack.input.problem import CaseProblem
 from klack.network.port import ELEMENT, FLOW, Port, Role
@@ -105,7 +105,7 @@ class VariableOrifice(OpeningComponent):
 
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
-        fluid, viscosity = ambient_viscosity(rows)
+        fluid, viscosity = fixed_viscosity(rows)
         moving = self.lift is not None
         rows.branch(
             area_over_lift_step if moving else area_over_time_step,

@@ -42,6 +42,8 @@ COVERS = {
     "against closed and independent solutions.",
     "fluids": "Density, sound speed and viscosity against reference data; gas, vapour, and "
     "the table of the kernel.",
+    "fluid-data": "Fluids against published values over temperature and pressure, and their "
+    "viscosity under pressure.",
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
     "hydraulic-parts": "Check and relief valves, accumulators, pumps, spool edges, fittings, "
     "walls: formulas, and small networks integrated apart.",
