@@ -99,7 +99,7 @@ def settle(solenoid):
     """Let 4 V act on the coil for 8 ms; its element and the last output."""
     rows = Rows(Ambient())
     rows.component = "coil"
-    rows.handles = {"armature": 0, "base": GROUND}
+    rows.handles = {"armature": 0, "base": GROUND, "terminals": 0}
     rows.partners = {"terminals": (Steady(),)}
     solenoid.add_rows(rows)
     element = rows.elements[0]
