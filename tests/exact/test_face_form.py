@@ -140,6 +140,7 @@ def test_the_gap_counts_to_the_first_touch_of_the_form(tmp_path, key):
     assert placed.case.contact.gap == pytest.approx(expected, abs=5e-9)
 
 
+@pytest.mark.slow
 def test_a_tilted_face_is_a_tilted_body(tmp_path):
     """Gaps of all points after first touch, against the body turned by motion.placement."""
     form = "reach: 5 um\ntilt: 0.001 deg\ntilt_direction: 90 deg"

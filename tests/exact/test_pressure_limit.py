@@ -187,6 +187,7 @@ def test_points_take_what_the_loops_take():
     assert seen > 3
 
 
+@pytest.mark.slow
 def test_running_in_at_the_interface_level():
     """Reference: the law with memory of the same loops; 4 % on ten elements over the contact."""
     text = SPHERES.read_text("utf-8").replace("run: {", "run: {impacts: 3, ")

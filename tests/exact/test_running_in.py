@@ -100,6 +100,7 @@ def test_loops_that_end_below_the_impact_say_how_far_they_go(monkeypatch):
     assert study.running_in is None
 
 
+@pytest.mark.slow
 def test_loops_that_end_above_the_first_impact_answer_it(monkeypatch):
     """Exact: the first two impacts as with whole loops; 1e-3 for tables between other states."""
     whole = run_impact(_case("impacts: 9"), levels=("reduced",), certify=False).running_in
@@ -116,6 +117,7 @@ def test_loops_that_end_above_the_first_impact_answer_it(monkeypatch):
     assert any("where the static loops end" in text for text in study.warnings)
 
 
+@pytest.mark.slow
 def test_a_plastic_strain_beyond_small_strain_is_doubted():
     """Bad input: the same loops with the strain of softer faces."""
     case = _case("impacts: 1")

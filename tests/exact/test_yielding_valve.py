@@ -88,6 +88,7 @@ def test_what_yield_has_left_is_told():
     assert not any("yields before" in text for text in study.warnings)
 
 
+@pytest.mark.slow
 def test_a_continued_stroke_has_faces_that_are_run_in():
     """Exact: the same bits as one stroke."""
     whole = _study(("duration: 400 us", "duration: 384 us")).variants["dry"].result

@@ -23,6 +23,9 @@ LONG = (
     "interface",
     "sound",
     "measurement",
+    "measured",
+    "plasticity",
+    "friction",
     "films",
     "drivers",
 )
