@@ -180,6 +180,42 @@ def test_a_single_point_is_told_without_a_word():
     assert one(record, "seat contact force") == pytest.approx(25.0 * 1e9 / (1e9 + 1e4), rel=1e-12)
 
 
+IRON = (
+    "      iron: [{material: X6Cr17, length: 40 mm, area: 28 mm^2, "
+    "hysteresis: {coercivity: 200 A/m, initial_permeability: 150}}]\n"
+)
+MAGNET_IN_SERIES = (
+    "      magnets: [{polarity: with-coil, remanence: 0.3 T, recoil_permeability: 1.05, "
+    "length: 1 mm, area: 40 mm^2}]\n"
+)
+
+
+def test_iron_with_hysteresis_is_told_to_lie_on_its_mean_curve():
+    plain = IRON[: IRON.index(", hysteresis")] + "}]\n"
+    base = Conditions(current={"coil": 1.0})
+    marked, mean = (
+        points(written(MAGNET.replace("    driver:", f"{iron}    driver:")), base=base)
+        for iron in (IRON, plain)
+    )
+
+    assert one(marked, "coil armature force") == one(mean, "coil armature force")
+    assert mean.warnings == ()
+    assert [text for text in marked.warnings if "'coil' has iron with hysteresis" in text]
+
+
+def test_a_permanent_magnet_pulls_without_a_current():
+    """Magnet and gap in series, 3 mm in radius and 150 um wide, by hand."""
+    tree = written(MAGNET.replace("    driver:", f"{MAGNET_IN_SERIES}    driver:"))
+
+    record = points(tree, base=Conditions(current={"coil": 0.0}))
+
+    gap = 150e-6 - one(record, "needle tip displacement")
+    area = pi * 3e-3**2
+    strength = 0.3 * 1e-3 / (MU0 * 1.05)
+    flux = strength / (1e-3 / (MU0 * 1.05 * 40e-6) + gap / (MU0 * area))
+    assert one(record, "coil armature force") == pytest.approx(flux**2 / (2 * MU0 * area), rel=1e-6)
+
+
 def test_voltage_and_current_are_two_ways_to_say_the_same():
     tree = written(MAGNET)
 

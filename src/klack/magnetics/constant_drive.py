@@ -17,7 +17,14 @@ from klack.network.network import Network
 from klack.network.port import Role
 from klack.units import format_si
 
-__all__ = ["coils_of", "current_left", "driven", "resistance_of", "start_currents"]
+__all__ = [
+    "coils_of",
+    "current_left",
+    "driven",
+    "hysteretic_coils",
+    "resistance_of",
+    "start_currents",
+]
 
 Coil = Solenoid | ForceMapSolenoid
 
@@ -47,6 +54,15 @@ def coils_of(network: Network) -> dict[str, Coil]:
 def resistance_of(coil: Coil) -> float:
     """Resistance [ohm] at the temperature of the winding."""
     return warm_resistance(coil.resistance, coil.winding_temperature)
+
+
+def hysteretic_coils(network: Network) -> list[str]:
+    """Coils whose flux at a constant current depends on what was before."""
+    return [
+        name
+        for name, coil in coils_of(network).items()
+        if isinstance(coil, Solenoid) and any(part.hysteresis is not None for part in coil.iron)
+    ]
 
 
 def start_currents(network: Network) -> dict[str, float]:

@@ -31,7 +31,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
-from klack.magnetics.constant_drive import driven, start_currents
+from klack.magnetics.constant_drive import driven, hysteretic_coils, start_currents
 from klack.network.checks import LooseBodyWarning
 from klack.network.network import Network
 from klack.network.rows import Rows
@@ -209,6 +209,7 @@ def find_point(
     notes += told
     notes += _own_notes(point, rows, held)
     notes += [_other_note(rows, roles, point, other) for other in others]
+    notes += [_loop_note(name) for name in hysteretic_coils(network)]
     return PointFound(
         point=point, network=network, rows=rows, currents=currents, notes=tuple(notes)
     )
@@ -324,6 +325,14 @@ def _other_note(rows: Rows, roles: ValveRoles, point: OperatingPoint, other: Ope
     return (
         f"more than one operating point: '{port}' at {here} here and at {there} from another start"
         f"{stable}. Which one the valve is in depends on what was before (--from)."
+    )
+
+
+def _loop_note(coil: str) -> str:
+    return (
+        f"'{coil}' has iron with hysteresis: the point lies on its mean curve. Coming from a "
+        "larger current, flux and force are larger, from a smaller one smaller; a run with such a "
+        "drive tells by how much."
     )
 
 
