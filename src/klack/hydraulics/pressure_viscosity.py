@@ -6,12 +6,12 @@ Both laws are one formula with three numbers,
 
 with the same slope :math:`\alpha = B Z / c` at one atmosphere :math:`p_0`:
 
-=========  ======================  ========  =====================
-law        ``B``                   ``c``     ``Z``
-=========  ======================  ========  =====================
-Barus      ``alpha c``             196.2 MPa 1
-Roelands   ``ln(mu_0) + 9.67``     196.2 MPa ``alpha c / B``
-=========  ======================  ========  =====================
+=========  ======================  =========  =====================
+law        ``B``                   ``c``      ``Z``
+=========  ======================  =========  =====================
+Barus      ``alpha c``             196.2 MPa  1
+Roelands   ``ln(mu_0) + 9.67``     196.2 MPa  ``alpha c / B``
+=========  ======================  =========  =====================
 
 ``mu_0`` in Pa s.  A laminar gap between two pressures has the flow and the shear of one constant
 viscosity, exactly: the mean :func:`mean_viscosity_ratio`.
