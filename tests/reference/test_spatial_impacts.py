@@ -27,8 +27,8 @@ FILM = (
     ", film: {shape: ring, inner_radius: 1.35 mm, outer_radius: 1.95 mm, cut_off: 1 um, "
     "pressure: 6 bar}}"
 )
-SOLVED = 1e-7  # forces of a step follow known slopes where little is left
-CLIPPED = 5e-3  # single steps in which sectors close in part
+SOLVED = 1e-7  # forces of a step follow slopes where little is left
+CORNER = 1e-3  # the same where sectors take turns in opening: heights fit to 1e-4
 
 
 def case(duration="0.25 ms", variants="[dry, wet]", land="0.2 mm"):
@@ -115,28 +115,27 @@ def test_the_needle_hits_first_on_the_side_that_it_leans_to(study):
 def test_film_sectors_press_as_the_film_did(study):
     found = [item for item in recorded_impacts(study.variants["wet"]) if item[1].stop == "opening"]
     assert found
+    partly = 0  # sectors that are closed across a part of their width
     for _, _, record in found:
         film = record.film
         pressure = sector_pressure(film)
         scale = float(np.abs(film.film_force).max())
         assert scale > 1.0
         difference = np.abs(pressure.axial_force - film.film_force) / scale
-        # gaps at both circles of all sectors: open, or closed, at both ends of the step
+        assert np.quantile(difference, 0.98) < SOLVED
+        assert difference.max() < CORNER
         rows = np.array(
             [
-                [1.0, r * np.cos(a), r * np.sin(a)]
-                for a in pressure.angles
+                [[1.0, r * np.cos(a), r * np.sin(a)] for a in pressure.angles]
                 for r in (film.land.inner_radius, film.land.outer_radius)
             ]
         )
-        gaps = np.concatenate([film.before @ rows.T, film.after @ rows.T], axis=1)
-        plain = np.all(gaps > 0.0, axis=1) | np.all(gaps <= 0.0, axis=1)
-        assert np.count_nonzero(plain) > 50
-        assert difference[plain].max() < SOLVED
-        assert difference.max() < CLIPPED
+        inner, outer = (film.after @ row.T > 0.0 for row in rows)
+        partly += np.count_nonzero(inner != outer)
         assert pressure.pressure.min() >= -film.land.tension * (1.0 + 1e-8)
         assert np.any(pressure.cavitates)
         assert film.time[0] < record.begin < film.time[-1]
+    assert partly
 
 
 def test_a_film_tilts_as_the_needle_does_also_over_the_edge_of_a_face():

@@ -4,16 +4,14 @@ A step that begins with lift and tilts :math:`u_0` and ends with :math:`u_1` has
 
 .. math:: h = \max(g + r\,(t_x \cos\theta + t_y \sin\theta), 0) + h_r
 
-at its ends, and :func:`klack.hydraulics.tilted_film.sector_step` has the mean forces of the sectors
-over such a step.  Divided by the area of a sector they are its mean pressure above ambient.  With
-the drag along a cone,
+at its ends, of which :func:`klack.hydraulics.tilted_film.film_pressure` has the mean forces of the
+sectors over the step.  Divided by the area of a sector they are its mean pressure above ambient.
+With the drag along a cone,
 
 .. math:: f_s = c_s \frac{\ln(h_0 / h_1)}{h_0 - h_1} \frac{h_0 - h_1}{\Delta t}, \qquad
     F = s \Bigl(\sum_k F_k + f_s\Bigr),
 
-the forces of all sectors are the recorded axial force, to the tolerance with which it was found;
-to some per cent of the largest force where a sector is closed across a part of its width, since the
-step cuts heights off between the circles and this computation at the circles.
+the forces of all sectors are the recorded axial force, to the tolerance with which it was found.
 """
 
 from dataclasses import dataclass
@@ -21,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.hydraulics.tilted_film import SectorFilm, sector_film, sector_step
+from klack.hydraulics.tilted_film import SectorFilm, film_pressure, land_of, sector_film
 from klack.simulation.spatial_impact import FilmLand, FilmMoments
 
 __all__ = ["SectorPressure", "sector_pressure"]
@@ -98,8 +96,14 @@ def sector_pressure(film: FilmMoments, at: NDArray[np.int64] | None = None) -> S
 
 
 def _forces(cut: SectorFilm, land: FilmLand, open0: Floats, open1: Floats, step: float) -> Floats:
-    before, after = (np.maximum(gap, 0.0) + land.lowest for gap in (open0, open1))
-    return sector_step(cut, before, after, step, land.viscosity, tension=land.tension)[0]
+    """Forces on the circles of the sectors; heights of the points are cut off as in the run."""
+    a, b = (np.maximum(gap @ cut.between.T, 0.0) + land.lowest for gap in (open0, open1))
+    mobility = a**2 * b**2 / (6.0 * land.viscosity * (a + b))
+    closing = (np.maximum(open0, 0.0) - np.maximum(open1, 0.0)) / step
+    head, still = np.zeros(cut.load.shape), np.zeros(land.circles)
+    held = np.zeros(land.sectors, dtype=np.bool_)
+    arrays = land_of(cut)
+    return np.asarray(film_pressure(arrays, mobility, closing, head, still, land.tension, held)[0])
 
 
 def _drag(land: FilmLand, lift0: float, lift1: float, step: float) -> float:
