@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Literal, Self
 from numba import carray
 from pydantic import Field, model_validator
 
+from klack.compiling.jit import inner
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
@@ -19,44 +20,38 @@ from klack.units import Area, Length
 __all__ = ["Inertance"]
 
 
+@inner(error_model="numpy")
+def _pass(par: Any, state: Any, inp: Any, out: Any, friction: float, table: int) -> None:
+    """Mean flow of the step under a friction; ``table``: place of the fluid table in ``par``."""
+    size, inertia = int(par[0]), par[1]
+    h, before = inp[1], state[0]
+    fluid = carray(par, (size,))[table:]
+    _, _, g_a, hint_a = fluid_at(fluid, inp[2], int(state[1]))
+    _, _, g_b, hint_b = fluid_at(fluid, inp[3], int(state[2]))
+    gain = 0.5 * h / (inertia + 0.5 * h * friction)
+    rise = gain * (g_a - g_b - friction * before)
+    mean = before + rise
+    after = mean + rise
+    out[0], out[1], out[2] = mean, gain / inp[4], -gain / inp[5]
+    out[3], out[4], out[5] = after, hint_a, hint_b
+    out[6] = 0.5 * inertia * after * after
+
+
 @step_function
 def inertance_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Mean flow of the step; ``par``: size of all, ``l/(rho A)``, friction, fluid table.
 
     ``state``: mass flow, and the places in the fluid table of both ends.
     """
-    size, inertia, friction = int(par[0]), par[1], par[2]
-    h, before = inp[1], state[0]
-    table = carray(par, (size,))[3:]
-    _, _, g_a, hint_a = fluid_at(table, inp[2], int(state[1]))
-    _, _, g_b, hint_b = fluid_at(table, inp[3], int(state[2]))
-    gain = 0.5 * h / (inertia + 0.5 * h * friction)
-    rise = gain * (g_a - g_b - friction * before)
-    mean = before + rise
-    after = mean + rise
-    out[0], out[1], out[2] = mean, gain / inp[4], -gain / inp[5]
-    out[3], out[4], out[5] = after, hint_a, hint_b
-    out[6] = 0.5 * inertia * after * after
+    _pass(par, state, inp, out, par[2], 3)
     return 0
 
 
 @step_function
 def inertance_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     """Step of :func:`inertance_step`, ``par`` with the viscosity law in front of the table."""
-    size, inertia = int(par[0]), par[1]
     ratio, _, _ = mean_viscosity_ratio(inp[2], inp[3], par[3], par[4])
-    friction = par[2] * ratio
-    h, before = inp[1], state[0]
-    table = carray(par, (size,))[5:]
-    _, _, g_a, hint_a = fluid_at(table, inp[2], int(state[1]))
-    _, _, g_b, hint_b = fluid_at(table, inp[3], int(state[2]))
-    gain = 0.5 * h / (inertia + 0.5 * h * friction)
-    rise = gain * (g_a - g_b - friction * before)
-    mean = before + rise
-    after = mean + rise
-    out[0], out[1], out[2] = mean, gain / inp[4], -gain / inp[5]
-    out[3], out[4], out[5] = after, hint_a, hint_b
-    out[6] = 0.5 * inertia * after * after
+    _pass(par, state, inp, out, par[2] * ratio, 5)
     return 0
 
 

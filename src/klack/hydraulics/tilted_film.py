@@ -32,6 +32,7 @@ __all__ = [
     "film_pressure",
     "film_slopes",
     "land_of",
+    "mean_mobility",
     "sector_film",
     "sector_forces",
     "sector_step",
@@ -274,10 +275,15 @@ def sector_step(
         _require_heights(f"sector_step: {name}", film, heights)
     require_positive("sector_step: step", step, "s")
     x0, x1 = before @ film.between.T, after @ film.between.T
-    mobility = x0**2 * x1**2 / (6.0 * viscosity * (x0 + x1))
+    mobility = mean_mobility(x0, x1, viscosity)
     change = x0**2 * x1 * (2.0 * x0 + x1) / (6.0 * viscosity * (x0 + x1) ** 2)
     edges = _edges(film, inner_pressure, outer_pressure)
     return _solved(film, mobility, (before - after) / step, change, edges, tension, 1.0 / step)
+
+
+def mean_mobility(before: Array, after: Array, viscosity: float) -> Array:
+    """Mobility [m^3/(Pa s)] of points over a step between two heights: :func:`sector_step`."""
+    return np.asarray(before**2 * after**2 / (6.0 * viscosity * (before + after)))
 
 
 def _edges(film: SectorFilm, inner: float, outer: float) -> tuple[Array, Array]:

@@ -13,7 +13,18 @@ from klack.network.port import ELEMENT, Port
 from klack.network.rows import Rows
 from klack.units import DampingCoefficient, Force, Speed, format_si
 
-__all__ = ["GuideFriction"]
+__all__ = ["GuideFriction", "require_breakaway"]
+
+
+def require_breakaway(coulomb: float, breakaway: float | None) -> None:
+    """Refuse a friction at rest [N] below the sliding one."""
+    if breakaway is not None and breakaway < coulomb:
+        raise CaseProblem(
+            ("breakaway",),
+            got=format_si(breakaway, "N"),
+            expected=f"at least the sliding friction, {format_si(coulomb, 'N')}",
+            hint="remove it for equal values.",
+        )
 
 
 class GuideFriction(Component):
@@ -50,13 +61,7 @@ class GuideFriction(Component):
 
     @model_validator(mode="after")
     def _excess(self) -> "GuideFriction":
-        if self.breakaway is not None and self.breakaway < self.coulomb:
-            raise CaseProblem(
-                ("breakaway",),
-                got=format_si(self.breakaway, "N"),
-                expected=f"at least the sliding friction, {format_si(self.coulomb, 'N')}",
-                hint="remove it for equal values.",
-            )
+        require_breakaway(self.coulomb, self.breakaway)
         if self.smoothing_speed is not None:
             warnings.warn(
                 "guide-friction: smoothing_speed has no meaning since friction sticks at rest. "

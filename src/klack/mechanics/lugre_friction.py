@@ -7,13 +7,13 @@ from typing import Any, ClassVar, Self
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner
-from klack.input.problem import CaseProblem
+from klack.mechanics.friction import require_breakaway
 from klack.mechanics.relaxation import relaxed
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Channel, Rows
 from klack.network.step_function import step_function
-from klack.units import DampingCoefficient, Force, Ratio, Speed, Stiffness, format_si
+from klack.units import DampingCoefficient, Force, Ratio, Speed, Stiffness
 
 __all__ = ["LuGreFriction", "lugre_step"]
 
@@ -151,13 +151,7 @@ class LuGreFriction(Component):
 
     @model_validator(mode="after")
     def _excess(self) -> Self:
-        if self.breakaway is not None and self.breakaway < self.coulomb:
-            raise CaseProblem(
-                ("breakaway",),
-                got=format_si(self.breakaway, "N"),
-                expected=f"at least the sliding friction, {format_si(self.coulomb, 'N')}",
-                hint="remove it for equal values.",
-            )
+        require_breakaway(self.coulomb, self.breakaway)
         return self
 
     def add_rows(self, rows: Rows) -> None:

@@ -19,7 +19,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.hydraulics.tilted_film import SectorFilm, film_pressure, land_of, sector_film
+from klack.hydraulics.tilted_film import (
+    SectorFilm,
+    film_pressure,
+    land_of,
+    mean_mobility,
+    sector_film,
+)
 from klack.simulation.spatial_impact import FilmLand, FilmMoments
 
 __all__ = ["SectorPressure", "sector_pressure"]
@@ -98,7 +104,7 @@ def sector_pressure(film: FilmMoments, at: NDArray[np.int64] | None = None) -> S
 def _forces(cut: SectorFilm, land: FilmLand, open0: Floats, open1: Floats, step: float) -> Floats:
     """Forces on the circles of the sectors; heights of the points are cut off as in the run."""
     a, b = (np.maximum(gap @ cut.between.T, 0.0) + land.lowest for gap in (open0, open1))
-    mobility = a**2 * b**2 / (6.0 * land.viscosity * (a + b))
+    mobility = mean_mobility(a, b, land.viscosity)
     closing = (np.maximum(open0, 0.0) - np.maximum(open1, 0.0)) / step
     head, still = np.zeros(cut.load.shape), np.zeros(land.circles)
     held = np.zeros(land.sectors, dtype=np.bool_)

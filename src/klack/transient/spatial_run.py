@@ -687,7 +687,8 @@ class _Moving:
         excess = self._repair(level)
         self.sides.move(self.q - begun)
         told = (run.recording, run.scratch, record_, t, H / count)
-        self.stops.tell(*told, self.q, self.state.lam, self.gap0, points=points)
+        for c in range(len(self.order)):
+            self.stops.tell(c, *told, self.q, self.state.lam, self.gap0, points=points)
         self.impacts.tell(t, H / count, record_, begun)
         clock[0] += steps
         clock[1] = level

@@ -64,6 +64,7 @@ class StopRecord:
 
     def tell(
         self,
+        c: int,
         recording: Recording,
         scratch: Scratch,
         record: Record,
@@ -75,27 +76,11 @@ class StopRecord:
         *,
         points: bool,
     ) -> None:
-        """Take in the steps of length ``h`` of a record that begins at ``t`` [s].
+        """Take in the steps of contact ``c`` in a record from ``t`` on, of length ``h`` [s].
 
         ``q``, ``lam``, ``gap0``: modes, forces and gaps of the points at its end; ``points``:
         whether points were looked at.
         """
-        for c in range(len(self._rows)):
-            self._tell(c, recording, scratch, record, t, h, q, lam, gap0, points)
-
-    def _tell(
-        self,
-        c: int,
-        recording: Recording,
-        scratch: Scratch,
-        record: Record,
-        t: float,
-        h: float,
-        q: Vector,
-        lam: Vector,
-        gap0: Vector,
-        points: bool,
-    ) -> None:
         network, row = self._network, self._rows[c]
         state, faces = network.interface_state, network.interfaces
         first = int(network.elements.port0[network.elements.rows]) + network.branches.rows
