@@ -21,6 +21,7 @@ from klack.verification.rigid_needle import (
     fly_in_films,
     fly_in_network,
     guide_of,
+    needle_on_cone,
     needle_on_ring,
 )
 
@@ -191,9 +192,13 @@ def test_centred_and_wet_as_along_the_axis():
     assert abs(space.books.relative_residual) < 1e-11
 
 
-def test_recorded_gaps_before_the_touch_are_those_of_the_bodies():
-    """Exact: the gap of the axial network, also where no point is looked at yet."""
-    run = fly_in_network(valve(), {}, gap=20e-6, speed=-0.5, duration=50e-6, wet=True)
+@pytest.mark.parametrize("half_angle", [0.5 * pi, 0.25 * pi])
+def test_recorded_gaps_before_the_touch_are_those_of_the_bodies(half_angle):
+    """Exact: the gap of the axial network, also where no point is looked at yet, and on a cone."""
+    model = needle_on_cone(half_angle, 0.1, stiffer=0.8, gap=20e-6)
+    film = replace(film_of(model), slope=np.sin(half_angle))
+    needle = replace(valve(), model=model, films=(film,))
+    run = fly_in_network(needle, {}, gap=20e-6, speed=-0.5, duration=50e-6, wet=True)
     record, touch = run.interfaces["contact"], run.events[0].time
     falling = record.time + record.step < touch
     assert np.count_nonzero(falling) > 20
