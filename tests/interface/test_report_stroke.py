@@ -561,7 +561,7 @@ def test_impacts_round_the_ring_have_their_figures(study: StrokeStudy):
     assert "left out" not in rings.picture.note
     assert len(films.charts) == 2
     page = render_html(content)
-    text = page[page.index("Pressure in the films, wet") :]
+    text = page[page.index("<h2>Pressure in the films, wet") :]
     figure = json.loads(re.search(r'<script type="application/json">(.*?)</script>', text)[1])
     go.Figure(data=figure["data"], layout=figure["layout"], frames=figure["frames"])
     assert 10 < len(figure["frames"]) <= 41

@@ -72,10 +72,18 @@ class StoredAnalysis(Analysis[Kept]):
     page: str
     renewed: Callable[[Kept], Kept] = _unchanged
 
-    def content(self, record: Kept) -> Content:
-        """Report of a record, in words, tables and figures."""
+    def content(self, record: Kept, *, result: str = "", case: str = "") -> Content:
+        """Report of a record, in words, tables and figures.
+
+        Parameters
+        ----------
+        record : record of the analysis
+        result, case : str
+            Folder of the result, and what it was computed from, as typed at a terminal: for the
+            commands that the report names.
+        """
         content: Content = named(self.page)(record)
-        return content
+        return content.placed(result=result, case=case)
 
     def save(self, record: Kept, folder: Path) -> Path:
         """Write ``folder/result.zarr``; an earlier result stays whole until this one is complete.

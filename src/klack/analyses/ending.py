@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from klack.analyses.analysis import StoredAnalysis
     from klack.analyses.record import AnyRecord
     from klack.analyses.unfinished import LogForm
+    from klack.report.page import Content
 
 __all__ = ["Ending"]
 
@@ -31,20 +32,29 @@ class Ending(Shown):
     folder : Path
     report : bool
         Whether pages are written.
+    case : str
+        What the result is computed from, as typed at a terminal; empty if not from one case.
     """
 
     folder: Path
     report: bool
+    case: str = ""
 
     def __post_init__(self) -> None:
         """Refuse a folder that cannot be written to; the rest was checked before."""
         require_folder(self.folder)
 
     @classmethod
-    def of(cls, wanted: WantedResult, name: str) -> Self:
+    def of(cls, wanted: WantedResult, name: str, *, case: Path | str = "") -> Self:
         """The ending that was asked for, in a folder of that name without another."""
         folder = Path("klack-results") / name if wanted.out is None else wanted.out
-        return cls(json=wanted.json, quiet=wanted.quiet, folder=folder, report=wanted.report)
+        return cls(
+            json=wanted.json,
+            quiet=wanted.quiet,
+            folder=folder,
+            report=wanted.report,
+            case=str(case),
+        )
 
     @contextmanager
     def resumable(self, log: "LogForm[Any, Any]") -> Iterator[Progress]:
@@ -88,11 +98,14 @@ class Ending(Shown):
             if beside is not None:
                 names.extend(beside(stage))
 
+        def page() -> "Content":
+            return analysis.content(record, result=str(self.folder), case=self.case)
+
         with show_progress(self.quiet) as progress:
             failure = write_result(
                 self.folder,
                 save,
-                page=(lambda: analysis.content(record)) if self.report else None,
+                page=page if self.report else None,
                 progress=progress,
                 unfinished=unfinished,
             )

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from datetime import datetime
 
 from klack.analyses.record import AnyRecord
-from klack.report.page import Content, Section, Table
+from klack.report.page import Content, NextStep, Section, Table
 from klack.report.wording import own_code, quantity
 
 __all__ = ["page_of", "stage_table"]
@@ -20,6 +20,7 @@ def page_of(
     sections: Iterable[Section],
     definitions: tuple[tuple[str, str], ...],
     limits: tuple[tuple[str, str], ...],
+    next_steps: Iterable[NextStep] = (),
 ) -> Content:
     """Put the sections of a record between its title and its versions; empty ones are left out.
 
@@ -36,6 +37,7 @@ def page_of(
         The key numbers.
     sections : iterable of Section
     definitions, limits : tuple of (term, text)
+    next_steps : iterable of NextStep
     """
     made = f"klack {record.version}"
     heading = (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)
@@ -54,6 +56,7 @@ def page_of(
         limits=limits,
         case_text=record.case_text,
         versions=", ".join([made, *libraries, *own_code(record.own_components)]),
+        next_steps=tuple(next_steps),
     )
 
 

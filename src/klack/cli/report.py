@@ -37,7 +37,7 @@ def report(
     record = analysis.load(result)
     require_folder(folder)
     with staged_folder(folder, beside) as stage:
-        write_reports(analysis.content(record), stage)
+        write_reports(analysis.content(record, result=str(result)), stage)
     wanted.warn(missing_in(record))
     wanted.say(f"Report in {folder}: {', '.join(REPORTS)}")
     made: ReportJson = {

@@ -62,7 +62,11 @@ def plotly_chart(chart: Chart) -> dict[str, Any]:
         "hovermode": "closest" if _has_names(chart) else "x unified",
         "shapes": [],
         "annotations": [],
-        "xaxis": _axis(chart.x) | {"anchor": f"y{_suffix(len(heights) - 1)}"},
+        "xaxis": _axis(chart.x)
+        | {
+            "anchor": f"y{_suffix(len(heights) - 1)}",
+            "unifiedhovertitle": {"text": f"%{{x:.4g}} {escape(chart.x.unit)}"},
+        },
     }
     data: list[dict[str, Any]] = []
     named: set[str] = set()

@@ -4,12 +4,14 @@ Everything here is plain text; each renderer escapes it in its own way, because 
 the text of the case come from the user.
 """
 
-from dataclasses import dataclass
-from typing import Protocol
+import re
+import shlex
+from dataclasses import dataclass, replace
+from typing import Protocol, Self
 
 from klack.report.chart import AnyChart
 
-__all__ = ["Content", "Picture", "Section", "Sound", "Table"]
+__all__ = ["Content", "NextStep", "Picture", "Section", "Sound", "Table"]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,8 +50,8 @@ class Sound:
 class Section:
     """A heading with what belongs under it: text, sounds, picture, charts, tables.
 
-    A ``wide`` picture keeps its size on the screen, and has a page of its own on paper, which lies
-    on its side if the picture is wider than high.
+    A ``wide`` picture keeps its size on the screen, and has a page of its own at the end of the
+    paper, which lies on its side if the picture is wider than high.
     """
 
     title: str
@@ -59,6 +61,18 @@ class Section:
     wide: bool = False
     charts: tuple[AnyChart, ...] = ()
     tables: tuple[Table, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NextStep:
+    """What can be done with a result next: why, and the command.
+
+    In the command ``RESULT`` stands for the folder of the result and ``CASE`` for what it was
+    computed from, until :meth:`Content.placed` writes them.
+    """
+
+    purpose: str
+    command: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +89,7 @@ class Content:
     definitions, limits : tuple of (term, text)
     case_text : str
     versions : str
+    next_steps : tuple of NextStep
     """
 
     title: str
@@ -88,3 +103,24 @@ class Content:
     limits: tuple[tuple[str, str], ...]
     case_text: str
     versions: str
+    next_steps: tuple[NextStep, ...] = ()
+
+    def placed(self, *, result: str = "", case: str = "") -> Self:
+        """Write folder and case into the next steps; those that need an unknown one are left out.
+
+        Parameters
+        ----------
+        result, case : str
+            As typed at a terminal; empty if not known.
+        """
+        known = {"RESULT": result, "CASE": case}
+
+        def command(step: NextStep) -> str:
+            return re.sub("RESULT|CASE", lambda word: shlex.quote(known[word[0]]), step.command)
+
+        steps = tuple(
+            replace(step, command=command(step))
+            for step in self.next_steps
+            if all(known[word] for word in re.findall("RESULT|CASE", step.command))
+        )
+        return replace(self, next_steps=steps)

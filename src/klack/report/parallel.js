@@ -44,7 +44,7 @@ function drawParallel(place, chart) {
     const kept = [], others = [];
     for (let i = 0; i < count; i++) (stays(i) ? kept : others).push(i);
     pen.globalAlpha = 0.35;
-    pen.strokeStyle = "#d9dde2";
+    pen.strokeStyle = colour("--line");
     others.forEach(line);
     pen.globalAlpha = kept.length > 400 ? 0.35 : 0.75;
     kept.sort((a, b) => axes[chart.coloured].values[b] - axes[chart.coloured].values[a]);
@@ -55,7 +55,7 @@ function drawParallel(place, chart) {
     pen.globalAlpha = 1;
     pen.font = "12px system-ui, sans-serif";
     axes.forEach((axis, k) => {
-      pen.strokeStyle = pen.fillStyle = "#22262b";
+      pen.strokeStyle = pen.fillStyle = colour("--ink");
       pen.beginPath();
       pen.moveTo(x(k), y(0));
       pen.lineTo(x(k), y(1));
@@ -65,7 +65,7 @@ function drawParallel(place, chart) {
       for (const [part, word] of words) {
         pen.fillStyle = "rgba(255,255,255,0.8)";
         pen.fillRect(x(k) + 3, y(part) - 8, pen.measureText(word).width + 4, 15);
-        pen.fillStyle = "#22262b";
+        pen.fillStyle = colour("--ink");
         pen.fillText(word, x(k) + 5, y(part) + 4);
       }
       pen.save();

@@ -42,7 +42,7 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
     with show_progress(wanted.quiet):
         checked = load_case(find_case(case))
         levels = checked.require_levels(level if level else checked.run.levels)
-        ending = Ending.of(wanted, checked.name)
+        ending = Ending.of(wanted, checked.name, case=case)
 
         from klack.analyses.impact.analysis import IMPACT
         from klack.analyses.impact.run import run_impact

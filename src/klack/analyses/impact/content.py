@@ -30,7 +30,7 @@ from klack.analyses.page import page_of
 from klack.assembling.body_summary import BodySummary
 from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.report.chart import AnyChart
-from klack.report.page import Content, Section, Table
+from klack.report.page import Content, NextStep, Section, Table
 from klack.report.wording import (
     count,
     listed,
@@ -94,7 +94,35 @@ def report_content(study: ImpactStudy) -> Content:
         sections=sections,
         definitions=_definitions(study),
         limits=_limits(study),
+        next_steps=_next_steps(study),
     )
+
+
+def _next_steps(study: ImpactStudy) -> list[NextStep]:
+    meshed = all(body.elements for body in study.bodies)
+    steps = []
+    if meshed and not leaves_axis(study) and "full" not in {*study.levels, *study.failures}:
+        steps.append(
+            NextStep(
+                purpose="Compare with every degree of freedom of both bodies.",
+                command="klack impact CASE --level reduced,full",
+            )
+        )
+    if meshed:
+        steps.append(
+            NextStep(
+                purpose="Error of the mesh, the modes and the step, and better sizes for them.",
+                command="klack advise CASE",
+            )
+        )
+    steps += [
+        NextStep(purpose="The sound of this impact, with WAV files.", command="klack noise RESULT"),
+        NextStep(
+            purpose="Force and motion as tables for other programs.",
+            command="klack export RESULT --to csv --out tables",
+        ),
+    ]
+    return steps
 
 
 def _bodies_at_peak(study: ImpactStudy) -> Section:

@@ -56,6 +56,7 @@ _LOOKS: dict[str, Look] = {
     "reduced-none": Look("orange", "dotted", 1.9),
     "lumped": Look("pink", "sparse", 2.1),
 }
+_THIN = 0.7  # [px]
 _LOW_FREQUENCY, _TOP_FREQUENCY, _RESOLUTION = 1e3, 1e6, 250.0  # [Hz]
 OUTPUT_UNITS: dict[GaugeKind, tuple[str, float]] = {
     "displacement": ("µm", 1e6),
@@ -88,6 +89,10 @@ def _level_curve(x: Floats, y: Floats, result: LevelResult, label: bool = True) 
     return _look(result.level).curve(x, y, result.label if label else "")
 
 
+def _thin(curve: Curve) -> Curve:
+    return replace(curve, width=_THIN, style="solid")
+
+
 def _since_touch(result: LevelResult, time: Floats) -> Floats:
     return 1e6 * (time - result.measures.first_touch)
 
@@ -103,17 +108,19 @@ def force_chart(study: ImpactStudy) -> Chart:
     curves, differences = [], []
     reference = results[0]
     peak = reference.measures.peak_force
-    # a level that chatters fills a band: below the others
+    # a level that chatters fills a band: thin, below the others
     for result in sorted(results, key=lambda one: not _chatters(one, reference)):
         time = _since_touch(result, result.history.time)
         seen = (time >= limits[0]) & (time <= limits[1])
-        curves.append(_level_curve(time[seen], result.history.force[seen], result))
+        curve = _level_curve(time[seen], result.history.force[seen], result)
+        curves.append(_thin(curve) if _chatters(result, reference) else curve)
         if result is not reference and result.level in study.deviations:
             expected = np.interp(
                 time[seen], _since_touch(reference, reference.history.time), reference.history.force
             )
             apart = 100 * (result.history.force[seen] - expected) / peak
-            differences.append(_level_curve(time[seen], apart, result, label=False))
+            curve = _level_curve(time[seen], apart, result, label=False)
+            differences.append(_thin(curve) if _chatters(result, reference) else curve)
     panels = [Panel(y=AxisSpec(label="contact force", unit="N"), curves=tuple(curves))]
     note = "First touch of every level is placed at zero."
     if differences:

@@ -85,7 +85,8 @@ def stroke(
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)
-    ending = Ending.of(asked, checked.name)
+    # code of one's own is named on the command line only: a command without it would fail
+    ending = Ending.of(asked, checked.name, case="" if component else case)
 
     with show_progress(asked.quiet):
         from klack.analyses.stroke.analysis import STROKE

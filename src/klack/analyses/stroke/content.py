@@ -35,11 +35,11 @@ from klack.analyses.stroke.summary import (
 )
 from klack.analyses.stroke.wording import largest, stroke_answer
 from klack.report.chart import AnyChart, Chart
-from klack.report.page import Content, Section, Table
+from klack.report.page import Content, NextStep, Section, Table
 from klack.report.wording import quantity
 from klack.simulation.network_result import EnergyBooks
 
-__all__ = ["stroke_charts", "stroke_content"]
+__all__ = ["NEXT_STEPS", "stroke_charts", "stroke_content"]
 
 _MOST_IMPACTS = 12
 _ROUND_OFF = 1e-12
@@ -85,6 +85,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         sections=sections,
         definitions=_DEFINITIONS,
         limits=_limits(study),
+        next_steps=NEXT_STEPS,
     )
 
 
@@ -400,6 +401,20 @@ def _energy(value: float | None, books: EnergyBooks) -> str:
 
 
 # --------------------------------------------------------------------------- words
+
+
+NEXT_STEPS = (
+    NextStep(purpose="The sound of these impacts, with WAV files.", command="klack noise RESULT"),
+    NextStep(
+        purpose="How much the steps in time matter: the same with finer ones.",
+        command="klack stroke CASE --accuracy fine --out finer",
+    ),
+    NextStep(purpose="The valve as a drawing of its network.", command="klack show CASE"),
+    NextStep(
+        purpose="All channels for measurement software.",
+        command="klack export RESULT --to mdf --out channels",
+    ),
+)
 
 
 _DEFINITIONS: tuple[tuple[str, str], ...] = (

@@ -31,7 +31,7 @@ from klack.analyses.study.wording import (
     surrogate_cells,
     variant_words,
 )
-from klack.report.page import Content, Section, Sound, Table
+from klack.report.page import Content, NextStep, Section, Sound, Table
 from klack.report.wording import count, signed
 from klack.studies.fronts import spread_over
 
@@ -88,7 +88,26 @@ def study_content(record: StudyRecord) -> Content:
         sections=sections,
         definitions=_DEFINITIONS,
         limits=(_OF_STROKES if not record.model else _OF_IMPACTS, *_LIMITS),
+        next_steps=_next_steps(record),
     )
+
+
+def _next_steps(record: StudyRecord) -> list[NextStep]:
+    found = record.optimum
+    best = [] if found is None or found.best < 0 else [found.best]
+    return [
+        *(
+            NextStep(
+                purpose="The case of the recommended point, to compute and to change.",
+                command=f"klack export RESULT --to case --point {point}",
+            )
+            for point in best
+        ),
+        NextStep(
+            purpose="All points as a table for other programs.",
+            command="klack export RESULT --to csv --out tables",
+        ),
+    ]
 
 
 def _answer(

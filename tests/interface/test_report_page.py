@@ -1,0 +1,119 @@
+"""Contents, parts that fold, next steps and full pages of every report; truth = the content."""
+
+import re
+import shlex
+import zlib
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.stroke.content import NEXT_STEPS
+from klack.cli.main import app
+from klack.report.chart import AxisSpec, Chart, Curve, Panel
+from klack.report.html import render_html
+from klack.report.page import Content, NextStep, Section, Table
+from klack.report.pdf import render_pdf
+
+
+@pytest.fixture(scope="module")
+def impact_content(impact_study: ImpactStudy) -> Content:
+    return report_content(impact_study)
+
+
+def test_contents_lead_to_every_part(impact_content: Content):
+    page = render_html(impact_content)
+
+    links = re.findall(r'<li><a href="#([\w-]+)">([^<]+)</a>', page)
+    parts = re.findall(r'<details class="part" open id="([\w-]+)">\s*<summary><h2>([^<]+)<', page)
+
+    assert links == parts
+    titles = [title for _, title in parts]
+    assert titles[: len(impact_content.sections)] == [s.title for s in impact_content.sections]
+    assert titles[-3:] == ["What the words mean", "Limits", "How to compute it again"]
+
+
+def test_next_steps_are_commands_that_exist(impact_study: ImpactStudy):
+    levels = {"reduced": impact_study.levels["reduced"]}
+    alone = replace(impact_study, levels=levels, reference="reduced", deviations={})
+    contents = (
+        report_content(impact_study),
+        report_content(alone),
+        replace(_EMPTY, next_steps=NEXT_STEPS),
+    )
+    found = [
+        step.command
+        for content in contents
+        for step in content.placed(result="a result", case="my case.yaml").next_steps
+    ]
+
+    assert any("'a result'" in command for command in found)
+    assert "klack impact 'my case.yaml' --level reduced,full" in found
+    for command in found:
+        program, *words = shlex.split(command)
+        assert program == "klack"
+        app.parse_args(words, exit_on_error=False, print_error=False)
+
+
+def test_steps_that_need_an_unknown_case_are_left_out():
+    content = one_chart_each(0)
+    content = replace(
+        content,
+        next_steps=(
+            NextStep(purpose="a", command="klack noise RESULT"),
+            NextStep(purpose="b", command="klack advise CASE"),
+        ),
+    )
+
+    steps = content.placed(result="$(reboot); x").next_steps
+
+    assert [shlex.split(step.command) for step in steps] == [["klack", "noise", "$(reboot); x"]]
+    page = render_html(content.placed(result="<b>", case=""))
+    assert "klack noise &#39;&lt;b&gt;&#39;" in page
+    assert "What next" not in render_html(content.placed())
+
+
+def one_chart_each(count: int, panels: int = 2) -> Content:
+    """Sections with one chart; two panels are a little more than half a page high."""
+    x = np.linspace(0.0, 1.0, 5)
+    axis = AxisSpec(label="x")
+    panel = Panel(y=axis, curves=(Curve(x=x, y=x, label="line"),), share=1.05)
+    chart = Chart(name="c", title="c", x=axis, panels=panels * (panel,), note="Caption.")
+    section = Section(title="One", charts=(chart,))
+    return replace(_EMPTY, sections=count * (section,))
+
+
+def pages_of(paper: bytes) -> int:
+    plain = paper
+    for packed in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", paper, re.DOTALL):
+        with suppress(zlib.error):
+            plain += zlib.decompress(packed)
+    return len(re.findall(rb"/MediaBox", plain))
+
+
+def test_figures_that_nearly_fit_are_drawn_smaller_instead_of_leaving_half_a_page():
+    # 0.7 + 2 * 1.05 * 1.9 = 4.7 in = 119 mm high; with heading and caption 138 mm of 259
+    assert pages_of(render_pdf(one_chart_each(8))) == 5  # two each, and the first page's head
+
+
+def test_a_figure_that_needs_a_page_of_its_own_keeps_its_size():
+    # 0.7 + 4 * 1.05 * 1.9 = 8.7 in = 221 mm
+    assert pages_of(render_pdf(one_chart_each(3, panels=4))) == 5
+
+
+_EMPTY = Content(
+    title="t",
+    subtitle="s",
+    description="",
+    answer="a",
+    numbers=Table(columns=("", "x"), rows=(("y", "1"),)),
+    warnings=(),
+    sections=(),
+    definitions=(),
+    limits=(),
+    case_text="",
+    versions="",
+)
