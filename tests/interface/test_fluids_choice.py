@@ -105,7 +105,7 @@ def test_unknown_names_and_temperatures_are_told():
     assert find_fluid("T16") is None
     with pytest.raises(InputError, match="did you mean 'ISO VG 46'"):
         library_fluid("ISO VG 64")
-    with pytest.raises(InputError, match=r"got 150 degC, expected 0 to 100 degC"):
+    with pytest.raises(InputError, match=r"got 150 degC, expected 0 to 140 degC"):
         FLUIDS["water"].at(423.15)
 
 

@@ -202,7 +202,7 @@ def test_a_chamber_smaller_than_area_times_stroke_is_refused_with_both_numbers()
 def test_a_chamber_that_overflows_ends_the_run_when_its_pressure_leaves_all_sense():
     case = read_valve_case(CLOSED, Path("closed.yaml"))
     with (
-        pytest.warns(AccuracyWarning, match=r"leaves the range of the fluid .*up to 500 bar"),
+        pytest.warns(AccuracyWarning, match=r"leaves the range of the fluid .*up to 780 bar"),
         pytest.raises(ConvergenceError, match=r"^c: the pressure is 4\d{3}\.\d bar at") as end,
     ):
         simulate_network(case.network.network().rows(), duration=1e-4, step=20e-9, record=64e-8)

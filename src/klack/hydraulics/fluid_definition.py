@@ -51,6 +51,7 @@ class FluidState(NamedTuple):
     pressure_viscosity: float  # [1/Pa]
     vapour_pressure: float  # [Pa]
     vapour_density: float  # [kg/m^3]
+    pressure_range: PressureRange | None = None  # None: what the law of the liquid says
 
 
 class FluidProperties(Protocol):
@@ -77,6 +78,10 @@ class MeasuredProperties:
     viscosity : tuple [Pa s]
     pressure_viscosity : tuple [1/Pa]
     vapour_pressure : tuple [Pa]
+    highest_pressure : tuple [Pa]
+        To which the properties hold; between the columns on straight lines.
+    range_source : str
+        Where it comes from.
     """
 
     pressure: float
@@ -88,6 +93,8 @@ class MeasuredProperties:
     viscosity: tuple[float, ...]
     pressure_viscosity: tuple[float, ...]
     vapour_pressure: tuple[float, ...]
+    highest_pressure: tuple[float, ...]
+    range_source: str
 
     @cached_property
     def _over_temperature(self) -> CubicSpline:
@@ -116,6 +123,10 @@ class MeasuredProperties:
             pressure_viscosity=alpha,
             vapour_pressure=boiling,
             vapour_density=_vapour_density(boiling, temperature, self.molar_mass),
+            pressure_range=PressureRange(
+                highest=float(np.interp(temperature, self.temperature, self.highest_pressure)),
+                source=self.range_source,
+            ),
         )
 
 
@@ -276,7 +287,8 @@ class FluidDefinition:
     lowest_temperature, highest_temperature : float [K]
         Range in which the constants hold.
     pressure_range : PressureRange, optional
-        Absolute pressures for which they hold; by default what the law of the liquid says.
+        Absolute pressures for which they hold; by default what the properties or the law of the
+        liquid say.
     """
 
     name: str
@@ -327,7 +339,7 @@ class FluidDefinition:
             liquid=state.liquid,
             base_viscosity=state.viscosity,
             pressure_viscosity=state.pressure_viscosity,
-            known_range=self.pressure_range,
+            known_range=state.pressure_range or self.pressure_range,
             vapour=Vapour(
                 pressure=state.vapour_pressure,
                 density=state.vapour_density,

@@ -18,12 +18,12 @@ from klack.sourced import Constant, entry_named, require_entry
 
 __all__ = ["FLUIDS", "find_fluid", "library_fluid"]
 
-_TEMPERATURES = (273.15, 293.15, 313.15, 333.15, 353.15, 373.15)
+_STEP = 20.0  # [K] between the columns of the pure fluids
 _READ_AT = 5e5  # [Pa]
 
 _GENERIC_OIL = "OpenHydraulics (Modelica), GenericOil.mo: 'approximately an ISO VG 46 oil'"
 _GUIDE = "usual value of this class of fluids, not traced to a measurement"
-_ISENTROPE = "bulk modulus within 10 % of the equation of state along isentropes from 0 to 100 degC"
+_ISENTROPE = "bulk modulus within 10 % of the equation of state along the isentrope"
 _LIKE_ALKANES = "n-decane and n-dodecane at the same share of the bulk modulus, within 10 %"
 _BARUS = "above it the viscosity of Barus is too steep"
 _FITTED = "Walther line through the two viscosities of the grade"
@@ -72,7 +72,12 @@ Source = tuple[float, str, bool]  # value, source, verified
 
 
 def _measured(
-    name: str, source: str, molar_mass: float, highest: float, **columns: tuple[float, ...]
+    name: str,
+    source: str,
+    molar_mass: float,
+    temperature: tuple[float, ...],
+    highest_pressure: tuple[float, ...],
+    **columns: tuple[float, ...],
 ) -> FluidDefinition:
     constants = [
         Constant(label=label, value=columns[key], unit=unit, source=source, verified=True)
@@ -88,13 +93,27 @@ def _measured(
     return FluidDefinition(
         name=name,
         properties=MeasuredProperties(
-            pressure=_READ_AT, molar_mass=molar_mass, temperature=_TEMPERATURES, **columns
+            pressure=_READ_AT,
+            molar_mass=molar_mass,
+            temperature=temperature,
+            highest_pressure=highest_pressure,
+            range_source=_ISENTROPE,
+            **columns,
         ),
         constants=(*constants, mass),
-        lowest_temperature=_TEMPERATURES[0],
-        highest_temperature=_TEMPERATURES[-1],
-        pressure_range=PressureRange(highest=highest, source=_ISENTROPE),
+        lowest_temperature=temperature[0],
+        highest_temperature=temperature[-1],
     )
+
+
+def _every_step(lowest: float, *, first: float | None = None) -> tuple[float, ...]:
+    """Temperatures [K] up to 140 degC, after a freezing point where it is off the steps."""
+    steps = range(round((413.15 - lowest) / _STEP) + 1)
+    return (*(() if first is None else (first,)), *(lowest + _STEP * k for k in steps))
+
+
+def _bar(*pressures: float) -> tuple[float, ...]:
+    return tuple(1e5 * pressure for pressure in pressures)
 
 
 def _from_constants(
@@ -125,13 +144,80 @@ HEPTANE = _measured(
     "CoolProp 8.0.0: Span and Wagner, Int. J. Thermophys. 24 (2003) 41; viscosity Michailidou "
     "et al., J. Phys. Chem. Ref. Data 43 (2014)",
     0.100202,
-    500e5,
-    density=(700.862, 684.196, 667.261, 649.925, 632.032, 613.385),
-    bulk_modulus=(1.0725e9, 9.0843e8, 7.6385e8, 6.3631e8, 5.2372e8, 4.2431e8),
-    bulk_modulus_slope=(12.055, 11.945, 11.844, 11.752, 11.665, 11.583),
-    viscosity=(0.00052504, 0.00041392, 0.0003352, 0.00027683, 0.00023192, 0.00019629),
-    pressure_viscosity=(9.482e-9, 9.638e-9, 9.941e-9, 1.038e-8, 1.098e-8, 1.174e-8),
-    vapour_pressure=(1522.26, 4722.16, 12326.4, 28039.2, 57090.1, 106229.0),
+    _every_step(233.15),
+    _bar(1050, 950, 860, 780, 710, 640, 570, 510, 450, 400),
+    density=(
+        733.877,
+        717.383,
+        700.862,
+        684.196,
+        667.261,
+        649.925,
+        632.032,
+        613.385,
+        593.725,
+        572.679,
+    ),
+    bulk_modulus=(
+        1.4723e9,
+        1.2592e9,
+        1.0725e9,
+        9.0843e8,
+        7.6385e8,
+        6.3631e8,
+        5.2372e8,
+        4.2431e8,
+        3.366e8,
+        2.5936e8,
+    ),
+    bulk_modulus_slope=(
+        12.285,
+        12.165,
+        12.055,
+        11.945,
+        11.844,
+        11.752,
+        11.665,
+        11.583,
+        11.505,
+        11.429,
+    ),
+    viscosity=(
+        0.00096246,
+        0.00069153,
+        0.00052504,
+        0.00041392,
+        0.0003352,
+        0.00027683,
+        0.00023192,
+        0.00019629,
+        0.00016726,
+        0.00014299,
+    ),
+    pressure_viscosity=(
+        9.743e-9,
+        9.498e-9,
+        9.482e-9,
+        9.638e-9,
+        9.941e-9,
+        1.038e-8,
+        1.098e-8,
+        1.174e-8,
+        1.27e-8,
+        1.392e-8,
+    ),
+    vapour_pressure=(
+        77.0049,
+        394.204,
+        1522.26,
+        4722.16,
+        12326.4,
+        28039.2,
+        57090.1,
+        106229.0,
+        183605.0,
+        298607.0,
+    ),
 )
 
 DECANE = _measured(
@@ -139,13 +225,54 @@ DECANE = _measured(
     "CoolProp 8.0.0: Lemmon and Span, J. Chem. Eng. Data 51 (2006); viscosity Huber et al., Fluid "
     "Phase Equilib. 224 (2004)",
     0.142282,
-    750e5,
-    density=(746.254, 730.724, 715.222, 699.659, 683.947, 667.995),
-    bulk_modulus=(1.3377e9, 1.1527e9, 9.9123e8, 8.4955e8, 7.2475e8, 6.1446e8),
-    bulk_modulus_slope=(12.572, 12.386, 12.218, 12.068, 11.931, 11.810),
-    viscosity=(0.0012809, 0.00091791, 0.00069394, 0.00054548, 0.00044151, 0.0003654),
-    pressure_viscosity=(1.135e-8, 1.095e-8, 1.078e-8, 1.077e-8, 1.087e-8, 1.109e-8),
-    vapour_pressure=(26.319, 127.801, 486.708, 1524.76, 4076.32, 9570.06),
+    _every_step(253.15),
+    _bar(1140, 1080, 1010, 950, 880, 810, 750, 690, 630),
+    density=(761.905, 746.254, 730.724, 715.222, 699.659, 683.947, 667.995, 651.699, 634.940),
+    bulk_modulus=(
+        1.5509e9,
+        1.3377e9,
+        1.1527e9,
+        9.9123e8,
+        8.4955e8,
+        7.2475e8,
+        6.1446e8,
+        5.1678e8,
+        4.3013e8,
+    ),
+    bulk_modulus_slope=(12.779, 12.572, 12.386, 12.218, 12.068, 11.931, 11.810, 11.696, 11.592),
+    viscosity=(
+        0.0019314,
+        0.0012809,
+        0.00091791,
+        0.00069394,
+        0.00054548,
+        0.00044151,
+        0.0003654,
+        0.00030759,
+        0.00026226,
+    ),
+    pressure_viscosity=(
+        1.221e-8,
+        1.135e-8,
+        1.095e-8,
+        1.078e-8,
+        1.077e-8,
+        1.087e-8,
+        1.109e-8,
+        1.141e-8,
+        1.184e-8,
+    ),
+    vapour_pressure=(
+        3.98962,
+        26.319,
+        127.801,
+        486.708,
+        1524.76,
+        4076.32,
+        9570.06,
+        20184.0,
+        38943.7,
+    ),
 )
 
 DODECANE = _measured(
@@ -153,13 +280,54 @@ DODECANE = _measured(
     "CoolProp 8.0.0: Lemmon and Huber, Energy Fuels 18 (2004); viscosity Huber et al., Energy "
     "Fuels 18 (2004)",
     0.170335,
-    800e5,
-    density=(764.601, 749.724, 734.964, 720.227, 705.423, 690.464),
-    bulk_modulus=(1.4725e9, 1.2741e9, 1.102e9, 9.5166e8, 8.1959e8, 7.0307e8),
-    bulk_modulus_slope=(12.767, 12.563, 12.378, 12.208, 12.053, 11.907),
-    viscosity=(0.0022815, 0.0014961, 0.0010663, 0.00080431, 0.00063173, 0.00051108),
-    pressure_viscosity=(1.258e-8, 1.166e-8, 1.127e-8, 1.115e-8, 1.122e-8, 1.142e-8),
-    vapour_pressure=(1.75532, 11.6841, 57.9455, 226.939, 733.712, 2026.88),
+    _every_step(273.15, first=263.65),
+    _bar(1060, 1040, 990, 950, 900, 850, 800, 740, 690),
+    density=(771.738, 764.601, 749.724, 734.964, 720.227, 705.423, 690.464, 675.261, 659.719),
+    bulk_modulus=(
+        1.5776e9,
+        1.4725e9,
+        1.2741e9,
+        1.102e9,
+        9.5166e8,
+        8.1959e8,
+        7.0307e8,
+        5.9991e8,
+        5.084e8,
+    ),
+    bulk_modulus_slope=(12.873, 12.767, 12.563, 12.378, 12.208, 12.053, 11.907, 11.767, 11.632),
+    viscosity=(
+        0.0029089,
+        0.0022815,
+        0.0014961,
+        0.0010663,
+        0.00080431,
+        0.00063173,
+        0.00051108,
+        0.00042257,
+        0.00035498,
+    ),
+    pressure_viscosity=(
+        1.339e-8,
+        1.258e-8,
+        1.166e-8,
+        1.127e-8,
+        1.115e-8,
+        1.122e-8,
+        1.142e-8,
+        1.176e-8,
+        1.224e-8,
+    ),
+    vapour_pressure=(
+        0.629749,
+        1.75532,
+        11.6841,
+        57.9455,
+        226.939,
+        733.712,
+        2026.88,
+        4916.1,
+        10699.5,
+    ),
 )
 
 WATER = _measured(
@@ -167,21 +335,40 @@ WATER = _measured(
     "CoolProp 8.0.0: IAPWS-95, Wagner and Pruss, J. Phys. Chem. Ref. Data 31 (2002); viscosity "
     "Huber et al., J. Phys. Chem. Ref. Data 38 (2009)",
     0.018015,
-    2500e5,
-    density=(1000.046, 998.390, 992.391, 983.370, 971.969, 958.536),
-    bulk_modulus=(1.9686e9, 2.1958e9, 2.3219e9, 2.3678e9, 2.3509e9, 2.2851e9),
-    bulk_modulus_slope=(5.723, 6.030, 6.373, 6.707, 7.046, 7.390),
-    viscosity=(0.0017909, 0.0010015, 0.00065278, 0.00046613, 0.00035416, 0.00028169),
-    pressure_viscosity=(-1.097e-9, -2.394e-10, 2.206e-10, 5.21e-10, 7.469e-10, 9.338e-10),
-    vapour_pressure=(611.21, 2339.32, 7384.94, 19946.4, 47414.5, 101418.0),
+    _every_step(273.15),
+    _bar(*8 * (2500,)),
+    density=(1000.046, 998.390, 992.391, 983.370, 971.969, 958.536, 943.258, 926.210),
+    bulk_modulus=(1.9686e9, 2.1958e9, 2.3219e9, 2.3678e9, 2.3509e9, 2.2851e9, 2.181e9, 2.0468e9),
+    bulk_modulus_slope=(5.723, 6.030, 6.373, 6.707, 7.046, 7.390, 7.751, 8.133),
+    viscosity=(
+        0.0017909,
+        0.0010015,
+        0.00065278,
+        0.00046613,
+        0.00035416,
+        0.00028169,
+        0.00023211,
+        0.00019668,
+    ),
+    pressure_viscosity=(
+        -1.097e-9,
+        -2.394e-10,
+        2.206e-10,
+        5.21e-10,
+        7.469e-10,
+        9.338e-10,
+        1.101e-9,
+        1.257e-9,
+    ),
+    vapour_pressure=(611.21, 2339.32, 7384.94, 19946.4, 47414.5, 101418.0, 198674.0, 361539.0),
 )
 
 ISO_4113 = _from_constants(
     "ISO 4113",
     MineralOil,
     _OIL,
-    273.15,
-    373.15,
+    253.15,
+    413.15,
     _FUEL_PRESSURES,
     density=(
         825.0,
@@ -203,8 +390,8 @@ DIESEL = _from_constants(
     "diesel",
     MineralOil,
     _OIL,
-    273.15,
-    373.15,
+    253.15,
+    413.15,
     _FUEL_PRESSURES,
     density=(835.0, "within the band of EN 590, 820 to 845 kg/m^3", False),
     expansion=(8.3e-4, _GUIDE, False),
@@ -222,8 +409,8 @@ VG_32 = _from_constants(
     "ISO VG 32",
     MineralOil,
     _OIL,
-    263.15,
-    373.15,
+    253.15,
+    413.15,
     _OIL_PRESSURES,
     density=(870.0, _GUIDE, False),
     expansion=(7.0e-4, _GUIDE, False),
@@ -241,8 +428,8 @@ VG_46 = _from_constants(
     "ISO VG 46",
     MineralOil,
     _OIL,
-    263.15,
-    373.15,
+    253.15,
+    413.15,
     _OIL_PRESSURES,
     density=(875.0, _GUIDE, False),
     expansion=(7.0e-4, _GUIDE, False),
@@ -280,7 +467,7 @@ DOT_4 = _from_constants(
     MineralOil,
     _OIL,
     233.15,
-    373.15,
+    413.15,
     _OIL_PRESSURES,
     density=(1064.0, "middle of a data sheet's band 1.05 to 1.10 at 20 degC", False),
     expansion=(8.0e-4, _GUIDE, False),
@@ -298,8 +485,8 @@ PETROL = _from_constants(
     "petrol",
     MineralOil,
     _VOLATILE,
-    253.15,
-    323.15,
+    233.15,
+    413.15,
     _PETROL_PRESSURES,
     density=(745.0, "within the band of EN 228, 720 to 775 kg/m^3", False),
     expansion=(1.2e-3, f"{_GUIDE}; 1.1e-3 to 1.3e-3", False),
