@@ -40,6 +40,7 @@ def compiled_by(*words, out):
     return int(functions)
 
 
+@pytest.mark.slow
 def test_it_says_what_was_compiled_and_where(warm):
     numbers, said = warm
 
@@ -50,6 +51,7 @@ def test_it_says_what_was_compiled_and_where(warm):
     assert set(numbers["groups"]) == {"loop", "rest", "components", "valve", "impact"}
 
 
+@pytest.mark.slow
 def test_a_second_time_compiles_nothing(warm, capsys):
     assert main(["warm", "--json", "-"]) == 0
 
@@ -59,10 +61,12 @@ def test_a_second_time_compiles_nothing(warm, capsys):
 
 
 @pytest.mark.parametrize("case", STROKES)
+@pytest.mark.slow
 def test_strokes_of_shipped_cases_compile_nothing(warm, tmp_path, case):
     assert compiled_by("stroke", case, "--duration", "0.1 ms", out=tmp_path / "out") == 0
 
 
+@pytest.mark.slow
 def test_impacts_compile_nothing(warm, tmp_path):
     words = ("impact", "two-rods", "--level", "reduced,interface")
     assert compiled_by(*words, out=tmp_path / "out") == 0

@@ -42,6 +42,7 @@ def test_elastic_materials_say_nothing():
         tell_elastic(read_case(text.replace(given, ""), SPHERES), "these are")
 
 
+@pytest.mark.slow
 def test_noise_of_an_impact_says_that_its_faces_were_new():
     """Truth: the share of the energy in the balance of the impact."""
     study = run_impact(load_case(SPHERES), levels=["reduced"], certify=False)

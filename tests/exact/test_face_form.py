@@ -154,6 +154,7 @@ def test_a_tilted_face_is_a_tilted_body(tmp_path):
     assert given.gap == pytest.approx(placed.gap, abs=1e-3 * np.ptp(given.gap))
 
 
+@pytest.mark.slow
 def test_gaps_of_a_placed_body_have_the_form(tmp_path):
     """At rest the exact gaps of off-axis runs are those of the contact points."""
     form = "crown: 1 um\nwaviness: {amplitude: 0.1 um, wavelength: 20 mm, direction: 30 deg}"

@@ -33,6 +33,7 @@ def _case(keys, given=YIELD):
     return read_case(text.replace(KEYS, f"{KEYS}, {keys}").replace(YIELD, given), SPHERES)
 
 
+@pytest.mark.slow
 def test_running_in_follows_the_recursion_of_two_energies():
     """Exact for rigid bodies: W_L(P_n) = E + D(P_(n-1)), e_n^2 = W_e(P_n)/E; 1 %.
 

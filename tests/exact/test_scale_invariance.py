@@ -127,6 +127,7 @@ def test_units_of_a_drawing_change_nothing(reference, unit):
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
+@pytest.mark.slow
 def test_larger_bodies_hit_longer_and_harder(reference, scale):
     """From 4 um to 4 m.
 

@@ -48,6 +48,7 @@ def _impact(text, *levels):
 
 
 @pytest.mark.parametrize("level", ["reduced", "interface"])
+@pytest.mark.slow
 def test_an_elastic_impact_on_the_written_case_is_the_run_in_one(level):
     """Exact but for the smooth start of an elastic law: the same contact problem; 0.5 %."""
     found, text = _run_in()

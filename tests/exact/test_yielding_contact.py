@@ -46,6 +46,7 @@ def _jackson_green(ratio):
     return np.exp(-(ratio ** (5 / 12)) / 4) * ratio**1.5 + pressed
 
 
+@pytest.mark.slow
 def test_first_yield_is_below_the_surface_of_a_sphere(loops):
     """Reference: Johnson 1985, 4.2; a third of an element in the approach on this mesh, 15 %."""
     assert loops.first_yield == pytest.approx(FORCE, rel=0.15)

@@ -38,6 +38,7 @@ def _study(given=YIELD, levels=("reduced", "interface"), *changes):
 
 
 @pytest.mark.parametrize("level", ["reduced", "interface"])
+@pytest.mark.slow
 def test_levels_with_yield_keep_the_energy(level):
     """Conservation: what yields is what is missing."""
     study = _study()
@@ -53,6 +54,7 @@ def test_levels_with_yield_keep_the_energy(level):
     assert 0.01 < result.energies["plastic"] / E < 0.6
 
 
+@pytest.mark.slow
 def test_elastic_levels_are_doubted_and_the_law_is_measured_by_its_own_kind():
     """Exact: the estimate of the elastic case; the port's pattern is that of another peak, 1e-5."""
     lumped = ("contact:\n", "lumped: {stiffness: 1e8 N/m}\ncontact:\n")

@@ -53,6 +53,7 @@ def _study(*changes):
     return run_stroke(_valve(*changes))
 
 
+@pytest.mark.slow
 def test_first_impact_is_that_of_the_impact():
     """Reference: ``klack impact`` of the same bodies; 10 ns steps, ports of another force."""
     study = _study()
@@ -101,6 +102,7 @@ def test_a_continued_stroke_has_faces_that_are_run_in():
     np.testing.assert_array_equal(gap, whole.channels["seat gap"].values[-len(gap) :])
 
 
+@pytest.mark.slow
 def test_a_stop_hit_harder_than_its_loops_go_is_told():
     """Bad input: a speed of the stop below that of the stroke."""
     slow = _valve(("speed: 0.1 m/s}", "speed: 0.03 m/s}"))
@@ -118,6 +120,7 @@ def test_a_stop_hit_harder_than_its_loops_go_is_told():
     )
 
 
+@pytest.mark.slow
 def test_a_film_lies_beside_faces_that_yield():
     """Conservation: the energy of a wet stroke on faces that yield; a thin film takes little."""
     changes = (
@@ -157,6 +160,7 @@ def test_a_high_yield_stress_changes_no_bit():
     assert not hard.faces
 
 
+@pytest.mark.slow
 def test_a_law_that_cannot_be_leaves_the_stop_elastic(monkeypatch):
     """Bad input: modes that carry more than the loops; a warning, and the yield check says more."""
 

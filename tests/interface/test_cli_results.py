@@ -105,6 +105,7 @@ def test_demo_runs_the_shipped_valve(asked, quick_report, monkeypatch):
     assert opened == [Path("klack-results/demo-valve/report.html").resolve().as_uri()]
 
 
+@pytest.mark.slow
 def test_report_is_written_again_from_the_store(asked, quick_report, capsys):
     assert main(["impact", str(DRAWN), "--no-report", "-q", "--out", "r"]) == 0
 
@@ -116,6 +117,7 @@ def test_report_is_written_again_from_the_store(asked, quick_report, capsys):
     assert "Report in r: report.html, report.pdf" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_ctrl_c_while_the_report_is_written_keeps_the_result(
     asked, quick_report, monkeypatch, capsys
 ):
@@ -135,6 +137,7 @@ def test_ctrl_c_while_the_report_is_written_keeps_the_result(
     assert "stopped; the result is in r; klack report r" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_bug_in_a_report_does_not_cost_the_calculation(asked, quick_report, monkeypatch, capsys):
     assert main(["impact", str(DRAWN), "-q", "--out", "r"]) == 0
     monkeypatch.setattr("klack.report.pdf.write_pdf", lambda study, path: 1 / 0)

@@ -98,6 +98,7 @@ def test_a_second_process_compiles_nothing(program):
     assert (program / "store" / "klack-compiled").stat().st_mode & 0o077 == 0
 
 
+@pytest.mark.slow
 def test_code_from_another_file_is_never_stale(program):
     """Numba itself would give 7 again: it looks at the file of the caller only."""
     assert end(start(program)) == [7.0, 2, []]
@@ -107,6 +108,7 @@ def test_code_from_another_file_is_never_stale(program):
     assert end(start(program)) == [11.0, 2, []]
 
 
+@pytest.mark.slow
 def test_an_inner_function_from_the_store_is_linked_into_a_new_caller(program):
     end(start(program))
 
@@ -156,6 +158,7 @@ def test_two_processes_that_start_together_compile_each_function_once(program):
     assert files(program, "*.lock") == []
 
 
+@pytest.mark.slow
 def test_code_of_another_processor_is_not_run(program):
     """It is left where it is: machines may share a home."""
     assert end(start(program)) == [7.0, 2, []]
@@ -187,6 +190,7 @@ def test_damaged_code_is_compiled_again(program, damage):
     assert end(start(program)) == [7.0, 0, []]
 
 
+@pytest.mark.slow
 def test_code_that_others_may_write_is_not_run(program):
     end(start(program))
     files(program)[0].parent.chmod(0o777)
@@ -220,6 +224,7 @@ def test_a_read_only_store_is_read(program, tmp_path):
     assert "read-only" in said[0]
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_one_warning(program):
     """As a limit of the size of files, which the system reports in the same way."""
     value, compiled, said = end(start(program, FILE_LIMIT="100"))

@@ -325,6 +325,7 @@ class TestInterruption:
             assert matrix(table)[i].tolist() == single(small, points[i], "wet", MEASURES)
 
     @pytest.mark.skipif(sys.platform == "win32", reason="signals")
+    @pytest.mark.slow
     def test_ctrl_c_ends_all_threads_soon(self):
         """Of a process with thousands of points left."""
         script = f"""

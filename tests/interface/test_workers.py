@@ -91,6 +91,7 @@ def attempt(item):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.slow
 def test_who_dies_is_replaced_and_its_item_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -63,6 +63,7 @@ def _displacements(path, nodes):
     return np.array(fields)
 
 
+@pytest.mark.slow
 def test_displacements_are_those_of_calculix(tmp_path):
     """Reference: displacement of the loads (their work over the force), pressed and let go; 0.2 %.
 

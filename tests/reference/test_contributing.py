@@ -182,6 +182,7 @@ def python(code: str, folder: Path) -> dict:
     return json.loads(done.stdout.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_the_recipe_of_a_measure(tmp_path, monkeypatch):
     """One entry in one file; then tables, JSON, schema, report and glossary have it."""
     (entry,) = blocks("a measure", "python")
@@ -226,6 +227,7 @@ assert main(["flight", {case!r}, *words]) == 0
 """
 
 
+@pytest.mark.slow
 def test_the_recipe_of_an_analysis(tmp_path):
     """One folder and one line; then there is a command, and what it leaves behind is read.
 

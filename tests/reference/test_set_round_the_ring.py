@@ -17,6 +17,7 @@ YIELD, SIZE, FINE, SECTORS = 280e6, 8e-6, 5, 6
 MESH = {"yield_stress": YIELD, "size": SIZE, "fine": FINE}
 
 
+@pytest.mark.slow
 def test_sectors_take_the_set_of_the_meridian_plane():
     """Reference: plastic gap and loss of the static loops at the force per length of a sector.
 
