@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import bessel, butter, lfilter
 
 from klack.errors import require_positive
 
@@ -47,6 +46,9 @@ class LowPass:
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles [1/s], shape (order,)."""
+        # takes half a second to load, which cases without a low pass save
+        from scipy.signal import bessel, butter
+
         omega = 2.0 * pi * self.cut_off
         if self.kind == "butterworth":
             _, denominator = butter(self.order, omega, analog=True)
@@ -91,6 +93,8 @@ def low_passed(values: Floats, poles: NDArray[np.complex128], step: float) -> Fl
     >>> float(round((ramp - low_passed(ramp, np.array([-0.1 + 0j]), 1.0))[-1], 6))
     10.0
     """
+    from scipy.signal import lfilter
+
     shown = np.zeros(np.shape(values))
     for pole, residue in zip(poles, _residues(poles), strict=True):
         decay = np.exp(pole * step)

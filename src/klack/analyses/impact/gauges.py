@@ -19,7 +19,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from klack.analyses.impact.record import LevelResult
 from klack.assembling.bodies import BodyPair
@@ -111,6 +110,8 @@ def modal_motion(
         At the start.
     step : float [s]
     """
+    from scipy.signal import lfilter  # takes half a second to load
+
     n, m = loads.shape
     q, v = np.zeros((n + 1, m)), np.zeros((n + 1, m))
     for i in range(m):
