@@ -65,6 +65,7 @@ __all__ = [
     "format_si",
     "is_level",
     "parse_quantity",
+    "parse_temperature",
     "powers_of_unit",
     "size_of_unit",
     "takes_prefix",
@@ -190,7 +191,10 @@ SPECIFIC_HEAT = Kind("a specific heat", "J/kg/K", "385 J/kg/K", ("J/kg/K", "kJ/k
 CONDUCTANCE = Kind("a thermal conductance", "W/K", "0.6 W/K", ("W/K", "mW/K"))
 HEAT_TRANSFER = Kind("a heat transfer coefficient", "W/m^2/K", "12 W/m^2/K", ("W/m^2/K",))
 EXPANSION = Kind(
-    "a coefficient over temperature", "1/K", "12e-6 1/K", ("1/K", "%/K", "um/m/K"),
+    "a coefficient over temperature",
+    "1/K",
+    "12e-6 1/K",
+    ("1/K", "%/K", "um/m/K"),
     {"1/K": 1.0, "%/K": 1e-2, "ppm/K": 1e-6, "um/m/K": 1e-6},
 )
 RATIO = Kind(
@@ -578,11 +582,32 @@ def _temperature() -> tuple[BeforeValidator, WithJsonSchema]:
 
 
 def _read_temperature(value: object, info: ValidationInfo, *, kind: Kind) -> float:
+    found = _celsius(value, kind)
+    return _read(value, info, kind=kind) if found is None else found
+
+
+def _celsius(value: object, kind: Kind) -> float | None:
+    """Temperature [K] of a text in degrees Celsius; None for anything else."""
     if isinstance(value, str):
         match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
         if match:
             return _in_range(round(float(match[1]) + 273.15, 6), value, kind, "temperature")
-    return _read(value, info, kind=kind)
+    return None
+
+
+def parse_temperature(value: str, where: str = "temperature") -> float:
+    """Turn ``"20 degC"`` or ``"293 K"`` into K, above 0.
+
+    >>> parse_temperature("-30 degC")
+    243.15
+    """
+    found = _celsius(value, TEMPERATURE)
+    found = parse_quantity(value, TEMPERATURE, where) if found is None else found
+    if not found > 0.0:
+        raise QuantityError(
+            where, value, TEMPERATURE, "check the sign and the unit.", expected="one above 0 K"
+        )
+    return found
 
 
 def _length_unit(value: object) -> float:

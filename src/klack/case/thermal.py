@@ -1,4 +1,4 @@
-"""The section ``thermal``: what is warmed by a stroke, and what a stroke takes from temperatures."""
+"""The section ``thermal``: what a stroke warms, and what of a stroke follows temperatures."""
 
 from collections.abc import Mapping
 
@@ -99,7 +99,10 @@ class CaseThermal(Section):
         default=None, gt=0, description="Of the warm-up; default to the steady state."
     )
     tolerance: TemperatureRise = Field(
-        default=0.1, ge=1e-6, le=100, description="Error of a step, and distance to the steady state."
+        default=0.1,
+        ge=1e-6,
+        le=100,
+        description="Error of a step, and distance to the steady state.",
     )
     spacing: TemperatureRise = Field(
         default=5.0,

@@ -119,7 +119,7 @@ def _check_heat(thermal: CaseThermal, parts: Mapping[str, Component]) -> None:
 
 
 def _check_grown(key: Key, text: str, parts: Mapping[str, Component]) -> None:
-    component, _, field = text.partition(".")
+    component, _, _ = text.partition(".")
     require_known(key, component, list(parts.keys()), "component")
     part = parts[component]
     known = {

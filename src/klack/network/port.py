@@ -41,7 +41,8 @@ class Port:
     Parameters
     ----------
     domain : str
-        ``"mechanical"``, ``"hydraulic"``, ``"electric"`` or ``"thermal"``; only equal domains can be joined.
+        ``"mechanical"``, ``"hydraulic"``, ``"electric"`` or ``"thermal"``; only equal domains can
+        be joined.
     role : Role
     optional : bool
         Whether it may stay unconnected.

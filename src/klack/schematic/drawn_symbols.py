@@ -61,7 +61,10 @@ _TWO_ENDED: Mapping[str, tuple[Stroke, ...]] = {
     ),
     "flow-source": _PUMP,
     "thermal-conductance": (*_BOX, Stroke("M10,-8 V8 M14,-8 V8 M18,-8 V8 M22,-8 V8 M26,-8 V8")),
-    "convection": (*_BOX, Stroke("M11,8 q4,-4 0,-8 t0,-8 M18,8 q4,-4 0,-8 t0,-8 M25,8 q4,-4 0,-8 t0,-8")),
+    "convection": (
+        *_BOX,
+        Stroke("M11,8 q4,-4 0,-8 t0,-8 M18,8 q4,-4 0,-8 t0,-8 M25,8 q4,-4 0,-8 t0,-8"),
+    ),
     "heat-radiation": (*_BOX, Stroke("M9,4 q3,-8 6,0 t6,0 t6,0 M24,0 L27,4 L23,6")),
 }
 

@@ -51,7 +51,8 @@ class HeatCapacity(ThermalComponent):
         """Heat capacity [J/K]."""
         if self.capacity is not None:
             return self.capacity
-        assert self.mass is not None and self.specific_heat is not None
+        assert self.mass is not None
+        assert self.specific_heat is not None
         return self.mass * self.specific_heat
 
     def add_heat(self, heat: HeatRows) -> None:

@@ -101,9 +101,7 @@ class HeatNetwork:
         links = self.links(self.start)
         _, label = connected_components(links.between > 0.0, directed=False)
         islands = [tuple(np.flatnonzero(label == i).tolist()) for i in np.unique(label)]
-        return tuple(
-            nodes for nodes in islands if n and not links.to_fixed[list(nodes)].any()
-        )
+        return tuple(nodes for nodes in islands if n and not links.to_fixed[list(nodes)].any())
 
 
 def heat_network(network: Network) -> HeatNetwork | None:
@@ -140,7 +138,9 @@ def heat_network(network: Network) -> HeatNetwork | None:
         part.add_heat(rows)
         for node in rows.capacity.keys() - before.keys():
             words[node] = name
-    made = _numbered(rows, words, {name: at[name, "node"] for name in parts if _stores(parts[name])})
+    made = _numbered(
+        rows, words, {name: at[name, "node"] for name in parts if _stores(parts[name])}
+    )
     _require_known(made)
     return made
 

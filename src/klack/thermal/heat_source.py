@@ -57,9 +57,13 @@ class HeatSource(ThermalComponent):
 
     def add_heat(self, heat: HeatRows) -> None:
         """Supply its node."""
-        time, power = ((0.0,), (self.power or 0.0,))
-        if self.table is not None:
-            time, power = self.table.time, self.table.power
+        time, power = self.course()
         heat.supplies.append(
             HeatSupply(component=heat.component, node=heat.node["node"], time=time, power=power)
         )
+
+    def course(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Times [s] and powers [W], constant beyond both ends."""
+        if self.table is not None:
+            return self.table.time, self.table.power
+        return (0.0,), (self.power or 0.0,)

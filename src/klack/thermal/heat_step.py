@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from klack.thermal.grounded_inverse import grounded_inverse
 from klack.thermal.heat_network import HeatNetwork, Links
 
-__all__ = ["HeatStep", "heat_step", "steady_temperature"]
+__all__ = ["HeatStep", "heat_step", "in_balance", "steady_temperature"]
 
 Array = NDArray[np.float64]
 
@@ -79,9 +79,7 @@ def heat_step(
     near = grounded_inverse(joined, outward.sum(axis=1) + C / length)
     mu, V = np.linalg.eigh(root[:, None] * near * root)
     z = np.maximum(length / np.maximum(mu, np.finfo(float).tiny) - 1.0, 0.0)
-    first, last = (
-        V.T @ ((q[slow] + across @ q[fast] + outward @ known) / root) for q in flow
-    )
+    first, last = (V.T @ ((q[slow] + across @ q[fast] + outward @ known) / root) for q in flow)
     y = V.T @ (root * (start[slow] - zero))
     one, two, three = (_phi(k, z) for k in (1, 2, 3))
     end = np.exp(-z) * y + length * (one * first + two * (last - first))
@@ -101,9 +99,21 @@ def heat_step(
     given_off = np.array(
         [B[:, j] @ (sums - length * known[j]) for j in range(len(known))], dtype=float
     )
-    return HeatStep(
-        temperature=zero + rise, supplied=supplied, stored=stored, given_off=given_off
+    return HeatStep(temperature=zero + rise, supplied=supplied, stored=stored, given_off=given_off)
+
+
+def in_balance(network: HeatNetwork, links: Links, start: Array, flow: Array) -> Array:
+    """Temperatures [K] with those of nodes without capacity in balance with the others."""
+    zero = network.fixed[0]
+    held = network.capacity > 0.0
+    slow, fast = np.flatnonzero(held), np.flatnonzero(~held)
+    down, B = links.between[np.ix_(fast, slow)], links.to_fixed[fast]
+    inner = grounded_inverse(links.between[np.ix_(fast, fast)], down.sum(axis=1) + B.sum(axis=1))
+    found = start.copy()
+    found[fast] = zero + inner @ (
+        flow[fast] + down @ (start[slow] - zero) + B @ (network.fixed - zero)
     )
+    return found
 
 
 def steady_temperature(

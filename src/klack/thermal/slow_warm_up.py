@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError, InputError
 from klack.thermal.heat_network import HeatNetwork
-from klack.thermal.heat_step import HeatStep, heat_step, steady_temperature
+from klack.thermal.heat_step import HeatStep, heat_step, in_balance, steady_temperature
 
 __all__ = ["SlowSettings", "SlowWarmUp", "WarmPoint", "warm_up"]
 
@@ -35,6 +35,7 @@ MeanHeat = Callable[[Array], Array]
 _MOST_POINTS = 2000
 _MOST_REPEATS = 25
 _SAFETY, _MOST_SHRINK, _MOST_GROWTH = 0.8, 0.1, 4.0
+_HALVINGS = 8  # of a factor of 2 between step lengths
 _MOST_STEADY = 40
 _SETTLED = 0.1  # of the tolerance: where the steady state is taken as found
 _HOPELESS = 2  # points in a row from which the heat grows faster than it is given off
@@ -146,14 +147,15 @@ class _Gain:
     at: Array | None = None
     aim: Array | None = None
 
-    def see(self, temperature: Array, aim: Array | None) -> None:
-        """Next point, and the steady state that its heat would lead to."""
+    def see(self, temperature: Array, aim: Array | None, least: float) -> None:
+        """Next point, and the steady state that its heat leads to; moves below ``least`` wait."""
         if aim is not None and self.at is not None and self.aim is not None:
             moved = temperature - self.at
-            if float(np.abs(moved).max(initial=0.0)) > 0.0:
-                self.value = float((aim - self.aim) @ moved / (moved @ moved))
-                away = float((aim - temperature) @ moved) > 0.0
-                self.hopeless = self.hopeless + 1 if self.value >= 1.0 and away else 0
+            if float(np.abs(moved).max(initial=0.0)) <= least:
+                return
+            self.value = float((aim - self.aim) @ moved / (moved @ moved))
+            away = float((aim - temperature) @ moved) > 0.0
+            self.hopeless = self.hopeless + 1 if self.value >= 1.0 and away else 0
         self.at, self.aim = temperature, aim
 
     @property
@@ -202,8 +204,7 @@ def warm_up(
         If no step is short enough, as where the heat jumps with the temperature.
     """
     march = _March(network, mean_heat, settings)
-    T = network.start.copy()
-    Q = march.heat(T, 0.0)
+    T, Q = _started(march)
     if settings.duration is None:
         _require_way_out(network, Q + network.supplied(inf))
     march.points.append(WarmPoint(time=0.0, temperature=T, stroke_temperature=T, heat=Q))
@@ -246,11 +247,29 @@ def _require_way_out(network: HeatNetwork, flow: Array) -> None:
             names = " and ".join(f"'{network.names[i]}'" for i in nodes)
             raise InputError(
                 "warm-up",
-                got=f"{float(flow[list(nodes)].sum()):.3g} W into {names}, from where no path leads "
-                "to ambient: the temperatures would rise for ever",
+                got=f"{float(flow[list(nodes)].sum()):.3g} W into {names}, from where no path "
+                "leads to ambient: the temperatures would rise for ever",
                 expected="a path to ambient or to a fixed-temperature, or a duration",
                 hint="connect a convection to ambient, or give thermal.duration, e.g. 10 min.",
             )
+
+
+def _started(march: _March) -> tuple[Array, Array]:
+    """Temperatures and heat at time zero; nodes without capacity are in balance with the rest."""
+    network, T = march.network, march.network.start.copy()
+    Q = march.heat(T, 0.0)
+    for _ in range(_MOST_STEADY):
+        flow = Q + network.supplied(0.0)
+        new = in_balance(network, network.links(T), T, flow)
+        moved = float(np.abs(new - T).max(initial=0.0))
+        if moved <= _SETTLED * march.settings.tolerance:
+            return new, Q
+        T = new
+        Q = march.heat(T, 0.0)
+    raise ConvergenceError(
+        "warm-up: the nodes without capacity find no balance with the heat of a stroke.\n"
+        "Try: give them a heat capacity."
+    )
 
 
 def _aim(march: _March, T: Array, Q: Array) -> Array | None:
@@ -262,7 +281,7 @@ def _ended(march: _March, T: Array, Q: Array) -> str:
     """Why the march is over; empty if it goes on."""
     settings, network = march.settings, march.network
     aim = _aim(march, T, Q)
-    march.gain.see(T, aim)
+    march.gain.see(T, aim, settings.tolerance)
     if settings.duration is not None:
         return "duration" if march.time >= settings.duration * (1.0 - 1e-12) else ""
     if network.corners and march.time < network.corners[-1]:
@@ -279,7 +298,7 @@ def _step(march: _March, T: Array, Q: Array) -> tuple[HeatStep, Array, Array, fl
     """Take one step: its end, the temperatures and heat of its stroke, and its length."""
     network, settings = march.network, march.settings
     links = network.links(T)
-    length = min(_first_length(march, T, Q), march.longest)
+    length = _first_length(march, T, Q)
     for _ in range(_MOST_REPEATS):
         ends = tuple(network.supplied(march.time + x) for x in (0.0, length))
         guess = heat_step(network, links, T, (Q + ends[0], Q + ends[1]), length)
@@ -303,21 +322,22 @@ def _step(march: _March, T: Array, Q: Array) -> tuple[HeatStep, Array, Array, fl
 def _first_length(march: _March, T: Array, Q: Array) -> float:
     """Longest step in which no temperature is expected to move by more than the spacing."""
     network, settings = march.network, march.settings
-    links = network.links(T)
-    aim = march.gain.aim
+    links, held = network.links(T), network.capacity > 0.0
+    aim = _aim(march, T, Q)
     most = settings.spacing
     if aim is not None and settings.duration is None:
-        most = min(most, max(0.5 * float(np.abs(aim - T).max()), 0.5 * settings.tolerance))
+        far = 0.5 * float(np.abs(aim - T)[held].max(initial=0.0))
+        most = min(most, max(far, 0.5 * settings.tolerance))
     ends = [t for t in network.corners if t > march.time * (1.0 + 1e-12)]
     ends += [settings.duration] if settings.duration is not None else []
-    longest = min(ends) - march.time if ends else inf
+    longest = min([*ends, inf]) - march.time
+    longest = min(longest, march.longest)
 
     def moved(length: float) -> float:
         flow = tuple(Q + network.supplied(march.time + x) for x in (0.0, length))
         step = heat_step(network, links, T, (flow[0], flow[1]), length)
-        return float(np.abs(step.temperature - T).max(initial=0.0))
+        return float(np.abs(step.temperature - T)[held].max(initial=0.0))
 
-    held = network.capacity > 0.0
     if not held.any():
         return min(longest, 1.0)
     rate = np.abs(_flows(network, T, Q + network.supplied(march.time)))[held]
@@ -335,7 +355,7 @@ def _first_length(march: _March, T: Array, Q: Array) -> float:
     if high >= longest and moved(longest) <= most:
         return longest
     high = min(high, longest)
-    for _ in range(30):
+    for _ in range(_HALVINGS):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if moved(middle) <= most else (low, middle)
     return low
@@ -357,7 +377,6 @@ def _steady(march: _March, T: Array, Q: Array) -> WarmPoint:
         aim = _aim(march, T, Q)
         assert aim is not None
         moved = float(np.abs(aim - T).max(initial=0.0))
-        march.gain.see(T, aim)
         if moved <= settled:
             return WarmPoint(time=inf, temperature=aim, stroke_temperature=T, heat=Q)
         T, Q = aim, march.heat(aim, inf)
