@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from klack.case.consistency import require_known
 from klack.case.thermal import CaseThermal
 from klack.case.valve_sections import ValveSections
-from klack.input.problem import CaseProblem, Key, one_of
+from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.network.component import Component
 from klack.network.described import kind_of_field
 from klack.network.port import Role
@@ -138,5 +138,5 @@ def _check_grown(key: Key, text: str, parts: Mapping[str, Component]) -> None:
             key,
             got=f"'{text}'",
             expected=f"a length of '{component}', or the preload of a spring: {one_of(fitting)}",
-            hint="write component.key, as stop.gap.",
+            hint=nearest(text, fitting, "write component.key, as stop.gap."),
         )

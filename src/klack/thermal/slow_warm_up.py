@@ -216,8 +216,9 @@ def warm_up(
             break
         if len(march.points) >= _MOST_POINTS:
             raise ConvergenceError(
-                f"warm-up: {_MOST_POINTS} strokes lead to {march.time:.6g} s only.\n"
-                "Try: a larger thermal.spacing, or a shorter thermal.duration."
+                f"warm-up: {_MOST_POINTS} strokes lead to {march.time:.6g} s only; perhaps the heat "
+                "of a stroke jumps with the temperature.\n"
+                "Try: a larger thermal.tolerance and spacing, or a shorter thermal.duration."
             )
         step, stroke, heat, length = _step(march, T, Q)
         energy.add(step)
