@@ -20,6 +20,7 @@ def case(tmp_path, monkeypatch):
     return path
 
 
+@pytest.mark.slow
 def test_a_warm_up_with_its_files(case, tmp_path, capsys):
     assert main(["heat", str(case), "--json", "heat.json", "--no-report"]) == 0
 

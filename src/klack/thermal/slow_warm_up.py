@@ -199,7 +199,7 @@ def warm_up(
     Raises
     ------
     InputError
-        Without a duration, for heat that has no way out: the temperatures would rise for ever.
+        Without a duration, for heat that has no way out: the temperatures would rise without end.
     ConvergenceError
         If no step is short enough, as where the heat jumps with the temperature.
     """
@@ -216,8 +216,8 @@ def warm_up(
             break
         if len(march.points) >= _MOST_POINTS:
             raise ConvergenceError(
-                f"warm-up: {_MOST_POINTS} strokes lead to {march.time:.6g} s only; perhaps the heat "
-                "of a stroke jumps with the temperature.\n"
+                f"warm-up: {_MOST_POINTS} strokes lead to {march.time:.6g} s only; perhaps the "
+                "heat of a stroke jumps with the temperature.\n"
                 "Try: a larger thermal.tolerance and spacing, or a shorter thermal.duration."
             )
         step, stroke, heat, length = _step(march, T, Q)
@@ -249,7 +249,7 @@ def _require_way_out(network: HeatNetwork, flow: Array) -> None:
             raise InputError(
                 "warm-up",
                 got=f"{float(flow[list(nodes)].sum()):.3g} W into {names}, from where no path "
-                "leads to ambient: the temperatures would rise for ever",
+                "leads to ambient: the temperatures would rise without end",
                 expected="a path to ambient or to a fixed-temperature, or a duration",
                 hint="connect a convection to ambient, or give thermal.duration, e.g. 10 min.",
             )
@@ -279,7 +279,7 @@ def _aim(march: _March, T: Array, Q: Array) -> Array | None:
 
 
 def _ended(march: _March, T: Array, Q: Array) -> str:
-    """Why the march is over; empty if it goes on."""
+    """Why the march is over; empty if it continues."""
     settings, network = march.settings, march.network
     aim = _aim(march, T, Q)
     march.gain.see(T, aim, settings.tolerance)

@@ -74,8 +74,10 @@ def heat(
         from klack.analyses.heat.log import HEAT_LOG
         from klack.analyses.heat.run import run_heat
         from klack.analyses.heat.table import CAUSES_NAME, CSV_NAME, write_causes, write_csv
+        from klack.compiling.ahead import compiling_ahead
 
-    with ending.resumable(HEAT_LOG) as progress:
+    ahead = compiling_ahead(("loop", "rest"), wanted.threads)
+    with ending.resumable(HEAT_LOG) as progress, ahead:
         record = run_heat(
             checked,
             variant=variant,
