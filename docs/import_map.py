@@ -51,7 +51,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     # the valve as a network of components
     ("network",),
     ("control",),
-    ("hydraulics", "magnetics"),
+    ("hydraulics", "magnetics", "thermal"),
     ("mechanics",),
     # in time, and what is made of it
     ("simulation",),

@@ -29,11 +29,14 @@ __all__ = [
     "DampingCoefficient",
     "Density",
     "DynamicViscosity",
+    "Expansion",
     "FieldStrength",
     "Flux",
     "FluxDensity",
     "Force",
     "Frequency",
+    "HeatCapacity",
+    "HeatTransfer",
     "Kind",
     "KinematicViscosity",
     "Length",
@@ -41,15 +44,19 @@ __all__ = [
     "Mass",
     "Modulus",
     "Permeance",
+    "Power",
     "Pressure",
     "QuantityError",
     "Rate",
     "Ratio",
     "Resistance",
     "Rotation",
+    "SpecificHeat",
     "Speed",
     "Stiffness",
     "Temperature",
+    "TemperatureRise",
+    "ThermalConductance",
     "Time",
     "Voltage",
     "Volume",
@@ -58,6 +65,7 @@ __all__ = [
     "format_si",
     "is_level",
     "parse_quantity",
+    "parse_temperature",
     "powers_of_unit",
     "size_of_unit",
     "takes_prefix",
@@ -174,6 +182,21 @@ FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
 PERMEANCE = Kind("a permeance", "H", "20 nH", ("H", "uH", "nH"), smallest=1e-21)
 FLUX = Kind("a magnetic flux", "Wb", "20 uWb", ("Wb", "mWb", "uWb"), smallest=1e-21)
 TEMPERATURE = Kind("a temperature", "K", "20 degC", ("degC", "K"), {"K": 1.0}, largest=1e6)
+TEMPERATURE_RISE = Kind(
+    "a difference of temperatures", "K", "5 K", ("K", "mK"), {"K": 1.0, "mK": 1e-3}, largest=1e6
+)
+POWER = Kind("a power", "W", "12 W", ("W", "mW", "kW"))
+HEAT_CAPACITY = Kind("a heat capacity", "J/K", "14 J/K", ("J/K", "kJ/K"))
+SPECIFIC_HEAT = Kind("a specific heat", "J/kg/K", "385 J/kg/K", ("J/kg/K", "kJ/kg/K"))
+CONDUCTANCE = Kind("a thermal conductance", "W/K", "0.6 W/K", ("W/K", "mW/K"))
+HEAT_TRANSFER = Kind("a heat transfer coefficient", "W/m^2/K", "12 W/m^2/K", ("W/m^2/K",))
+EXPANSION = Kind(
+    "a coefficient over temperature",
+    "1/K",
+    "12e-6 1/K",
+    ("1/K", "%/K", "um/m/K"),
+    {"1/K": 1.0, "%/K": 1e-2, "ppm/K": 1e-6, "um/m/K": 1e-6},
+)
 RATIO = Kind(
     "a number without unit",
     "-",
@@ -217,6 +240,12 @@ KINDS = (
     FLUX,
     TEMPERATURE,
     RATIO,
+    POWER,
+    HEAT_CAPACITY,
+    SPECIFIC_HEAT,
+    CONDUCTANCE,
+    HEAT_TRANSFER,
+    EXPANSION,
 )
 
 
@@ -553,11 +582,32 @@ def _temperature() -> tuple[BeforeValidator, WithJsonSchema]:
 
 
 def _read_temperature(value: object, info: ValidationInfo, *, kind: Kind) -> float:
+    found = _celsius(value, kind)
+    return _read(value, info, kind=kind) if found is None else found
+
+
+def _celsius(value: object, kind: Kind) -> float | None:
+    """Temperature [K] of a text in degrees Celsius; None for anything else."""
     if isinstance(value, str):
         match = re.fullmatch(rf"({_NUMBER}) ?(?:degC|°C)", " ".join(value.split()))
         if match:
             return _in_range(round(float(match[1]) + 273.15, 6), value, kind, "temperature")
-    return _read(value, info, kind=kind)
+    return None
+
+
+def parse_temperature(value: str, where: str = "temperature") -> float:
+    """Turn ``"20 degC"`` or ``"293 K"`` into K, above 0.
+
+    >>> parse_temperature("-30 degC")
+    243.15
+    """
+    found = _celsius(value, TEMPERATURE)
+    found = parse_quantity(value, TEMPERATURE, where) if found is None else found
+    if not found > 0.0:
+        raise QuantityError(
+            where, value, TEMPERATURE, "check the sign and the unit.", expected="one above 0 K"
+        )
+    return found
 
 
 def _length_unit(value: object) -> float:
@@ -598,6 +648,13 @@ FieldStrength = Annotated[float, *typed(FIELD_STRENGTH)]
 Permeance = Annotated[float, *typed(PERMEANCE)]
 Flux = Annotated[float, *typed(FLUX)]
 Temperature = Annotated[float, *_temperature()]
+TemperatureRise = Annotated[float, *typed(TEMPERATURE_RISE)]
+Power = Annotated[float, *typed(POWER)]
+HeatCapacity = Annotated[float, *typed(HEAT_CAPACITY)]
+SpecificHeat = Annotated[float, *typed(SPECIFIC_HEAT)]
+ThermalConductance = Annotated[float, *typed(CONDUCTANCE)]
+HeatTransfer = Annotated[float, *typed(HEAT_TRANSFER)]
+Expansion = Annotated[float, *typed(EXPANSION)]
 Ratio = Annotated[float, *typed(RATIO)]
 LengthUnit = Annotated[
     float,

@@ -50,6 +50,7 @@ def test_all_shipped_cases_are_tested():
         "stairs",  # in test_workflow_stairs.py
         "struck-bar",
         "two-rods",
+        "warm-valve",  # in test_how_to_heat.py
         "witness",  # in test_calculix_impact.py
     }
 

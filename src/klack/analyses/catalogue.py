@@ -56,6 +56,7 @@ ANALYSES: tuple[Entry, ...] = (
         "klack stroke demo-stroke --variant wet,dry",
     ),
     Entry("operating_point.analysis:OPERATING_POINT", "klack operating points"),
+    Entry("heat.analysis:HEAT", "klack heat", "klack heat warm-valve"),
     Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
     Entry("stroke_shots.analysis:STROKE_SHOTS", "klack study of strokes"),
     Entry(

@@ -10,6 +10,7 @@ from klack.case.free_parameters import free_parameters
 from klack.case.noise_consistency import check_noise
 from klack.case.reader import Lines
 from klack.case.spatial_consistency import require_bodies
+from klack.case.thermal_consistency import check_thermal
 from klack.case.valve_consistency import check_valve
 from klack.case.valve_sections import ValveSections
 from klack.case.variants import VARIANTS, Variant
@@ -27,6 +28,7 @@ class ValveCase(ValveSections):
     def _consistent(self) -> Self:
         check_valve(self)
         check_noise(self)
+        check_thermal(self)
         free_parameters(self)
         return self
 

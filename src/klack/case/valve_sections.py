@@ -18,6 +18,7 @@ from klack.case.noise import CaseNoise
 from klack.case.part_sections import INCLUDE, PARTS, CaseInclude
 from klack.case.shots import StrokeShots
 from klack.case.study import CaseStudy
+from klack.case.thermal import CaseThermal
 from klack.case.variants import Variant
 from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem
@@ -194,6 +195,7 @@ class ValveSections(CaseFile):
         default=None, description="Measurement of strokes of this valve."
     )
     noise: CaseNoise | None = Field(default=None, description="Input of klack noise.")
+    thermal: CaseThermal | None = Field(default=None, description="Input of klack heat.")
     calibration: CaseCalibration | None = Field(
         default=None, description="What klack calibrate fits to measured strokes."
     )

@@ -65,6 +65,13 @@ COMPONENTS = (
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),
     ("controlled-voltage", "klack.magnetics.controlled_voltage.ControlledVoltage"),
+    # heat
+    ("heat-capacity", "klack.thermal.heat_capacity.HeatCapacity"),
+    ("thermal-conductance", "klack.thermal.conductance.Conductance"),
+    ("convection", "klack.thermal.convection.Convection"),
+    ("heat-radiation", "klack.thermal.radiation.Radiation"),
+    ("fixed-temperature", "klack.thermal.fixed_temperature.FixedTemperature"),
+    ("heat-source", "klack.thermal.heat_source.HeatSource"),
 )
 """Type and dotted path of the class, for each component type."""
 

@@ -30,7 +30,12 @@ def check_nodes(components: Mapping[str, Component], nodes: Iterable[Node]) -> N
     """
     nodes = tuple(nodes)
     _check_dangling(components, nodes)
-    checks = {"mechanical": _check_motion, "hydraulic": _check_pressure, "electric": _check_drive}
+    checks = {
+        "mechanical": _check_motion,
+        "hydraulic": _check_pressure,
+        "electric": _check_drive,
+        "thermal": _check_temperature,
+    }
     for node in nodes:
         checks[node.domain](components, node)
 
@@ -58,6 +63,7 @@ def _where_to(domain: str, port: str) -> str:
         "mechanical": f"connect it to a port of a body, or to the ground: [{port}, ground].",
         "hydraulic": f"connect it to a chamber or a pressure, or to ambient: [{port}, ambient].",
         "electric": f"connect it to its partner: [driver.terminals, {port}].",
+        "thermal": f"connect it to a heat capacity, or to ambient: [{port}, ambient].",
     }
     return words[domain]
 
@@ -141,6 +147,19 @@ def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProbl
         expected="a chamber, a prescribed pressure or ambient at every hydraulic node",
         hint="add the dead volume there as a chamber (a few mm^3), or a pressure source.",
     )
+
+
+def _check_temperature(components: Mapping[str, Component], node: Node) -> None:
+    prescribed = [str(joint) for joint in node.having(Role.TEMPERATURE)]
+    prescribed += [node.word] if node.word else []
+    stores = [str(joint) for joint in node.having(Role.HEAT_STORE)]
+    if len(prescribed) > 1 or (prescribed and stores):
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{_and([*prescribed, *stores])} at one node",
+            expected="one prescribed temperature, or heat capacities",
+            hint="put a thermal-conductance or a convection between them.",
+        )
 
 
 def _check_drive(components: Mapping[str, Component], node: Node) -> None:

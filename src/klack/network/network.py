@@ -2,8 +2,9 @@ r"""A valve as components and connections: checked, then translated into rows fo
 
 A *connection* lists all ports that meet in one node.  A mechanical node is one point of one body
 (or of the ground) and everything that pushes it there; a hydraulic node is one pressure; an
-electric node is one pair of wires.  Two words may stand in place of a port: ``ground`` does not
-move, ``ambient`` has the pressure of the surroundings.
+electric node is one pair of wires, a thermal node is one temperature.  Two words may stand in
+place of a port: ``ground`` does not move, ``ambient`` has the pressure, or the temperature, of the
+surroundings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -134,7 +135,7 @@ class Network:
                 pressures += 1
             bodies = node.having(Role.MOTION)
             motion = handles[bodies[0].component][bodies[0].name] if bodies else GROUND
-            shared = {"mechanical": motion, "electric": node.index}
+            shared = {"mechanical": motion, "electric": node.index, "thermal": node.index}
             shared["hydraulic"] = AMBIENT if node.word else pressures
             for joint in node.joints:
                 handles[joint.component][joint.name] = shared[node.domain]

@@ -10,7 +10,10 @@ from klack.network.port import Port, Role
 __all__ = ["RESERVED", "Joint", "Node", "join"]
 
 RESERVED = {"ground": "mechanical", "ambient": "hydraulic"}
-"""Words allowed in a connection instead of a port, and their domains."""
+"""Words allowed in a connection instead of a port, and their domains.
+
+``ambient`` beside thermal ports is the temperature of the surroundings.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +30,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """Ports that are one point (mechanical), one pressure (hydraulic), or one pair of wires.
+    """Ports that are one point, one pressure, one pair of wires, or one temperature.
 
     Parameters
     ----------
@@ -95,7 +98,10 @@ def _node(
         seen[str(joint)] = index
         joints.append(joint)
     domains = {str(joint): joint.port.domain for joint in joints}
-    domains |= {word: RESERVED[word] for word in words}
+    thermal = set(domains.values()) == {"thermal"}
+    domains |= {
+        word: "thermal" if thermal and word == "ambient" else RESERVED[word] for word in words
+    }
     if len(set(domains.values())) > 1:
         raise CaseProblem(
             ("connections", index),

@@ -3,7 +3,20 @@
 from dataclasses import dataclass
 from enum import Enum
 
-__all__ = ["COIL", "COMPLIANCE", "ELEMENT", "FLOW", "MOTION", "PRESSURE", "VOLTAGE", "Port", "Role"]
+__all__ = [
+    "COIL",
+    "COMPLIANCE",
+    "ELEMENT",
+    "FLOW",
+    "HEAT",
+    "HEAT_STORE",
+    "MOTION",
+    "PRESSURE",
+    "TEMPERATURE",
+    "VOLTAGE",
+    "Port",
+    "Role",
+]
 
 
 class Role(Enum):
@@ -16,6 +29,9 @@ class Role(Enum):
     FLOW = "carries flow"
     VOLTAGE = "drives"
     COIL = "is driven"
+    HEAT_STORE = "stores heat"
+    TEMPERATURE = "prescribes temperature"
+    HEAT = "carries heat"
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +41,8 @@ class Port:
     Parameters
     ----------
     domain : str
-        ``"mechanical"``, ``"hydraulic"`` or ``"electric"``; only equal domains can be joined.
+        ``"mechanical"``, ``"hydraulic"``, ``"electric"`` or ``"thermal"``; only equal domains can
+        be joined.
     role : Role
     optional : bool
         Whether it may stay unconnected.
@@ -43,3 +60,6 @@ PRESSURE = Port("hydraulic", Role.PRESSURE)
 FLOW = Port("hydraulic", Role.FLOW)
 VOLTAGE = Port("electric", Role.VOLTAGE)
 COIL = Port("electric", Role.COIL)
+HEAT_STORE = Port("thermal", Role.HEAT_STORE, optional=True)
+TEMPERATURE = Port("thermal", Role.TEMPERATURE)
+HEAT = Port("thermal", Role.HEAT)

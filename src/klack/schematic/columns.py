@@ -19,7 +19,14 @@ from klack.schematic.shapes import Domain
 
 __all__ = ["Plan", "plan_of"]
 
-_RULERS = (Role.MOTION, Role.COMPLIANCE, Role.PRESSURE, Role.VOLTAGE)
+_RULERS = (
+    Role.MOTION,
+    Role.COMPLIANCE,
+    Role.PRESSURE,
+    Role.VOLTAGE,
+    Role.HEAT_STORE,
+    Role.TEMPERATURE,
+)
 _BODIES, _PUSHING, _DRIVING = 0, 1, 2
 
 

@@ -60,6 +60,12 @@ _TWO_ENDED: Mapping[str, tuple[Stroke, ...]] = {
         Stroke("M10,-4 H26 V4 H10 Z", "fluid"),
     ),
     "flow-source": _PUMP,
+    "thermal-conductance": (*_BOX, Stroke("M10,-8 V8 M14,-8 V8 M18,-8 V8 M22,-8 V8 M26,-8 V8")),
+    "convection": (
+        *_BOX,
+        Stroke("M11,8 q4,-4 0,-8 t0,-8 M18,8 q4,-4 0,-8 t0,-8 M25,8 q4,-4 0,-8 t0,-8"),
+    ),
+    "heat-radiation": (*_BOX, Stroke("M9,4 q3,-8 6,0 t6,0 t6,0 M24,0 L27,4 L23,6")),
 }
 
 _ARROW_UP = "M0,14 V-14 M-5,-6 L0,-14 L5,-6"
@@ -67,6 +73,18 @@ _ARROW_DOWN = "M0,-14 V14 M-5,6 L0,14 L5,6"
 _AXES = Stroke("M-18,-14 V14 H18", "thin")
 
 _FRAMED: Mapping[str, tuple[Stroke, ...]] = {
+    "heat-capacity": (
+        Stroke("M-16,-12 H16 V12 H-16 Z", "metal"),
+        Stroke("M-8,8 q4,-4 0,-8 t0,-6 M0,8 q4,-4 0,-8 t0,-6 M8,8 q4,-4 0,-8 t0,-6", "thin"),
+    ),
+    "fixed-temperature": (
+        Stroke("M-3,-14 a3,3 0 0 1 6,0 V4 a6,6 0 1 1 -6,0 Z", "paper"),
+        Stroke("M0,-8 V6", "heavy"),
+    ),
+    "heat-source": (
+        Stroke(_circle(0, 0, 12), "paper"),
+        Stroke("M-6,6 q4,-4 0,-8 t0,-4 M2,6 q4,-4 0,-8 t0,-4", "thin"),
+    ),
     "annulus": (
         Stroke("M-20,-12 H20 M-20,12 H20", "heavy"),
         Stroke("M-14,-7 H12 V7 H-14 Z", "metal"),

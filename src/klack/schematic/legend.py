@@ -17,6 +17,7 @@ _LINES: tuple[tuple[Domain, str], ...] = (
     ("hydraulic", "fluid"),
     ("mechanical", "motion and force"),
     ("electric", "voltage and current"),
+    ("thermal", "temperature and heat"),
 )
 _MARKED = (
     ("ground", "ground"),

@@ -21,11 +21,13 @@ _WIRES: dict[Domain, str] = {
     "mechanical": f'stroke="{_INK}" stroke-width="3"',
     "hydraulic": f'stroke="{COLOURS["blue"]}" stroke-width="1.8"',
     "electric": f'stroke="{COLOURS["red"]}" stroke-width="1.6" stroke-dasharray="5 3"',
+    "thermal": f'stroke="{COLOURS["orange"]}" stroke-width="1.8" stroke-dasharray="1 4"',
 }
 _DOTS: dict[Domain, str] = {
     "mechanical": _INK,
     "hydraulic": COLOURS["blue"],
     "electric": COLOURS["red"],
+    "thermal": COLOURS["orange"],
 }
 _INKS = {
     "line": f'fill="none" stroke="{_INK}" stroke-width="1.4"',
@@ -60,7 +62,7 @@ def svg_of(drawn: Schematic, name: str = "") -> str:
 
 def _ordered_lines(drawn: Schematic) -> Iterable[str]:
     """Wires with their leads; the thick ones first, so that they hide no other."""
-    for domain in ("mechanical", "hydraulic", "electric"):
+    for domain in ("mechanical", "hydraulic", "electric", "thermal"):
         for wire in drawn.wires:
             if wire.domain == domain:
                 leads = [lead.points for lead in drawn.leads if lead.node == wire.node]

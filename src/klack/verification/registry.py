@@ -60,6 +60,8 @@ COVERS = {
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "
     "sizes, one law after the other.",
     "cases": "Case files: units by their definitions, expressions, included parts of networks.",
+    "heat": "Heat networks and warm-up: exact decays, pulses, Modelica's examples, copper that "
+    "heats itself, and every stroke of a warm-up computed.",
     "operating-point": "Where a valve rests: springs, magnets, restrictions and both together "
     "against solutions by hand, networks of SciPy, and runs that stay there.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "

@@ -1,0 +1,103 @@
+"""``klack heat``: how a valve warms up stroke by stroke."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from klack.analyses.ending import Ending
+from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.progress import show_progress
+from klack.terminal.wanted import WANTED_RESULT, WantedResult
+
+__all__ = ["heat"]
+
+_Variant = Annotated[
+    str | None, Parameter(name="--variant", help="Of the strokes. [default: the first one]")
+]
+_Soak = Annotated[
+    str | None,
+    Parameter(
+        name="--soak",
+        allow_leading_hyphen=True,
+        help='Strokes of a valve that is at these temperatures throughout, "-30 degC, 120 degC", '
+        "instead of a warm-up; compared with 20 degC, cause by cause.",
+    ),
+]
+_Duration = Annotated[
+    str | None,
+    Parameter(
+        name="--duration",
+        help='Of the warm-up, "10 min". [default: as in the case, else to the steady state]',
+    ),
+]
+
+
+def heat(
+    case: CaseArgument,
+    /,
+    *,
+    variant: _Variant = None,
+    soak: _Soak = None,
+    duration: _Duration = None,
+    component: Components = None,
+    wanted: WantedResult = WANTED_RESULT,
+) -> int:
+    """Follow how strokes warm up a valve, and how their delays and impacts change with it."""
+    from klack.errors import InputError, require_positive
+    from klack.units import TIME, parse_quantity, parse_temperature
+
+    texts = [text.strip() for text in (soak or "").split(",")]
+    temperatures = [parse_temperature(text, "--soak") for text in texts] if soak is not None else []
+    if temperatures and duration is not None:
+        raise InputError(
+            "--duration",
+            got="a duration beside --soak",
+            expected="one of them",
+            hint="--soak computes single strokes, at temperatures that stay.",
+        )
+    with show_progress(wanted.quiet):
+        from klack.case.shipped import find_case
+        from klack.case.valve_reader import load_valve_case
+
+        checked = load_valve_case(find_case(case), imported(component))
+    if duration is not None and checked.thermal is not None:
+        length = parse_quantity(duration, TIME, "--duration")
+        require_positive("--duration", length, "s")
+        changed = checked.thermal.model_copy(update={"duration": length})
+        checked = checked.model_copy(update={"thermal": changed})
+    ending = Ending.of(wanted, f"{checked.name}-{'soaked' if temperatures else 'heat'}")
+
+    with show_progress(wanted.quiet):
+        from klack.analyses.heat.analysis import HEAT
+        from klack.analyses.heat.figures import heat_charts
+        from klack.analyses.heat.log import HEAT_LOG
+        from klack.analyses.heat.run import run_heat
+        from klack.analyses.heat.table import CAUSES_NAME, CSV_NAME, write_causes, write_csv
+        from klack.compiling.ahead import compiling_ahead
+
+    ahead = compiling_ahead(("loop", "rest"), wanted.threads)
+    with ending.resumable(HEAT_LOG) as progress, ahead:
+        record = run_heat(
+            checked,
+            variant=variant,
+            soak=temperatures,
+            threads=wanted.threads,
+            folder=ending.folder,
+            progress=progress,
+        )
+
+    def beside(folder: Path) -> tuple[str, ...]:
+        from klack.report.printed import png_chart, svg_chart
+
+        write_csv(record, folder / CSV_NAME)
+        write_causes(record, folder / CAUSES_NAME)
+        names = [CSV_NAME, CAUSES_NAME]
+        for chart in heat_charts(record):
+            for end, draw in (("svg", svg_chart), ("png", png_chart)):
+                name = f"{chart.name}.{end}"
+                (folder / name).write_bytes(draw(chart))
+                names.append(name)
+        return tuple(names)
+
+    return ending.end(HEAT, record, beside=beside, unfinished=HEAT_LOG)

@@ -1,0 +1,106 @@
+"""Record of a warm-up, or of strokes of a valve soaked at temperatures."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.record import CaseRecord
+
+__all__ = ["CauseRow", "HeatStudy", "WarmColumn"]
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WarmColumn:
+    """One quantity at every point.
+
+    Parameters
+    ----------
+    name, unit : str
+        SI.
+    values : array, shape (points,)
+        nan where a stroke does not have it.
+    """
+
+    name: str
+    unit: str
+    values: Vector
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CauseRow:
+    """A stroke with one cause, or all of them, at other temperatures than the base.
+
+    Parameters
+    ----------
+    state : str
+        At which temperatures, in words.
+    cause : str
+        ``"base"``, an aspect, or ``"all"``.
+    numbers : mapping of str to float
+    """
+
+    state: str
+    cause: str
+    numbers: Mapping[str, float]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HeatStudy(CaseRecord):
+    """Warm-up of a valve, or its strokes soaked.
+
+    Parameters
+    ----------
+    variant : str
+    period : float [s]
+        From one stroke to the next.
+    time : array, shape (points,) [s]
+        Of a warm-up: infinite for the steady state; of soaked strokes all 0.
+    temperature : tuple of WarmColumn [K]
+        Of the nodes.
+    heat : tuple of WarmColumn [W]
+        Mean heat of the strokes into each node.
+    numbers, values : tuple of WarmColumn
+        Of the strokes: delays and peaks; resistances and gaps.
+    causes : tuple of CauseRow
+    end : str
+        ``"steady"``, ``"duration"``, ``"runaway"``, ``"hot"``, or ``"soaked"``.
+    gain : float [-]
+        See :class:`~klack.thermal.slow_warm_up.SlowWarmUp`.
+    supplied, stored, given_off : mapping of str to float [J]
+        By node, over the time of the warm-up.
+    energy_residual : float [-]
+    unsent : mapping of str to float [W]
+        Mean power of losses of the last stroke that warm no node.
+    strokes, repeats : int
+        Strokes computed, and steps that were done again.
+    cpu_time : float [s]
+        Processor time of the strokes.
+    """
+
+    variant: str
+    period: float
+    time: Vector
+    temperature: tuple[WarmColumn, ...]
+    heat: tuple[WarmColumn, ...]
+    numbers: tuple[WarmColumn, ...]
+    values: tuple[WarmColumn, ...]
+    causes: tuple[CauseRow, ...]
+    end: str
+    gain: float
+    supplied: Mapping[str, float]
+    stored: Mapping[str, float]
+    given_off: Mapping[str, float]
+    energy_residual: float
+    unsent: Mapping[str, float]
+    strokes: int
+    repeats: int
+    cpu_time: float
+
+    @property
+    def columns(self) -> tuple[WarmColumn, ...]:
+        """All but the time."""
+        return (*self.temperature, *self.heat, *self.numbers, *self.values)

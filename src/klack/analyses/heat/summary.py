@@ -1,0 +1,264 @@
+"""Warm-ups for scripts and terminals."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
+from klack.analyses.heat.warm_valve import ASPECTS
+from klack.analyses.json_parts import OwnComponents, Real, Version
+from klack.report.wording import listed, quantity
+from klack.terminal.tables import TextTable
+from klack.units import format_si
+
+__all__ = [
+    "HeatJson",
+    "answer",
+    "cause_words",
+    "cell",
+    "heat_to_json",
+    "heat_told",
+    "main_columns",
+    "rows_of_causes",
+    "time_cell",
+]
+
+_ZERO_CELSIUS = 273.15
+_NOISE = 1e-9  # of the base: the rounding of a difference
+_TOLD = 40
+"""Points on a terminal."""
+
+
+class ColumnJson(TypedDict):
+    """One quantity of all points."""
+
+    unit: Annotated[str, Field(description="SI; 1 for a pure number.")]
+    values: Annotated[list[Real], Field(description="One per point; null where there is none.")]
+
+
+class CauseJson(TypedDict):
+    """A stroke with one cause at other temperatures than the base."""
+
+    state: Annotated[str, Field(description="At which temperatures.")]
+    cause: Annotated[str, Field(description="base, one aspect, or all of them.")]
+    numbers: Annotated[dict[str, Real], Field(description="SI, by the names of 'strokes'.")]
+
+
+class HeatJson(TypedDict):
+    """``klack heat``."""
+
+    schema: Literal["klack-heat/1"]
+    case: str
+    klack: Version
+    own_components: OwnComponents
+    variant: str
+    period_s: float
+    end: Annotated[
+        Literal["steady", "duration", "runaway", "hot", "soaked"],
+        Field(description="How it ended; soaked: strokes at given temperatures."),
+    ]
+    gain: Annotated[Real, Field(description="From 1 on there is no steady state.")]
+    time_s: Annotated[list[Real], Field(description="null for the steady state.")]
+    temperature_K: Annotated[dict[str, list[Real]], Field(description="By node.")]
+    heat_W: Annotated[dict[str, list[Real]], Field(description="Mean heat of the strokes.")]
+    strokes: Annotated[dict[str, ColumnJson], Field(description="Delays and peaks.")]
+    values: Annotated[dict[str, ColumnJson], Field(description="Resistances and gaps.")]
+    causes: list[CauseJson]
+    supplied_J: Annotated[dict[str, float], Field(description="Heat into each node.")]
+    stored_J: dict[str, float]
+    given_off_J: Annotated[dict[str, float], Field(description="To each known temperature.")]
+    energy_residual: float
+    unsent_W: Annotated[dict[str, float], Field(description="Losses that warm no node.")]
+    stroke_count: int
+    repeats: Annotated[int, Field(description="Steps that were done again.")]
+    cpu_time_s: float
+    wall_time_s: float
+    warnings: list[str]
+
+
+def heat_to_json(record: HeatStudy) -> dict[str, Any]:
+    """Plain numbers in SI."""
+    return {
+        "schema": "klack-heat/1",
+        "case": record.case,
+        "klack": record.version,
+        "own_components": dict(record.own_components),
+        "variant": record.variant,
+        "period_s": record.period,
+        "end": record.end,
+        "gain": _plain(record.gain),
+        "time_s": [_plain(x) for x in record.time],
+        "temperature_K": {x.name: [_plain(v) for v in x.values] for x in record.temperature},
+        "heat_W": {x.name: [_plain(v) for v in x.values] for x in record.heat},
+        "strokes": _table(record.numbers),
+        "values": _table(record.values),
+        "causes": [
+            {
+                "state": row.state,
+                "cause": row.cause,
+                "numbers": {name: _plain(x) for name, x in row.numbers.items()},
+            }
+            for row in record.causes
+        ],
+        "supplied_J": dict(record.supplied),
+        "stored_J": dict(record.stored),
+        "given_off_J": dict(record.given_off),
+        "energy_residual": record.energy_residual,
+        "unsent_W": dict(record.unsent),
+        "stroke_count": record.strokes,
+        "repeats": record.repeats,
+        "cpu_time_s": record.cpu_time,
+        "wall_time_s": record.wall_time,
+        "warnings": list(record.warnings),
+    }
+
+
+def _plain(value: float) -> float | None:
+    return float(value) if isfinite(value) else None
+
+
+def _table(columns: Sequence[WarmColumn]) -> dict[str, ColumnJson]:
+    return {x.name: {"unit": x.unit, "values": [_plain(v) for v in x.values]} for x in columns}
+
+
+def heat_told(record: HeatStudy) -> Iterator[TextTable | str]:
+    """What a terminal shows: points, causes, and the energy balance."""
+    shown = main_columns(record)
+    yield TextTable(
+        title=f"Strokes, {record.variant}"
+        if record.end == "soaked"
+        else f"Warm-up, {record.variant}, a stroke every {format_si(record.period, 's')}",
+        columns=(*(() if record.end == "soaked" else ("time",)), *(x.name for x in shown)),
+        rows=[
+            (
+                *(() if record.end == "soaked" else (time_cell(record.time[i]),)),
+                *(cell(x.values[i], x.unit) for x in shown),
+            )
+            for i in range(min(len(record.time), _TOLD))
+        ],
+    )
+    if len(record.time) > _TOLD:
+        yield f"The first {_TOLD} of {len(record.time)} points; all of them are in the CSV file."
+    yield TextTable(
+        title="Causes: change against the base, each alone at the temperatures of the state",
+        columns=("state", "cause", *record.causes[0].numbers),
+        rows=rows_of_causes(record),
+        left=2,
+    )
+    yield answer(record)
+
+
+def main_columns(record: HeatStudy) -> tuple[WarmColumn, ...]:
+    """Columns for people: temperatures, then numbers and values that some stroke has.
+
+    Of gaps that are the same at every point, the first one.
+    """
+    known: list[WarmColumn] = []
+    for x in (*record.numbers, *record.values):
+        same = any(x.unit == y.unit and np.array_equal(x.values, y.values) for y in known)
+        if np.isfinite(x.values).any() and not same:
+            known.append(x)
+    return (*record.temperature, *known)
+
+
+def cell(value: float, unit: str, *, page: bool = False) -> str:
+    """A number for people, on a terminal or on a page; temperatures in degrees Celsius."""
+    if not isfinite(value):
+        return "–"
+    if unit == "K":
+        return f"{value - _ZERO_CELSIUS:.1f} °C"
+    if unit == "1":
+        return f"{value:.4f}"
+    return quantity(float(value), unit) if page else format_si(float(value), unit, 4)
+
+
+def time_cell(value: float) -> str:
+    """A moment of a warm-up."""
+    if not isfinite(value):
+        return "steady"
+    return f"{value:.1f} s" if value < 600.0 else f"{value / 60.0:.1f} min"
+
+
+def rows_of_causes(record: HeatStudy, *, page: bool = False) -> list[tuple[str, ...]]:
+    """Base in full, then what each cause alone changes, all together, and what the sum misses."""
+    units = {x.name: x.unit for x in record.numbers}
+    base = record.causes[0].numbers
+    first = (cell(x, units[name], page=page) for name, x in base.items())
+    rows = [(record.causes[0].state, "base", *first)]
+
+    def changed(name: str, value: float) -> str:
+        noise = abs(value) < _NOISE * abs(base[name])
+        return "0" if noise else _change(value, units[name], page=page)
+
+    for state in dict.fromkeys(row.state for row in record.causes[1:]):
+        group = [row for row in record.causes[1:] if row.state == state]
+        alone = [row for row in group if row.cause != "all"]
+        for row in group:
+            cells = (changed(name, row.numbers[name] - base[name]) for name in units)
+            rows.append((state, cause_words(row.cause), *cells))
+        cells = (changed(name, _beyond(group[-1], alone, base, name)) for name in units)
+        rows.append((state, "beyond their sum", *cells))
+    return rows
+
+
+def _beyond(
+    whole: CauseRow, alone: Sequence[CauseRow], base: Mapping[str, float], name: str
+) -> float:
+    parts = sum(row.numbers[name] - base[name] for row in alone)
+    return whole.numbers[name] - base[name] - parts
+
+
+def cause_words(cause: str) -> str:
+    """What a cause is."""
+    words = {str(aspect): text for aspect, text in ASPECTS.items()}
+    return {**words, "all": "all together"}.get(cause, cause)
+
+
+def _change(value: float, unit: str, *, page: bool) -> str:
+    if not isfinite(value):
+        return "–"
+    size = abs(value)
+    if unit == "1":
+        shown = f"{size:.4f}"
+    else:
+        shown = quantity(size, unit, 3) if page else format_si(size, unit, 3)
+    return f"{'+' if value >= 0.0 else '−' if page else '-'}{shown}"
+
+
+def answer(record: HeatStudy) -> str:
+    """The result in a paragraph."""
+    strokes = f"{record.strokes} strokes in {format_si(record.cpu_time, 's', 3)} of processor time."
+    if record.end == "soaked":
+        return f"{len(record.time)} temperatures of the whole valve, {strokes}"
+    last = float(record.time[np.isfinite(record.time)][-1])
+    hottest = max(record.temperature, key=lambda x: float(x.values[-1]))
+    at = f"'{hottest.name}' is hottest, at {cell(hottest.values[-1], 'K')}"
+    ends = {
+        "steady": f"steady after {time_cell(last)}: {at}",
+        "duration": f"the duration ends after {time_cell(last)}: {at}",
+        "runaway": f"thermal runaway: there is no steady state. From {time_cell(last)} on the heat "
+        f"grows {record.gain:.3g} times as fast with the temperature as it is given off; then {at}",
+        "hot": f"no steady state below 2000 K: after {time_cell(last)} {at}",
+    }
+    unsent = ""
+    if record.unsent:
+        total = format_si(sum(record.unsent.values()), "W", 3)
+        unsent = f" Losses of {total} warm no node: {listed(_largest(record))}."
+    heat, given, kept = (
+        format_si(sum(x.values()), "J", 4)
+        for x in (record.supplied, record.given_off, record.stored)
+    )
+    return (
+        f"Warm-up: {ends[record.end]}. Of {heat} of heat {given} were given off and {kept} stored; "
+        f"residual {record.energy_residual:.0e}.{unsent} {strokes}"
+    )
+
+
+def _largest(record: HeatStudy, most: int = 3) -> list[str]:
+    found = sorted(record.unsent.items(), key=lambda item: -abs(item[1]))
+    words = [f"'{name}' {format_si(power, 'W', 3)}" for name, power in found[:most]]
+    return words + (["others"] if len(found) > most else [])

@@ -1,0 +1,112 @@
+"""The section ``thermal``: what a stroke warms, and what of a stroke follows temperatures."""
+
+from collections.abc import Mapping
+
+from pydantic import Field
+
+from klack.input.section import Name, Section, Text
+from klack.units import Expansion, Length, Ratio, Temperature, TemperatureRise, Time
+
+__all__ = ["CaseThermal", "Growth", "GrowthLength", "HeatedMagnet", "SentHeat"]
+
+_REFERENCE = 293.15
+
+
+class SentHeat(Section):
+    """A loss of the stroke that warms a node."""
+
+    loss: Text = Field(
+        examples=["coil ohmic"],
+        description="A component, for all its losses, or one of them as the energy balance calls "
+        "it: coil ohmic, coil eddy, seat contact, feed flow.",
+    )
+    node: Name = Field(description="Thermal node: a heat-capacity.")
+    share: Ratio = Field(default=1.0, gt=0, le=1, description="Of that loss.")
+
+
+class HeatedMagnet(Section):
+    """Permanent magnets whose remanence follows a temperature."""
+
+    node: Name = Field(description="Thermal node.")
+    coefficient: Expansion = Field(
+        description="Relative change of the remanence; NdFeB -0.12 %/K, ferrite -0.2 %/K."
+    )
+    reference: Temperature = Field(
+        default=_REFERENCE, gt=0, description="Where the remanence of the case holds."
+    )
+
+
+class GrowthLength(Section):
+    """One length of a chain that closes in a gap."""
+
+    node: Name = Field(description="Thermal node whose temperature it has.")
+    length: Length = Field(
+        description="Above 0 if the gap widens when the part grows, below 0 if it narrows."
+    )
+    expansion: Expansion = Field(
+        examples=["11.5e-6 1/K"], description="Linear thermal expansion of its material."
+    )
+
+
+class Growth(Section):
+    r"""A gap that changes with the temperatures, ``g = g_0 + sum(l alpha (T - T_ref))``.
+
+    A preload changes by the stiffness of its spring: ``F = F_0 - k sum(...)``, with the chain of
+    the length in which the spring is held.
+    """
+
+    of: tuple[Text, ...] = Field(
+        examples=[["stop.gap", "coil.gap"]],
+        min_length=1,
+        description="What changes by it, as component.key: lengths, or the preload of a spring.",
+    )
+    lengths: tuple[GrowthLength, ...] = Field(min_length=1, description="The chain.")
+    reference: Temperature = Field(
+        default=_REFERENCE, gt=0, description="Where the numbers of the case hold."
+    )
+
+    def change(self, temperature: Mapping[str, float]) -> float:
+        """Change of the gap [m] at temperatures of the nodes [K]."""
+        return sum(
+            item.length * item.expansion * (temperature[item.node] - self.reference)
+            for item in self.lengths
+        )
+
+
+class CaseThermal(Section):
+    """Input of klack heat: where the losses go, and what follows the temperatures."""
+
+    period: Time = Field(
+        examples=["100 ms"], gt=0, description="From one stroke to the next; run.duration or more."
+    )
+    heat: tuple[SentHeat, ...] = Field(
+        default=(), description="Losses of the stroke, and the nodes that they warm."
+    )
+    windings: Mapping[Name, Name] = Field(
+        default_factory=dict,
+        description="coil: node of its copper, in place of its winding_temperature.",
+    )
+    fluid: Name | None = Field(
+        default=None, description="Node of the fluid; default the temperature of the surroundings."
+    )
+    magnets: Mapping[Name, HeatedMagnet] = Field(
+        default_factory=dict, description="coil: what its permanent magnets follow."
+    )
+    growth: Mapping[Name, Growth] = Field(
+        default_factory=dict, description="name: a gap that changes with temperatures."
+    )
+    duration: Time | None = Field(
+        default=None, gt=0, description="Of the warm-up; default to the steady state."
+    )
+    tolerance: TemperatureRise = Field(
+        default=0.1,
+        ge=1e-6,
+        le=100,
+        description="Error of a step, and distance to the steady state.",
+    )
+    spacing: TemperatureRise = Field(
+        default=5.0,
+        ge=1e-5,
+        le=500,
+        description="A stroke is computed anew after a change by this at the latest.",
+    )

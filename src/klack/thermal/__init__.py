@@ -1,0 +1,1 @@
+"""Heat: components of a thermal network, one per file; its exact steps, and slow warm-up."""
