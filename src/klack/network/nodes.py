@@ -10,7 +10,7 @@ from klack.network.port import Port, Role
 __all__ = ["RESERVED", "Joint", "Node", "join"]
 
 RESERVED = {"ground": "mechanical", "ambient": "hydraulic"}
-"""Words allowed in a connection instead of a port, and their domains."""
+"""Words allowed in a connection instead of a port, and their domains; ambient is gas as well."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +27,7 @@ class Joint:
 
 @dataclass(frozen=True, slots=True)
 class Node:
-    """Ports that are one point (mechanical), one pressure (hydraulic), or one pair of wires.
+    """Ports that are one point (mechanical), one pressure (hydraulic, pneumatic), or two wires.
 
     Parameters
     ----------
@@ -95,7 +95,12 @@ def _node(
         seen[str(joint)] = index
         joints.append(joint)
     domains = {str(joint): joint.port.domain for joint in joints}
-    domains |= {word: RESERVED[word] for word in words}
+    gas = set(domains.values()) == {"pneumatic"}
+    domains |= {
+        word: "pneumatic" if gas and word == "ambient" else RESERVED[word] for word in words
+    }
+    if {"hydraulic", "pneumatic"} <= set(domains.values()):
+        raise _mixed_fluids(index, domains)
     if len(set(domains.values())) > 1:
         raise CaseProblem(
             ("connections", index),
@@ -112,6 +117,17 @@ def _node(
         )
     domain = next(iter(domains.values()))
     return Node(index, domain, tuple(joints), words[0] if words else "")
+
+
+def _mixed_fluids(index: int, domains: Mapping[str, str]) -> CaseProblem:
+    words = {"hydraulic": "liquid", "pneumatic": "gas"}
+    return CaseProblem(
+        ("connections", index),
+        got=" with ".join(f"{name} ({words.get(d, d)})" for name, d in domains.items()),
+        expected="ports of liquid alone, or of gas alone",
+        hint="they meet through a body: a pressure-face on the side of the liquid and a gas-face on "
+        "that of the gas; or take an accumulator, which has its gas inside.",
+    )
 
 
 def _joint(key: tuple[str | int, ...], text: str, ports: Mapping[str, Mapping[str, Port]]) -> Joint:

@@ -3,7 +3,21 @@
 from dataclasses import dataclass
 from enum import Enum
 
-__all__ = ["COIL", "COMPLIANCE", "ELEMENT", "FLOW", "MOTION", "PRESSURE", "VOLTAGE", "Port", "Role"]
+__all__ = [
+    "COIL",
+    "COMPLIANCE",
+    "ELEMENT",
+    "FLOW",
+    "FLUID_DOMAINS",
+    "GAS_FLOW",
+    "GAS_PRESSURE",
+    "GAS_VOLUME",
+    "MOTION",
+    "PRESSURE",
+    "VOLTAGE",
+    "Port",
+    "Role",
+]
 
 
 class Role(Enum):
@@ -11,7 +25,7 @@ class Role(Enum):
 
     MOTION = "moves"  # port of a body: rules the displacement of a mechanical node
     ELEMENT = "pushes"  # exchanges force with a body
-    COMPLIANCE = "stores fluid"  # volume with compliance: rules the pressure of a hydraulic node
+    COMPLIANCE = "stores fluid"  # volume with compliance: rules the pressure of its node
     PRESSURE = "prescribes pressure"
     FLOW = "carries flow"
     VOLTAGE = "drives"
@@ -25,7 +39,8 @@ class Port:
     Parameters
     ----------
     domain : str
-        ``"mechanical"``, ``"hydraulic"`` or ``"electric"``; only equal domains can be joined.
+        ``"mechanical"``, ``"hydraulic"``, ``"pneumatic"`` or ``"electric"``; only equal domains can
+        be joined.
     role : Role
     optional : bool
         Whether it may stay unconnected.
@@ -36,10 +51,16 @@ class Port:
     optional: bool = False
 
 
+FLUID_DOMAINS = ("hydraulic", "pneumatic")
+"""Domains of liquid and of gas, whose nodes are pressures and which a dry valve lacks."""
+
 MOTION = Port("mechanical", Role.MOTION)
 ELEMENT = Port("mechanical", Role.ELEMENT)
 COMPLIANCE = Port("hydraulic", Role.COMPLIANCE)
 PRESSURE = Port("hydraulic", Role.PRESSURE)
 FLOW = Port("hydraulic", Role.FLOW)
+GAS_VOLUME = Port("pneumatic", Role.COMPLIANCE)
+GAS_PRESSURE = Port("pneumatic", Role.PRESSURE)
+GAS_FLOW = Port("pneumatic", Role.FLOW)
 VOLTAGE = Port("electric", Role.VOLTAGE)
 COIL = Port("electric", Role.COIL)
