@@ -1,6 +1,5 @@
 """Rows of gas that pneumatic components add; the room of gases makes one element of them."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -89,6 +88,8 @@ class GasRows:
     branches: list[GasBranchRow] = field(default_factory=list)
     walls: list[GasWallRow] = field(default_factory=list)
 
-    def node_of(self) -> Mapping[int, int]:
-        """Number of each node in the solver: chambers first, then prescribed pressures."""
-        return {handle: i for i, handle in enumerate([*self.chambers, *self.sources])}
+    def highest_pressure(self) -> float:
+        """Highest pressure that chambers and sources have at the start, absolute [Pa]."""
+        stated = [row.pressure for row in self.chambers.values() if row.pressure is not None]
+        given = [float(np.interp(0.0, s.time, s.pressure)) for s in self.sources.values()]
+        return max([*stated, *given], default=0.0)

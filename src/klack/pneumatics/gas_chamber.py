@@ -10,6 +10,7 @@ from klack.network.component import Component
 from klack.network.gas_rows import GasChamberRow
 from klack.network.port import GAS_VOLUME, Port
 from klack.network.rows import Rows
+from klack.pneumatics.gas_step import ISOTHERMAL
 from klack.pneumatics.network_gas import network_gas
 from klack.units import HeatConductance, Pressure, Temperature, Volume
 
@@ -87,6 +88,6 @@ class GasChamber(Component):
             volume=self.volume,
             pressure=self.pressure,
             temperature=self.temperature or wall,
-            heat=-1.0 if self.isothermal else self.heat_conductance or 0.0,
+            heat=ISOTHERMAL if self.isothermal else self.heat_conductance or 0.0,
             wall=wall,
         )

@@ -18,6 +18,7 @@ from klack.pneumatics.gas_step import (
     OF_CHAMBER,
     SOURCE,
     WALL,
+    STEADY,
     WORK_OF_CHAMBER,
     gas_step,
 )
@@ -26,9 +27,9 @@ __all__ = ["GasNetwork", "close_gas"]
 
 Vector = NDArray[np.float64]
 
-_ISOTHERMAL = -1.0
-_FIRST_STEP, _LONGER, _STEPS = 1e-7, 8.0, 34  # of pseudo-time to steady flow [s]
-_STEADY = 1e-13  # change of each pressure in the last of these steps
+_FIRST_STEP, _LONGER = 1e-7, 8.0  # of pseudo-time to steady flow [s]
+_LONG, _LONGEST = 1e3, 1e12  # from here on it may be found; it must be here
+_FOUND, _NEARLY = 1e-11, 1e-6  # change of each pressure in the last of these steps
 _FAILURES = {
     1: "the gas does not settle in this step",
     2: "a chamber has no volume left (V_0 + A y)",
@@ -74,7 +75,7 @@ class GasNetwork:
         head += [self.ambient.pressure, self.ambient.temperature, *starts[:4]]
         numbers: list[float] = list(head)
         for row in chambers.values():
-            heat = _ISOTHERMAL if steady is not None else row.heat
+            heat = STEADY if steady is not None else row.heat
             numbers += [row.volume, heat, row.wall]
         tables: list[float] = []
         for source in sources.values():
@@ -130,8 +131,8 @@ class GasNetwork:
             p = row.pressure or self.ambient.pressure
             mass = p * volumes[handle] / (gas.gas_constant * row.wall)
             state[OF_CHAMBER * i : OF_CHAMBER * i + 4] = mass, mass * gas.cv * row.wall, p, row.wall
-        inputs, h = np.repeat(y, 2), _FIRST_STEP
-        for _ in range(_STEPS):
+        inputs, h, left = np.repeat(y, 2), _FIRST_STEP, 1.0
+        while h < _LONG or (left > _FOUND and h < _LONGEST):
             status, out = evaluate(
                 gas_step, par, state, [-h, h, *inputs], len(self.ports) + states + 3
             )
@@ -139,11 +140,11 @@ class GasNetwork:
                 raise ConvergenceError(f"gas: {_FAILURES[status]}, on the way to steady flow.")
             after = out[len(self.ports) :][:states]
             pressures = slice(2, OF_CHAMBER * n, OF_CHAMBER)
-            change = np.abs(after[pressures] / state[pressures] - 1.0)
+            left = float(np.max(np.abs(after[pressures] / state[pressures] - 1.0)))
             state, h = after, h * _LONGER
             state[4 : OF_CHAMBER * n : OF_CHAMBER] = 1e30  # fully implicit: nothing swings
-            if h > 1e3 and float(change.max()) < _STEADY:
-                break
+        if left > _NEARLY:
+            raise ConvergenceError("gas: the pressures find no steady flow.")
         return {handle: float(state[OF_CHAMBER * i + 2]) for i, handle in enumerate(free)}
 
 

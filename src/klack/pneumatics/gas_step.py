@@ -29,17 +29,23 @@ __all__ = [
     "BRANCH",
     "CHAMBER",
     "HEAD",
+    "ISOTHERMAL",
     "OF_CHAMBER",
     "SOURCE",
+    "STEADY",
     "WALL",
     "WORK_OF_CHAMBER",
     "gas_step",
 ]
 
+ISOTHERMAL, STEADY = -1.0, -2.0
+"""In place of a heat conductance: gas as warm as its wall; the same on the way to steady flow, where
+its mass is that of its pressure, since the sum over a step without end has lost all digits."""
+
 HEAD = 14
 """Numbers before the rows: chambers, sources, branches, walls, ports, R, cv, cp, ambient pressure
 and temperature, and where chambers, sources, branches and walls begin."""
-CHAMBER = 3  # volume, heat conductance (below zero: isothermal), temperature of the wall
+CHAMBER = 3  # volume, heat conductance (or ``ISOTHERMAL``, ``STEADY``), temperature of the wall
 SOURCE = 3  # temperature, where its table begins, points: times, then pressures
 BRANCH = 12  # nodes a and b; 6 of the law; ports of the lift (-1: none); table and its points
 WALL = 3  # node, port, area
@@ -52,7 +58,8 @@ _MOST_THETAS = 4
 _MOST_NEWTON = 40
 _SETTLED = 1e-7  # last step but one over the value; the last one leaves its square
 _FALL = 0.2  # least share that a Newton step leaves of a pressure or a temperature
-_MOST_PARTS = 4096
+_SHORTER, _LONGER = 0.05, 4.0  # of a part that does not settle, and of the next one
+_LEAST_PART = 1e-14
 
 
 @inner(error_model="numpy")
@@ -305,6 +312,8 @@ def _finish(
         heat, wall = par[at + 1], par[at + 2]
         done = work[c] * (work[c + 6] - work[c + 5])
         mass = now[s] + work[c + 7]
+        if heat <= STEADY:
+            mass = work[c + 3] * work[c + 6] / (R * wall)
         energy = now[s + 1] + work[c + 8] - done
         if heat < 0.0:
             warmed = mass * cv * wall - energy
@@ -314,6 +323,10 @@ def _finish(
         warmth += warmed
         if not mass > 0.0 or not energy > 0.0:
             return False, supply, warmth
+        work[c + 7], work[c + 8] = mass, energy
+    for i in range(chambers):
+        c, s = WORK_OF_CHAMBER * i, OF_CHAMBER * i
+        mass, energy = work[c + 7], work[c + 8]
         now[s], now[s + 1] = mass, energy
         now[s + 2], now[s + 3] = energy * R / (cv * work[c + 6]), energy / (mass * cv)
         now[s + 4] = work[c + 11]
@@ -368,29 +381,26 @@ def gas_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     now = shift(out, ports)
     work = shift(now, numbers)
     books = shift(work, WORK_OF_CHAMBER * chambers + 4 * chambers * chambers + 2 * chambers)
-    parts, done = 1, False
     supply, warmth = 0.0 * par[8], 0.0 * par[8]
     if not _place_walls(par, work, inp, 0.0, 5) or not _place_walls(par, work, inp, 1.0, 6):
         return 2
-    while not done:
-        done = True
-        for i in range(numbers):
-            now[i] = state[i]
-        for j in range(ports):
-            out[j] = 0.0
-        supply, warmth = 0.0 * par[8], 0.0 * par[8]
-        if inp[1] > 0.0:
-            for k in range(parts):
-                _place_walls(par, work, inp, k / parts, 5)
-                _place_walls(par, work, inp, (k + 1) / parts, 6)
-                done, more, warmed = _advance(par, now, work, inp, out, k / parts, 1.0 / parts)
-                if not done:
-                    break
-                supply += more
-                warmth += warmed
-        if not done:
-            parts *= 4
-            if parts > _MOST_PARTS:
+    for i in range(numbers):
+        now[i] = state[i]
+    for j in range(ports):
+        out[j] = 0.0
+    begin, part = 0.0, 1.0
+    while inp[1] > 0.0 and begin < 1.0:
+        end = 1.0 if begin + part > 1.0 - 0.1 * part else begin + part
+        _place_walls(par, work, inp, begin, 5)
+        _place_walls(par, work, inp, end, 6)
+        done, more, warmed = _advance(par, now, work, inp, out, begin, end - begin)
+        if done:
+            supply += more
+            warmth += warmed
+            begin, part = end, _LONGER * part
+        else:
+            part *= _SHORTER
+            if part < _LEAST_PART:
                 return 1
     store = 0.0 * par[8]
     for i in range(chambers):

@@ -96,7 +96,11 @@ def _on(ports: Iterable[PlannedPort], side: Side) -> list[PlannedPort]:
     return [port for port in ports if side in port.sides]
 
 
-_OPEN: Mapping[str, str] = {"mechanical": "open: ground", "hydraulic": "open: surroundings"}
+_OPEN: Mapping[str, str] = {
+    "mechanical": "open: ground",
+    "hydraulic": "open: surroundings",
+    "pneumatic": "open: surroundings",
+}
 """What a port in no connection counts as."""
 
 
