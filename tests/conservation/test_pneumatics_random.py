@@ -45,8 +45,9 @@ def _network(rng):
         pressure=(float(10 ** rng.uniform(0, 7)), float(10 ** rng.uniform(0, 7))),
         temperature=float(rng.uniform(250, 350)),
     )
+    first = 2 if chambers > 1 and rng.uniform() < 0.4 else 0  # no way to the outside
     for _ in range(int(rng.integers(1, 8))):
-        a, b = rng.choice(chambers + 2, size=2, replace=False)
+        a, b = first + rng.choice(chambers + 2 - first, size=2, replace=False)
         law = (
             VALVE,
             float(rng.choice([0.0, 10 ** rng.uniform(-9, -4)])),
@@ -69,32 +70,31 @@ def _network(rng):
 def test_mass_and_energy_of_random_networks(seed):
     rng = np.random.default_rng(seed)
     net = _network(rng)
+    closed = all(min(row.a, row.b) > 1 for row in net.rows.branches)
     n, ports, size = len(net.rows.chambers), len(net.ports), net.states()
     par, state, gas = net.parameters(), net.start(np.zeros(ports)), net.gas
     y, t = np.zeros(ports), 0.0
-    room = (
-        min(
-            (row.volume / sum(abs(w.area) for w in net.rows.walls if w.node == handle))
-            for handle, row in [*net.rows.chambers.items(), *[(-1, row) for row in ()]]
-            if any(w.node == handle for w in net.rows.walls)
-        )
-        if any(w.node in net.rows.chambers for w in net.rows.walls)
-        else 1e-3
-    )
+    areas = {h: sum(abs(w.area) for w in net.rows.walls if w.node == h) for h in net.rows.chambers}
+    rooms = [row.volume / areas[h] for h, row in net.rows.chambers.items() if areas[h] > 0.0]
+    room = min([*rooms, 1e-3])
     _, out = evaluate(gas_step, par, state, [0.0, 0.0, *np.repeat(y, 2)], ports + size + 3)
     store = out[-3]
     for _ in range(12):
         h = 10 ** rng.uniform(-9, 0)
-        y1 = rng.uniform(-0.4, 0.4, ports) * min(room, 1e-3)
+        y1 = np.full(ports, rng.uniform(-0.4, 0.4) * room)
         inputs = [t, h, *np.column_stack([y, y1]).ravel()]
         status, out = evaluate(gas_step, par, state, inputs, ports + size + 3)
         assert status == 0
         after = out[ports : ports + size]
         mass, was = after[: OF_CHAMBER * n : OF_CHAMBER], state[: OF_CHAMBER * n : OF_CHAMBER]
-        assert np.all(np.isfinite(after[: OF_CHAMBER * n])) and np.all(mass > 0.0)
+        assert np.all(np.isfinite(after[: OF_CHAMBER * n]))
+        assert np.all(mass > 0.0)
         assert np.all(after[2 : OF_CHAMBER * n : OF_CHAMBER] > 0.0)
         work, supplies = float(out[:ports] @ (y1 - y)), out[-2] + out[-1]
+        if closed:
+            assert mass.sum() == pytest.approx(was.sum(), rel=1e-12, abs=0.0)
         energies = np.abs(after[1 : OF_CHAMBER * n : OF_CHAMBER]) + mass * gas.cp * 293.15
         scale = energies.sum() + was.sum() * gas.cp * 293.15 + abs(work) + abs(out[-2])
-        assert abs(work + out[-3] - store - supplies) < 1e-12 * scale + 1e-12 * abs(out[-1])
+        # round-off of what flows in circles in a step of a second is not in this scale
+        assert abs(work + out[-3] - store - supplies) < 1e-10 * scale + 1e-12 * abs(out[-1])
         state, store, y, t = after.copy(), out[-3], y1, t + h

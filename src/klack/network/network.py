@@ -2,8 +2,8 @@ r"""A valve as components and connections: checked, then translated into rows fo
 
 A *connection* lists all ports that meet in one node.  A mechanical node is one point of one body
 (or of the ground) and everything that pushes it there; a hydraulic node, of liquid, and a pneumatic
-one, of gas, is one pressure; an electric node is one pair of wires.  Two words may stand in place of
-a port: ``ground`` does not move, ``ambient`` has the pressure of the surroundings.
+one, of gas, is one pressure; an electric node is one pair of wires.  Two words may stand in place
+of a port: ``ground`` does not move, ``ambient`` has the pressure of the surroundings.
 """
 
 from collections.abc import Mapping, Sequence

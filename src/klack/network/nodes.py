@@ -125,8 +125,8 @@ def _mixed_fluids(index: int, domains: Mapping[str, str]) -> CaseProblem:
         ("connections", index),
         got=" with ".join(f"{name} ({words.get(d, d)})" for name, d in domains.items()),
         expected="ports of liquid alone, or of gas alone",
-        hint="they meet through a body: a pressure-face on the side of the liquid and a gas-face on "
-        "that of the gas; or take an accumulator, which has its gas inside.",
+        hint="they meet through a body: a pressure-face on the side of the liquid and a gas-face "
+        "on that of the gas; or take an accumulator, which has its gas inside.",
     )
 
 

@@ -32,8 +32,9 @@ class GasChamber(Component):
     Walls that move are ``gas-face``.
 
     Limits: ideal gas with constant heat capacities; one state, so shorter than 1/20 of a sound
-    wave; kinetic energy of the gas is left out.  The heat conductance is constant: of still gas beside a
-    wall about 5 to 20 W/(m^2 K), of a jet of some bar 100 to 1000 W/(m^2 K), times the area.
+    wave; kinetic energy of the gas is left out.  The heat conductance is constant: of still gas
+    beside a wall about 5 to 20 W/(m^2 K), of a jet of some bar 100 to 1000 W/(m^2 K), times the
+    area.
     Source: Beater, Pneumatic Drives, Springer 2007, ch. 4; ISO 6358-2:2013, annex.
     """
 

@@ -17,8 +17,8 @@ from klack.pneumatics.gas_step import (
     HEAD,
     OF_CHAMBER,
     SOURCE,
-    WALL,
     STEADY,
+    WALL,
     WORK_OF_CHAMBER,
     gas_step,
 )

@@ -17,9 +17,9 @@ class GasFace(FaceComponent):
 
     .. math:: F = \pm A\,(p - p_{amb}), \qquad \Delta V = \pm A\,y
 
-    ``+`` for ``direction: opening``: the pressure lifts the body, and a rising body makes room below
-    it.  The work on the body is taken from the internal energy of the gas.  A body with a face in
-    liquid and one in gas is a piston between both.
+    ``+`` for ``direction: opening``: the pressure lifts the body, and a rising body makes room
+    below it.  The work on the body is taken from the internal energy of the gas.  A body with a
+    face in liquid and one in gas is a piston between both.
 
     Limits: one pressure over the whole face.
     """

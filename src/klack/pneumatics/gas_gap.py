@@ -29,7 +29,7 @@ class GasGap(Component):
 
     Limits: laminar, isothermal in the gap, viscosity at 20 degC; no drag on the needle.  Gaps below
     about 1 um leak more than this, since the gas slips at the walls (free path 0.07 um at 1 bar).
-    Source: Reynolds equation of a gas, Hamrock, Fundamentals of Fluid Film Lubrication 1994, ch. 16.
+    Source: Hamrock, Fundamentals of Fluid Film Lubrication 1994, ch. 16 (gas films).
     """
 
     type: ClassVar[str] = "gas-gap"

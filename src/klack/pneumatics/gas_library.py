@@ -22,7 +22,7 @@ def _gas(
     compressibility: tuple[float, ...],
 ) -> Gas:
     read = f"CoolProp 8.0.0: {source}"
-    labels = {
+    labels: dict[str, tuple[float | tuple[float, ...], str]] = {
         "molar mass": (molar_mass, "kg/mol"),
         "ratio of heat capacities at 20 degC, as an ideal gas": (kappa, "-"),
         "dynamic viscosity at 20 degC and 1 bar": (viscosity, "Pa s"),

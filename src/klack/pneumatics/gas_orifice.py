@@ -24,16 +24,16 @@ class GasOrifice(RestrictionComponent):
               \psi = \Bigl[1 - \Bigl(\frac{r - b}{r_c - b}\Bigr)^2\Bigr]^m
 
     with ``r_c = 1 - dp_c/p_1``, at the reference atmosphere of 100 kPa and 293.15 K.  Give either
-    the sonic ``conductance`` and ``critical_ratio`` of a data sheet, which are measured with air, or
-    the diameter or area, of which ``discharge`` acts as an ideal nozzle.  In the last thousandth of
-    the pressure ratio the flow is laminar: a straight line to none.
+    the sonic ``conductance`` and ``critical_ratio`` of a data sheet, which are measured with air,
+    or the diameter or area, of which ``discharge`` acts as an ideal nozzle.  In the last thousandth
+    of the pressure ratio the flow is laminar: a straight line to none.
 
     Positive flow runs from a to b; reversed, it has the same law.
 
     Limits: quasi-steady, no heat exchange: the enthalpy passes unchanged.  Reference density of dry
-    air, 1.1884 kg/m^3; the standard has 1.185 kg/m^3 of air with 65 % humidity (0.3 %).  For another
-    gas the conductance is converted, the critical ratio is not.  A thin sharp edge is never fully
-    choked: its flow still rises by some 10 % below the critical ratio.
+    air, 1.1884 kg/m^3; the standard has 1.185 kg/m^3 of air with 65 % humidity (0.3 %).  For
+    another gas the conductance is converted, the critical ratio is not.  A thin sharp edge is never
+    fully choked: its flow still rises by some 10 % below the critical ratio.
     Source: ISO 6358-1:2013; Beater, Pneumatic Drives, Springer 2007, ch. 5.
     """
 

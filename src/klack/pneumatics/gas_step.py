@@ -10,8 +10,8 @@ A step is implicit, for all chambers at once, by Newton's method for the pressur
 at its end; what acts in it is :math:`\hat p = \theta p_1 + (1 - \theta) p_0` and
 :math:`\hat T` likewise, with :math:`\theta` = 0.51, or :math:`1 - 1/(k H)` where flows balance a
 pressure at a rate :math:`k` that the step does not resolve.  Masses and energies are then sums of
-what flowed: both are conserved to round-off, whatever is left of the iteration.  A step in which the
-iteration does not settle is divided.
+what flowed: both are conserved to round-off, whatever is left of the iteration.  A step in which
+the iteration does not settle is divided, into parts that grow again.
 
 The network is one element: its parameters describe the topology, its states are those of all
 chambers.  Entries of the energy balance count from gas at the ambient state: the store of a
@@ -39,8 +39,8 @@ __all__ = [
 ]
 
 ISOTHERMAL, STEADY = -1.0, -2.0
-"""In place of a heat conductance: gas as warm as its wall; the same on the way to steady flow, where
-its mass is that of its pressure, since the sum over a step without end has lost all digits."""
+"""In place of a heat conductance: gas as warm as its wall; the same on the way to steady flow,
+where its mass is that of its pressure, since the sum over so long a step has lost all digits."""
 
 HEAD = 14
 """Numbers before the rows: chambers, sources, branches, walls, ports, R, cv, cp, ambient pressure

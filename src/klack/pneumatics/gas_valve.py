@@ -28,16 +28,16 @@ class GasValve(RestrictionComponent):
               x = x_0 + y_\text{needle} - y_\text{body}
 
     Either a table of sonic conductances over the lift, straight between its points and constant
-    beyond them, or a seat: the mantle between a sharp edge of the ``diameter`` and a flat or conical
-    face, at most the area of the bore, times ``discharge`` as an ideal nozzle,
+    beyond them, or a seat: the mantle between a sharp edge of the ``diameter`` and a flat or
+    conical face, at most the area of the bore, times ``discharge`` as an ideal nozzle,
 
     .. math:: A = \pi h\,(d - h \cos\alpha), \quad h = x \sin\alpha, \qquad A \le \pi d^2/4 .
 
     The opening is that in the middle of the step.  Closed, the ``leak`` remains.
 
     Limits: no force on the needle: what the gas pushes is given by ``gas-face``, of the sealing
-    diameter when closed.  The jet lowers the pressure at the rim of a face; that share is part of no
-    component.  Limits of ``gas-orifice`` hold.
+    diameter when closed.  The jet lowers the pressure at the rim of a face; that share is part of
+    no component.  Limits of ``gas-orifice`` hold.
     Source: ISO 6358-1:2013; mantle of a frustum.
     """
 
