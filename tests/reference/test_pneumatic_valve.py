@@ -64,7 +64,7 @@ def test_steady_flow_at_the_start_energy_and_mass(result):
     assert flow["line"][0] == pytest.approx(flow["throat"][0] + flow["guide"][0], rel=1e-9)
     assert flow["throat"][0] == pytest.approx(flow["exhaust"][0], rel=1e-6)
     assert result.books.relative_residual <= 1e-11
-    # flows are those of the last step of a record: the trapezoidal rule sees what filled the chamber
+    # flows are those of the last step of a record: the trapezoidal rule sums them up
     net = flow["throat"] - flow["exhaust"]
     filled = np.concatenate([[0.0], np.cumsum(0.5 * (net[1:] + net[:-1]) * np.diff(result.time))])
     mass = channels["working mass"].values
