@@ -52,7 +52,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("network",),
     ("control",),
     ("hydraulics", "magnetics", "thermal"),
-    ("mechanics",),
+    ("mechanics", "pneumatics"),
     # in time, and what is made of it
     ("simulation",),
     ("transient", "acoustics", "measurement", "studies"),

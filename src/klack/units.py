@@ -35,7 +35,9 @@ __all__ = [
     "FluxDensity",
     "Force",
     "Frequency",
+    "GasConstant",
     "HeatCapacity",
+    "HeatConductance",
     "HeatTransfer",
     "Kind",
     "KinematicViscosity",
@@ -51,6 +53,7 @@ __all__ = [
     "Ratio",
     "Resistance",
     "Rotation",
+    "SonicConductance",
     "SpecificHeat",
     "Speed",
     "Stiffness",
@@ -171,6 +174,15 @@ COMPLIANCE = Kind("a compliance", "m/N", "1 nm/N", ("m/N", "um/N", "nm/N"), smal
 VOLUME_FLOW = Kind(
     "a volume flow", "m^3/s", "1 l/min", ("m^3/s", "l/min", "l/h", "mm^3/s"), smallest=1e-24
 )
+SONIC_CONDUCTANCE = Kind(
+    "a sonic conductance",
+    "m^3/s/Pa",
+    "0.2 l/s/bar",
+    ("l/s/bar", "l/min/bar", "m^3/s/Pa"),
+    smallest=1e-30,
+)
+GAS_CONSTANT = Kind("a specific gas constant", "J/kg/K", "287.05 J/kg/K", ("J/kg/K", "kJ/kg/K"))
+HEAT_CONDUCTANCE = Kind("a heat flow per temperature", "W/K", "0.02 W/K", ("W/K", "mW/K"))
 DYNAMIC_VISCOSITY = Kind("a dynamic viscosity", "Pa*s", "0.4 mPa*s", ("Pa*s", "mPa*s"))
 KINEMATIC_VISCOSITY = Kind("a kinematic viscosity", "m^2/s", "46 mm^2/s", ("m^2/s", "mm^2/s"))
 VOLTAGE = Kind("a voltage", "V", "14 V", ("V", "mV", "kV"))
@@ -228,6 +240,9 @@ KINDS = (
     DAMPING,
     COMPLIANCE,
     VOLUME_FLOW,
+    SONIC_CONDUCTANCE,
+    GAS_CONSTANT,
+    HEAT_CONDUCTANCE,
     DYNAMIC_VISCOSITY,
     KINEMATIC_VISCOSITY,
     VOLTAGE,
@@ -637,6 +652,9 @@ Acceleration = Annotated[float, *typed(ACCELERATION)]
 DampingCoefficient = Annotated[float, *typed(DAMPING)]
 Compliance = Annotated[float, *typed(COMPLIANCE)]
 VolumeFlow = Annotated[float, *typed(VOLUME_FLOW)]
+SonicConductance = Annotated[float, *typed(SONIC_CONDUCTANCE)]
+GasConstant = Annotated[float, *typed(GAS_CONSTANT)]
+HeatConductance = Annotated[float, *typed(HEAT_CONDUCTANCE)]
 DynamicViscosity = Annotated[float, *typed(DYNAMIC_VISCOSITY)]
 KinematicViscosity = Annotated[float, *typed(KINEMATIC_VISCOSITY)]
 Voltage = Annotated[float, *typed(VOLTAGE)]

@@ -202,7 +202,7 @@ def test_every_word_stands_for_one_class():
 def test_every_component_of_the_domains_is_registered():
     registered = {path for _, path in COMPONENTS}
     existing = set()
-    for domain in ("mechanics", "hydraulics", "magnetics", "thermal"):
+    for domain in ("mechanics", "hydraulics", "pneumatics", "magnetics", "thermal"):
         folder = Path(klack.__file__).parent / domain
         for info in iter_modules([str(folder)]):
             module = import_module(f"klack.{domain}.{info.name}")

@@ -1,42 +1,17 @@
 """Pressure source: a pressure that the rest of the valve cannot change."""
 
 from collections.abc import Mapping
-from typing import ClassVar, Self
-
-from pydantic import Field, model_validator
+from typing import ClassVar
 
 from klack.hydraulics.network_fluid import network_fluid
-from klack.hydraulics.time_table import check_table, step_table, value_at_start
-from klack.input.section import Section
-from klack.network.component import Component
+from klack.hydraulics.pressure_history import PressureHistory, PressureStep, PressureTable
 from klack.network.port import PRESSURE, Port
 from klack.network.rows import Rows
-from klack.units import Pressure, Time
 
 __all__ = ["PressureSource", "PressureStep", "PressureTable"]
 
 
-class PressureStep(Section):
-    """Straight ramp to another pressure, which then stays."""
-
-    to: Pressure = Field(gt=0, description="Absolute.")
-    at: Time = Field(ge=0, description="Start of the ramp.")
-    rise: Time = Field(default=1e-6, gt=0, description="Length of the ramp.")
-
-
-class PressureTable(Section):
-    """Pressure over time: straight between its points, constant beyond them."""
-
-    time: tuple[Time, ...] = Field(description="Rising.")
-    pressure: tuple[Pressure, ...] = Field(description="Absolute, one per time.")
-
-    @model_validator(mode="after")
-    def _usable(self) -> Self:
-        check_table(self.time, self.pressure, "pressure")
-        return self
-
-
-class PressureSource(Component):
+class PressureSource(PressureHistory):
     """Prescribed pressure: constant, with a step, or from a table.
 
     Stands for a rail, a tank or a pump with its accumulator: it gives and takes any flow.  Its
@@ -45,32 +20,6 @@ class PressureSource(Component):
 
     type: ClassVar[str] = "pressure-source"
     ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
-
-    pressure: Pressure | None = Field(
-        default=None, gt=0, description="Absolute; before the step, if there is one."
-    )
-    step: PressureStep | None = Field(default=None, description="Changes the pressure once.")
-    table: PressureTable | None = Field(default=None, description="Instead of the pressure.")
-
-    @model_validator(mode="after")
-    def _one_history(self) -> Self:
-        if self._exactly_one(("pressure", "table"), "the pressure over time") == "table":
-            return self._refuse_with(("step",), "table", "the table contains every change")
-        return self
-
-    def history(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Times [s] and pressures [Pa], constant beyond both ends."""
-        if self.table is not None:
-            return self.table.time, self.table.pressure
-        start = self.pressure or 0.0
-        if self.step is None:
-            return (0.0,), (start,)
-        return step_table(start, self.step.to, self.step.at, self.step.rise)
-
-    def at_start(self) -> Component:
-        """Return a source of the pressure at time zero."""
-        now = value_at_start(*self.history())
-        return self.model_copy(update={"pressure": now, "step": None, "table": None})
 
     def add_rows(self, rows: Rows) -> None:
         """Prescribe the pressure of the node."""

@@ -1,4 +1,4 @@
-"""Every component type that a case file may name, and the section of the fluid."""
+"""Every component type that a case file may name, and the sections of fluid and gas."""
 
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -10,7 +10,14 @@ from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Section
 from klack.network.component import Component
 
-__all__ = ["COMPONENTS", "component_class", "component_classes", "fluid_section", "type_words"]
+__all__ = [
+    "COMPONENTS",
+    "component_class",
+    "component_classes",
+    "fluid_section",
+    "gas_section",
+    "type_words",
+]
 
 # Registering a component type is one line here: type word and where its class is.  The word must be
 # the class's own ``type``; words are joined by hyphens, like all words that a case may choose from.
@@ -55,6 +62,13 @@ COMPONENTS = (
     ("spool-edge", "klack.hydraulics.spool_edge.SpoolEdge"),
     ("pressure-loss", "klack.hydraulics.pressure_loss.PressureLoss"),
     ("pipe-friction", "klack.hydraulics.pipe_friction.PipeFriction"),
+    # pneumatics
+    ("gas-chamber", "klack.pneumatics.gas_chamber.GasChamber"),
+    ("gas-source", "klack.pneumatics.gas_source.GasSource"),
+    ("gas-orifice", "klack.pneumatics.gas_orifice.GasOrifice"),
+    ("gas-valve", "klack.pneumatics.gas_valve.GasValve"),
+    ("gas-gap", "klack.pneumatics.gas_gap.GasGap"),
+    ("gas-face", "klack.pneumatics.gas_face.GasFace"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),
@@ -76,6 +90,7 @@ COMPONENTS = (
 """Type and dotted path of the class, for each component type."""
 
 _FLUID = "klack.hydraulics.fluid_choice.FluidChoice"
+_GAS = "klack.pneumatics.gas_choice.GasChoice"
 
 
 def type_words() -> tuple[str, ...]:
@@ -130,6 +145,12 @@ def component_classes() -> Iterator[type[Component]]:
 def fluid_section() -> type[Section]:
     """Class of the section ``fluid``; imports it."""
     found: type[Section] = _registered(_FLUID)
+    return found
+
+
+def gas_section() -> type[Section]:
+    """Class of the section ``gas``; imports it."""
+    found: type[Section] = _registered(_GAS)
     return found
 
 

@@ -33,6 +33,7 @@ def check_nodes(components: Mapping[str, Component], nodes: Iterable[Node]) -> N
     checks = {
         "mechanical": _check_motion,
         "hydraulic": _check_pressure,
+        "pneumatic": _check_pressure,
         "electric": _check_drive,
         "thermal": _check_temperature,
     }
@@ -62,6 +63,8 @@ def _where_to(domain: str, port: str) -> str:
     words = {
         "mechanical": f"connect it to a port of a body, or to the ground: [{port}, ground].",
         "hydraulic": f"connect it to a chamber or a pressure, or to ambient: [{port}, ambient].",
+        "pneumatic": f"connect it to a gas-chamber or a gas-source, or to ambient: "
+        f"[{port}, ambient].",
         "electric": f"connect it to its partner: [driver.terminals, {port}].",
         "thermal": f"connect it to a heat capacity, or to ambient: [{port}, ambient].",
     }
@@ -138,6 +141,13 @@ def _is_flow_source(components: Mapping[str, Component], joint: Joint) -> bool:
 
 
 def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProblem:
+    if node.domain == "pneumatic":
+        return CaseProblem(
+            ("connections", node.index),
+            got=f"{node}: nothing there stores gas or prescribes the pressure",
+            expected="a gas-chamber, a gas-source or ambient at every pneumatic node",
+            hint="add the dead volume there as a gas-chamber (a few mm^3), or a gas-source.",
+        )
     got = f"{node}: nothing there stores fluid or prescribes the pressure"
     if any(_is_flow_source(components, joint) for joint in node.joints):
         got = f"{node}: a flow is forced into a node without volume"

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from klack.errors import InputError
 from klack.input.section import Section
 from klack.network.across import OffAxisPart
-from klack.network.port import Port
+from klack.network.port import FLUID_DOMAINS, Port
 from klack.network.rows import Rows
 
 __all__ = ["Component"]
@@ -50,9 +50,9 @@ class Component(Section):
     def dry(self) -> "Component | None":
         """Return this part without any fluid; None if nothing is left of it.
 
-        Whatever has a hydraulic port goes, a section ``film`` goes, all else stays.
+        Whatever has a port for liquid or gas goes, a section ``film`` goes, all else stays.
         """
-        if any(port.domain == "hydraulic" for port in self.port_kinds().values()):
+        if any(port.domain in FLUID_DOMAINS for port in self.port_kinds().values()):
             return None
         return self.model_copy(update={"film": None}) if hasattr(self, "film") else self
 

@@ -19,6 +19,7 @@ from klack.network.catalogue import (
     component_class,
     component_classes,
     fluid_section,
+    gas_section,
     type_words,
 )
 from klack.network.component import Component
@@ -26,7 +27,14 @@ from klack.network.network import Network
 from klack.network.rows import Ambient
 from klack.units import Pressure, Temperature
 
-__all__ = ["AmbientSection", "AnyComponent", "LateSection", "NetworkSection", "read_component"]
+__all__ = [
+    "AmbientSection",
+    "AnyComponent",
+    "LateGas",
+    "LateSection",
+    "NetworkSection",
+    "read_component",
+]
 
 
 def read_component(value: Any, context: Any = None) -> Component:
@@ -107,6 +115,27 @@ class LateSection:
         return {"anyOf": [{"type": "string", "examples": ["n-heptane"]}, section]}
 
 
+def _read_gas(value: Any, info: ValidationInfo) -> Any:
+    found = gas_section()
+    if value is None or isinstance(value, found):
+        return value
+    return found.model_validate(value, context=info.context)
+
+
+class LateGas(LateSection):
+    """The section ``gas``, likewise."""
+
+    def section(self) -> type[Section]:
+        """Class of the section."""
+        return gas_section()
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        section = handler(gas_section().__pydantic_core_schema__)
+        return {"anyOf": [{"type": "string", "examples": ["air"]}, section]}
+
+
 class AmbientSection(Section):
     """Surroundings of the valve."""
 
@@ -128,6 +157,9 @@ class NetworkSection(Section):
     ambient: AmbientSection = Field(default=AmbientSection(), description="Surroundings.")
     fluid: Annotated[Any, BeforeValidator(_read_fluid), LateSection()] = Field(
         default=None, description="Fluid of the valve; none: a dry valve."
+    )
+    gas: Annotated[Any, BeforeValidator(_read_gas), LateGas()] = Field(
+        default=None, description="Gas of pneumatic components; none without them."
     )
     components: Mapping[Name, AnyComponent] = Field(
         min_length=1, description="name: {type: ..., and the keys of that type}."
@@ -151,4 +183,5 @@ class NetworkSection(Section):
             See :class:`klack.network.network.Network`.
         """
         fluid = self.fluid.at(self.ambient.temperature) if self.fluid is not None else None
-        return Network(self.components, self.connections, self.ambient.ambient(), fluid)
+        gas = self.gas.gas() if self.gas is not None else None
+        return Network(self.components, self.connections, self.ambient.ambient(), fluid, gas)

@@ -1,10 +1,10 @@
 r"""A valve as components and connections: checked, then translated into rows for the solver.
 
 A *connection* lists all ports that meet in one node.  A mechanical node is one point of one body
-(or of the ground) and everything that pushes it there; a hydraulic node is one pressure; an
-electric node is one pair of wires, a thermal node is one temperature.  Two words may stand in
-place of a port: ``ground`` does not move, ``ambient`` has the pressure, or the temperature, of the
-surroundings.
+(or of the ground) and everything that pushes it there; a hydraulic node, of liquid, and a pneumatic
+one, of gas, is one pressure; an electric node is one pair of wires, a thermal node is one
+temperature.  Two words may stand in place of a port: ``ground`` does not move, ``ambient`` has the
+pressure, or the temperature, of the surroundings.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,8 +15,8 @@ from klack.input.problem import CaseProblem
 from klack.network.checks import check_nodes, check_rows
 from klack.network.component import Component
 from klack.network.nodes import RESERVED, Node, join
-from klack.network.port import Role
-from klack.network.protocols import NetworkFluid
+from klack.network.port import FLUID_DOMAINS, Role
+from klack.network.protocols import NetworkFluid, NetworkGas
 from klack.network.rows import AMBIENT, GROUND, Ambient, Rows
 
 __all__ = ["Network"]
@@ -38,6 +38,8 @@ class Network:
     ambient : Ambient
     fluid : NetworkFluid or None
         At its temperature; needed as soon as anything is hydraulic.
+    gas : NetworkGas or None
+        Needed as soon as anything is pneumatic.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class Network:
     connections: Sequence[Sequence[str]]
     ambient: Ambient = field(default_factory=Ambient)
     fluid: NetworkFluid | None = None
+    gas: NetworkGas | None = None
     nodes: tuple[Node, ...] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -78,12 +81,21 @@ class Network:
         object.__setattr__(self, "nodes", nodes)
         if self.fluid is None:
             for name, component in self.components.items():
-                if _is_hydraulic(component):
+                if _has_port_of(component, "hydraulic"):
                     raise CaseProblem(
                         (),
                         got=f"no fluid, but the hydraulic component '{name}'",
                         expected="fluid: the fluid of the valve",
                         hint="add e.g. 'fluid: {name: n-heptane}'.",
+                    )
+        if self.gas is None:
+            for name, component in self.components.items():
+                if _has_port_of(component, "pneumatic"):
+                    raise CaseProblem(
+                        (),
+                        got=f"no gas, but the pneumatic component '{name}'",
+                        expected="gas: the gas of the valve",
+                        hint="add e.g. 'gas: air'.",
                     )
 
     def rows(self) -> Rows:
@@ -102,8 +114,8 @@ class Network:
         LooseBodyWarning
             For an unsupported body.
         """
-        rows = Rows(ambient=self.ambient, fluid=self.fluid)
-        if any(_is_hydraulic(component) for component in self.components.values()):
+        rows = Rows(ambient=self.ambient, fluid=self.fluid, gas=self.gas)
+        if any(_has_port_of(component, "hydraulic") for component in self.components.values()):
             rows.component = "ambient"
             rows.pressure(AMBIENT, time=[0.0], pressure=[self.ambient.pressure])
         handles, partners = self._handles(), self._partners()
@@ -111,6 +123,8 @@ class Network:
             rows.component = name
             rows.handles, rows.partners = handles[name], partners[name]
             self.components[name].add_rows(rows)
+        for close in rows.closing.values():
+            close(rows)
         check_rows(rows)
         return rows
 
@@ -125,18 +139,18 @@ class Network:
         for name, component in self.components.items():
             handles[name] = {}
             for port, kind in component.port_kinds().items():
-                rest = AMBIENT if kind.domain == "hydraulic" else GROUND
+                rest = AMBIENT if kind.domain in FLUID_DOMAINS else GROUND
                 handles[name][port] = rest
                 if kind.role is Role.MOTION:
                     handles[name][port], moving = moving, moving + 1
         pressures = AMBIENT
         for node in self.nodes:
-            if node.domain == "hydraulic" and not node.word:
+            if node.domain in FLUID_DOMAINS and not node.word:
                 pressures += 1
             bodies = node.having(Role.MOTION)
             motion = handles[bodies[0].component][bodies[0].name] if bodies else GROUND
             shared = {"mechanical": motion, "electric": node.index, "thermal": node.index}
-            shared["hydraulic"] = AMBIENT if node.word else pressures
+            shared["hydraulic"] = shared["pneumatic"] = AMBIENT if node.word else pressures
             for joint in node.joints:
                 handles[joint.component][joint.name] = shared[node.domain]
         return handles
@@ -170,12 +184,14 @@ class Network:
             together = [port for old in met for port in old]
             together += [port for port in new if port not in together]
             merged = [old for old in merged if old not in met] + [together]
-        return type(self)({**self.components, **components}, merged, self.ambient, self.fluid)
+        parts = {**self.components, **components}
+        return type(self)(parts, merged, self.ambient, self.fluid, self.gas)
 
     def dry(self) -> Self:
         """Return the same valve without fluid: no flow, no pressure force, no film, no leakage."""
         parts = {name: part.dry() for name, part in self.components.items()}
-        wet = any(_is_hydraulic(part) for part in parts.values() if part is not None)
+        left = [part for part in parts.values() if part is not None]
+        wet = any(_has_port_of(part, "hydraulic") for part in left)
         return self._changed(parts, "", self.fluid if wet else None)
 
     def lumped(self, stiffness: float, restitution: float | None = None) -> Self:
@@ -209,11 +225,12 @@ class Network:
                 ports.append(instead)
             if len(ports) > 1:
                 connections.append(ports)
-        return type(self)(kept, connections, self.ambient, fluid)
+        gas = self.gas if any(_has_port_of(part, "pneumatic") for part in kept.values()) else None
+        return type(self)(kept, connections, self.ambient, fluid, gas)
 
 
-def _is_hydraulic(component: Component) -> bool:
-    return any(port.domain == "hydraulic" for port in component.port_kinds().values())
+def _has_port_of(component: Component, domain: str) -> bool:
+    return any(port.domain == domain for port in component.port_kinds().values())
 
 
 def _part_of(port: str) -> str:

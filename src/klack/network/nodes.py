@@ -12,7 +12,8 @@ __all__ = ["RESERVED", "Joint", "Node", "join"]
 RESERVED = {"ground": "mechanical", "ambient": "hydraulic"}
 """Words allowed in a connection instead of a port, and their domains.
 
-``ambient`` beside thermal ports is the temperature of the surroundings.
+``ambient`` beside ports of gas is the pressure of the surroundings as well, beside thermal ports
+their temperature.
 """
 
 
@@ -98,10 +99,11 @@ def _node(
         seen[str(joint)] = index
         joints.append(joint)
     domains = {str(joint): joint.port.domain for joint in joints}
-    thermal = set(domains.values()) == {"thermal"}
-    domains |= {
-        word: "thermal" if thermal and word == "ambient" else RESERVED[word] for word in words
-    }
+    others = set(domains.values())
+    of_ambient = next((d for d in ("pneumatic", "thermal") if others == {d}), RESERVED["ambient"])
+    domains |= {word: of_ambient if word == "ambient" else RESERVED[word] for word in words}
+    if {"hydraulic", "pneumatic"} <= set(domains.values()):
+        raise _mixed_fluids(index, domains)
     if len(set(domains.values())) > 1:
         raise CaseProblem(
             ("connections", index),
@@ -118,6 +120,17 @@ def _node(
         )
     domain = next(iter(domains.values()))
     return Node(index, domain, tuple(joints), words[0] if words else "")
+
+
+def _mixed_fluids(index: int, domains: Mapping[str, str]) -> CaseProblem:
+    words = {"hydraulic": "liquid", "pneumatic": "gas"}
+    return CaseProblem(
+        ("connections", index),
+        got=" with ".join(f"{name} ({words.get(d, d)})" for name, d in domains.items()),
+        expected="ports of liquid alone, or of gas alone",
+        hint="they meet through a body: a pressure-face on the side of the liquid and a gas-face "
+        "on that of the gas; or take an accumulator, which has its gas inside.",
+    )
 
 
 def _joint(key: tuple[str | int, ...], text: str, ports: Mapping[str, Mapping[str, Port]]) -> Joint:

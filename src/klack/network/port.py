@@ -8,6 +8,10 @@ __all__ = [
     "COMPLIANCE",
     "ELEMENT",
     "FLOW",
+    "FLUID_DOMAINS",
+    "GAS_FLOW",
+    "GAS_PRESSURE",
+    "GAS_VOLUME",
     "HEAT",
     "HEAT_STORE",
     "MOTION",
@@ -24,7 +28,7 @@ class Role(Enum):
 
     MOTION = "moves"  # port of a body: rules the displacement of a mechanical node
     ELEMENT = "pushes"  # exchanges force with a body
-    COMPLIANCE = "stores fluid"  # volume with compliance: rules the pressure of a hydraulic node
+    COMPLIANCE = "stores fluid"  # volume with compliance: rules the pressure of its node
     PRESSURE = "prescribes pressure"
     FLOW = "carries flow"
     VOLTAGE = "drives"
@@ -41,8 +45,8 @@ class Port:
     Parameters
     ----------
     domain : str
-        ``"mechanical"``, ``"hydraulic"``, ``"electric"`` or ``"thermal"``; only equal domains can
-        be joined.
+        ``"mechanical"``, ``"hydraulic"``, ``"pneumatic"``, ``"electric"`` or ``"thermal"``; only
+        equal domains can be joined.
     role : Role
     optional : bool
         Whether it may stay unconnected.
@@ -53,11 +57,17 @@ class Port:
     optional: bool = False
 
 
+FLUID_DOMAINS = ("hydraulic", "pneumatic")
+"""Domains of liquid and of gas, whose nodes are pressures and which a dry valve lacks."""
+
 MOTION = Port("mechanical", Role.MOTION)
 ELEMENT = Port("mechanical", Role.ELEMENT)
 COMPLIANCE = Port("hydraulic", Role.COMPLIANCE)
 PRESSURE = Port("hydraulic", Role.PRESSURE)
 FLOW = Port("hydraulic", Role.FLOW)
+GAS_VOLUME = Port("pneumatic", Role.COMPLIANCE)
+GAS_PRESSURE = Port("pneumatic", Role.PRESSURE)
+GAS_FLOW = Port("pneumatic", Role.FLOW)
 VOLTAGE = Port("electric", Role.VOLTAGE)
 COIL = Port("electric", Role.COIL)
 HEAT_STORE = Port("thermal", Role.HEAT_STORE, optional=True)

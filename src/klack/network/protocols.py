@@ -5,7 +5,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["InterfaceLaw", "LawNumbers", "NetworkFluid", "PressureBounds"]
+__all__ = ["InterfaceLaw", "LawNumbers", "NetworkFluid", "NetworkGas", "PressureBounds"]
 
 Values = NDArray[np.float64]
 
@@ -80,6 +80,18 @@ class NetworkFluid(Protocol):
     def specific_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
         """Volume per mass [m^3/kg] and its slope [m^3/(kg Pa)]."""
         ...
+
+
+class NetworkGas(Protocol):
+    """A gas of a network; what it computes with it is a matter of the room of gases.
+
+    Attributes
+    ----------
+    name : str
+    """
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
 
 
 class LawNumbers(Protocol):

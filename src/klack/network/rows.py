@@ -14,8 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 from klack.network.across import SideLaw
+from klack.network.gas_rows import GasRows
 from klack.network.motion_course import MotionCourse
-from klack.network.protocols import InterfaceLaw, NetworkFluid
+from klack.network.protocols import InterfaceLaw, NetworkFluid, NetworkGas
 from klack.network.step_function import StepFunction
 
 if TYPE_CHECKING:
@@ -77,13 +78,15 @@ class Channel:
     """A state that is recorded under ``<component> <label>``; ``index`` counts in the state.
 
     ``derived`` states follow from what else is known at the same moment: before the first step
-    they are what the step function makes of that, not what the state starts with.
+    they are what the step function makes of that, not what the state starts with.  A row that
+    stands for several components names the ``owner`` of each channel.
     """
 
     label: str
     unit: str
     index: int
     derived: bool = False
+    owner: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -109,9 +112,11 @@ class BodyRow:
 class ElementRow:
     """Element that applies forces to ports; see :mod:`klack.network.step_function`.
 
-    ``names`` are what the component calls its ports.  ``at_rest`` gives the first states that the
+    ``names`` are what the component calls its ports, or ``component.port`` in a row that stands for
+    several.  ``at_rest`` gives the first states that the
     element has at the start once its ports rest at given displacements [m]; without it the states
-    at the start are ``state`` wherever the ports are.  ``interval`` [s] is that of its exchange
+    at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
+    point, where they differ.  ``interval`` [s] is that of its exchange
     with something outside: no step is longer.
     """
 
@@ -126,6 +131,7 @@ class ElementRow:
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
     at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
+    at_steady: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
 
 
@@ -394,12 +400,14 @@ class LimitRow:
 class Rows:
     """Collects the rows of a network, one component after the other.
 
-    ``ambient`` and ``fluid`` hold for the whole network.  While a component adds its rows,
-    ``component`` is its name and ``handles`` maps its port names to handles.
+    ``ambient``, ``fluid`` and ``gas`` hold for the whole network.  While a component adds its rows,
+    ``component`` is its name and ``handles`` maps its port names to handles.  What a component puts
+    into ``closing`` is called once, after all components, under one name once.
     """
 
     ambient: Ambient
     fluid: NetworkFluid | None = None
+    gas: NetworkGas | None = None
     component: str = ""
     handles: Mapping[str, int] = field(default_factory=dict)
     partners: Mapping[str, tuple[object, ...]] = field(default_factory=dict)
@@ -414,6 +422,8 @@ class Rows:
     limits: list[LimitRow] = field(default_factory=list)
     sides: list[SideRow] = field(default_factory=list)
     controllers: list[ControllerRow] = field(default_factory=list)
+    gas_rows: GasRows = field(default_factory=GasRows)
+    closing: dict[str, Callable[["Rows"], None]] = field(default_factory=dict)
     coils: dict[int, str] = field(default_factory=dict)  # electric node -> component of its coil
 
     def port(self, name: str) -> int:

@@ -99,6 +99,7 @@ def _on(ports: Iterable[PlannedPort], side: Side) -> list[PlannedPort]:
 _OPEN: Mapping[str, str] = {
     "mechanical": "open: ground",
     "hydraulic": "open: surroundings",
+    "pneumatic": "open: surroundings",
     "thermal": "open: surroundings",
 }
 """What a port in no connection counts as."""

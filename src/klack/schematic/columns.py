@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from klack.network.network import Network
 from klack.network.nodes import Joint, Node
-from klack.network.port import Role
+from klack.network.port import FLUID_DOMAINS, Role
 from klack.schematic.cells import PlannedPort, Side
 from klack.schematic.shapes import Domain
 
@@ -71,7 +71,7 @@ def plan_of(network: Network) -> Plan:
             domain: Domain = kind.domain  # type: ignore[assignment]
             if joint not in at:
                 side: Side = "left" if column in (_BODIES, _PUSHING) or column < -1 else "right"
-                if kind.domain == "hydraulic":
+                if kind.domain in FLUID_DOMAINS:
                     side = "left"
                 mark = words.get(joint, "open")
                 planned.append(PlannedPort(port, domain, (side,), None, mark))
@@ -117,15 +117,15 @@ def _columns(network: Network, nodes: Mapping[int, Node]) -> tuple[dict[str, int
         domains = {kind.domain for kind in kinds}
         if any(kind.role is Role.MOTION for kind in kinds):
             columns[name] = _BODIES
-        elif "hydraulic" in domains and len(domains) > 1:
+        elif domains & set(FLUID_DOMAINS) and len(domains) > 1:
             columns[name] = -1
-        elif "hydraulic" in domains:
+        elif domains & set(FLUID_DOMAINS):
             fluid.append(name)
         else:
             columns[name] = _DRIVING if domains == {"electric"} else _PUSHING
     homes = {}
     for index, node in nodes.items():
-        if node.domain != "hydraulic":
+        if node.domain not in FLUID_DOMAINS:
             ruler = _ruler(node)
             rest = max(columns[joint.component] for joint in node.joints)
             homes[index] = rest + 1 if ruler is None else columns[ruler.component]
@@ -140,7 +140,7 @@ def _spread(
     homes: dict[int, int],
 ) -> None:
     """Step from the bodies through the hydraulics; adds their columns and those of their nodes."""
-    wet = {index: node for index, node in nodes.items() if node.domain == "hydraulic"}
+    wet = {index: node for index, node in nodes.items() if node.domain in FLUID_DOMAINS}
     meets: dict[str, list[int]] = {}
     for index, node in wet.items():
         for joint in node.joints:

@@ -53,6 +53,11 @@ _TWO_ENDED: Mapping[str, tuple[Stroke, ...]] = {
     "force-over-stroke": (*_BOX, Stroke("M9,9 C16,8 16,-6 27,-8")),
     "fmu": (*_BOX, Stroke("M12,-5 H24 V5 H12 Z M15,-5 V-8 M21,-5 V-8 M15,5 V8 M21,5 V8")),
     "orifice": (Stroke("M0,0 H36 M11,-11 Q18,-1 25,-11 M11,11 Q18,1 25,11"),),
+    "gas-orifice": (Stroke("M0,0 H36 M11,-11 Q18,-1 25,-11 M11,11 Q18,1 25,11"),),
+    "gas-gap": (
+        Stroke("M0,0 H9 M27,0 H36 M9,-4 H27 M9,4 H27"),
+        Stroke("M9,-9 H27 M9,9 H27", "heavy"),
+    ),
     "line": (*_PIPE, Stroke("M6,0 q3,-5 6,0 t6,0 t6,0 t6,0", "thin")),
     "inertance": (
         Stroke("M0,0 H3 M33,0 H36"),
@@ -111,6 +116,8 @@ _FRAMED: Mapping[str, tuple[Stroke, ...]] = {
     "gravity": (Stroke(_circle(0, -11, 4), "metal"), Stroke("M0,-7 V14 M-5,6 L0,14 L5,6")),
     "chamber": (Stroke("M-14,-12 H14 a12,12 0 0 1 0,24 H-14 a12,12 0 0 1 0,-24 Z", "fluid"),),
     "pressure-source": (Stroke("M12,0 L-9,-12 V12 Z", "solid"),),
+    "gas-chamber": (Stroke("M-14,-12 H14 a12,12 0 0 1 0,24 H-14 a12,12 0 0 1 0,-24 Z", "paper"),),
+    "gas-source": (Stroke("M12,0 L-9,-12 V12 Z", "paper"),),
     "voltage-step": (_AXES, Stroke("M-18,10 H-10 V-9 H8 V10 H16")),
     "voltage-table": (_AXES, Stroke("M-18,8 L-9,-6 L-1,2 L7,-11 L16,-4")),
     "drive-profile": (_AXES, Stroke("M-18,10 L-9,-10 H-2 L3,2 H11 L16,10")),
@@ -140,6 +147,8 @@ _SEATS: Mapping[str, tuple[Stroke, ...]] = {
 FRAMELESS: Mapping[str, tuple[float, float]] = {
     "accumulator": (52.0, 24.0),
     "chamber": (52.0, 24.0),
+    "gas-chamber": (52.0, 24.0),
+    "gas-source": (24.0, 24.0),
     "pressure-source": (24.0, 24.0),
 }
 """Sizes of the symbols that are drawn without a frame."""
@@ -173,8 +182,11 @@ def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
     """Symbol round its middle; None for a type that has none."""
     if part.type == "seat":
         return _SEATS.get(str(getattr(part, "shape", "")))
-    if part.type in ("pressure-face", "land-face"):
-        inner = 1.0 if part.type == "pressure-face" else 0.4
+    if part.type == "gas-valve":
+        cone = (getattr(part, "half_angle", None) or 1.6) < 1.57
+        return _SEATS["cone" if cone else "flat"]
+    if part.type in ("pressure-face", "gas-face", "land-face"):
+        inner = 0.4 if part.type == "land-face" else 1.0
         return _face(getattr(part, "direction", "") == "closing", inner)
     if part.type in ("solenoid", "force-map-solenoid"):
         return _magnet(part)

@@ -15,6 +15,7 @@ _SIZE, _TITLE, _ROW, _LINE, _MARGIN = 10.0, 14.0, 20.0, 30.0, 16.0
 _NARROWEST = 620.0
 _LINES: tuple[tuple[Domain, str], ...] = (
     ("hydraulic", "fluid"),
+    ("pneumatic", "gas"),
     ("mechanical", "motion and force"),
     ("electric", "voltage and current"),
     ("thermal", "temperature and heat"),
@@ -49,7 +50,7 @@ def with_legend(drawn: Schematic, network: Network, title: str = "") -> Schemati
         marks.add(MARKS["unknown"])
     outside = {"ambient": f": {value_text(network.ambient.pressure, 'Pa')}"}
     entries: list[tuple[Domain | None, str, str]] = [
-        (domain, "", text + _of_fluid(network) * (domain == "hydraulic"))
+        (domain, "", text + _of_fluid(network, domain))
         for domain, text in _LINES
         if domain in domains
     ]
@@ -78,7 +79,8 @@ def with_legend(drawn: Schematic, network: Network, title: str = "") -> Schemati
     )
 
 
-def _of_fluid(network: Network) -> str:
-    if network.fluid is None:
+def _of_fluid(network: Network, domain: Domain) -> str:
+    fluid = {"hydraulic": network.fluid, "pneumatic": network.gas}.get(domain)
+    if fluid is None:
         return ""
-    return cut(f": {network.fluid.name}, {network.ambient.temperature - 273.15:.4g} °C", 60)
+    return cut(f": {fluid.name}, {network.ambient.temperature - 273.15:.4g} °C", 60)

@@ -7,7 +7,7 @@ from klack.schematic.lettering import text_width
 
 __all__ = ["Box", "Domain", "Label", "Lead", "Point", "Stroke", "Symbol", "Wire", "bounds"]
 
-Domain = Literal["hydraulic", "mechanical", "electric", "thermal"]
+Domain = Literal["hydraulic", "pneumatic", "mechanical", "electric", "thermal"]
 Point = tuple[float, float]
 Ink = Literal["line", "thin", "heavy", "solid", "fluid", "metal", "paper", "unknown"]
 _ASCENT, _DESCENT = 0.8, 0.25  # of the size: letters above and below their line

@@ -1,7 +1,7 @@
 """A schematic as an SVG picture, without scripts and with every text escaped.
 
 The domains are told apart by line style as well as by colour, so that a black and white copy stays
-readable: fluid thin, mechanical thick, electric dashed.
+readable: fluid thin, gas dotted, mechanical thick, electric dashed.
 """
 
 import re
@@ -20,12 +20,14 @@ _FORBIDDEN = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff
 _WIRES: dict[Domain, str] = {
     "mechanical": f'stroke="{_INK}" stroke-width="3"',
     "hydraulic": f'stroke="{COLOURS["blue"]}" stroke-width="1.8"',
+    "pneumatic": f'stroke="{COLOURS["green"]}" stroke-width="2" stroke-dasharray="1 4"',
     "electric": f'stroke="{COLOURS["red"]}" stroke-width="1.6" stroke-dasharray="5 3"',
-    "thermal": f'stroke="{COLOURS["orange"]}" stroke-width="1.8" stroke-dasharray="1 4"',
+    "thermal": f'stroke="{COLOURS["orange"]}" stroke-width="1.8" stroke-dasharray="8 3 1 3"',
 }
 _DOTS: dict[Domain, str] = {
     "mechanical": _INK,
     "hydraulic": COLOURS["blue"],
+    "pneumatic": COLOURS["green"],
     "electric": COLOURS["red"],
     "thermal": COLOURS["orange"],
 }
@@ -62,7 +64,7 @@ def svg_of(drawn: Schematic, name: str = "") -> str:
 
 def _ordered_lines(drawn: Schematic) -> Iterable[str]:
     """Wires with their leads; the thick ones first, so that they hide no other."""
-    for domain in ("mechanical", "hydraulic", "electric", "thermal"):
+    for domain in ("mechanical", "hydraulic", "pneumatic", "electric", "thermal"):
         for wire in drawn.wires:
             if wire.domain == domain:
                 leads = [lead.points for lead in drawn.leads if lead.node == wire.node]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.memory import require_memory
-from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.network.rows import BranchRow, Channel, ElementRow, Rows
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
@@ -57,12 +57,12 @@ class Recorder:
         self.network, self.looks = network, looks
         rows, elements = network.rows, network.elements
         states = [
-            (elements.state0[k] + channel.index, _column(row, channel.label), channel.unit)
+            (elements.state0[k] + channel.index, _channel(row, channel), channel.unit)
             for k, row in enumerate(rows.elements)
             for channel in row.channels
         ]
         branch_states = [
-            (network.branches.state0[k] + channel.index, _column(row, channel.label), channel.unit)
+            (network.branches.state0[k] + channel.index, _channel(row, channel), channel.unit)
             for k, row in enumerate(rows.branches)
             for channel in row.channels
         ]
@@ -282,6 +282,11 @@ def _require_memory(records: int, columns: int) -> None:
     )
 
 
+def _channel(row: ElementRow | BranchRow, channel: Channel) -> str:
+    return f"{channel.owner} {channel.label}" if channel.owner else _column(row, channel.label)
+
+
 def _column(row: ElementRow | BranchRow, what: str, port: str = "") -> str:
     owner = f"{row.component}.{port}" if port else row.component
+    owner = port if "." in port else owner  # of a row that stands for several components
     return " ".join(filter(None, (owner, row.label, what)))

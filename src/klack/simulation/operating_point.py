@@ -153,7 +153,15 @@ def steady_rows(rows: Rows) -> Rows:
         handle: node if node.volume <= 0.0 else replace(node, stated=False)
         for handle, node in rows.nodes.items()
     }
-    return replace(rows, nodes=nodes, bodies=[replace(row, speed=0.0) for row in rows.bodies])
+    return replace(
+        rows,
+        nodes=nodes,
+        bodies=[replace(row, speed=0.0) for row in rows.bodies],
+        elements=[
+            row if row.at_steady is None else replace(row, at_rest=row.at_steady)
+            for row in rows.elements
+        ],
+    )
 
 
 def far_ends(rows: Rows) -> list[dict[str, float]]:

@@ -47,6 +47,8 @@ COVERS = {
     "hydraulics": "Orifices, gaps, seats, annuli, chambers and inertances against closed formulas.",
     "hydraulic-parts": "Check and relief valves, accumulators, pumps, spool edges, fittings, "
     "walls: formulas, and small networks integrated apart.",
+    "pneumatics": "Gas: flow laws of ISO 6358, vessels that fill and empty, and networks "
+    "integrated apart.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "
     "compliance, order.",

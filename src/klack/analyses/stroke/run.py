@@ -350,6 +350,9 @@ def _label(valve: Valve, rows: Rows, *, wet: bool, flexible: bool) -> str:
     fluid = "dry"
     if wet and rows.fluid is not None:
         fluid = f"{rows.fluid.name} at {_highest_pressure(rows) / 1e5:.3g} bar"
+    if wet and rows.gas is not None:
+        gas = f"{rows.gas.name} at {rows.gas_rows.highest_pressure() / 1e5:.3g} bar"
+        fluid = gas if rows.fluid is None else f"{fluid}, {gas}"
     elastic = [
         row.body.mode_count - row.body.rigid_count for row in rows.bodies if row.body.mode_count
     ]

@@ -1,0 +1,1 @@
+"""Gases and pneumatic components: chambers, orifices, seats, sources; one per file."""
