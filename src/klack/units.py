@@ -23,6 +23,7 @@ __all__ = [
     "Acceleration",
     "Angle",
     "Area",
+    "Capacitance",
     "Compliance",
     "Conductivity",
     "Current",
@@ -41,6 +42,7 @@ __all__ = [
     "Mass",
     "Modulus",
     "Permeance",
+    "Power",
     "Pressure",
     "QuantityError",
     "Rate",
@@ -168,6 +170,8 @@ KINEMATIC_VISCOSITY = Kind("a kinematic viscosity", "m^2/s", "46 mm^2/s", ("m^2/
 VOLTAGE = Kind("a voltage", "V", "14 V", ("V", "mV", "kV"))
 CURRENT = Kind("a current", "A", "2.5 A", ("A", "mA"))
 RESISTANCE = Kind("a resistance", "ohm", "1.2 ohm", ("ohm", "mohm"))
+CAPACITANCE = Kind("a capacitance", "F", "220 uF", ("F", "mF", "uF"), smallest=1e-15)
+POWER = Kind("a power", "W", "12 W", ("W", "mW", "kW"))
 CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"), smallest=1e-24)
 FLUX_DENSITY = Kind("a flux density", "T", "1.5 T", ("T", "mT"))
 FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
@@ -210,6 +214,8 @@ KINDS = (
     VOLTAGE,
     CURRENT,
     RESISTANCE,
+    CAPACITANCE,
+    POWER,
     CONDUCTIVITY,
     FLUX_DENSITY,
     FIELD_STRENGTH,
@@ -592,6 +598,8 @@ KinematicViscosity = Annotated[float, *typed(KINEMATIC_VISCOSITY)]
 Voltage = Annotated[float, *typed(VOLTAGE)]
 Current = Annotated[float, *typed(CURRENT)]
 Resistance = Annotated[float, *typed(RESISTANCE)]
+Capacitance = Annotated[float, *typed(CAPACITANCE)]
+Power = Annotated[float, *typed(POWER)]
 Conductivity = Annotated[float, *typed(CONDUCTIVITY)]
 FluxDensity = Annotated[float, *typed(FLUX_DENSITY)]
 FieldStrength = Annotated[float, *typed(FIELD_STRENGTH)]
