@@ -23,6 +23,7 @@ __all__ = [
     "Acceleration",
     "Angle",
     "Area",
+    "Capacitance",
     "Compliance",
     "Conductivity",
     "Current",
@@ -37,7 +38,6 @@ __all__ = [
     "Frequency",
     "GasConstant",
     "HeatCapacity",
-    "HeatConductance",
     "HeatTransfer",
     "Kind",
     "KinematicViscosity",
@@ -182,12 +182,13 @@ SONIC_CONDUCTANCE = Kind(
     smallest=1e-30,
 )
 GAS_CONSTANT = Kind("a specific gas constant", "J/kg/K", "287.05 J/kg/K", ("J/kg/K", "kJ/kg/K"))
-HEAT_CONDUCTANCE = Kind("a heat flow per temperature", "W/K", "0.02 W/K", ("W/K", "mW/K"))
 DYNAMIC_VISCOSITY = Kind("a dynamic viscosity", "Pa*s", "0.4 mPa*s", ("Pa*s", "mPa*s"))
 KINEMATIC_VISCOSITY = Kind("a kinematic viscosity", "m^2/s", "46 mm^2/s", ("m^2/s", "mm^2/s"))
 VOLTAGE = Kind("a voltage", "V", "14 V", ("V", "mV", "kV"))
 CURRENT = Kind("a current", "A", "2.5 A", ("A", "mA"))
 RESISTANCE = Kind("a resistance", "ohm", "1.2 ohm", ("ohm", "mohm"))
+CAPACITANCE = Kind("a capacitance", "F", "220 uF", ("F", "mF", "uF"), smallest=1e-15)
+POWER = Kind("a power", "W", "12 W", ("W", "mW", "kW"))
 CONDUCTIVITY = Kind("a conductivity", "S/m", "2 MS/m", ("S/m", "MS/m"), smallest=1e-24)
 FLUX_DENSITY = Kind("a flux density", "T", "1.5 T", ("T", "mT"))
 FIELD_STRENGTH = Kind("a field strength", "A/m", "120 A/m", ("A/m", "kA/m"))
@@ -242,12 +243,13 @@ KINDS = (
     VOLUME_FLOW,
     SONIC_CONDUCTANCE,
     GAS_CONSTANT,
-    HEAT_CONDUCTANCE,
     DYNAMIC_VISCOSITY,
     KINEMATIC_VISCOSITY,
     VOLTAGE,
     CURRENT,
     RESISTANCE,
+    CAPACITANCE,
+    POWER,
     CONDUCTIVITY,
     FLUX_DENSITY,
     FIELD_STRENGTH,
@@ -654,12 +656,13 @@ Compliance = Annotated[float, *typed(COMPLIANCE)]
 VolumeFlow = Annotated[float, *typed(VOLUME_FLOW)]
 SonicConductance = Annotated[float, *typed(SONIC_CONDUCTANCE)]
 GasConstant = Annotated[float, *typed(GAS_CONSTANT)]
-HeatConductance = Annotated[float, *typed(HEAT_CONDUCTANCE)]
 DynamicViscosity = Annotated[float, *typed(DYNAMIC_VISCOSITY)]
 KinematicViscosity = Annotated[float, *typed(KINEMATIC_VISCOSITY)]
 Voltage = Annotated[float, *typed(VOLTAGE)]
 Current = Annotated[float, *typed(CURRENT)]
 Resistance = Annotated[float, *typed(RESISTANCE)]
+Capacitance = Annotated[float, *typed(CAPACITANCE)]
+Power = Annotated[float, *typed(POWER)]
 Conductivity = Annotated[float, *typed(CONDUCTIVITY)]
 FluxDensity = Annotated[float, *typed(FLUX_DENSITY)]
 FieldStrength = Annotated[float, *typed(FIELD_STRENGTH)]

@@ -105,7 +105,7 @@ def test_a_run_with_a_controller_does_not_continue():
     network = rows(by(lambda t, s: 1.0))
     run = simulate_network(network, duration=5e-5, start="free")
 
-    with pytest.raises(InputError, match="memory of a controller"):
+    with pytest.raises(InputError, match="memory of this controller"):
         simulate_network(network, duration=5e-5, state=run.state)
 
 

@@ -85,11 +85,43 @@ def pull(current: float, lift: float) -> float:
 # --------------------------------------------------------------------------- valves of usual kinds
 
 
+def test_a_closed_direct_injector_is_pressed_by_spring_and_pressure():
+    found = points(read_case_tree(VALVES / "direct_injector.yaml"))
+
+    pressed = 22.0 + pi / 4 * 1.3e-3**2 * (100e5 - AMBIENT)  # sac at ambient pressure
+    assert one(found, "seat contact force") == pytest.approx(
+        pressed / (1.0 + 30e3 / 1e8), rel=1e-9
+    )  # spring and seat share
+
+
+def test_a_held_direct_injector_passes_what_both_restrictions_pass():
+    tree = read_case_tree(VALVES / "direct_injector.yaml")
+    found = points(tree, base=Conditions(current={"": 8.0}))
+
+    sac = one(found, "sac pressure")
+    fluid = library_fluid("n-heptane").at(293.15)
+    density, area = float(fluid.density(sac)), 6 * pi / 4 * 0.18e-3**2
+    assert one(found, "holes mass flow") == pytest.approx(
+        0.62 * area * np.sqrt(2.0 * density * sac), rel=1e-3
+    )  # the holes cavitate: Nurick, without the vapour pressure of 5 kPa
+    assert one(found, "valve mass flow") == pytest.approx(one(found, "holes mass flow"), rel=1e-9)
+    assert one(found, "stop contact force") == pytest.approx(
+        one(found, "coil armature force")
+        - 22.0
+        - 30e3 * one(found, "needle tip displacement")
+        - pi / 4 * 1.3e-3**2 * (one(found, "body pressure") - sac)
+        + one(found, "valve jet force"),
+        rel=1e-6,
+    )
+
+
 @pytest.mark.parametrize(
     ("name", "current"),
     [
         ("brake_valve_hot", 0.0),
         ("brake_valve_hot", 2.0),
+        ("direct_injector", 0.0),
+        ("direct_injector", 8.0),
         ("pilot_injector", 0.0),
         ("pilot_injector", 12.0),
         ("pump_and_relief", None),

@@ -1,13 +1,14 @@
 """What every controlled component has: sample time, sensors and a law."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
 from klack.control.hysteresis import HysteresisController
-from klack.control.law import Law
+from klack.control.law import Law, LawMaker
 from klack.control.pid import PidController
+from klack.control.running import RunningControl
 from klack.control.sensor import Sensor
 from klack.control.state_machine import StateMachine
 from klack.input.problem import CaseProblem, nearest, one_of
@@ -30,7 +31,10 @@ class Controlled(Component):
     longer than the sample time.  In Python a function can be the controller: :meth:`by`.  A case
     file runs no code, so there it is one of the laws.
 
-    Limits: a run with a controller cannot continue from a stored state, and has no derivatives.
+    A run continues from a stored state where the controller can be stored: laws are, a function is
+    if it has the two methods of :class:`klack.control.memory.Remembering`, an FMU is not.
+
+    Limits: a run with a controller has no derivatives.
     """
 
     sample_time: Time = Field(
@@ -41,7 +45,7 @@ class Controlled(Component):
     )
     controller: ControlLaw | None = Field(default=None, description="Law of the output.")
 
-    _function: Law | None = PrivateAttr(None)
+    _function: Law | LawMaker | None = PrivateAttr(None)
 
     @model_validator(mode="after")
     def _known_sensors(self) -> Self:
@@ -55,15 +59,15 @@ class Controlled(Component):
                 )
         return self
 
-    def by(self, function: Law) -> Self:
+    def by(self, function: Law | LawMaker) -> Self:
         """Return this component with a function as its controller.
 
         Parameters
         ----------
-        function : callable
+        function : callable, or an object with ``begin``
             ``function(time, signals) -> output``: time [s], signals by the names of the sensors in
             their units, output [V], [N] or [Pa].  Called once at every sampling instant from time
-            zero.
+            zero.  ``begin(sample_time)`` of an object returns such a function, fresh for each run.
         """
         result = self.model_copy()
         result._function = function
@@ -81,23 +85,17 @@ class Controlled(Component):
                 expected="one of: pid, hysteresis, state-machine; or a function in Python",
                 hint="add 'controller: {kind: pid, ...}', or use .by(function) in Python.",
             )
-        names = tuple(self.sensors)
 
-        def begin() -> Callable[[float, tuple[float, ...]], float]:
-            act = function if law is None else law.begin(self.sample_time)
-            assert act is not None
-            read = [sensor.begin() for sensor in self.sensors.values()]
-
-            def output(time: float, values: tuple[float, ...]) -> float:
-                signals = [r(time, value) for r, value in zip(read, values, strict=True)]
-                return act(time, dict(zip(names, signals, strict=True)))
-
-            return output
+        def begin() -> RunningControl:
+            made = function if law is None else law
+            assert made is not None
+            act = made.begin(self.sample_time) if isinstance(made, LawMaker) else made
+            return RunningControl(act, {n: sensor.begin() for n, sensor in self.sensors.items()})
 
         rows.controllers.append(
             ControllerRow(
                 component=rows.component,
-                sensors=names,
+                sensors=tuple(self.sensors),
                 channels=tuple(sensor.channel for sensor in self.sensors.values()),
                 units=tuple(sensor.unit for sensor in self.sensors.values()),
                 period=self.sample_time,

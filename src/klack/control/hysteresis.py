@@ -3,13 +3,14 @@
 from collections.abc import Mapping
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from klack.control.law import Law
+from klack.control.memory import Memory, remembered
 from klack.input.problem import CaseProblem
 from klack.input.section import Name, Number, Section
 
-__all__ = ["HysteresisController"]
+__all__ = ["HysteresisController", "RunningHysteresis"]
 
 
 class HysteresisController(Section):
@@ -40,17 +41,30 @@ class HysteresisController(Section):
         """Sensors that it reads."""
         return (self.sensor,)
 
-    def begin(self, period: float) -> Law:
+    def begin(self, period: float) -> "RunningHysteresis":
         """Return a fresh controller."""
-        output = self.low
+        return RunningHysteresis(self)
 
-        def act(time: float, signals: Mapping[str, float]) -> float:
-            nonlocal output
-            signal = signals[self.sensor]
-            if signal >= self.upper:
-                output = self.high
-            elif signal <= self.lower:
-                output = self.low
-            return output
 
-        return act
+class RunningHysteresis:
+    """A hysteresis controller that runs: its last output."""
+
+    def __init__(self, law: HysteresisController) -> None:
+        self._law, self._output = law, law.low
+
+    def __call__(self, time: float, signals: Mapping[str, float]) -> float:
+        """Output at a sampling instant."""
+        signal = signals[self._law.sensor]
+        if signal >= self._law.upper:
+            self._output = self._law.high
+        elif signal <= self._law.lower:
+            self._output = self._law.low
+        return self._output
+
+    def memory(self) -> Memory:
+        """Last output."""
+        return {"hysteresis": np.array([self._output])}
+
+    def recall(self, memory: Memory) -> None:
+        """Continue from there."""
+        (self._output,) = (float(x) for x in remembered(memory, "hysteresis", 1))

@@ -1,17 +1,18 @@
 """PID control in discrete time, with limits and anti-windup."""
 
 from collections.abc import Mapping
+from math import isnan, nan
 from typing import Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.control.law import Law
+from klack.control.memory import Memory, remembered
 from klack.input.problem import CaseProblem
 from klack.input.section import Name, Number, Section
 from klack.units import Time
 
-__all__ = ["PidController", "Setpoint"]
+__all__ = ["PidController", "RunningPid", "Setpoint"]
 
 
 class Setpoint(Section):
@@ -83,26 +84,45 @@ class PidController(Section):
         """Sensors that it reads."""
         return (self.sensor,)
 
-    def begin(self, period: float) -> Law:
+    def begin(self, period: float) -> "RunningPid":
         """Return a fresh controller for a sample time [s]."""
-        integral, slope, before = 0.0, 0.0, None
-        part = 0.0 if self.integral_time is None else self.gain * period / self.integral_time
+        return RunningPid(self, period)
 
-        def act(time: float, signals: Mapping[str, float]) -> float:
-            nonlocal integral, slope, before
-            signal = signals[self.sensor]
-            wanted = self.setpoint
-            error = (wanted.at(time) if isinstance(wanted, Setpoint) else wanted) - signal
-            change = 0.0 if before is None else signal - before
-            before = signal
-            slope = (self.derivative_filter * slope - self.gain * self.derivative_time * change) / (
-                self.derivative_filter + period
-            )
-            more = part * error
-            output = self.bias + self.gain * error + integral + more + slope
-            further = (output > self.upper and more > 0.0) or (output < self.lower and more < 0.0)
-            if not (self.anti_windup and further):
-                integral += more
-            return min(max(output, self.lower), self.upper)
 
-        return act
+class RunningPid:
+    """A PID controller that runs: its integral, its derivative and the last signal."""
+
+    def __init__(self, law: PidController, period: float) -> None:
+        self._law, self._period = law, period
+        self._integral, self._slope = 0.0, 0.0
+        self._before: float | None = None
+        self._part = 0.0 if law.integral_time is None else law.gain * period / law.integral_time
+
+    def __call__(self, time: float, signals: Mapping[str, float]) -> float:
+        """Output at a sampling instant."""
+        law = self._law
+        signal = signals[law.sensor]
+        wanted = law.setpoint
+        error = (wanted.at(time) if isinstance(wanted, Setpoint) else wanted) - signal
+        change = 0.0 if self._before is None else signal - self._before
+        self._before = signal
+        self._slope = (
+            law.derivative_filter * self._slope - law.gain * law.derivative_time * change
+        ) / (law.derivative_filter + self._period)
+        more = self._part * error
+        output = law.bias + law.gain * error + self._integral + more + self._slope
+        further = (output > law.upper and more > 0.0) or (output < law.lower and more < 0.0)
+        if not (law.anti_windup and further):
+            self._integral += more
+        return min(max(output, law.lower), law.upper)
+
+    def memory(self) -> Memory:
+        """Integral, derivative, last signal (nan before the first)."""
+        before = nan if self._before is None else self._before
+        return {"pid": np.array([self._integral, self._slope, before])}
+
+    def recall(self, memory: Memory) -> None:
+        """Continue from there."""
+        integral, slope, before = (float(x) for x in remembered(memory, "pid", 3))
+        self._integral, self._slope = integral, slope
+        self._before = None if isnan(before) else before

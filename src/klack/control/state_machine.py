@@ -3,14 +3,15 @@
 from collections.abc import Mapping
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from klack.control.law import Law
+from klack.control.memory import Memory, remembered
 from klack.input.problem import CaseProblem, nearest
 from klack.input.section import Name, Number, Section
 from klack.units import Time
 
-__all__ = ["MachineState", "StateMachine", "Transition"]
+__all__ = ["MachineState", "RunningMachine", "StateMachine", "Transition"]
 
 _ROUNDING = 1e-9  # of a sample time
 
@@ -78,23 +79,40 @@ class StateMachine(Section):
         ways = [way for state in self.states for way in state.transitions]
         return tuple(dict.fromkeys(way.sensor for way in ways if way.sensor is not None))
 
-    def begin(self, period: float) -> Law:
-        """Return a fresh machine."""
-        known = {state.name: state for state in self.states}
-        state, entered = self.states[0], 0.0
+    def begin(self, period: float) -> "RunningMachine":
+        """Return a fresh machine for a sample time [s]."""
+        return RunningMachine(self, period)
 
-        def act(time: float, signals: Mapping[str, float]) -> float:
-            nonlocal state, entered
-            for way in state.transitions:
-                if way.after is not None:
-                    due = time - entered >= way.after - _ROUNDING * period
-                elif way.above is not None:
-                    due = signals[str(way.sensor)] >= way.above
-                else:
-                    due = signals[str(way.sensor)] <= float(way.below or 0.0)
-                if due:
-                    state, entered = known[way.to], time
-                    break
-            return state.output
 
-        return act
+class RunningMachine:
+    """A state machine that runs: its state, and when it entered it."""
+
+    def __init__(self, law: StateMachine, period: float) -> None:
+        self._states, self._period = law.states, period
+        self._places = {state.name: k for k, state in enumerate(law.states)}
+        self._state, self._entered = 0, 0.0
+
+    def __call__(self, time: float, signals: Mapping[str, float]) -> float:
+        """Output at a sampling instant."""
+        for way in self._states[self._state].transitions:
+            if way.after is not None:
+                due = time - self._entered >= way.after - _ROUNDING * self._period
+            elif way.above is not None:
+                due = signals[str(way.sensor)] >= way.above
+            else:
+                due = signals[str(way.sensor)] <= float(way.below or 0.0)
+            if due:
+                self._state, self._entered = self._places[way.to], time
+                break
+        return self._states[self._state].output
+
+    def memory(self) -> Memory:
+        """Number of the state, and when it was entered [s]."""
+        return {"state-machine": np.array([float(self._state), self._entered])}
+
+    def recall(self, memory: Memory) -> None:
+        """Continue from there."""
+        state, self._entered = (float(x) for x in remembered(memory, "state-machine", 2))
+        if not 0.0 <= state < len(self._states):
+            raise KeyError("state-machine")
+        self._state = int(state)

@@ -28,6 +28,7 @@ from pydantic import Field, model_validator
 
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
+from klack.magnetics.output_stage import OutputStage
 from klack.network.component import Component
 from klack.network.port import VOLTAGE, Port
 from klack.network.rows import Rows
@@ -137,6 +138,13 @@ class DriveState:
 class DriveProgram:
     """States of a driver; it starts in the first one at time zero.
 
+    Parameters
+    ----------
+    states : tuple of DriveState
+    stage : OutputStage, optional
+        What the current flows through in each state; the voltages of the states are then those
+        without current.
+
     Examples
     --------
     >>> on = DriveState("on", 12.0, (Switch(When.CURRENT_ABOVE, 2.2, "off"),))
@@ -146,6 +154,7 @@ class DriveProgram:
     """
 
     states: tuple[DriveState, ...]
+    stage: OutputStage | None = None
 
     def __post_init__(self) -> None:
         names = [state.name for state in self.states]
@@ -173,6 +182,12 @@ class DriveProgram:
         sizes = [block.size for block in blocks]
         starts = 1 + len(blocks) + np.concatenate(([0], np.cumsum(sizes[:-1])))
         return np.concatenate(([float(len(blocks))], starts, *blocks))
+
+    def stage_numbers(self) -> NDArray[np.float64]:
+        """Flat output stage for the compiled step; none without one."""
+        if self.stage is None:
+            return np.zeros(0)
+        return self.stage.numbers([state.name for state in self.states])
 
 
 def _check(state: DriveState, switch: Switch, names: Sequence[str]) -> None:

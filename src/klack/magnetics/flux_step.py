@@ -15,46 +15,45 @@ identity stays exact:
 (armature a, base b).
 """
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.compiling.constant import constant
-from klack.compiling.jit import inner
 from klack.errors import require_positive
 from klack.magnetics.circuit import MagneticCircuit
-from klack.magnetics.drive_kernel import (
-    crossed_switch,
-    due_switch,
-    next_time,
-    state_block,
-    state_voltage,
-    switch_current,
-)
+from klack.magnetics.drive_kernel import due_switch, next_time, state_block, state_voltage
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.flux_kernel import (
-    circuit_current,
     circuit_energy,
     circuit_flux,
-    circuit_gaps,
     circuit_heat,
     circuit_loss_and_force,
-    circuit_step,
     linked,
     stack,
 )
 from klack.magnetics.flux_map import FluxMap
-from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES, STOPS, circuit_numbers
-from klack.magnetics.gap_range import GapRange
-from klack.magnetics.map_kernel import (
-    map_current,
-    map_energy,
-    map_force,
-    map_numbers,
-    map_step,
+from klack.magnetics.flux_pieces import (
+    DIODE_BLOCKS,
+    FIRST_PIECE,
+    KEPT,
+    LEAST_PIECE,
+    MOST_EVENTS,
+    NO_SWITCH,
+    SPOTS,
+    TELLING,
+    first_crossing,
+    next_state,
+    piece_advance,
+    piece_current,
+    piece_gaps,
+    piece_to_current,
 )
+from klack.magnetics.flux_table import MAP, MOST_TUBES, STOPS, circuit_numbers
+from klack.magnetics.gap_range import GapRange
+from klack.magnetics.map_kernel import map_energy, map_force, map_numbers
+from klack.magnetics.output_stage import START_VOLTAGE
 from klack.magnetics.quiet_step import DIODE, FRONT, allowed_bend, quiet_step
+from klack.magnetics.stage_step import STAGE_BOOKS, stage_channels, stage_step
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
@@ -105,149 +104,10 @@ _MAP_ADVICE = (
     "gap that the stops allow."
 )
 
-_TUBES, _SPOTS = MOST_TUBES, 2 * MOST_TUBES
-_KEPT = 2 * MOST_TUBES + MOST_STOPS
-_MOST_EVENTS = 30
-_LOCATED = 1e-12
-_TELLS = 1e-6  # of a step: shorter pieces say nothing of the rates of the fluxes
-_FIRST = 1 / 4  # of a step: piece after a switch
-_LEAST = 1 / 64  # ... no piece is cut further for its bend
+_TUBES = MOST_TUBES
 _FRONT, _DIODE = FRONT, DIODE
-_NONE, _BLOCKS = -1, -2
 _MAP = MAP
 _HEADER = 8
-
-
-@inner(error_model="numpy", forceinline=True)
-def _gaps(
-    par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
-) -> None:
-    """Prepare the gap data of a piece; for a map just the gaps themselves."""
-    if par[at + _MAP] != 0.0:
-        middle[0], end[0], slope[0] = x0, x1, 0.0
-    else:
-        circuit_gaps(par, at, hints, x0, x1, middle, end, slope)
-
-
-@inner(error_model="numpy")
-def _advance(
-    par: Any,
-    at: int,
-    hints: Any,
-    phi: Any,
-    change: Any,
-    middle: Any,
-    end: Any,
-    per_time: float,
-    voltage: float,
-    conducts: bool,
-) -> tuple[bool, float]:
-    """Find the change of the fluxes over a piece, and its mean current."""
-    if par[at + _MAP] != 0.0:
-        return map_step(
-            par, at, phi[0], change, middle[0], end[0], per_time, voltage, par[1], conducts
-        )
-    return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[1], conducts)
-
-
-@inner(error_model="numpy", forceinline=True)
-def _current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
-    """Return the current at the end of a piece [A]."""
-    if par[at + _MAP] != 0.0:
-        return map_current(par, at, phi[0] + change[0], end[0])
-    return circuit_current(par, at, hints, phi, change, end)
-
-
-@inner(error_model="numpy")
-def _locate(
-    par: Any,
-    at: int,
-    hints: Any,
-    phi: Any,
-    change: Any,
-    x0: float,
-    speed: float,
-    length: float,
-    voltage: float,
-    before: float,
-    after: float,
-    target: float,
-    rise: float,
-) -> tuple[float, float]:
-    """Length of the piece at whose end the current meets its target, and its mean current.
-
-    The target is ``target`` now and rises evenly by ``rise`` over ``length``.  The length is
-    negative if that fails.  ``change`` comes with the change over ``length`` and
-    leaves with that of the located piece.
-    """
-    middle, end, slope = stack(phi, _TUBES), stack(phi, _TUBES), stack(phi, _TUBES)
-    loops = int(par[at])
-    low, high = 0.0, length
-    f_low, f_high = before - target, after - target - rise
-    accepted = _LOCATED * (abs(target) + abs(before))
-    side = 0
-    size = length
-    for _ in range(100):
-        guess = (low * f_high - high * f_low) / (f_high - f_low)
-        guess = min(max(guess, low + 1e-3 * _LOCATED * length), high)
-        for j in range(loops):
-            change[j] *= guess / size
-        size = guess
-        _gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
-        found, mean = _advance(par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True)
-        if not found:
-            return -1.0, 0.0
-        f = _current(par, at, hints, phi, change, end) - target - rise * (size / length)
-        if abs(f) <= accepted or high - low <= _LOCATED * length:
-            return size, mean
-        if f * f_high > 0.0:
-            high, f_high = size, f
-            if side == 1:
-                f_low *= 0.5
-            side = 1
-        else:
-            low, f_low = size, f
-            if side == -1:
-                f_high *= 0.5
-            side = -1
-    return -1.0, 0.0
-
-
-@inner(error_model="numpy", forceinline=True)
-def _crossing(
-    par: Any, block: int, current: float, end: float, begin: float, over: float
-) -> tuple[float, float, int]:
-    """Return the first transition before ``end``, its current now, and how far that rises.
-
-    ``begin`` and ``over`` are the times of the two ends since the start of the cycle.
-    """
-    target, rise, which, earliest = 0.0, 0.0, _NONE, 2.0
-    if par[block + 1] != 0.0 and end < 0.0:
-        which, earliest = _BLOCKS, current / (current - end)
-    k = crossed_switch(par, block, 0, end, over)
-    while k >= 0:
-        value = switch_current(par, block, k, begin)
-        more = switch_current(par, block, k, over) - value
-        part = (value - current) / (end - current - more)
-        if part < earliest:
-            target, rise, which, earliest = value, more, k, part
-        k = crossed_switch(par, block, k + 1, end, over)
-    return target, rise, which
-
-
-@inner(error_model="numpy", forceinline=True)
-def _next_state(
-    par: Any, block: int, switch: int, now: float, entered: float, cycle: float
-) -> tuple[float, float, float]:
-    """Enter the next state, timed ones exactly on time: state, entered, cycle."""
-    s = block + 3 + 4 * switch
-    when, value = par[s], par[s + 1]
-    clock = now
-    if when == 2.0:
-        clock = entered + value
-    elif when == 3.0:
-        clock = cycle + value
-    return par[s + 2], max(clock, entered), clock if par[s + 3] != 0.0 else cycle
 
 
 @step_function
@@ -264,7 +124,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     is_open, current, last = state[3] != 0.0, state[4], state[7]
     # on the stack, where nothing else can be meant: the compiler keeps what it has read
     phi, rate, bend = stack(out, 6), stack(out, 6), stack(out, 6)
-    change, told_of, hints = stack(out, 6), stack(out, 6), stack(out, _KEPT)
+    change, told_of, hints = stack(out, 6), stack(out, 6), stack(out, KEPT)
     middle, final, slope = stack(out, _TUBES), stack(out, _TUBES), stack(out, _TUBES)
     for j in range(loops):
         phi[j] = state[_FRONT + j]
@@ -274,7 +134,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         hints[j] = state[_FRONT + 3 * loops + j]
     stops = int(par[at + STOPS])
     for j in range(stops):
-        hints[_SPOTS + j] = state[_FRONT + 3 * loops + spots + j]
+        hints[SPOTS + j] = state[_FRONT + 3 * loops + spots + j]
 
     supply = ohmic = eddy = push = pulse = hysteresis = 0.0
     done = 0.0
@@ -285,17 +145,17 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     speed = (x1 - x0) * per_step
     close = 1e-9 * h + 1e-15 * abs(t)
     if h <= 0.0:
-        _gaps(par, at, hints, x0, x0, middle, final, slope)
+        piece_gaps(par, at, hints, x0, x0, middle, final, slope)
     while done < h:
         now = t + done
         block = state_block(par, drive, int(mode))
         which = due_switch(par, block, now, entered, cycle, current, close)
         if which >= 0:
-            mode, entered, cycle = _next_state(par, block, which, now, entered, cycle)
+            mode, entered, cycle = next_state(par, block, which, now, entered, cycle)
             last = 0.0  # the rates belong to the voltage before
             blocked = False
             events += 1
-            if events > _MOST_EVENTS:
+            if events > MOST_EVENTS:
                 return 2
             continue
         if is_open and par[block + 1] == 0.0:
@@ -306,7 +166,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         whole = due >= piece - close
         if not whole:
             piece = due
-        longest = min(longest, max(2.0 * last if last > 0.0 else _FIRST * h, _LEAST * h))
+        longest = min(longest, max(2.0 * last if last > 0.0 else FIRST_PIECE * h, LEAST_PIECE * h))
         if longest < piece - close:
             piece, whole = constant(longest), False
         if piece != h:
@@ -317,8 +177,8 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         ahead = 0.5 * (last + piece)
         for j in range(loops):
             told_of[j] = change[j] = constant(piece * (rate[j] + bend[j] * ahead))
-        _gaps(par, at, hints, xa, xb, middle, final, slope)
-        found, mean = _advance(
+        piece_gaps(par, at, hints, xa, xb, middle, final, slope)
+        found, mean = piece_advance(
             par, at, hints, phi, change, middle, final, per_time, voltage, not is_open
         )
         if not found:
@@ -327,7 +187,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         for j in range(loops):
             untold = max(untold, abs(change[j] - told_of[j]))
             largest = max(largest, abs(phi[j] + change[j]))
-        if last > 0.0 and untold > bend_left * largest and piece > _LEAST * h:
+        if last > 0.0 and untold > bend_left * largest and piece > LEAST_PIECE * h:
             longest = 0.5 * piece
             continue
         longest = 2.0 * piece
@@ -335,30 +195,30 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if is_open and not blocked and voltage > through * per_time + _DIODE:
             is_open = False
             last = 0.0
-            found, mean = _advance(
+            found, mean = piece_advance(
                 par, at, hints, phi, change, middle, final, per_time, voltage, True
             )
             if not found:
                 return 1
             through = linked(par, at, change)
         end = 0.0
-        which = _NONE
+        which = NO_SWITCH
         if not is_open:
-            end = _current(par, at, hints, phi, change, final)
+            end = piece_current(par, at, hints, phi, change, final)
             begin, within = now - cycle, min(close, 0.25 * piece)  # a target may jump at the ends
-            target, rise, which = _crossing(
+            target, rise, which = first_crossing(
                 par, block, current, end, begin + within, begin + piece - within
             )
-            if which != _NONE:
-                if which == _BLOCKS and current <= 0.0:
+            if which != NO_SWITCH:
+                if which == DIODE_BLOCKS and current <= 0.0:
                     is_open = blocked = True
                     last = 0.0
                     events += 1
-                    if events > _MOST_EVENTS:
+                    if events > MOST_EVENTS:
                         return 2
                     continue
                 length = piece
-                piece, mean = _locate(
+                piece, mean = piece_to_current(
                     par,
                     at,
                     hints,
@@ -379,7 +239,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 whole = False
                 xb = xa + speed * piece
                 end = target + rise * (piece / length)
-                _gaps(par, at, hints, xa, xb, middle, final, slope)
+                piece_gaps(par, at, hints, xa, xb, middle, final, slope)
                 through = linked(par, at, change)
             heat = par[1] * mean * mean * piece
             ohmic += heat
@@ -399,7 +259,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             curve = per_time
         elif last > 0.0:
             curve = 1.0 / ahead
-        told = piece > _TELLS * h  # of a shorter piece the rate is round-off, and so is a guess
+        told = piece > TELLING * h  # of a shorter piece the rate is round-off, and so is a guess
         for j in range(loops):
             phi[j] += change[j]
             if told:
@@ -410,14 +270,14 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         current = end
         blocked = False
         done = h if whole else done + piece
-        if which != _NONE:
+        if which != NO_SWITCH:
             last = 0.0
-            if which == _BLOCKS:
+            if which == DIODE_BLOCKS:
                 is_open = blocked = True
             else:
-                mode, entered, cycle = _next_state(par, block, which, t + done, entered, cycle)
+                mode, entered, cycle = next_state(par, block, which, t + done, entered, cycle)
             events += 1
-            if events > _MOST_EVENTS:
+            if events > MOST_EVENTS:
                 return 2
 
     force = push * per_step
@@ -438,7 +298,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     for j in range(spots):
         out[2 + _FRONT + 3 * loops + j] = hints[j]
     for j in range(stops):
-        out[2 + _FRONT + 3 * loops + spots + j] = hints[_SPOTS + j]
+        out[2 + _FRONT + 3 * loops + spots + j] = hints[SPOTS + j]
     books = 2 + size
     out[books - 1] = largest
     out[books], out[books + 1], out[books + 2], out[books + 3] = supply, ohmic, eddy, energy
@@ -460,9 +320,12 @@ def flux_numbers(
     numbers = map_numbers(plant) if isinstance(plant, FluxMap) else circuit_numbers(plant)
     program = driver.numbers()
     size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1]) + int(numbers[STOPS]) + 1
+    stage, at = driver.stage_numbers(), 0
+    if driver.stage is not None:
+        size, at = size + 1, _HEADER + numbers.size + program.size
     head = [0.0, resistance, gap, -1.0 if closing else 1.0]
-    head += [_HEADER, _HEADER + numbers.size, size, 0.0]
-    return np.concatenate((head, numbers, program))
+    head += [_HEADER, _HEADER + numbers.size, size, at]
+    return np.concatenate((head, numbers, program, stage))
 
 
 def flux_state(
@@ -478,6 +341,8 @@ def flux_state(
     phi = np.array(fluxes, dtype=float).ravel()
     state[_FRONT : _FRONT + phi.size] = phi
     state[-1] = np.max(np.abs(phi), initial=0.0)
+    if parameters[7] > 0.0:  # behind an output stage
+        state[-2] = parameters[int(parameters[7]) + START_VOLTAGE]
     return state
 
 
@@ -529,14 +394,16 @@ def flux_rows(
         return flux_state(parameters, steady_fluxes(plant, current=current, gap=x), current)
 
     state = at_rest(np.zeros(2))
+    staged = driver.stage is not None
+    books = STAGE_BOOKS if staged else BOOKS
     rows.element(
-        magnet_step,
+        stage_step if staged else magnet_step,
         ports=(armature, base),
         parameters=parameters,
         state=state,
         at_rest=at_rest if np.any(state[_FRONT:]) else None,
-        books=(*BOOKS, HYSTERESIS) if parameters[_HEADER + STOPS] else BOOKS,
-        channels=CHANNELS,
+        books=(*books, HYSTERESIS) if parameters[_HEADER + STOPS] else books,
+        channels=stage_channels(state.size) if staged else CHANNELS,
         failures=FAILURES,
     )
     known = gap_range or GapRange.of(plant)

@@ -77,6 +77,7 @@ COMPONENTS = (
     ("drive-profile", "klack.magnetics.drive_profile.DriveProfile"),
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
+    ("boost-driver", "klack.magnetics.boost_driver.BoostDriver"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),
     ("controlled-voltage", "klack.magnetics.controlled_voltage.ControlledVoltage"),
     # heat

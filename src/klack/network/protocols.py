@@ -1,11 +1,19 @@
 """What a network asks of the fluid in it and of the laws of its contacts, whatever they are."""
 
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["InterfaceLaw", "LawNumbers", "NetworkFluid", "NetworkGas", "PressureBounds"]
+__all__ = [
+    "InterfaceLaw",
+    "LawNumbers",
+    "NetworkFluid",
+    "NetworkGas",
+    "PressureBounds",
+    "RunningController",
+]
 
 Values = NDArray[np.float64]
 
@@ -131,3 +139,20 @@ class InterfaceLaw(Protocol):
     def flat(self) -> LawNumbers:
         """Return the law as plain numbers."""
         ...
+
+
+class RunningController(Protocol):
+    """A controller during a run."""
+
+    def __call__(self, time: float, values: tuple[float, ...]) -> float:
+        """Output for a time [s] and the values of its channels, in the units of its signals."""
+
+    @property
+    def can_be_stored(self) -> bool:
+        """Whether a run can continue from what it remembers."""
+
+    def memory(self) -> Mapping[str, NDArray[np.generic]]:
+        """All that the next call depends on."""
+
+    def recall(self, memory: Mapping[str, NDArray[np.generic]]) -> None:
+        """Continue from a memory; KeyError for that of another controller."""

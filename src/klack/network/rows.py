@@ -16,7 +16,7 @@ from klack.errors import InputError
 from klack.network.across import SideLaw
 from klack.network.gas_rows import GasRows
 from klack.network.motion_course import MotionCourse
-from klack.network.protocols import InterfaceLaw, NetworkFluid, NetworkGas
+from klack.network.protocols import InterfaceLaw, NetworkFluid, NetworkGas, RunningController
 from klack.network.step_function import StepFunction
 
 if TYPE_CHECKING:
@@ -146,8 +146,7 @@ class ControllerRow:
         Name of each sensor, what it reads, and the unit of its signal.
     period : float [s]
     begin : callable
-        Returns a fresh controller: output for a time [s] and the values of the channels, in the
-        units of the signals.
+        Returns a fresh controller.
     actuator : "voltage", "force" or "pressure"
         The output is the voltage of a coil [V], the first parameter of an element [N], or a
         prescribed pressure [Pa].
@@ -160,7 +159,7 @@ class ControllerRow:
     channels: tuple[str, ...]
     units: tuple[str, ...]
     period: float
-    begin: Callable[[], Callable[[float, tuple[float, ...]], float]]
+    begin: Callable[[], RunningController]
     actuator: Literal["voltage", "force", "pressure"]
     handle: int
 

@@ -12,7 +12,7 @@ from klack.network.port import GAS_VOLUME, Port
 from klack.network.rows import Rows
 from klack.pneumatics.gas_step import ISOTHERMAL
 from klack.pneumatics.network_gas import network_gas
-from klack.units import HeatConductance, Pressure, Temperature, Volume
+from klack.units import Pressure, Temperature, ThermalConductance, Volume
 
 __all__ = ["GasChamber"]
 
@@ -50,7 +50,7 @@ class GasChamber(Component):
     temperature: Temperature | None = Field(
         default=None, gt=0, description="Of the gas at the start; default that of the wall."
     )
-    heat_conductance: HeatConductance | None = Field(
+    heat_conductance: ThermalConductance | None = Field(
         default=None,
         ge=0,
         description="Heat flow from the wall per temperature, coefficient times area; default "

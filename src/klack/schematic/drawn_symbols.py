@@ -123,6 +123,7 @@ _FRAMED: Mapping[str, tuple[Stroke, ...]] = {
     "drive-profile": (_AXES, Stroke("M-18,10 L-9,-10 H-2 L3,2 H11 L16,10")),
     "two-point": (_AXES, Stroke("M-18,12 L-11,-9 l4,7 l3,-7 l4,7 l3,-7 l4,7 l3,-7 L16,12")),
     "peak-hold": (_AXES, Stroke("M-18,12 L-11,-11 l3,3 l3,-3 L0,2 l3,-3 l3,3 l3,-3 l3,3 L16,12")),
+    "boost-driver": (_AXES, Stroke("M-18,12 L-11,-11 L-5,3 l3,-4 l3,4 l3,-4 l3,4 l3,-4 L16,12")),
     "pwm": (_AXES, Stroke("M-18,10 V-8 h5 V10 h5 V-8 h5 V10 h5 V-8 h5 V10 h5")),
 }
 

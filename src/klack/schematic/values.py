@@ -20,6 +20,7 @@ __all__ = ["value_lines", "written"]
 _MOST = 4
 _MAIN: Mapping[str, tuple[str, ...]] = {
     "peak-hold": ("boost_voltage", "peak_current", "supply_voltage", "hold_current", "end"),
+    "boost-driver": ("capacitance", "boost_voltage", "peak_current", "hold_current"),
     "solenoid": ("turns", "resistance", "gap", "residual_gap", "start_current"),
     "force-map-solenoid": ("resistance", "gap", "start_current"),
     "two-point": ("voltage", "upper", "lower", "end"),

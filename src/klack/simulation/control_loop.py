@@ -3,7 +3,7 @@
 The time loop runs from one instant to the next; between them nothing knows of controllers.
 """
 
-from collections.abc import Callable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import inf, isfinite
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest
+from klack.network.protocols import RunningController
 from klack.network.rows import ControllerRow
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_recorder import Recorder
@@ -20,6 +21,8 @@ from klack.units import KINDS, format_si, parse_quantity
 __all__ = ["ControlLoop"]
 
 _WHOLE = 1e-6  # of a look, to which a sample time must be a whole number
+_STORED = "controllers."
+_ACTED = f"{_STORED}acted"
 _OTHER = {"kg/s": {"kg/s": 1.0, "g/s": 1e-3}, "-": {"-": 1.0, "1": 1.0}}
 
 
@@ -32,7 +35,7 @@ class _Running:
     target: NDArray[np.float64]  # what the output is written to, at this place
     place: int
     least: float  # smallest output that has a meaning
-    output: Callable[[float, tuple[float, ...]], float]
+    output: RunningController
 
 
 class ControlLoop:
@@ -45,10 +48,15 @@ class ControlLoop:
     recorder : Recorder
     look : float [s]
         Time between two looks at the network.
+    begun : int
+        Looks before the start of this run, of one that continues.
     """
 
-    def __init__(self, network: CompiledNetwork, recorder: Recorder, look: float) -> None:
-        self._network, self._look = network, look
+    def __init__(
+        self, network: CompiledNetwork, recorder: Recorder, look: float, begun: int = 0
+    ) -> None:
+        self._network, self._look, self._begun = network, look, begun
+        self._acted = -1  # looks, those before the start included
         columns = [*recorder.means, *recorder.points]
         self._names = [column.name for column in columns]
         self._units = [column.unit for column in columns]
@@ -56,13 +64,16 @@ class ControlLoop:
 
     def next(self, looked: int) -> int:
         """Looks until the next instant, after so many."""
-        return min(running.looks - looked % running.looks for running in self._all)
+        now = looked + self._begun
+        return min(running.looks - now % running.looks for running in self._all)
 
     def act(self, looked: int, values: NDArray[np.float64]) -> None:
         """Set the outputs of all controllers that are due, from the recorded values now."""
-        time = looked * self._look
+        now = looked + self._begun
+        time = now * self._look
+        self._acted = now
         for running in self._all:
-            if looked % running.looks:
+            if now % running.looks:
                 continue
             signals = zip(running.columns, running.scale, strict=True)
             found = running.output(time, tuple(float(values[c]) / s for c, s in signals))
@@ -75,6 +86,58 @@ class ControlLoop:
                     hint="check its law or function, and what it does with its signals.",
                 )
             running.target[running.place] = found
+
+    def memory(self) -> dict[str, NDArray[np.generic]]:
+        """What a run needs to continue: outputs, and the memory of all that can be stored."""
+        kept: dict[str, NDArray[np.generic]] = {_ACTED: np.array([self._acted])}
+        for running in self._all:
+            head = f"{_STORED}{running.row.component}."
+            if running.output.can_be_stored:
+                kept[f"{head}output"] = running.target[running.place : running.place + 1].copy()
+                kept |= {f"{head}{k}": np.asarray(a) for k, a in running.output.memory().items()}
+        return kept
+
+    def recall(self, state: Mapping[str, NDArray[np.generic]]) -> bool:
+        """Continue from :meth:`memory` in a stored state.
+
+        Returns
+        -------
+        bool
+            Whether the controllers have acted at the start of this run already.
+
+        Raises
+        ------
+        InputError
+            For a controller whose memory is not stored, and for the memory of another one.
+        """
+        if not self._begun and _ACTED not in state:  # an operating point, at time zero
+            return False
+        for running in self._all:
+            head = f"{_STORED}{running.row.component}."
+            where = f"components.{running.row.component}"
+            if not running.output.can_be_stored:
+                raise InputError(
+                    where,
+                    got="a run that continues from a stored state",
+                    expected="a run from its start: the memory of this controller is not stored",
+                    hint="compute the whole time in one run; a function in Python can be stored if "
+                    "it has the methods memory() and recall().",
+                )
+            found = {k[len(head) :]: a for k, a in state.items() if k.startswith(head)}
+            try:
+                running.target[running.place] = float(np.asarray(found.pop("output"))[0])
+                running.output.recall(found)
+            except (KeyError, IndexError) as error:
+                raise InputError(
+                    f"{where}: controller",
+                    got=f"a stored state without its {error.args[0]}"
+                    if isinstance(error, KeyError)
+                    else "a stored state without its output",
+                    expected="the state of a run with the same controller and sensors",
+                    hint="continue with the case of that run, or run from the start.",
+                ) from None
+        self._acted = int(np.asarray(state[_ACTED])[0])
+        return self._acted == self._begun
 
     def _running(self, row: ControllerRow) -> _Running:
         looks = round(row.period / self._look)

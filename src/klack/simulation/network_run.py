@@ -156,13 +156,6 @@ def simulate_network(
         if value is not None:
             require_positive(f"simulate_network: {name}", value, "s")
     sizes = step_sizes(rows, accuracy, step=step, coarse=coarse)
-    if rows.controllers and state is not None:
-        raise InputError(
-            f"components.{rows.controllers[0].component}",
-            got="a run that continues from a stored state",
-            expected="a run from its start: the memory of a controller is not stored",
-            hint="compute the whole time in one run.",
-        )
     network = compile_network(rows, sizes)
     grid = grid_of(duration, sizes, record)
     if rows.controllers and grid.look > 1:  # instants may lie at any macro step
@@ -214,8 +207,10 @@ def simulate_network(
     _compile(network, recorder.recording, clock, grid)
     control = None
     if rows.controllers:
-        control = ControlLoop(network, recorder, step * grid.look_steps)
-        control.act(0, recorder.start_values())
+        before_now = first_step // grid.look_steps  # a run ends with a record, so with a look
+        control = ControlLoop(network, recorder, step * grid.look_steps, before_now)
+        if state is None or not control.recall(state):
+            control.act(0, recorder.start_values())
     begin = perf_counter()
     failure = _run(network, recorder, finder, limits, clock, grid, progress, control)
     wall_time = perf_counter() - begin
@@ -241,7 +236,9 @@ def simulate_network(
         sizes=sizes,
         steps=StepCounts(*(int(count) for count in clock[2:] - done_before)),
         wall_time=wall_time,
-        state=saved_state(network, clock) | {_IMPACTS: finder.state, _LAST: recorder.last(records)},
+        state=saved_state(network, clock)
+        | {_IMPACTS: finder.state, _LAST: recorder.last(records)}
+        | ({} if control is None else control.memory()),
         failure="" if failure is None else str(failure),
         start=begun,
         faces=_pressed_faces(network),

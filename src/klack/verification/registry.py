@@ -57,6 +57,8 @@ COVERS = {
     "magnetic-parts": "Parts of a magnetic circuit: hysteresis of the iron, permanent magnets, "
     "maps from files.",
     "drivers": "Coils in time: currents, switchings inside steps, eddy currents, motion, energy.",
+    "output-stage": "Coils behind an output stage: boost capacitor, recuperation, diodes, "
+    "clamp, a second shot.",
     "control": "Sensors, PID, hysteresis, state machines and functions of the user, against exact "
     "recursions.",
     "network": "A whole valve in one time loop: energy balance of all domains, restart, step "

@@ -1,0 +1,187 @@
+"""Pieces of the step of a coil: from one switching instant to the next.
+
+A piece has a constant voltage at its source and an even motion of the armature.  The general step
+(:mod:`klack.magnetics.flux_step`) and the one behind an output stage
+(:mod:`klack.magnetics.stage_step`) are made of them.
+"""
+
+from typing import Any
+
+from klack.compiling.jit import inner
+from klack.magnetics.drive_kernel import crossed_switch, switch_current
+from klack.magnetics.flux_kernel import circuit_current, circuit_gaps, circuit_step, stack
+from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES
+from klack.magnetics.map_kernel import map_current, map_step
+
+__all__ = [
+    "DIODE_BLOCKS",
+    "FIRST_PIECE",
+    "KEPT",
+    "LEAST_PIECE",
+    "LOCATED",
+    "MOST_EVENTS",
+    "NO_SWITCH",
+    "SPOTS",
+    "TELLING",
+    "first_crossing",
+    "next_state",
+    "piece_advance",
+    "piece_current",
+    "piece_gaps",
+    "piece_to_current",
+]
+
+LOCATED = 1e-12
+"""Instants within a step are found to this share of the current, and of the piece."""
+
+NO_SWITCH, DIODE_BLOCKS = -1, -2
+"""What ends a piece beside the switches of a state."""
+
+SPOTS = 2 * MOST_TUBES
+"""Places in tables that are kept from step to step, at most."""
+
+KEPT = SPOTS + MOST_STOPS
+"""The same with the stops of hysteretic iron."""
+
+MOST_EVENTS = 30
+"""Switchings in a step, at most."""
+
+TELLING = 1e-6
+"""Of a step: shorter pieces say nothing of the rates of the fluxes."""
+
+FIRST_PIECE, LEAST_PIECE = 1 / 4, 1 / 64
+"""Of a step: the piece after a switch, and one that is not cut further for its bend."""
+
+
+@inner(error_model="numpy", forceinline=True)
+def piece_gaps(
+    par: Any, at: int, hints: Any, x0: float, x1: float, middle: Any, end: Any, slope: Any
+) -> None:
+    """Prepare the gap data of a piece; for a map just the gaps themselves."""
+    if par[at + MAP] != 0.0:
+        middle[0], end[0], slope[0] = x0, x1, 0.0
+    else:
+        circuit_gaps(par, at, hints, x0, x1, middle, end, slope)
+
+
+@inner(error_model="numpy")
+def piece_advance(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    change: Any,
+    middle: Any,
+    end: Any,
+    per_time: float,
+    voltage: float,
+    conducts: bool,
+) -> tuple[bool, float]:
+    """Find the change of the fluxes over a piece, and its mean current."""
+    if par[at + MAP] != 0.0:
+        return map_step(
+            par, at, phi[0], change, middle[0], end[0], per_time, voltage, par[1], conducts
+        )
+    return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[1], conducts)
+
+
+@inner(error_model="numpy", forceinline=True)
+def piece_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
+    """Return the current at the end of a piece [A]."""
+    if par[at + MAP] != 0.0:
+        return map_current(par, at, phi[0] + change[0], end[0])
+    return circuit_current(par, at, hints, phi, change, end)
+
+
+@inner(error_model="numpy")
+def piece_to_current(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    change: Any,
+    x0: float,
+    speed: float,
+    length: float,
+    voltage: float,
+    before: float,
+    after: float,
+    target: float,
+    rise: float,
+) -> tuple[float, float]:
+    """Length of the piece at whose end the current meets its target, and its mean current.
+
+    The target is ``target`` now and rises evenly by ``rise`` over ``length``.  The length is
+    negative if that fails.  ``change`` comes with the change over ``length`` and
+    leaves with that of the located piece.
+    """
+    middle, end, slope = stack(phi, MOST_TUBES), stack(phi, MOST_TUBES), stack(phi, MOST_TUBES)
+    loops = int(par[at])
+    low, high = 0.0, length
+    f_low, f_high = before - target, after - target - rise
+    accepted = LOCATED * (abs(target) + abs(before))
+    side = 0
+    size = length
+    for _ in range(100):
+        guess = (low * f_high - high * f_low) / (f_high - f_low)
+        guess = min(max(guess, low + 1e-3 * LOCATED * length), high)
+        for j in range(loops):
+            change[j] *= guess / size
+        size = guess
+        piece_gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
+        found, mean = piece_advance(
+            par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True
+        )
+        if not found:
+            return -1.0, 0.0
+        f = piece_current(par, at, hints, phi, change, end) - target - rise * (size / length)
+        if abs(f) <= accepted or high - low <= LOCATED * length:
+            return size, mean
+        if f * f_high > 0.0:
+            high, f_high = size, f
+            if side == 1:
+                f_low *= 0.5
+            side = 1
+        else:
+            low, f_low = size, f
+            if side == -1:
+                f_high *= 0.5
+            side = -1
+    return -1.0, 0.0
+
+
+@inner(error_model="numpy", forceinline=True)
+def first_crossing(
+    par: Any, block: int, current: float, end: float, begin: float, over: float
+) -> tuple[float, float, int]:
+    """Return the first transition before ``end``, its current now, and how far that rises.
+
+    ``begin`` and ``over`` are the times of the two ends since the start of the cycle.
+    """
+    target, rise, which, earliest = 0.0, 0.0, NO_SWITCH, 2.0
+    if par[block + 1] != 0.0 and end < 0.0:
+        which, earliest = DIODE_BLOCKS, current / (current - end)
+    k = crossed_switch(par, block, 0, end, over)
+    while k >= 0:
+        value = switch_current(par, block, k, begin)
+        more = switch_current(par, block, k, over) - value
+        part = (value - current) / (end - current - more)
+        if part < earliest:
+            target, rise, which, earliest = value, more, k, part
+        k = crossed_switch(par, block, k + 1, end, over)
+    return target, rise, which
+
+
+@inner(error_model="numpy", forceinline=True)
+def next_state(
+    par: Any, block: int, switch: int, now: float, entered: float, cycle: float
+) -> tuple[float, float, float]:
+    """Enter the next state, timed ones exactly on time: state, entered, cycle."""
+    s = block + 3 + 4 * switch
+    when, value = par[s], par[s + 1]
+    clock = now
+    if when == 2.0:
+        clock = entered + value
+    elif when == 3.0:
+        clock = cycle + value
+    return par[s + 2], max(clock, entered), clock if par[s + 3] != 0.0 else cycle

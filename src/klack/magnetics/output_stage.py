@@ -1,0 +1,140 @@
+r"""Output stage of a driver: battery, boost capacitor, switches, diodes and a clamp.
+
+In every state of the driver the current of the coil takes one *path*.  At its terminals the coil
+then sees
+
+.. math:: u = U_b - U_z + k\,U_c - U_d - (R_s + R_d + R_z)\,i, \qquad
+          C\,\dot U_c = -k\,i + i_r , \qquad i > 0,
+
+with the battery :math:`U_b`, a clamp :math:`U_z` (a Zener diode, or a transistor in avalanche), the
+forward voltage :math:`U_d` of the diodes in the path, the resistance of its switches, diodes and
+clamp, and the boost capacitor: :math:`k = 1` discharges it into the coil, :math:`k = -1` takes
+the energy of the coil back, :math:`k = 0` leaves it alone.  A converter recharges it at constant
+power, with at most a constant current, up to its nominal voltage; both have closed solutions
+(:func:`recharged`).
+
+Limits: switches are ideal apart from their resistance, diodes apart from forward voltage and
+resistance (no reverse recovery); no resistance in series with the capacitor, no inductance of the
+wires; the battery is ideal; each stage has a capacitor of its own.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.compiling.jit import inner
+
+__all__ = ["STAGE_HEADER", "STAGE_ROW", "START_VOLTAGE", "OutputStage", "StagePath", "recharged"]
+
+STAGE_HEADER = 6
+"""Numbers of a stage before its paths: capacitance, nominal, power, current, efficiency, start."""
+
+START_VOLTAGE = 5
+"""Place of the voltage at the start in a stage."""
+
+STAGE_ROW = 9
+"""Numbers of a path: battery, clamp, k, diodes, three resistances, lowest voltage, next state."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StagePath:
+    """Way of the current in one state of the driver.
+
+    Parameters
+    ----------
+    battery : float [V]
+        Source in the path.
+    clamp : float [V]
+        Against the current; its energy is lost.
+    capacitor : int
+        1 if the boost capacitor drives the current, -1 if the current charges it, else 0.
+    diodes : float [V]
+        Sum of the forward voltages.
+    switch_resistance, diode_resistance, clamp_resistance : float [ohm]
+    empty : tuple of float [V] and str, optional
+        The driver leaves for that state once the capacitor has fallen to that voltage.
+    """
+
+    battery: float = 0.0
+    clamp: float = 0.0
+    capacitor: int = 0
+    diodes: float = 0.0
+    switch_resistance: float = 0.0
+    diode_resistance: float = 0.0
+    clamp_resistance: float = 0.0
+    empty: tuple[float, str] | None = None
+
+    @property
+    def still(self) -> float:
+        """Voltage at the terminals without current and without the capacitor [V]."""
+        return self.battery - self.clamp - self.diodes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputStage:
+    """A stage and the paths of all states of its driver.
+
+    Parameters
+    ----------
+    capacitance : float [F]
+    start : float [V]
+        Voltage of the capacitor at the start.
+    nominal : float [V]
+        Up to which it is recharged.
+    power : float [W]
+        Into the capacitor; 0: no recharge.
+    current : float [A]
+        Largest one into the capacitor; 0: no limit.
+    efficiency : float
+        Of the converter.
+    paths : mapping of str to StagePath
+        By state.
+    """
+
+    capacitance: float
+    start: float
+    nominal: float
+    power: float
+    current: float
+    efficiency: float
+    paths: Mapping[str, StagePath]
+
+    def numbers(self, states: Sequence[str]) -> NDArray[np.float64]:
+        """Flat stage for the compiled step, the paths in the order of the states."""
+        numbers = [self.capacitance, self.nominal, self.power, self.current]
+        numbers += [self.efficiency, self.start]
+        for name in states:
+            path = self.paths[name]
+            low, then = path.empty or (-1.0, name)
+            numbers += [path.battery, path.clamp, float(path.capacitor), path.diodes]
+            numbers += [path.switch_resistance, path.diode_resistance, path.clamp_resistance]
+            numbers += [low, float(states.index(then))]
+        return np.array(numbers)
+
+
+@inner(error_model="numpy")
+def recharged(par: Any, stage: int, voltage: float, time: float) -> float:
+    r"""Voltage of the capacitor after the converter has worked for a time.
+
+    At constant power :math:`U_1 = \sqrt{U_0^2 + 2 P t/C}`, at constant current
+    :math:`U_1 = U_0 + I t/C`; the current limits where it is below :math:`P/U`.
+    """
+    capacitance, nominal = par[stage], par[stage + 1]
+    power, limit = par[stage + 2], par[stage + 3]
+    if power <= 0.0 or voltage >= nominal:
+        return voltage
+    left = time
+    if limit > 0.0 and limit * voltage < power:
+        end = min(power / limit, nominal)
+        needed = capacitance * (end - voltage) / limit
+        if left <= needed:
+            return voltage + limit * left / capacitance
+        voltage = end
+        left -= needed
+    # increments, so that nothing is lost over a short time
+    square = 2.0 * power * left / capacitance
+    return min(voltage + square / (sqrt(voltage * voltage + square) + voltage), nominal)
