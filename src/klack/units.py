@@ -198,7 +198,6 @@ TEMPERATURE = Kind("a temperature", "K", "20 degC", ("degC", "K"), {"K": 1.0}, l
 TEMPERATURE_RISE = Kind(
     "a difference of temperatures", "K", "5 K", ("K", "mK"), {"K": 1.0, "mK": 1e-3}, largest=1e6
 )
-POWER = Kind("a power", "W", "12 W", ("W", "mW", "kW"))
 HEAT_CAPACITY = Kind("a heat capacity", "J/K", "14 J/K", ("J/K", "kJ/K"))
 SPECIFIC_HEAT = Kind("a specific heat", "J/kg/K", "385 J/kg/K", ("J/kg/K", "kJ/kg/K"))
 CONDUCTANCE = Kind("a thermal conductance", "W/K", "0.6 W/K", ("W/K", "mW/K"))
@@ -257,7 +256,6 @@ KINDS = (
     FLUX,
     TEMPERATURE,
     RATIO,
-    POWER,
     HEAT_CAPACITY,
     SPECIFIC_HEAT,
     CONDUCTANCE,
@@ -670,7 +668,6 @@ Permeance = Annotated[float, *typed(PERMEANCE)]
 Flux = Annotated[float, *typed(FLUX)]
 Temperature = Annotated[float, *_temperature()]
 TemperatureRise = Annotated[float, *typed(TEMPERATURE_RISE)]
-Power = Annotated[float, *typed(POWER)]
 HeatCapacity = Annotated[float, *typed(HEAT_CAPACITY)]
 SpecificHeat = Annotated[float, *typed(SPECIFIC_HEAT)]
 ThermalConductance = Annotated[float, *typed(CONDUCTANCE)]
