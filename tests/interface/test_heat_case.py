@@ -288,3 +288,30 @@ def test_a_node_that_one_stroke_warms_noticeably_is_a_doubt():
     case = read(("capacity: 0.02 J/K", "capacity: 0.001 J/K"), ("duration: 1 s", "duration: 40 ms"))
 
     assert any("one stroke warms 'copper' by" in text for text in run_heat(case).warnings)
+
+
+def test_a_winding_may_follow_a_fixed_temperature():
+    case = read(
+        (
+            "    path: {type",
+            "    block: {type: fixed-temperature, temperature: 90 degC}\n    path: {type",
+        ),
+        ("windings: {coil: copper}", "windings: {coil: block}"),
+        ("[path.b, ambient]", "[path.b, block.node]"),
+        ("duration: 1 s", "duration: 40 ms"),
+    )
+
+    study = run_heat(case)
+
+    assert study.values[0].values == pytest.approx(2.0 * (1.0 + 3.93e-3 * 70.0), rel=1e-12)
+    assert set(study.given_off) == {"ambient", "block"}
+
+
+def test_strokes_in_which_the_valve_does_not_open_are_a_doubt():
+    case = read(("voltage: 12 V", "voltage: 2.2 V"))
+
+    study = run_heat(case, soak=(243.15, 573.15))
+
+    opening = next(x.values for x in study.numbers if x.name == "opening delay")
+    assert np.isfinite(opening).tolist() == [True, False]
+    assert any("1 of 2 strokes have no opening delay" in text for text in study.warnings)

@@ -10,11 +10,14 @@ from scipy.sparse.csgraph import connected_components
 
 from klack.errors import InputError
 from klack.network.network import Network
+from klack.network.port import Role
 from klack.thermal.heat_rows import HeatPath, HeatRows, HeatSupply, ThermalComponent
 
 __all__ = ["HeatNetwork", "Links", "heat_network"]
 
 Array = NDArray[np.float64]
+
+_RULING = (Role.HEAT_STORE, Role.TEMPERATURE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -127,26 +130,19 @@ def heat_network(network: Network) -> HeatNetwork | None:
         for joint in node.joints
     }
     words = {1 + node.index: str(node) for node in network.nodes}
-    lonely = 1 + len(network.nodes)
+    named: dict[str, int] = {}
     for name, part in parts.items():
-        rows.component, rows.node = name, {}
-        for port, kind in part.port_kinds().items():
-            if (name, port) not in at and kind.role.name == "HEAT_STORE":
-                at[name, port], words[lonely], lonely = lonely, name, lonely + 1
-            rows.node = {**rows.node, port: at.get((name, port), 0)}
-        before = dict(rows.capacity)
+        ruled = [port for port, kind in part.port_kinds().items() if kind.role in _RULING]
+        for port in ruled:  # one in no connection is a node of its own
+            named[name] = at.setdefault((name, port), 1 + len(network.nodes) + len(named))
+        rows.component = name
+        rows.node = {port: at.get((name, port), 0) for port in part.port_kinds()}
         part.add_heat(rows)
-        for node in rows.capacity.keys() - before.keys():
-            words[node] = name
-    made = _numbered(
-        rows, words, {name: at[name, "node"] for name in parts if _stores(parts[name])}
-    )
+    words |= {node: name for name, node in reversed(named.items())}  # of several the first one
+    stores = {name: node for name, node in named.items() if node in rows.capacity}
+    made = _numbered(rows, words, stores)
     _require_known(made)
     return made
-
-
-def _stores(part: ThermalComponent) -> bool:
-    return any(kind.role.name == "HEAT_STORE" for kind in part.port_kinds().values())
 
 
 def _numbered(rows: HeatRows, words: Mapping[int, str], stores: Mapping[str, int]) -> HeatNetwork:
@@ -161,7 +157,7 @@ def _numbered(rows: HeatRows, words: Mapping[int, str], stores: Mapping[str, int
         node_of={name: place[node] for name, node in stores.items()},
         capacity=np.array([rows.capacity.get(node, 0.0) for node in free]),
         start=np.array([rows.start.get(node, rows.ambient) for node in free]),
-        fixed_names=("ambient", *(words.get(node, "") for node in fixed[1:])),
+        fixed_names=("ambient", *(words[node] for node in fixed[1:])),
         fixed=np.array([rows.fixed[node] for node in fixed]),
         paths=tuple(
             HeatPath(

@@ -144,8 +144,8 @@ def _phi(k: int, z: Array) -> Array:
 
     phi_0 is ``exp(-z)``, phi_k is ``(1/(k - 1)! - phi_{k-1})/z``.
 
-    >>> float(_phi(1, np.array([0.0]))[0]), float(_phi(2, np.array([1e9]))[0] * 1e9)
-    (1.0, 0.999999999)
+    >>> [round(float(_phi(k, np.array([2.0]))[0]), 6) for k in (1, 2, 3)]
+    [0.432332, 0.283834, 0.108083]
     """
     small = z < _SERIES
     low = np.where(small, z, 0.0)

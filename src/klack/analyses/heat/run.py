@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from time import perf_counter, process_time
 
@@ -190,6 +191,7 @@ def _soaked(strokes: _Strokes, network: HeatNetwork, soak: Sequence[float]) -> _
         heat={},
         strokes=whole,
         causes=_causes(strokes, _celsius(REFERENCE), base, states),
+        doubts=_lost(whole),
     )
 
 
@@ -219,7 +221,7 @@ def _warmed(strokes: _Strokes, network: HeatNetwork, thermal: CaseThermal) -> _F
         strokes=computed,
         causes=_causes(strokes, "start", start, {state: end}),
         slow=slow,
-        doubts=_ripple(network, thermal, points),
+        doubts=(*_ripple(network, thermal, points), *_lost(computed)),
     )
 
 
@@ -237,7 +239,7 @@ def _causes(
 
 
 def _every_name(network: HeatNetwork) -> tuple[str, ...]:
-    return (*network.node_of, *(name for name in network.fixed_names if name))
+    return (*network.node_of, *network.fixed_names)
 
 
 def _nodes(network: HeatNetwork, temperature: Vector) -> dict[str, float]:
@@ -285,6 +287,20 @@ def _ripple(
             found.append(
                 f"one stroke warms '{name}' by {most[i] / network.capacity[i]:.3g} K: within a "
                 "period its temperature swings by about as much round the mean that is shown."
+            )
+    return tuple(found)
+
+
+def _lost(strokes: Sequence[HeatedStroke]) -> tuple[str, ...]:
+    """Delays that some strokes have and others do not: there the valve does not open or close."""
+    found = []
+    for name in ("opening delay", "closing delay"):
+        missing = sum(not isfinite(stroke.numbers[name]) for stroke in strokes)
+        if 0 < missing < len(strokes):
+            way = "open to 90 % of its lift" if name == "opening delay" else "touch its seat"
+            found.append(
+                f"{missing} of {len(strokes)} strokes have no {name}: there the valve does not "
+                f"{way} within the stroke."
             )
     return tuple(found)
 
