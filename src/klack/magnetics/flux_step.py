@@ -538,6 +538,9 @@ def flux_rows(
         books=(*BOOKS, HYSTERESIS) if parameters[_HEADER + STOPS] else BOOKS,
         channels=CHANNELS,
         failures=FAILURES,
+        state_names={
+            _FRONT + j: (f"flux of loop {j + 1}", "Wb") for j in range(int(parameters[int(parameters[4])]))
+        },
     )
     known = gap_range or GapRange.of(plant)
     advice = _MAP_ADVICE if isinstance(plant, FluxMap) else _GAP_ADVICE
