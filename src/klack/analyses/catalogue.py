@@ -56,6 +56,11 @@ ANALYSES: tuple[Entry, ...] = (
         "klack stroke demo-stroke --variant wet,dry",
     ),
     Entry("operating_point.analysis:OPERATING_POINT", "klack operating points"),
+    Entry(
+        "linearisation.analysis:LINEARISATION",
+        "klack linear model",
+        "klack linearise demo-stroke --from coil.voltage --to needle.velocity",
+    ),
     Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
     Entry("stroke_shots.analysis:STROKE_SHOTS", "klack study of strokes"),
     Entry(

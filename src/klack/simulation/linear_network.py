@@ -46,10 +46,13 @@ class LinearNetwork:
     Parameters
     ----------
     system : LinearSystem
+    adds : mapping of int to (int, float)
+        Outputs that one component adds at a place, each with the input there and its sign.
     doubts : tuple of str
     """
 
     system: LinearSystem
+    adds: Mapping[int, tuple[int, float]]
     doubts: tuple[str, ...]
 
 
@@ -309,6 +312,7 @@ class _Assembly:
         self.rates = np.zeros((len(self.states), self.width))
         self.left = np.zeros((len(self.delays), self.width))
         self.outputs: list[tuple[Signal, Vector]] = []
+        self.adds: dict[str, tuple[str, float]] = {}
         self._ports_out()
         self._put_rows()
         self._put_contacts()
@@ -333,7 +337,14 @@ class _Assembly:
             inputs=tuple(self.inputs),
             outputs=tuple(signal for signal, _ in self.outputs),
         )  # fmt: skip
-        return LinearNetwork(system=system, doubts=tuple(dict.fromkeys(self.doubts)))
+        names = [signal.name for signal, _ in self.outputs]
+        adds = {
+            names.index(name): (self.input_at[place] - self.first_input, sign)
+            for name, (place, sign) in self.adds.items()
+        }
+        return LinearNetwork(
+            system=system, adds=adds, doubts=tuple(dict.fromkeys(self.doubts))
+        )
 
     def _move_ports(self) -> None:
         """Displacement and speed of every port."""
@@ -368,6 +379,17 @@ class _Assembly:
         if all(signal.name != other.name for other, _ in self.outputs):
             self.outputs.append((signal, form))
 
+    def _adds_flow(self, name: str, ends: Sequence[int], signs: Sequence[float]) -> None:
+        """Remember into which volume a flow goes, the first one that is free."""
+        for i, sign in zip(ends, signs, strict=True):
+            if i < self.network.nodes.volumes:
+                self.adds.setdefault(name, (f"{self.node_names[i]}.mass_flow", sign))
+
+    def _adds_force(self, name: str, port: int, sign: float) -> None:
+        if port < self.port_count:
+            at = self.network.ports[port]
+            self.adds.setdefault(name, (f"{at.component}.{at.port}.force", sign))
+
     def _columns(self, k: int, ports: Sequence[int], ends: Sequence[int]) -> Matrix:
         """Forms that the columns of the law of a row stand for."""
         kept = [self._unit(self.row_states[k] + j) for j in range(len(self.linear[k].kept))]
@@ -400,12 +422,14 @@ class _Assembly:
                     self.inflow[ends[0]] -= acts[0]
                     self.inflow[ends[1]] += acts[0]
                     self._show(owner, "mass_flow", "kg/s", acts[0])
+                    self._adds_flow(f"{owner}.mass_flow", ends, (-1.0, 1.0))
                     acts = acts[1:]
                 names = getattr(row, "names", ())
                 for p, port in enumerate(ports):
                     self.force[port] += acts[p]
                     label = names[p] if p < len(names) and names[p] else f"port {p + 1}"
-                    self._show(f"{owner}.{label}", "force", "N", acts[p])
+                    self._show(f"{owner}.{label}".replace(" ", "_"), "force", "N", acts[p])
+                    self._adds_force(f"{owner}.{label}.force".replace(" ", "_"), port, 1.0)
                 for channel, form in zip(row.channels, law.channels @ forms, strict=True):
                     if not any(channel.label.endswith(x) for x in ("driver state",)):
                         self._show(owner, channel.label, channel.unit, form)
@@ -429,6 +453,8 @@ class _Assembly:
             self.force[lower] -= push
             self._show(row.component, "gap", "m", opening)
             self._show(row.component, "contact_force", "N", push)
+            name = f"{row.component}.contact_force"
+            self._adds_force(name, *((upper, 1.0) if upper < self.port_count else (lower, -1.0)))
         sliders = self.network.sliders
         for c, slider in enumerate(self.rows.sliders):
             upper, lower = int(sliders.upper[c]), int(sliders.lower[c])
@@ -469,6 +495,7 @@ class _Assembly:
                 self.inflow[i] -= density * q
                 name = f"{row.component}.{'ab'[end]}"
                 self._show(name, "mass_flow", "kg/s", (1.0 - 2.0 * end) * density * q)
+                self._adds_flow(f"{name}.mass_flow", [i], (2.0 * end - 1.0,))
             for inner in range(segments - 1):
                 before, after = arrives(inner, 1), arrives(inner + 1, 0)
                 place = inner + 1
