@@ -539,7 +539,8 @@ def flux_rows(
         channels=CHANNELS,
         failures=FAILURES,
         state_names={
-            _FRONT + j: (f"flux of loop {j + 1}", "Wb") for j in range(int(parameters[int(parameters[4])]))
+            _FRONT + j: (f"flux of loop {j + 1}", "Wb")
+            for j in range(int(parameters[int(parameters[4])]))
         },
     )
     known = gap_range or GapRange.of(plant)

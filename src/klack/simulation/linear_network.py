@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, NO_LAW
 from klack.errors import InputError
-from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.network.rows import BranchRow, ElementRow, LineRow, Rows
 from klack.simulation.linear_rows import LinearRow, RowPoint, linear_row
 from klack.simulation.linear_system import LinearSystem, Signal
 from klack.simulation.network_arrays import Y0, StepRows
@@ -217,8 +217,9 @@ class _Assembly:
             size = float(np.linalg.norm(body.rigid_axial))
             moves = size > 0.0 and row.course is None and name not in self.held
             self.scale.append(size)
-            self.rigid.append(self._add(name, ("displacement", "m"), ("velocity", "m/s")) if moves
-                              else -1)
+            self.rigid.append(
+                self._add(name, ("displacement", "m"), ("velocity", "m/s")) if moves else -1
+            )
             first = len(self.states)
             if row.course is None:
                 for i in range(r, body.mode_count):
@@ -229,8 +230,8 @@ class _Assembly:
                     )
             self.elastic.append(first)
         self.row_states = []
-        for row_, found in zip((*self.rows.elements, *self.rows.branches), self.linear,
-                               strict=True):
+        every: list[ElementRow | BranchRow] = [*self.rows.elements, *self.rows.branches]
+        for row_, found in zip(every, self.linear, strict=True):
             labels = {c.index: (c.label, c.unit) for c in row_.channels} | dict(row_.state_names)
             self.row_states.append(
                 self._add(row_.component, *(labels.get(j, (f"state {j}", "")) for j in found.kept))
@@ -259,8 +260,8 @@ class _Assembly:
             )
             self.waves.append(len(self.delays))
             self.delays += [row_l.delay / row_l.segments] * (2 * row_l.segments)
-        for name in self.network.ports:
-            self.inputs.append(Signal(f"{name.component}.{name.port}", "force", "N"))
+        for port in self.network.ports:
+            self.inputs.append(Signal(f"{port.component}.{port.port}", "force", "N"))
         for k, row in enumerate(self.rows.bodies):
             if self.rigid[k] >= 0:
                 self.inputs.append(Signal(row.component, "force", "N"))
@@ -325,9 +326,7 @@ class _Assembly:
         nx, nu = len(self.states), len(self.inputs)
         blocks = (slice(0, nx), slice(nx, nx + nu), slice(nx + nu, None))
         forms = np.array([form for _, form in self.outputs]).reshape(-1, self.width)
-        matrices = [
-            part[:, block] for part in (self.rates, forms, self.left) for block in blocks
-        ]
+        matrices = [part[:, block] for part in (self.rates, forms, self.left) for block in blocks]
         A, B, Bw, C, D, Dw, Cz, Dz, Dzw = matrices
         system = LinearSystem(
             A=A, B=B, Bw=Bw, C=C, D=D, Dw=Dw, Cz=Cz, Dz=Dz, Dzw=Dzw,
@@ -342,9 +341,7 @@ class _Assembly:
             names.index(name): (self.input_at[place] - self.first_input, sign)
             for name, (place, sign) in self.adds.items()
         }
-        return LinearNetwork(
-            system=system, adds=adds, doubts=tuple(dict.fromkeys(self.doubts))
-        )
+        return LinearNetwork(system=system, adds=adds, doubts=tuple(dict.fromkeys(self.doubts)))
 
     def _move_ports(self) -> None:
         """Displacement and speed of every port."""
@@ -405,10 +402,11 @@ class _Assembly:
 
     def _put_rows(self) -> None:
         k = 0
-        for at, rows in (
+        kinds: list[tuple[StepRows, Sequence[ElementRow | BranchRow]]] = [
             (self.network.elements, self.rows.elements),
             (self.network.branches, self.rows.branches),
-        ):
+        ]
+        for at, rows in kinds:
             for j, row in enumerate(rows):
                 branch = isinstance(row, BranchRow)
                 ends = [int(at.a[j]), int(at.b[j])] if branch else []
@@ -464,47 +462,52 @@ class _Assembly:
 
     def _put_lines(self) -> None:
         """Waves, flows and friction: see :mod:`klack.simulation.delay_line`."""
-        nodes = self.network.nodes
-        density = nodes.density
         for line, row in enumerate(self.rows.lines):
-            Z, segments, K = row.impedance, row.segments, len(row.unsteady_gain)
-            gain, rate = row.unsteady_gain / segments, row.unsteady_rate
-            lump = row.resistance / segments + float(np.sum(gain))
+            self._put_line(line, row)
 
-            def arrives(segment: int, end: int, line: int = line) -> Vector:
-                """Wave that leaves a segment at its end a (0) or b (1)."""
-                return self._unit(self.first_wave + self.waves[line] + 2 * segment + end)
+    def _put_line(self, line: int, row: LineRow) -> None:
+        nodes = self.network.nodes
+        density, Z, segments = nodes.density, row.impedance, row.segments
+        terms = len(row.unsteady_gain)
+        gain = row.unsteady_gain / segments
+        lump = row.resistance / segments + float(np.sum(gain))
 
-            def memory(place: int, line: int = line, K: int = K) -> Matrix:
-                first = self.memories[line] + K * place
-                return np.array([self._unit(first + k) for k in range(K)]).reshape(K, self.width)
+        def arrives(segment: int, end: int) -> Vector:
+            """Wave that leaves a segment at its end a (0) or b (1)."""
+            return self._unit(self.first_wave + self.waves[line] + 2 * segment + end)
 
-            def rub(place: int, q: Vector, line: int = line, K: int = K) -> None:
-                first, held = self.memories[line] + K * place, memory(place)
-                for k in range(K):
-                    self.rates[first + k] = row.unsteady_rate[k] * (q - held[k])
+        def leaves(segment: int, end: int, wave: Vector) -> None:
+            """What enters a segment at an end travels to the other one."""
+            self.left[self.waves[line] + 2 * segment + 1 - end] = wave
 
-            for end, place, segment in ((0, 0, 0), (1, segments, segments - 1)):
-                i = int(nodes.end_node[2 * line + end])
-                head = density / self.fluid[i, 0] * self.pressure[i]  # P = rho_ref g(p)
-                wave = arrives(segment, end)
-                # half a lump: P = c + Z q + R/2 q + sum G/2 (q - i)
-                q = (head - wave + 0.5 * gain @ memory(place)) / (Z + 0.5 * lump)
-                rub(place, q)
-                self.left[self.waves[line] + 2 * segment + 1 - end] = wave + 2.0 * Z * q
-                self.inflow[i] -= density * q
-                name = f"{row.component}.{'ab'[end]}"
-                self._show(name, "mass_flow", "kg/s", (1.0 - 2.0 * end) * density * q)
-                self._adds_flow(f"{name}.mass_flow", [i], (2.0 * end - 1.0,))
-            for inner in range(segments - 1):
-                before, after = arrives(inner, 1), arrives(inner + 1, 0)
-                place = inner + 1
-                Q = (before - after + gain @ memory(place)) / (2.0 * Z + lump)
-                rub(place, Q)
-                # what enters the segments from here travels to their other ends
-                self.left[self.waves[line] + 2 * inner] = before - 2.0 * Z * Q
-                self.left[self.waves[line] + 2 * (inner + 1) + 1] = after + 2.0 * Z * Q
-            del rate
+        def memory(place: int) -> Matrix:
+            first = self.memories[line] + terms * place
+            forms = [self._unit(first + k) for k in range(terms)]
+            return np.array(forms).reshape(terms, self.width)
+
+        def rub(place: int, q: Vector) -> None:
+            first = self.memories[line] + terms * place
+            change = row.unsteady_rate[:, None] * (q - memory(place))
+            self.rates[first : first + terms] = change
+
+        for end, place, segment in ((0, 0, 0), (1, segments, segments - 1)):
+            i = int(nodes.end_node[2 * line + end])
+            head = density / self.fluid[i, 0] * self.pressure[i]  # P = rho_ref g(p)
+            wave = arrives(segment, end)
+            # half a lump: P = w + Z q + R/2 q + sum G/2 (q - i)
+            q = (head - wave + 0.5 * gain @ memory(place)) / (Z + 0.5 * lump)
+            rub(place, q)
+            leaves(segment, end, wave + 2.0 * Z * q)
+            self.inflow[i] -= density * q
+            name = f"{row.component}.{'ab'[end]}"
+            self._show(name, "mass_flow", "kg/s", (1.0 - 2.0 * end) * density * q)
+            self._adds_flow(f"{name}.mass_flow", [i], (2.0 * end - 1.0,))
+        for inner in range(segments - 1):
+            before, after = arrives(inner, 1), arrives(inner + 1, 0)
+            Q = (before - after + gain @ memory(inner + 1)) / (2.0 * Z + lump)
+            rub(inner + 1, Q)
+            leaves(inner, 1, before - 2.0 * Z * Q)
+            leaves(inner + 1, 0, after + 2.0 * Z * Q)
 
     def _put_volumes(self) -> None:
         nodes, state = self.network.nodes, self.network.node_state
@@ -543,5 +546,3 @@ class _Assembly:
                     - omega**2 * self._unit(place)
                     - 2.0 * float(body.damping[i]) * omega * self._unit(place + 1)
                 )
-
-

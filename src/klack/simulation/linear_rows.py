@@ -310,8 +310,9 @@ def _split(P: Matrix) -> tuple[Matrix, Matrix, list[int]]:
     slow = Z[:, :count]
     fast = Z[:, count:]
     if 0 < count < len(P):
-        fast = fast + slow @ solve_sylvester(T[:count, :count], -T[count:, count:],
-                                             -T[:count, count:])
+        fast = fast + slow @ solve_sylvester(
+            T[:count, :count], -T[count:, count:], -T[:count, count:]
+        )
     if not count:
         return slow, fast, []
     named = sorted(int(j) for j in qr(slow.T, pivoting=True, mode="r")[1][:count])

@@ -28,9 +28,7 @@ _Current = Annotated[
         "start of a run]",
     ),
 ]
-_Voltage = Annotated[
-    _Texts, Parameter(name="--voltage", negative="", help="Instead of a current.")
-]
+_Voltage = Annotated[_Texts, Parameter(name="--voltage", negative="", help="Instead of a current.")]
 _Lift = Annotated[
     _Text, Parameter(name="--lift", help='Hold the needle at this displacement, "40 um".')
 ]

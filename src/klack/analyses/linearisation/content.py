@@ -26,11 +26,11 @@ def linear_model_content(record: LinearModel) -> Content:
         "Linear model",
         subtitle=(f"variant {record.variant}",),
         answer=stability_text(record),
-        numbers=Table(
-            columns=EIGENVALUE_HEADS, rows=tuple(eigenvalue_rows(record, 12))
-        ),
+        numbers=Table(columns=EIGENVALUE_HEADS, rows=tuple(eigenvalue_rows(record, 12))),
         sections=(
-            Section(title="Frequency response, loops and eigenvalues", charts=linear_charts(record)),
+            Section(
+                title="Frequency response, loops and eigenvalues", charts=linear_charts(record)
+            ),
             Section(title="Stability margins", tables=_margins(record)),
             Section(title="Operating point", tables=(_point(record),)),
             Section(
@@ -93,7 +93,9 @@ def _margins(record: LinearModel) -> tuple[Table, ...]:
 def _signals(record: LinearModel) -> tuple[Table, ...]:
     """Names for --from, --to and the matrices."""
     return tuple(
-        Table(columns=(kind, "unit"), rows=tuple((x.name, x.unit or "1") for x in signals[:_LISTED]))
+        Table(
+            columns=(kind, "unit"), rows=tuple((x.name, x.unit or "1") for x in signals[:_LISTED])
+        )
         for kind, signals in (
             ("state", record.states),
             ("input", record.inputs),

@@ -61,8 +61,13 @@ def _response_chart(response: Response) -> Chart:
             Panel(
                 y=AxisSpec(label="phase", unit="degrees"),
                 curves=(
-                    Curve(x=response.frequency, y=_phase(values), label="phase", colour="orange",
-                          style="dashed"),
+                    Curve(
+                        x=response.frequency,
+                        y=_phase(values),
+                        label="phase",
+                        colour="orange",
+                        style="dashed",
+                    ),
                 ),
             ),
         ),
@@ -95,8 +100,13 @@ def _loop_chart(loop: LoopMargins) -> Chart:
             Panel(
                 y=AxisSpec(label="phase", unit="degrees"),
                 curves=(
-                    Curve(x=loop.frequency, y=_phase(values), label="phase", colour="orange",
-                          style="dashed"),
+                    Curve(
+                        x=loop.frequency,
+                        y=_phase(values),
+                        label="phase",
+                        colour="orange",
+                        style="dashed",
+                    ),
                 ),
                 marks=tuple(phase_marks),
             ),
@@ -114,9 +124,7 @@ def _eigenvalue_charts(record: LinearModel) -> tuple[Chart, ...]:
     frequency = np.array([mode.frequency for mode in tones])
     damping = np.array([100.0 * mode.damping for mode in tones])
     low, high = float(np.min(frequency)), float(np.max(frequency))
-    names = tuple(
-        ", ".join(record.parts(record.eigenvalues.index(mode))) for mode in tones
-    )
+    names = tuple(", ".join(record.parts(record.eigenvalues.index(mode))) for mode in tones)
     stands = damping >= 0.0
     curves = []
     for chosen, label, colour in ((stands, "decays", "blue"), (~stands, "grows", "red")):

@@ -30,7 +30,6 @@ from klack.network.rows import Rows
 from klack.progress import Progress, silent
 from klack.simulation.linear_network import LinearNetwork, linear_network
 from klack.simulation.linear_system import (
-    MOST_STATES,
     ORDER,
     PIECE,
     LinearSystem,
@@ -243,9 +242,7 @@ def _pairs(
     into = [_place("--from", system.inputs, name) for name in sources]
     out = [_place("--to", system.outputs, name) for name in targets]
     if bool(into) != bool(out):
-        missing, signals = (
-            ("--to", system.outputs) if into else ("--from", system.inputs)
-        )
+        missing, signals = ("--to", system.outputs) if into else ("--from", system.inputs)
         raise InputError(
             missing,
             got="nothing beside " + ("--from" if into else "--to"),
@@ -261,9 +258,7 @@ def _opened(linear: LinearNetwork, name: str) -> int:
     return list(linear.adds)[_place("--loop", signals, name)]
 
 
-def _axis(
-    found: Sequence[Mode], limit: float | None, asked: tuple[float, float] | None
-) -> Vector:
+def _axis(found: Sequence[Mode], limit: float | None, asked: tuple[float, float] | None) -> Vector:
     """Frequencies [Hz], closer about resonances."""
     sizes = [abs(mode.root) / (2.0 * np.pi) for mode in found if mode.verdict != 0 or mode.root]
     tones = [mode for mode in found if mode.frequency > 0.0]

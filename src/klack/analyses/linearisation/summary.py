@@ -85,7 +85,9 @@ class LinearModelJson(TypedDict):
     operating_point: Annotated[
         dict[str, Real], Field(description="By component, quantity and unit [SI].")
     ]
-    stable: Annotated[bool | None, Field(description="Null where something neither decays nor grows.")]
+    stable: Annotated[
+        bool | None, Field(description="Null where something neither decays nor grows.")
+    ]
     band_Hz: Annotated[float, Field(description="Of matrices and eigenvalues with lines.")]
     delays_s: list[float]
     states: list[SignalJson]
@@ -199,8 +201,10 @@ def stability_text(record: LinearModel) -> str:
     least = min(slow, key=lambda mode: mode.time_constant * -1.0, default=None)
     told = f"Stable{up_to}: every small disturbance decays"
     if record.neutral:
-        told = f"Neither stable nor unstable{up_to}: {len(record.neutral)} motions neither decay " \
+        told = (
+            f"Neither stable nor unstable{up_to}: {len(record.neutral)} motions neither decay "
             "nor grow (a free body, enclosed fluid, or one without losses); all others decay"
+        )
     if least is None:
         return f"{told}."
     return f"{told}, the slowest to 1/e in {format_si(least.time_constant, 's', 3)}."
@@ -208,11 +212,12 @@ def stability_text(record: LinearModel) -> str:
 
 def eigenvalue_rows(record: LinearModel, most: int) -> list[tuple[str, ...]]:
     """Verdict, frequency, damping ratio, time constant and components."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for k in _shown(record, most):
         mode = record.eigenvalues[k]
         parts = ", ".join(
-            f"{name} {100.0 * share:.0f} %" for name, share in list(record.parts(k).items())[:_PARTS]
+            f"{name} {100.0 * share:.0f} %"
+            for name, share in list(record.parts(k).items())[:_PARTS]
         )
         oscillates = mode.imaginary > 0.0
         rows.append(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.analyses.linearisation.record import LinearModel
+from klack.analyses.linearisation.record import LinearModel, LoopMargins, Response
 
 __all__ = ["write_files"]
 
@@ -101,7 +101,7 @@ def _write_responses(record: LinearModel, file: Path) -> None:
     """Magnitude and phase of every response and loop over the same frequencies."""
     columns: list[tuple[str, Any]] = []
     axis = (record.responses or record.loops)[0].frequency
-    curves = [
+    curves: list[tuple[str, str, Response | LoopMargins]] = [
         *((f"{x.target.name} over {x.source.name}", x.unit, x) for x in record.responses),
         *((f"open loop at {x.name}", "1", x) for x in record.loops),
     ]
