@@ -32,7 +32,8 @@ __all__ = ["LinearNetwork", "linear_network"]
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
-_DOUBT = 1e-3  # between the laws of two steps, or of both sides
+_DOUBT = 1e-3  # between the laws of two steps
+_KINK = 0.2  # between those to both sides; densities of two pressures differ by less
 _TOUCHING = 1e-13  # [m] gap of a contact that neither presses nor is apart
 _NEARLY = 1e-9  # [m] gap of an open contact, from which on it is far
 _WEAK = 1e-3  # [N] force of a closed contact below which it is about to open
@@ -133,7 +134,7 @@ class _Assembly:
             ),
             h,
         )
-        if found.kink > _DOUBT:
+        if found.kink > _KINK:
             self.doubts.append(
                 f"'{row.component}' is not smooth at this point: its answers to a small change "
                 f"to one and to the other side differ by {100.0 * found.kink:.2g} % (hysteresis, "

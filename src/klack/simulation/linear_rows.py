@@ -21,6 +21,7 @@ quadratic in the step: two steps remove it, and their difference tells whether t
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 from scipy.linalg import qr, schur, solve_sylvester
 
@@ -39,7 +40,7 @@ _MOVED = 1e-13  # [m] by which the point is left to both sides: laws may have a 
 _SPEED = 1e-8  # [m/s] the same
 _PRESSED = 1e-9  # of a pressure: the same
 _KEPT = 0.5  # of a state after a step: what keeps less has no memory
-_FELT = 1e-6  # of the effect of all that acts on a number
+_FELT = 1e-4  # of the effect of all that acts on a number
 _SHARE = 1e-3  # of a state or pressure: a small change
 _WAY = 1e-6  # [m] the same
 _RATE = 1e4  # [1/s] ... and its speed
@@ -148,13 +149,17 @@ def linear_row(at: RowPoint, h: float) -> LinearRow:
         for d, step in zip(sides, (h, 0.5 * h), strict=True)
     )
     usual = _usual(at, quick[3])
+    usual = _usual(at, quick[3])
+    doubt = max(_apart(a, b, usual) for a, b in zip(slow[:2], quick[:2], strict=True))
+    if slow[3] != quick[3]:
+        slow, doubt = quick, 1.0
     rate, acts = ((4.0 * b - a) / 3.0 for a, b in zip(slow[:2], quick[:2], strict=True))
     return LinearRow(
         kept=quick[3],
         rate=rate,
         acts=acts,
         channels=2.0 * quick[2] - slow[2],
-        doubt=max(_apart(a, b, usual) for a, b in zip(slow[:2], quick[:2], strict=True)),
+        doubt=doubt,
         kink=max(_apart(a, b, usual) for a, b in zip(left[:2], right[:2], strict=True)),
     )
 
@@ -175,9 +180,11 @@ def _warm(at: RowPoint, h: float) -> RowPoint:
 def _apart(a: Matrix, b: Matrix, changes: Vector) -> float:
     """Largest difference of two laws over their numbers.
 
-    Numbers with less than a millionth of the effect of their row are not compared: round-off.
+    Numbers with less than 1e-4 of the effect of their row are not compared: round-off.
     ``changes`` are usual ones of states, displacements, speeds, pressures and inputs.
     """
+    if a.shape != b.shape:  # a state more, or less
+        return 1.0
     if not a.size:
         return 0.0
     effect = np.max(np.abs(b) * changes, axis=1, keepdims=True)
@@ -211,7 +218,7 @@ def _derivatives(at: RowPoint, h: float, side: float) -> Matrix:
     seeds += [("parameter", j, 1.0) for j in range(len(at.inputs))]
     count = at.head + len(row.ports) + at.state.size + len(row.books)
     found = np.zeros((count, len(seeds)))
-    address = tangent_address(row.step)
+    address = _address(row)
     for begin in range(0, max(len(seeds), 1), LANES - 1):
         part = seeds[begin : begin + LANES - 1]
         par, state, inp, out = (
@@ -234,6 +241,19 @@ def _derivatives(at: RowPoint, h: float, side: float) -> Matrix:
             raise ConvergenceError(f"linearisation: {row.component}: {words}.")
         found[:, begin : begin + len(part)] = out[:count, 1 : 1 + len(part)]
     return found
+
+
+def _address(row: ElementRow | BranchRow) -> int:
+    try:
+        return tangent_address(row.step)
+    except NumbaError as error:
+        raise InputError(
+            f"components.{row.component}",
+            got="a step function that cannot carry derivatives: "
+            + " ".join(str(error).split())[:200],
+            expected="arithmetic and functions of math that klack differentiates",
+            hint="write it without ceil, floor and arrays of its own; int(x) rounds down.",
+        ) from error
 
 
 def _states_at(at: RowPoint) -> slice:

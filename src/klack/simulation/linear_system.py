@@ -345,7 +345,7 @@ def _newton(
     known = np.abs(left) @ np.abs(matrix) @ np.abs(right)
     unsure = 20.0 * _EPS * float(known / max(abs(along), 1e-300))
     share = left[:n] * right[:n]
-    waves = left[n:] * right[n:] * (1.0 + s * system.delays)
+    waves = left[n:] * right[n:] * system.delays  # as the characteristic matrix changes with s
     return complex(s.real, abs(s.imag)), np.concatenate([share, waves]), unsure
 
 

@@ -199,7 +199,7 @@ def _coil() -> list[Check]:
         _check("coil with a moving armature, decay [1/s]", slow, _near(linear.system, slow).real,
                1e-9, words),
         _check("coil with a moving armature, frequency of the armature [rad/s]", abs(fast),
-               abs(found), 1e-12, words, reason=ROUND_OFF),
+               abs(found), 5e-13, words),
         _check("coil with a moving armature, decay of the armature [1/s]", fast.real, found.real,
                1e-9, words),
         _check("coil with a moving armature, admittance at 200 Hz [A/V]", abs(known), abs(G),

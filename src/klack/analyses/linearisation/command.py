@@ -67,6 +67,14 @@ _Frequencies = Annotated[
         help='Range of the frequency response, "1 Hz" "20 kHz". [default: about all oscillations]',
     ),
 ]
+_Sweep = Annotated[
+    tuple[str, str, str, int] | None,
+    Parameter(
+        name="--sweep",
+        help="Stability over a key of the case, or lift, current or voltage, then from, to and the "
+        'number of values: --sweep network.components.pipe.length "0.2 m" "2 m" 10.',
+    ),
+]
 _Loop = Annotated[
     _Texts,
     Parameter(
@@ -92,21 +100,27 @@ def linearise(
     targets: _To = None,
     frequencies: _Frequencies = None,
     loop: _Loop = None,
+    sweep: _Sweep = None,
     component: Components = None,
     asked: WantedResult = WANTED_RESULT,
 ) -> int:
-    """Linear state space about the operating point: eigenvalues, response, margins."""
+    """Linear state space about the operating point: eigenvalues, response, margins, stability."""
     with show_progress(asked.quiet):
         from klack.analyses.linearisation.analysis import LINEARISATION
         from klack.analyses.linearisation.figures import linear_charts
         from klack.analyses.linearisation.run import run_linearisation
         from klack.analyses.linearisation.table import write_files
-        from klack.analyses.operating_point.conditions import Conditions, stated_drive
+        from klack.analyses.operating_point.conditions import (
+            Conditions,
+            asked_sweeps,
+            stated_drive,
+        )
         from klack.case.case_tree import read_case_tree
         from klack.case.shipped import find_case
         from klack.units import CURRENT, FREQUENCY, LENGTH, VOLTAGE, parse_quantity
 
-        checked = read_case_tree(find_case(case), imported(component)).case()
+        tree = read_case_tree(find_case(case), imported(component))
+        checked = tree.case()
 
     def hertz(text: str, option: str) -> float:
         value = parse_quantity(text, FREQUENCY, option)
@@ -147,6 +161,8 @@ def linearise(
             targets=targets or (),
             frequencies=ends,
             loops=loop or (),
+            tree=tree,
+            sweep=next(iter(asked_sweeps(checked, tree, () if sweep is None else (sweep,))), None),
             threads=asked.threads,
             progress=progress,
         )

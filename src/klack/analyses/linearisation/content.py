@@ -5,9 +5,11 @@ from klack.analyses.linearisation.record import LinearModel
 from klack.analyses.linearisation.summary import (
     EIGENVALUE_HEADS,
     LOOP_HEADS,
+    SWEEP_HEADS,
     eigenvalue_rows,
     loop_rows,
     stability_text,
+    sweep_rows,
 )
 from klack.analyses.page import page_of
 from klack.analyses.study.wording import shown_unit
@@ -32,6 +34,7 @@ def linear_model_content(record: LinearModel) -> Content:
                 title="Frequency response, loops and eigenvalues", charts=linear_charts(record)
             ),
             Section(title="Stability margins", tables=_margins(record)),
+            Section(title="Stability over a quantity", tables=_swept(record)),
             Section(title="Operating point", tables=(_point(record),)),
             Section(
                 title="Eigenvalues",
@@ -88,6 +91,13 @@ def _margins(record: LinearModel) -> tuple[Table, ...]:
     if not record.loops:
         return ()
     return (Table(columns=LOOP_HEADS, rows=tuple(loop_rows(record))),)
+
+
+def _swept(record: LinearModel) -> tuple[Table, ...]:
+    return tuple(
+        Table(columns=(x.short, *SWEEP_HEADS[1:]), rows=tuple(sweep_rows(x)))
+        for x in record.sweeps
+    )
 
 
 def _signals(record: LinearModel) -> tuple[Table, ...]:

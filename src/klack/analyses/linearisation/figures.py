@@ -5,14 +5,13 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.linearisation.record import LinearModel, LoopMargins, Response
+from klack.analyses.linearisation.record import LinearModel, LoopMargins, Response, StabilitySweep
 from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
+from klack.report.wording import printed_unit
 
 __all__ = ["linear_charts"]
 
 Vector = NDArray[np.float64]
-
-_DEGREES = (-360.0, 360.0)
 
 
 def linear_charts(record: LinearModel) -> tuple[Chart, ...]:
@@ -20,6 +19,7 @@ def linear_charts(record: LinearModel) -> tuple[Chart, ...]:
     return (
         *(_response_chart(x) for x in record.responses),
         *(_loop_chart(x) for x in record.loops),
+        *(_sweep_chart(x) for x in record.sweeps),
         *_eigenvalue_charts(record),
     )
 
@@ -113,6 +113,36 @@ def _loop_chart(loop: LoopMargins) -> Chart:
         ),
         note="The loop closes with -1: at its limit of stability the magnitude is one at -180 "
         "degrees.",
+    )
+
+
+def _sweep_chart(swept: StabilitySweep) -> Chart:
+    if swept.unit in ("1", "-"):
+        spec, factor = AxisSpec(label=swept.short), 1.0
+    else:
+        unit, factor = printed_unit(swept.values, swept.unit)
+        spec = AxisSpec(label=swept.short, unit=unit)
+    x = factor * swept.values
+    return Chart(
+        name=_word(f"stability over {swept.short}"),
+        title=f"Oscillation that decays the slowest, over {swept.short}",
+        x=spec,
+        panels=(
+            Panel(
+                y=AxisSpec(label="damping ratio", unit="%"),
+                curves=(
+                    Curve(x=x, y=100.0 * swept.damping, colour="blue"),
+                    Curve(x=x, y=100.0 * swept.damping, colour="blue", drawn="points", width=3.0),
+                ),
+                marks=(Mark(value=0.0, axis="y"),),
+                share=1.3,
+            ),
+            Panel(
+                y=AxisSpec(label="frequency", unit="Hz"),
+                curves=(Curve(x=x, y=swept.frequency, colour="orange", drawn="points", width=3.0),),
+            ),
+        ),
+        note="Below zero the valve oscillates. Every dot is a point of its own.",
     )
 
 

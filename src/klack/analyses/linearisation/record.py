@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 
-__all__ = ["Eigenvalue", "LinearModel", "LoopMargins", "PointValue", "Response", "SignalName"]
+__all__ = ["Eigenvalue", "LinearModel", "LoopMargins", "PointValue", "Response", "SignalName", "StabilitySweep"]
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -126,6 +126,41 @@ class PointValue:
     value: float
 
 
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StabilitySweep:
+    """The oscillation that decays the slowest along a swept quantity; nan where there is none.
+
+    Parameters
+    ----------
+    name, unit : str
+        Key of the case, or lift, current, voltage; SI.
+    values : array, shape (points,)
+    growth : array [1/s]
+        Real part of its eigenvalue.
+    frequency : array [Hz]
+    damping : array [-]
+    unstable : array of int
+        Number of eigenvalues that grow, those without oscillation among them; -1 where there is no
+        point.
+    failures : tuple of str
+        Why there is no point; empty where there is one.
+    """
+
+    name: str
+    unit: str
+    values: Vector
+    growth: Vector
+    frequency: Vector
+    damping: Vector
+    unstable: NDArray[np.int64]
+    failures: tuple[str, ...]
+
+    @property
+    def short(self) -> str:
+        """Name without the sections that hold all components."""
+        return self.name.removeprefix("network.components.")
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LinearModel(CaseRecord):
     """A valve as a linear system about an operating point.
@@ -154,6 +189,8 @@ class LinearModel(CaseRecord):
         delays.
     responses : tuple of Response
     loops : tuple of LoopMargins
+    sweeps : tuple of StabilitySweep
+        None or one.
     cpu_time : float [s]
         Processor time without bodies and contact laws.
     """
@@ -176,6 +213,7 @@ class LinearModel(CaseRecord):
     unconfirmed: int
     responses: tuple[Response, ...]
     loops: tuple[LoopMargins, ...]
+    sweeps: tuple[StabilitySweep, ...]
     cpu_time: float
 
     @property

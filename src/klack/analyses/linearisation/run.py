@@ -14,16 +14,19 @@ from klack.analyses.linearisation.record import (
     PointValue,
     Response,
     SignalName,
+    StabilitySweep,
 )
-from klack.analyses.operating_point.conditions import Conditions, Origin
+from klack.analyses.operating_point.conditions import Conditions, Origin, Sweep
 from klack.analyses.operating_point.quantities import measured
-from klack.analyses.operating_point.run import PointFound, find_point
+from klack.analyses.operating_point.run import PointFound, find_point, valve_at
 from klack.analyses.record import case_fields, run_fields
-from klack.assembling.valve import build_valve
+from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
+from klack.case.case_tree import CaseTree
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
-from klack.errors import InputError
+from klack.case.variants import Variant
+from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
 from klack.magnetics.constant_drive import coils_of, driven, resistance_of
 from klack.network.rows import Rows
@@ -100,6 +103,8 @@ def run_linearisation(
     targets: Sequence[str] = (),
     frequencies: tuple[float, float] | None = None,
     loops: Sequence[str] = (),
+    tree: CaseTree | None = None,
+    sweep: Sweep | None = None,
     threads: int | None = None,
     progress: Progress = silent,
 ) -> LinearModel:
@@ -120,6 +125,10 @@ def run_linearisation(
     frequencies : (float, float), optional [Hz]
     loops : sequence of str
         Outputs at which a loop is opened for its margins.
+    tree : CaseTree, optional
+        The case as it was written; for a sweep.
+    sweep : Sweep, optional
+        What changes from point to point, beside the point itself.
 
     Raises
     ------
@@ -160,6 +169,11 @@ def run_linearisation(
         loop_margins(system, output, *here.linear.adds[output], axis) for output in opened
     )
     owners = list(dict.fromkeys([*(x.owner for x in system.states), *system.waves]))
+    swept = (
+        ()
+        if sweep is None or tree is None
+        else (_stability(valve, tree, name, conditions, origin, sweep, band, clock, threads),)
+    )
     values = measured(found.point, found.network, found.rows, found.currents, roles).values
     return LinearModel(
         **case_fields(case),
@@ -187,8 +201,55 @@ def run_linearisation(
         unconfirmed=lost,
         responses=responses,
         loops=margins,
+        sweeps=swept,
         cpu_time=process_time() - taken,
         warnings=(*warned, *found.notes, *here.linear.doubts, *_notes(found.rows, lost, limit)),
+    )
+
+
+def _stability(
+    valve: Valve,
+    tree: CaseTree,
+    variant: Variant,
+    base: Conditions,
+    origin: Origin,
+    sweep: Sweep,
+    band: float | None,
+    clock: StageClock,
+    threads: int | None,
+) -> StabilitySweep:
+    """The slowest decay of an oscillation at every value of a sweep; each point on its own."""
+    count = len(sweep.values)
+    told = np.full((3, count), np.nan)
+    unstable, failures = np.full(count, -1, dtype=np.int64), list[str]()
+    for i, value in enumerate(sweep.values):
+        clock("sweep", i / count)
+        conditions = sweep.applied(base, value)
+        try:
+            here = valve_at(valve, tree, conditions, clock, threads)
+            roles = find_roles(here.case)
+            found = find_point(here, roles, variant, conditions, origin)
+            held = () if conditions.lift is None else (roles.needle,)
+            system = linear_point(found, held).linear.system
+            every, _ = modes(system, usual_band(system) if band is None else band)
+        except KlackError as error:
+            failures.append(str(error))
+            continue
+        failures.append("")
+        unstable[i] = sum(mode.verdict > 0 for mode in every)
+        tones = [mode for mode in every if mode.frequency > 0.0]
+        if tones:
+            least = max(tones, key=lambda mode: mode.root.real)
+            told[:, i] = least.root.real, least.frequency, least.damping
+    return StabilitySweep(
+        name=sweep.name,
+        unit=sweep.unit,
+        values=np.array(sweep.values),
+        growth=told[0].copy(),
+        frequency=told[1].copy(),
+        damping=told[2].copy(),
+        unstable=unstable,
+        failures=tuple(failures),
     )
 
 

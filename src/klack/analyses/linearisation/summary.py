@@ -8,7 +8,13 @@ from pydantic import Field
 from typing_extensions import TypedDict
 
 from klack.analyses.json_parts import OwnComponents, Real, Version
-from klack.analyses.linearisation.record import Eigenvalue, LinearModel, LoopMargins, SignalName
+from klack.analyses.linearisation.record import (
+    Eigenvalue,
+    LinearModel,
+    LoopMargins,
+    SignalName,
+    StabilitySweep,
+)
 from klack.analyses.study.wording import number_text
 from klack.terminal.tables import TextTable
 from klack.units import format_si
@@ -20,6 +26,7 @@ __all__ = [
     "linear_model_told",
     "loop_rows",
     "stability_text",
+    "sweep_rows",
 ]
 
 _TOLD = 24
@@ -28,6 +35,9 @@ _PARTS = 3
 
 EIGENVALUE_HEADS = ("", "frequency", "damping ratio", "time constant", "components")
 LOOP_HEADS = ("loop opened at", "gain margin", "at", "phase margin", "at", "distance from -1", "at")
+
+
+SWEEP_HEADS = ("value", "", "frequency", "damping ratio")
 
 
 class SignalJson(TypedDict):
@@ -73,6 +83,21 @@ class LoopJson(TypedDict):
     distance_frequency_Hz: float
 
 
+class SweepJson(TypedDict):
+    """The oscillation that decays the slowest along a sweep; null where there is none."""
+
+    name: str
+    unit: Annotated[str, Field(description="SI; 1 for a pure number.")]
+    values: list[float]
+    growth_1_s: list[Real]
+    frequency_Hz: list[Real]
+    damping_ratio: list[Real]
+    unstable: Annotated[
+        list[int], Field(description="Eigenvalues that grow; -1 where there is no point.")
+    ]
+    failures: Annotated[list[str], Field(description="Why there is no point; else empty.")]
+
+
 class LinearModelJson(TypedDict):
     """``klack linearise``."""
 
@@ -101,6 +126,7 @@ class LinearModelJson(TypedDict):
     unconfirmed: Annotated[int, Field(description="Of the matrices, without a root with delays.")]
     responses: list[ResponseJson]
     loops: list[LoopJson]
+    sweeps: list[SweepJson]
     cpu_time_s: Real
     wall_time_s: Real
     warnings: list[str]
@@ -142,6 +168,19 @@ def linear_model_to_json(record: LinearModel) -> dict[str, Any]:
             for x in record.responses
         ],
         "loops": [_loop(x) for x in record.loops],
+        "sweeps": [
+            {
+                "name": x.name,
+                "unit": x.unit,
+                "values": x.values.tolist(),
+                "growth_1_s": [_real(v) for v in x.growth],
+                "frequency_Hz": [_real(v) for v in x.frequency],
+                "damping_ratio": [_real(v) for v in x.damping],
+                "unstable": x.unstable.tolist(),
+                "failures": list(x.failures),
+            }
+            for x in record.sweeps
+        ],
         "cpu_time_s": record.cpu_time,
         "wall_time_s": record.wall_time,
         "warnings": list(record.warnings),
@@ -267,6 +306,23 @@ def loop_rows(record: LinearModel) -> list[tuple[str, ...]]:
     ]
 
 
+def sweep_rows(swept: StabilitySweep) -> list[tuple[str, ...]]:
+    """Verdict and least damped oscillation at every value."""
+    rows = []
+    for i, value in enumerate(swept.values):
+        word = "not found" if swept.failures[i] else "unstable" if swept.unstable[i] else "stable"
+        known = isfinite(swept.frequency[i])
+        rows.append(
+            (
+                number_text(float(value), swept.unit, 4),
+                word,
+                format_si(float(swept.frequency[i]), "Hz", 4) if known else "–",
+                f"{swept.damping[i]:.4g}" if known else "–",
+            )
+        )
+    return rows
+
+
 def linear_model_told(record: LinearModel) -> Iterator[TextTable | str]:
     """What a terminal shows: the verdict, the point, the eigenvalues, margins."""
     drive = ", ".join(f"{name} at {format_si(i, 'A')}" for name, i in record.drive.items())
@@ -288,6 +344,13 @@ def linear_model_told(record: LinearModel) -> Iterator[TextTable | str]:
         yield f"{_TOLD} of {count} eigenvalues; all of them are in the CSV file."
     if record.loops:
         yield TextTable(title="Stability margins", columns=LOOP_HEADS, rows=loop_rows(record))
+    for swept in record.sweeps:
+        yield TextTable(
+            title=f"Oscillation that decays the slowest, over {swept.short}",
+            columns=SWEEP_HEADS,
+            rows=sweep_rows(swept),
+            left=2,
+        )
     yield stability_text(record)
     yield (
         f"{len(record.states)} states, {len(record.inputs)} inputs, {len(record.outputs)} outputs "

@@ -66,6 +66,20 @@ def write_files(record: LinearModel, folder: Path) -> tuple[str, ...]:
     if record.responses or record.loops:
         names.append("frequency-response.csv")
         _write_responses(record, folder / names[-1])
+    for swept in record.sweeps:
+        names.append("stability.csv")
+        columns = (swept.values, swept.unstable, swept.growth, swept.frequency, swept.damping)
+        _write(
+            folder / names[-1],
+            [
+                f"{swept.name} [{swept.unit}]", "unstable eigenvalues", "growth [1/s]",
+                "frequency [Hz]", "damping ratio", "failure",
+            ],
+            (
+                [*(repr(c[i].item()) for c in columns), " ".join(swept.failures[i].split())]
+                for i in range(len(swept.values))
+            ),
+        )  # fmt: skip
     return tuple(names)
 
 
