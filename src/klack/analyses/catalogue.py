@@ -57,6 +57,11 @@ ANALYSES: tuple[Entry, ...] = (
     ),
     Entry("operating_point.analysis:OPERATING_POINT", "klack operating points"),
     Entry("heat.analysis:HEAT", "klack heat", "klack heat warm-valve"),
+    Entry(
+        "linearisation.analysis:LINEARISATION",
+        "klack linear model",
+        "klack linearise demo-stroke --from coil.voltage --to needle.velocity",
+    ),
     Entry("shots.analysis:SHOTS", "klack shots study", "klack shots demo-shots --shots 20"),
     Entry("stroke_shots.analysis:STROKE_SHOTS", "klack study of strokes"),
     Entry(

@@ -405,6 +405,10 @@ def flux_rows(
         books=(*books, HYSTERESIS) if parameters[_HEADER + STOPS] else books,
         channels=stage_channels(state.size) if staged else CHANNELS,
         failures=FAILURES,
+        state_names={
+            _FRONT + j: (f"flux of loop {j + 1}", "Wb")
+            for j in range(int(parameters[int(parameters[4])]))
+        },
     )
     known = gap_range or GapRange.of(plant)
     advice = _MAP_ADVICE if isinstance(plant, FluxMap) else _GAP_ADVICE

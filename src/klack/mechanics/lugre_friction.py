@@ -1,7 +1,7 @@
 """Friction with presliding: elastic bristles between two faces (LuGre)."""
 
 from collections.abc import Mapping
-from math import ceil, exp, pi, sin
+from math import exp, pi, sin
 from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -44,7 +44,10 @@ def _elasto_plastic(z: float, way: float, elastic: float, largest: float) -> tup
         return z + way, z + 0.5 * way
     left = min(way, _LONG * largest)
     total = (way - left) * largest
-    parts = ceil(left / (_SHARE * largest))
+    wanted = left / (_SHARE * largest)
+    parts = int(wanted)
+    if parts < wanted:
+        parts += 1
     s = left / parts
     for _ in range(parts):
         a = _bent(z, elastic, largest)

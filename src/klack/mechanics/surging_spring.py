@@ -149,5 +149,10 @@ class SurgingSpring(Component):
             at_rest=at_rest,
             books=(Book("energy", "store"), Book("damping", "loss")),
             channels=(Channel("first surge mode", "m", 0),),
+            state_names={
+                2 * i + k: (f"surge mode {i + 1}{word}", unit)
+                for i in range(len(table))
+                for k, (word, unit) in enumerate((("", "m"), (" velocity", "m/s")))
+            },
             interval=1.0 / (_STEPS_OF_PERIOD * float(self.frequencies()[-1])),
         )

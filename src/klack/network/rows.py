@@ -116,8 +116,8 @@ class ElementRow:
     several.  ``at_rest`` gives the first states that the
     element has at the start once its ports rest at given displacements [m]; without it the states
     at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
-    point, where they differ.  ``interval`` [s] is that of its exchange
-    with something outside: no step is longer.
+    point, where they differ.  ``interval`` [s] is that of its exchange with something outside: no
+    step is longer.  ``state_names`` are name and unit of states that no channel records, by index.
     """
 
     component: str
@@ -133,6 +133,7 @@ class ElementRow:
     at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     at_steady: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
+    state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -184,6 +185,7 @@ class BranchRow:
     channels: tuple[Channel, ...]
     failures: Mapping[int, str]
     column: float | None = None
+    state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -469,6 +471,7 @@ class Rows:
         label: str = "",
         at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         interval: float | None = None,
+        state_names: Mapping[int, tuple[str, str]] | None = None,
     ) -> None:
         """Add something that pushes ports; its forces are recorded by component and port."""
         self.elements.append(
@@ -485,6 +488,7 @@ class Rows:
                 failures=failures or {},
                 at_rest=at_rest,
                 interval=interval,
+                state_names=state_names or {},
             )
         )
 

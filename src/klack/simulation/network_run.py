@@ -72,6 +72,7 @@ __all__ = [
     "has_python_steps",
     "put_back",
     "read_rows",
+    "restore_state",
     "saved_state",
     "simulate_network",
 ]
@@ -177,7 +178,7 @@ def simulate_network(
     if spatial is not None:
         network = replace(network, moving=spatial.of(network, sizes))
     if state is not None:
-        _restore(network, clock, state)
+        restore_state(network, clock, state)
     if network.moving is not None and state is None:
         balance = None if near is None else partial(_balance, network, step, near)
         begun = network.moving.start(balance) or begun
@@ -690,7 +691,8 @@ def saved_state(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str,
     return saved
 
 
-def _restore(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
+def restore_state(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
+    """Put a network into a state of :func:`saved_state`, in place."""
     for key, target in _changing(network, clock).items():
         if key not in state and key.startswith((_SLIDERS, _RECORDS)):  # of an earlier version
             continue

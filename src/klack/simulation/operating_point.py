@@ -23,13 +23,14 @@ from klack.simulation.network_compile import CompiledNetwork, compile_network
 from klack.simulation.network_kernel import CLOCK
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import ChannelData, StaticStart
-from klack.simulation.network_run import read_rows, saved_state
+from klack.simulation.network_run import read_rows, restore_state, saved_state
 from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.static_start import SteadySlopes, begin_steady
 from klack.simulation.step_sizes import step_sizes
 
 __all__ = [
     "OperatingPoint",
+    "compiled_at",
     "far_ends",
     "operating_point",
     "static_compliance",
@@ -129,6 +130,15 @@ def operating_point(
         ),
         stable=stable,
     )
+
+
+def compiled_at(rows: Rows, point: OperatingPoint) -> tuple[CompiledNetwork, float]:
+    """The network of a point, in its state, and the step of its arrays [s]."""
+    free = steady_rows(rows)
+    sizes = step_sizes(free, "normal")
+    network = compile_network(free, sizes)
+    restore_state(network, _clock(), point.state)
+    return network, sizes.step
 
 
 def without_guesses(rows: Rows) -> Rows:

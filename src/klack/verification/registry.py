@@ -68,6 +68,8 @@ COVERS = {
     "heats itself, and every stroke of a warm-up computed.",
     "operating-point": "Where a valve rests: springs, magnets, restrictions and both together "
     "against solutions by hand, networks of SciPy, and runs that stay there.",
+    "linearisation": "Linear models of valves: closed forms, Routh's boundary, pipes by delay "
+    "theory, reciprocity, and small motions in time.",
     "exchange": "What goes out to other programs and comes back: meshes, matrices, state space, "
     "FMI.",
 }

@@ -46,7 +46,14 @@ from klack.simulation.operating_point import (
 from klack.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
-__all__ = ["PointFound", "find_point", "held_network", "run_operating_points", "searched"]
+__all__ = [
+    "PointFound",
+    "find_point",
+    "held_network",
+    "run_operating_points",
+    "searched",
+    "valve_at",
+]
 
 Vector = NDArray[np.float64]
 
@@ -139,7 +146,7 @@ def run_operating_points(
     for i, conditions in enumerate(asked):
         clock("operating points", i / len(asked))
         try:
-            here, taken = _valve_at(valve, tree, conditions, clock, threads), process_time()
+            here, taken = valve_at(valve, tree, conditions, clock, threads), process_time()
             now = find_point(here, roles, name, conditions, origin)
             measures = measured(now.point, now.network, now.rows, now.currents, roles)
         except KlackError as error:
@@ -220,7 +227,7 @@ def held_network(network: Network, currents: Mapping[str, float]) -> Network:
     return driven(network, currents).at_start()
 
 
-def _valve_at(
+def valve_at(
     valve: Valve,
     tree: CaseTree,
     conditions: Conditions,

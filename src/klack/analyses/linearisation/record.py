@@ -1,0 +1,246 @@
+"""Record of a linearisation: matrices, eigenvalues, responses, margins, and the point itself."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.record import CaseRecord
+
+__all__ = [
+    "Eigenvalue",
+    "LinearModel",
+    "LoopMargins",
+    "PointValue",
+    "Response",
+    "SignalName",
+    "StabilitySweep",
+]
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SignalName:
+    """A state, input or output: name and SI unit."""
+
+    name: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Eigenvalue:
+    """One eigenvalue, or one of a conjugate pair.
+
+    Parameters
+    ----------
+    real, imaginary : float [1/s]
+        The imaginary part is zero or above.
+    uncertainty : float [1/s]
+        By which round-off may move it.
+    verdict : str
+        ``decays``, ``grows`` or ``neutral``.
+    """
+
+    real: float
+    imaginary: float
+    uncertainty: float
+    verdict: str
+
+    @property
+    def frequency(self) -> float:
+        """Of the oscillation [Hz]; 0 without one."""
+        return self.imaginary / (2.0 * np.pi)
+
+    @property
+    def damping(self) -> float:
+        """Damping ratio [-]; below zero where the motion grows."""
+        size = float(np.hypot(self.real, self.imaginary))
+        return -self.real / size if size else 0.0
+
+    @property
+    def time_constant(self) -> float:
+        """Time [s] in which it decays to 1/e, or grows by e; infinite where it does neither."""
+        return 1.0 / abs(self.real) if self.real and self.verdict != "neutral" else np.inf
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Response:
+    """Frequency response of one output to one input.
+
+    Parameters
+    ----------
+    source, target : SignalName
+    frequency : array [Hz]
+    real, imaginary : array
+        In the unit of the output per unit of the input.
+    """
+
+    source: SignalName
+    target: SignalName
+    frequency: Vector
+    real: Vector
+    imaginary: Vector
+
+    @property
+    def unit(self) -> str:
+        """Of the magnitude."""
+        return f"{self.target.unit}/({self.source.unit})"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class LoopMargins:
+    """Margins of a loop that is opened at one place; nan where there is no crossing.
+
+    Parameters
+    ----------
+    name : str
+        Output at which the loop is opened.
+    frequency : array [Hz]
+    real, imaginary : array [-]
+        Of the open loop ``L``, closed by ``-1``.
+    gain_margin : float [-]
+        Factor on the loop at which it would reach the limit of stability, the nearest to one.
+    gain_frequency : float [Hz]
+    phase_margin : float [degrees]
+        Lag, or lead below zero, that would bring it there.
+    phase_frequency : float [Hz]
+    distance : float [-]
+        Least distance of ``L`` from -1.
+    distance_frequency : float [Hz]
+    """
+
+    name: str
+    frequency: Vector
+    real: Vector
+    imaginary: Vector
+    gain_margin: float
+    gain_frequency: float
+    phase_margin: float
+    phase_frequency: float
+    distance: float
+    distance_frequency: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointValue:
+    """One quantity of the operating point [SI]."""
+
+    component: str
+    quantity: str
+    unit: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StabilitySweep:
+    """The oscillation that decays the slowest along a swept quantity; nan where there is none.
+
+    Parameters
+    ----------
+    name, unit : str
+        Key of the case, or lift, current, voltage; SI.
+    values : array, shape (points,)
+    growth : array [1/s]
+        Real part of its eigenvalue.
+    frequency : array [Hz]
+    damping : array [-]
+    unstable : array of int
+        Number of eigenvalues that grow, those without oscillation among them; -1 where there is no
+        point.
+    failures : tuple of str
+        Why there is no point; empty where there is one.
+    """
+
+    name: str
+    unit: str
+    values: Vector
+    growth: Vector
+    frequency: Vector
+    damping: Vector
+    unstable: NDArray[np.int64]
+    failures: tuple[str, ...]
+
+    @property
+    def short(self) -> str:
+        """Name without the sections that hold all components."""
+        return self.name.removeprefix("network.components.")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearModel(CaseRecord):
+    """A valve as a linear system about an operating point.
+
+    Parameters
+    ----------
+    variant : str
+    drive : mapping of str to float [A]
+        Current of each coil.
+    point : tuple of PointValue
+    band : float [Hz]
+        Up to which the matrices and the eigenvalues hold where there are lines.
+    delays : array [s]
+        Of the segments of lines, both directions; empty without lines.
+    states, inputs, outputs : tuple of SignalName
+    A, B, C, D : array
+        Without delays: those of lines are all-passes.
+    eigenvalues : tuple of Eigenvalue
+        Those that grow first, then by their distance from zero.
+    owners : tuple of str
+        Components that have states.
+    shares : array, shape (eigenvalues, owners) [-]
+        Participation; every row adds up to one.
+    unconfirmed : int
+        Eigenvalues of the matrices within the band that lead to no root of the equation with
+        delays.
+    responses : tuple of Response
+    loops : tuple of LoopMargins
+    sweeps : tuple of StabilitySweep
+        None or one.
+    cpu_time : float [s]
+        Processor time without bodies and contact laws.
+    """
+
+    variant: str
+    drive: Mapping[str, float]
+    point: tuple[PointValue, ...]
+    band: float
+    delays: Vector
+    states: tuple[SignalName, ...]
+    inputs: tuple[SignalName, ...]
+    outputs: tuple[SignalName, ...]
+    A: Matrix
+    B: Matrix
+    C: Matrix
+    D: Matrix
+    eigenvalues: tuple[Eigenvalue, ...]
+    owners: tuple[str, ...]
+    shares: Matrix
+    unconfirmed: int
+    responses: tuple[Response, ...]
+    loops: tuple[LoopMargins, ...]
+    sweeps: tuple[StabilitySweep, ...]
+    cpu_time: float
+
+    @property
+    def has_lines(self) -> bool:
+        """Whether there are delays."""
+        return len(self.delays) > 0
+
+    def parts(self, mode: int) -> dict[str, float]:
+        """Components that take part in an eigenvalue by a hundredth or more, the largest first."""
+        order = np.argsort(-self.shares[mode])
+        row = {self.owners[k]: float(self.shares[mode, k]) for k in order}
+        return {name: share for name, share in row.items() if share >= 0.01}
+
+    @property
+    def growing(self) -> tuple[Eigenvalue, ...]:
+        """Eigenvalues that grow."""
+        return tuple(mode for mode in self.eigenvalues if mode.verdict == "grows")
+
+    @property
+    def neutral(self) -> tuple[Eigenvalue, ...]:
+        """Eigenvalues that neither decay nor grow, as far as can be told."""
+        return tuple(mode for mode in self.eigenvalues if mode.verdict == "neutral")

@@ -1,0 +1,360 @@
+"""``klack linearise``: from a case to its linear model."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from time import perf_counter, process_time
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.linearisation.loops import loop_margins
+from klack.analyses.linearisation.record import (
+    Eigenvalue,
+    LinearModel,
+    PointValue,
+    Response,
+    SignalName,
+    StabilitySweep,
+)
+from klack.analyses.operating_point.conditions import Conditions, Origin, Sweep
+from klack.analyses.operating_point.quantities import measured
+from klack.analyses.operating_point.run import PointFound, find_point, valve_at
+from klack.analyses.record import case_fields, run_fields
+from klack.assembling.valve import Valve, build_valve
+from klack.cache.setting import result_cache
+from klack.case.case_tree import CaseTree
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import find_roles
+from klack.case.variants import Variant
+from klack.errors import InputError, KlackError
+from klack.input.problem import nearest, one_of
+from klack.magnetics.constant_drive import coils_of, driven, resistance_of
+from klack.network.rows import Rows
+from klack.progress import Progress, silent
+from klack.simulation.linear_network import LinearNetwork, linear_network
+from klack.simulation.linear_system import (
+    ORDER,
+    PIECE,
+    LinearSystem,
+    Mode,
+    Signal,
+    modes,
+    rational,
+    transfer,
+)
+from klack.simulation.operating_point import compiled_at
+from klack.stages import StageClock, collected_warnings, trial
+
+__all__ = ["LinearPoint", "linear_point", "run_linearisation", "usual_band"]
+
+Vector = NDArray[np.float64]
+
+_STEP = 20e-9  # [s] of the laws of rows, at most
+_BAND = 20e3  # [Hz]
+_FEW_STATES = 400  # of lines, in the usual band
+_POINTS = 400
+_ABOUT = 12  # points about each resonance, to both sides
+_LEAST = 1e-3  # [Hz]
+_WORDS = {1: "grows", 0: "neutral", -1: "decays"}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LinearPoint:
+    """An operating point and the linear network about it."""
+
+    found: PointFound
+    linear: LinearNetwork
+
+
+def linear_point(found: PointFound, held: Sequence[str] = ()) -> LinearPoint:
+    """Linearise the network of an operating point.
+
+    Raises
+    ------
+    InputError
+        For what has no linear law there.
+    """
+    network, step = compiled_at(found.rows, found.point)
+    drives: dict[str, tuple[str, Rows]] = {}
+    for name, coil in coils_of(found.network).items():
+        more = {**found.currents, name: found.currents[name] + 1.0 / resistance_of(coil)}
+        with trial():
+            drives[f"{name}.voltage"] = ("V", driven(found.network, more).at_start().rows())
+    linear = linear_network(network, min(step, _STEP), held=held, drives=drives)
+    return LinearPoint(found=found, linear=linear)
+
+
+def usual_band(system: LinearSystem) -> float:
+    """Band [Hz] that few states describe."""
+    total = float(np.sum(system.delays))
+    if total == 0.0:
+        return _BAND
+    return min(_BAND, _FEW_STATES * PIECE / (2.0 * np.pi * ORDER * total))
+
+
+def run_linearisation(
+    case: ValveCase,
+    *,
+    variant: str | None = None,
+    base: Conditions | None = None,
+    origin: Origin = "start",
+    band: float | None = None,
+    sources: Sequence[str] = (),
+    targets: Sequence[str] = (),
+    frequencies: tuple[float, float] | None = None,
+    loops: Sequence[str] = (),
+    tree: CaseTree | None = None,
+    sweep: Sweep | None = None,
+    threads: int | None = None,
+    progress: Progress = silent,
+) -> LinearModel:
+    """Linearise a valve about its operating point.
+
+    Parameters
+    ----------
+    case : ValveCase
+    variant : str, optional
+    base : Conditions, optional
+        Drive and lift of the operating point.
+    origin : "start" or "far"
+        Where the search for the point begins.
+    band : float, optional [Hz]
+        Up to which matrices and eigenvalues hold where there are lines.
+    sources, targets : sequence of str
+        Inputs and outputs between which the frequency response is wanted.
+    frequencies : (float, float), optional [Hz]
+    loops : sequence of str
+        Outputs at which a loop is opened for its margins.
+    tree : CaseTree, optional
+        The case as it was written; for a sweep.
+    sweep : Sweep, optional
+        What changes from point to point, beside the point itself.
+
+    Raises
+    ------
+    InputError
+        For unknown names, a valve in three dimensions, or a point that has no linear law.
+    ConvergenceError
+        If there is no operating point.
+    """
+    begin = perf_counter()
+    name = case.one_variant(variant)
+    if case.motion == "three-dimensional":
+        raise InputError(
+            "motion",
+            got="three-dimensional",
+            expected="axial, for a linearisation",
+            hint="leave out motion, guide and placement.",
+        )
+    clock = StageClock(progress, result_cache())
+    roles = find_roles(case)
+    with collected_warnings() as warned:
+        valve = build_valve(case, clock, threads=threads)
+    clock("operating point", 0.0)
+    taken, conditions = process_time(), base or Conditions()
+    found = find_point(valve, roles, name, conditions, origin)
+    clock("linear laws", 0.0)
+    here = linear_point(found, () if conditions.lift is None else (roles.needle,))
+    system = here.linear.system
+    pairs = _pairs(system, sources, targets)
+    opened = [_opened(here.linear, loop) for loop in loops]
+    clock("eigenvalues", 0.0)
+    limit = usual_band(system) if band is None else band
+    model = rational(system, limit)
+    found_modes, lost = modes(system, limit)
+    clock("frequency response", 0.0)
+    axis = _axis(found_modes, limit if len(system.delays) else None, frequencies)
+    responses = _responses(system, pairs, axis)
+    margins = tuple(
+        loop_margins(system, output, *here.linear.adds[output], axis) for output in opened
+    )
+    owners = list(dict.fromkeys([*(x.owner for x in system.states), *system.waves]))
+    swept = (
+        ()
+        if sweep is None or tree is None
+        else (_stability(valve, tree, name, conditions, origin, sweep, band, clock, threads),)
+    )
+    values = measured(found.point, found.network, found.rows, found.currents, roles).values
+    return LinearModel(
+        **case_fields(case),
+        **run_fields(begin, clock),
+        variant=name,
+        drive=dict(found.currents),
+        point=tuple(
+            PointValue(component=c, quantity=q, unit=u, value=float(x))
+            for (c, q, u), x in values.items()
+        ),
+        band=limit,
+        delays=system.delays,
+        states=_names(model.states),
+        inputs=_names(model.inputs),
+        outputs=_names(model.outputs),
+        A=model.A,
+        B=model.B,
+        C=model.C,
+        D=model.D,
+        eigenvalues=tuple(_told(mode) for mode in found_modes),
+        owners=tuple(owners),
+        shares=np.array(
+            [[mode.participation.get(name, 0.0) for name in owners] for mode in found_modes]
+        ).reshape(len(found_modes), len(owners)),
+        unconfirmed=lost,
+        responses=responses,
+        loops=margins,
+        sweeps=swept,
+        cpu_time=process_time() - taken,
+        warnings=(*warned, *found.notes, *here.linear.doubts, *_notes(found.rows, lost, limit)),
+    )
+
+
+def _stability(
+    valve: Valve,
+    tree: CaseTree,
+    variant: Variant,
+    base: Conditions,
+    origin: Origin,
+    sweep: Sweep,
+    band: float | None,
+    clock: StageClock,
+    threads: int | None,
+) -> StabilitySweep:
+    """The slowest decay of an oscillation at every value of a sweep; each point on its own."""
+    count = len(sweep.values)
+    told = np.full((3, count), np.nan)
+    unstable, failures = np.full(count, -1, dtype=np.int64), list[str]()
+    for i, value in enumerate(sweep.values):
+        clock("sweep", i / count)
+        conditions = sweep.applied(base, value)
+        try:
+            here = valve_at(valve, tree, conditions, clock, threads)
+            roles = find_roles(here.case)
+            found = find_point(here, roles, variant, conditions, origin)
+            held = () if conditions.lift is None else (roles.needle,)
+            system = linear_point(found, held).linear.system
+            every, _ = modes(system, usual_band(system) if band is None else band)
+        except KlackError as error:
+            failures.append(str(error))
+            continue
+        failures.append("")
+        unstable[i] = sum(mode.verdict > 0 for mode in every)
+        tones = [mode for mode in every if mode.frequency > 0.0]
+        if tones:
+            least = max(tones, key=lambda mode: mode.root.real)
+            told[:, i] = least.root.real, least.frequency, least.damping
+    return StabilitySweep(
+        name=sweep.name,
+        unit=sweep.unit,
+        values=np.array(sweep.values),
+        growth=told[0].copy(),
+        frequency=told[1].copy(),
+        damping=told[2].copy(),
+        unstable=unstable,
+        failures=tuple(failures),
+    )
+
+
+def _notes(rows: Rows, lost: int, band: float) -> list[str]:
+    told = [
+        f"the controller '{row.component}' holds its output here: the linear model is that of "
+        "the valve with this loop open."
+        for row in rows.controllers
+    ]
+    if lost:
+        told.append(
+            f"{lost} eigenvalues of the matrices below {band:.4g} Hz lead to no root of the "
+            "equation with delays: raise --band to see whether they change."
+        )
+    return told
+
+
+def _told(mode: Mode) -> Eigenvalue:
+    return Eigenvalue(
+        real=mode.root.real,
+        imaginary=mode.root.imag,
+        uncertainty=mode.uncertainty,
+        verdict=_WORDS[mode.verdict],
+    )
+
+
+def _names(signals: Sequence[Signal]) -> tuple[SignalName, ...]:
+    return tuple(SignalName(name=x.name, unit=x.unit) for x in signals)
+
+
+def _plain(name: str) -> str:
+    return name.strip().replace(" ", "_")
+
+
+def _place(option: str, signals: Sequence[Signal], name: str) -> int:
+    names = [_plain(x.name) for x in signals]
+    if _plain(name) not in names:
+        raise InputError(
+            option,
+            got=f"'{name}'",
+            expected=f"one of: {one_of(names)}" if names else "a valve that has one",
+            hint=nearest(_plain(name), names, "take a name from this list."),
+        )
+    return names.index(_plain(name))
+
+
+def _pairs(
+    system: LinearSystem, sources: Sequence[str], targets: Sequence[str]
+) -> list[tuple[int, int]]:
+    """Places of inputs and outputs, every one with every other."""
+    into = [_place("--from", system.inputs, name) for name in sources]
+    out = [_place("--to", system.outputs, name) for name in targets]
+    if bool(into) != bool(out):
+        missing, signals = ("--to", system.outputs) if into else ("--from", system.inputs)
+        raise InputError(
+            missing,
+            got="nothing beside " + ("--from" if into else "--to"),
+            expected=f"one of: {one_of([_plain(x.name) for x in signals])}",
+            hint="name both ends of the response.",
+        )
+    return [(i, o) for i in dict.fromkeys(into) for o in dict.fromkeys(out)]
+
+
+def _opened(linear: LinearNetwork, name: str) -> int:
+    """Output at which a loop is opened."""
+    signals = [linear.system.outputs[k] for k in linear.adds]
+    return list(linear.adds)[_place("--loop", signals, name)]
+
+
+def _axis(found: Sequence[Mode], limit: float | None, asked: tuple[float, float] | None) -> Vector:
+    """Frequencies [Hz], closer about resonances."""
+    sizes = [abs(mode.root) / (2.0 * np.pi) for mode in found if mode.verdict != 0 or mode.root]
+    tones = [mode for mode in found if mode.frequency > 0.0]
+    if asked is not None:
+        low, high = asked
+    else:
+        seen = [abs(mode.root) / (2.0 * np.pi) for mode in tones] or sizes or [1e3]
+        low, high = 0.03 * min(seen), 10.0 * min(max(seen), 1e5)
+        if limit is not None:
+            high = max(limit, 10.0 * low)
+        low = max(low, _LEAST)
+    points = [np.geomspace(low, high, _POINTS)]
+    for mode in tones:
+        centre = abs(mode.root) / (2.0 * np.pi)
+        width = max(abs(mode.damping), 1e-9) * centre
+        away = width * np.geomspace(0.05, 20.0, _ABOUT)
+        points.append(np.concatenate([centre - away, [centre], centre + away]))
+    every = np.unique(np.concatenate(points))
+    return every[(every >= low) & (every <= high)]
+
+
+def _responses(
+    system: LinearSystem, pairs: Sequence[tuple[int, int]], axis: Vector
+) -> tuple[Response, ...]:
+    if not pairs:
+        return ()
+    found = np.array([[G[o, i] for i, o in pairs] for G in transfer(system, axis)])
+    named = _names(system.inputs), _names(system.outputs)
+    return tuple(
+        Response(
+            source=named[0][i],
+            target=named[1][o],
+            frequency=axis,
+            real=found[:, k].real.copy(),
+            imaginary=found[:, k].imag.copy(),
+        )
+        for k, (i, o) in enumerate(pairs)
+    )
