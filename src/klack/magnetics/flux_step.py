@@ -63,6 +63,7 @@ __all__ = [
     "BOOKS",
     "CHANNELS",
     "FAILURES",
+    "FLUXES",
     "HYSTERESIS",
     "flux_numbers",
     "flux_rows",
@@ -113,6 +114,8 @@ _TELLS = 1e-6  # of a step: shorter pieces say nothing of the rates of the fluxe
 _FIRST = 1 / 4  # of a step: piece after a switch
 _LEAST = 1 / 64  # ... no piece is cut further for its bend
 _FRONT, _DIODE = FRONT, DIODE
+FLUXES = FRONT
+"""Number of the first loop flux among the states."""
 _NONE, _BLOCKS = -1, -2
 _MAP = MAP
 _HEADER = 8
@@ -493,6 +496,7 @@ def flux_rows(
     base: int,
     current: float = 0.0,
     gap_range: GapRange | None = None,
+    channels: tuple[Channel, ...] = (),
 ) -> None:
     """Add a solenoid to the rows of a network.
 
@@ -516,6 +520,8 @@ def flux_rows(
         with remanence.
     gap_range : GapRange, optional
         That of the tables of the plant by default.
+    channels : tuple of Channel
+        Recorded besides.
 
     Raises
     ------
@@ -536,7 +542,7 @@ def flux_rows(
         state=state,
         at_rest=at_rest if np.any(state[_FRONT:]) else None,
         books=(*BOOKS, HYSTERESIS) if parameters[_HEADER + STOPS] else BOOKS,
-        channels=CHANNELS,
+        channels=(*CHANNELS, *channels),
         failures=FAILURES,
     )
     known = gap_range or GapRange.of(plant)

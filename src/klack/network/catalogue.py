@@ -57,6 +57,7 @@ COMPONENTS = (
     ("pipe-friction", "klack.hydraulics.pipe_friction.PipeFriction"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
+    ("magnetic-network", "klack.magnetics.magnetic_network.MagneticNetwork"),
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),
     ("voltage-step", "klack.magnetics.voltage_step.VoltageStep"),
     ("voltage-table", "klack.magnetics.voltage_table.VoltageTable"),
