@@ -40,12 +40,20 @@ from klack.magnetics.flux_kernel import (
     circuit_gaps,
     circuit_heat,
     circuit_loss_and_force,
+    circuit_settle,
     circuit_step,
     linked,
     stack,
 )
 from klack.magnetics.flux_map import FluxMap
-from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES, STOPS, circuit_numbers
+from klack.magnetics.flux_table import (
+    MAP,
+    MOST_STOPS,
+    MOST_TUBES,
+    SETTLES,
+    STOPS,
+    circuit_numbers,
+)
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.map_kernel import (
     map_current,
@@ -217,6 +225,18 @@ def _locate(
 
 
 @inner(error_model="numpy", forceinline=True)
+def _settle(
+    par: Any, at: int, hints: Any, phi: Any, end: Any, is_open: bool, move: Any
+) -> tuple[float, float]:
+    """Let fluxes spread among loops without eddy currents: energy released, heat of hysteresis."""
+    released = circuit_settle(par, at, hints, phi, end, is_open, move)
+    heat = 0.0
+    if released > 0.0 and par[at + STOPS] != 0.0:
+        heat = circuit_heat(par, at, hints, phi, move)
+    return released, heat
+
+
+@inner(error_model="numpy", forceinline=True)
 def _crossing(
     par: Any, block: int, current: float, end: float, begin: float, over: float
 ) -> tuple[float, float, int]:
@@ -287,8 +307,18 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     per_step = 1.0 / h if h > 0.0 else 0.0
     speed = (x1 - x0) * per_step
     close = 1e-9 * h + 1e-15 * abs(t)
-    if h <= 0.0:
+    settles = par[at + SETTLES] != 0.0
+    spread, after = stack(out, 6), stack(out, 6)
+    if h <= 0.0 or settles:
         _gaps(par, at, hints, x0, x0, middle, final, slope)
+    if h > 0.0 and settles:
+        released, heat = _settle(par, at, hints, phi, final, is_open, spread)
+        eddy += released
+        hysteresis += heat
+        for j in range(loops):
+            phi[j] += spread[j]
+        if is_open:
+            pulse += linked(par, at, spread)
     while done < h:
         now = t + done
         block = state_block(par, drive, int(mode))
@@ -397,6 +427,23 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if stops > 0:
             hysteresis += circuit_heat(par, at, hints, phi, change)
         push += force * piece
+        if settles:
+            opens = is_open or which == _BLOCKS
+            for j in range(loops):
+                after[j] = phi[j] + change[j]
+            released, heat = _settle(par, at, hints, after, final, opens, spread)
+            if released > 0.0:
+                eddy += released
+                hysteresis += heat
+                for j in range(loops):
+                    after[j] += spread[j]
+                    change[j] += spread[j]
+                if is_open:
+                    pulse += linked(par, at, spread)
+                if not opens:
+                    for j in range(loops):
+                        spread[j] = 0.0 * spread[j]
+                    end = _current(par, at, hints, after, spread, final)
         curve = 0.0
         if last == piece:
             curve = per_time

@@ -1,4 +1,4 @@
-"""A magnetic network of one's own: elements between magnetic nodes, one coil circuit, an armature."""
+"""A magnetic network of one's own: elements between magnetic nodes, a coil and an armature."""
 
 from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
@@ -101,9 +101,7 @@ class MagneticNetwork(Component):
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the working gap without residual gaps."""
         gaps = WorkingGaps(start=self.gap, usable=self.gap_range().usable)
-        tubes = [
-            tube for name, part in self.elements.items() for tube in part.tubes(name, gaps)
-        ]
+        tubes = [tube for name, part in self.elements.items() for tube in part.tubes(name, gaps)]
         return circuit_of_network(tubes, next(iter(self._moving())), self.gap)
 
     def gap_range(self) -> GapRange:

@@ -23,7 +23,7 @@ from klack.magnetics.network_loops import Tube
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance, ReluctanceLaw
 from klack.magnetics.solenoid_parts import EddyPart, IronPart, ParasiticGap, PoleGap
 from klack.magnetics.tabulation import hermite_grid
-from klack.units import Area, Current, FluxDensity, Length, Permeance, Ratio, Resistance
+from klack.units import Area, Current, FluxDensity, Length, Permeance, Resistance
 
 __all__ = ["MovingGap", "NetworkElement", "WorkingGaps"]
 
@@ -247,7 +247,7 @@ class CoilElement(_Element):
 class ShortedCoil(_Element):
     r"""A winding closed through a resistance, such as a damping ring of one turn.
 
-    Its current :math:`-\frac{N}{R}\dot\varphi` opposes the flux with :math:`\frac{N^2}{R}\dot\varphi`.
+    Its current :math:`-N\dot\varphi/R` opposes the flux with :math:`N^2\dot\varphi/R`.
     """
 
     kind: Literal["shorted-coil"]

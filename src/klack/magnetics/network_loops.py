@@ -54,8 +54,8 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
             got=f"{len(chords)} independent loops"
             + (f": {', '.join(tubes[k].branch.name for k in chords)}" if chords else ""),
             expected=f"1 to {MOST_LOOPS}",
-            hint="join elements that lie in parallel or leave out small leakages; an eddy ladder of "
-            "n terms counts n - 1 loops.",
+            hint="join elements that lie in parallel or leave out small leakages; an eddy ladder "
+            "of n terms counts n - 1 loops.",
         )
     loops = np.zeros((len(tubes), len(chords)), dtype=np.int64)
     for column, k in enumerate(chords):
@@ -70,9 +70,7 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
             expected="every element in a closed path",
             hint="check the names of the nodes in 'between'; a node needs two elements at least.",
         )
-    circuit = MagneticCircuit(
-        branches=tuple(tube.branch for tube in tubes), loops=loops, main=main
-    )
+    circuit = MagneticCircuit(branches=tuple(tube.branch for tube in tubes), loops=loops, main=main)
     _require_reluctance(circuit, gap)
     return circuit
 
@@ -117,9 +115,7 @@ def _spanning_tree(tubes: Sequence[Tube]) -> tuple[list[int], list[int]]:
     return tree, chords
 
 
-def _way(
-    tubes: Sequence[Tube], tree: Sequence[int], start: str, end: str
-) -> list[tuple[int, int]]:
+def _way(tubes: Sequence[Tube], tree: Sequence[int], start: str, end: str) -> list[tuple[int, int]]:
     """Tubes of the tree from one node to another, and +1 where they point along the way."""
     came: dict[str, tuple[str, int, int]] = {start: ("", -1, 0)}
     waiting = [start]

@@ -1,4 +1,4 @@
-r"""Checks of magnetic networks given in a case, against nodal solutions and equations written apart.
+r"""Checks of magnetic networks given in a case, against node potentials and equations of time.
 
 klack solves loop fluxes; here node potentials are solved: a tube of iron carries
 :math:`A\,B(\Delta/l)` at the potential difference :math:`\Delta`, by Froehlich's formula itself.
@@ -10,7 +10,7 @@ from functools import cache, partial
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
-from scipy.optimize import root
+from scipy.optimize import brentq, fsolve
 
 from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.static import static_state
@@ -79,14 +79,14 @@ def _nodal(current: float, gap: float) -> tuple[float, float]:
         return [1e5 * (middle - left - of_magnet), 1e5 * (middle - through - leak),
                 1e5 * (right - of_magnet)]  # fmt: skip
 
-    found = root(rest, np.zeros(3), tol=1e-14, options={"maxfev": 2000})
-    through = fluxes(found.x)[1]
+    found = fsolve(rest, np.zeros(3), xtol=1e-11)
+    through = fluxes(found)[1]
     return 80.0 * through, through
 
 
 def _at_rest() -> list[Check]:
     circuit, out = _e_core().circuit(), []
-    source = "node potentials of Froehlich's iron, SciPy root, written apart"
+    source = "node potentials of Froehlich's iron, SciPy fsolve, written apart"
     for current, gap in ((0.0, 100e-6), (1.5, 100e-6), (6.0, 20e-6)):
         state = static_state(circuit, current=current, gap=gap)
         linkage, through = _nodal(current, gap)
@@ -240,8 +240,7 @@ def _voltage_step() -> list[Check]:
     end, steps, speed = 400e-6, 4000, 0.15
 
     def mmf_of_iron(flux: float) -> float:
-        found = root(lambda d: 1e6 * (_iron_flux(d[0], length, area) - flux), [1.0], tol=1e-13)
-        return float(found.x[0])
+        return brentq(lambda drop: _iron_flux(drop, length, area) - flux, -1e5, 1e5, xtol=1e-12)
 
     def rates(t: float, y: np.ndarray) -> list[float]:
         current = y[1] / (leak * turns)
