@@ -449,12 +449,13 @@ def circuit_settle(
 ) -> float:
     r"""Let the flux spread among loops without eddy currents; return the energy released [J].
 
-    Such loops balance at every instant.  A step balances their mean only, so that what they lack at
-    its start has the opposite sign at its end, and so on: the fluxes ring, and with them the voltage
-    of an open coil.  ``move`` becomes the change of the loop fluxes ``phi`` that makes them balance
-    at the reluctances ``end``, at constant linkage, or without current if the coil is open.  The
-    stored energy is least there: its change is minus a loss, the mean mmf times ``move``, and of
-    the second order in what was lacking.  Zero, and no move, where nothing is gained.
+    Such loops balance at every instant.  A step balances their mean only, so that what they lack
+    at its start has the opposite sign at its end, and so on: the fluxes ring, and with them the
+    voltage of an open coil.  ``move`` becomes the change of the loop fluxes ``phi`` that makes
+    them balance at the reluctances ``end``, at constant linkage, or without current if the coil
+    is open.  The stored energy is least there: its change is minus a loss, the mean mmf times
+    ``move``, and of the second order in what was lacking.  Zero, and no move, where nothing is
+    gained.
     """
     A, g, along = stack(phi, 36), stack(phi, 6), stack(phi, 6)
     loops, tubes = int(par[at]), int(par[at + 1])
