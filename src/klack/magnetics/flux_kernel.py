@@ -27,8 +27,14 @@ from numba.extending import intrinsic
 from klack.compiling.jit import inner
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
-from klack.magnetics.flux_table import MOST_TUBES
-from klack.magnetics.stop_kernel import stops_end, stops_energy, stops_mean, stops_move
+from klack.magnetics.flux_table import MOST_TUBES, SETTLES
+from klack.magnetics.stop_kernel import (
+    stops_end,
+    stops_energy,
+    stops_mean,
+    stops_move,
+    stops_stiffness,
+)
 
 __all__ = [
     "circuit_current",
@@ -37,6 +43,7 @@ __all__ = [
     "circuit_gaps",
     "circuit_heat",
     "circuit_loss_and_force",
+    "circuit_settle",
     "circuit_step",
     "linked",
     "stack",
@@ -434,3 +441,90 @@ def circuit_step(
         if most == 1 or largest <= par[at + 5]:
             return True, current
     return False, 0.0
+
+
+@inner(error_model="numpy")
+def circuit_settle(
+    par: Any, at: int, hints: Any, phi: Any, end: Any, is_open: bool, move: Any
+) -> float:
+    r"""Let the flux spread among loops without eddy currents; return the energy released [J].
+
+    Such loops balance at every instant.  A step balances their mean only, so that what they lack
+    at its start has the opposite sign at its end, and so on: the fluxes ring, and with them the
+    voltage of an open coil.  ``move`` becomes the change of the loop fluxes ``phi`` that makes
+    them balance at the reluctances ``end``, at constant linkage, or without current if the coil
+    is open.  The stored energy is least there: its change is minus a loss, the mean mmf times
+    ``move``, and of the second order in what was lacking.  Zero, and no move, where nothing is
+    gained.
+    """
+    A, g, along = stack(phi, 36), stack(phi, 6), stack(phi, 6)
+    loops, tubes = int(par[at]), int(par[at + 1])
+    table = at + int(par[at + SETTLES])
+    count = int(par[table]) + (1 if is_open else 0)
+    first = table + 1
+    for j in range(loops):
+        move[j] = 0.0 * phi[j]
+    if count == 0:
+        return 0.0
+    most = 1 if int(par[at + 2]) == 1 else _CAREFUL
+    for _ in range(most):
+        for i in range(count):
+            g[i] = 0.0 * phi[0]
+            for j in range(i + 1):
+                A[i * count + j] = 0.0 * phi[0]
+        for k in range(tubes):
+            p = _tube(par, at, k)
+            touched = False
+            for i in range(count):
+                c = 0.0
+                for j in range(loops):
+                    c += par[first + i * loops + j] * par[p + _SIZE + j]
+                along[i] = c
+                touched = touched or c != 0.0
+            if not touched:
+                continue
+            b0, db = circuit_flux(par, at, k, phi), circuit_flux(par, at, k, move)
+            mmf, slope = end[k] * (b0 + db) - par[p + 2], end[k]
+            if par[p + 4] != 0.0:
+                iron = at + int(par[p + 4])
+                value, half = _iron_mean(par, iron, int(hints[2 * k + 1]), b0 + db, b0 + db)
+                mmf += value
+                slope += 2.0 * half
+            if par[p + 6] != 0.0:
+                stops, kept = at + int(par[p + 6]), _STOPS + int(par[p + 7])
+                mmf += stops_end(par, at, stops, hints, kept, b0, db)
+                slope += stops_stiffness(par, at, stops, hints, kept, b0, db)
+            for i in range(count):
+                g[i] -= along[i] * mmf
+                for j in range(i + 1):
+                    A[i * count + j] += along[i] * along[j] * slope
+        if not _factorise(A, count):
+            break
+        _solve(A, g, count)
+        largest = 0.0
+        for j in range(loops):
+            step = 0.0 * phi[0]
+            for i in range(count):
+                step += par[first + i * loops + j] * g[i]
+            move[j] += step
+            largest = max(largest, abs(step))
+        if largest <= par[at + 5]:
+            break
+    released = 0.0 * phi[0]
+    for k in range(tubes):
+        p = _tube(par, at, k)
+        b0, db = circuit_flux(par, at, k, phi), circuit_flux(par, at, k, move)
+        mean = end[k] * (b0 + 0.5 * db) - par[p + 2]
+        if par[p + 4] != 0.0:
+            value, _ = _iron_mean(par, at + int(par[p + 4]), int(hints[2 * k + 1]), b0, b0 + db)
+            mean += value
+        if par[p + 6] != 0.0:
+            kept = _STOPS + int(par[p + 7])
+            value, _ = stops_mean(par, at, at + int(par[p + 6]), hints, kept, b0, db)
+            mean += value
+        released -= mean * db
+    if released > 0.0:
+        return released
+    for j in range(loops):
+        move[j] = 0.0 * phi[j]
+    return 0.0

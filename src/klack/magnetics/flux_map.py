@@ -4,12 +4,13 @@ Everything follows from the stored energy :math:`W(\psi, x)`,
 
 .. math:: i = \frac{\partial W}{\partial \psi}, \qquad F = -\frac{\partial W}{\partial x} ,
 
-so a force that was given besides is not used, only compared: two tables that contradict each
-other would make a machine that creates energy.  Per gap of the table, ``psi(i)`` is a monotone
-cubic; its inverse ``i(psi)`` is tabulated on common linkages, integrated exactly, and joined over
-the gap by cubic splines.  The result is one bicubic surface, C1: current and force are continuous.
-The current rises with the linkage everywhere on it, :math:`\partial^2 W/\partial\psi^2 > 0`, so a
-voltage leads to one current only; a table whose splines fall between two gaps is refused.
+so a force that was given besides is not used, only compared (:class:`ForceComparison`): two tables
+that contradict each other would make a machine that creates energy.  Per gap of the table,
+``psi(i)`` is a monotone cubic; its inverse ``i(psi)`` is tabulated on common linkages, integrated
+exactly, and joined over the gap by cubic splines.  The result is one bicubic surface, C1: current
+and force are continuous.  The current rises with the linkage everywhere on it, :math:`\partial^2
+W/\partial\psi^2 > 0`, so a voltage leads to one current only; a table whose splines fall between
+two gaps is refused.
 
 Limits: no eddy currents (add them as a resistance, or describe the circuit); beyond the table
 the surface continues linearly in each direction, in ``psi`` with the last differential inductance.
@@ -23,8 +24,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from klack.errors import AccuracyWarning, InputError
+from klack.units import format_si
 
-__all__ = ["FluxMap"]
+__all__ = ["FluxMap", "ForceComparison"]
 
 Vector = NDArray[np.float64]
 
@@ -32,6 +34,54 @@ _LINKAGES = 129
 _ACCEPTED = 0.05  # largest disagreement of a given force, of its peak
 _SHARE = 0.34  # a little above a third, where the curvature ends
 _PLACES = 33  # looked at between two gaps
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ForceComparison:
+    r"""How far a given force is from that of the linkage: virtual work.
+
+    Force and linkage are slopes of one co-energy, so at constant current
+
+    .. math:: \frac{\partial F}{\partial i} = \frac{\partial \psi}{\partial x}, \qquad
+              F(i, x) = \int_0^i \frac{\partial \psi}{\partial x}\,\mathrm di .
+
+    Parameters
+    ----------
+    current, gap : float [A], [m]
+        Point of the largest difference of the forces.
+    given, derived : float [N]
+        Both forces there.
+    share : float [-]
+        Their difference over the largest given force.
+    ratio : float [-]
+        Given over derived force on the whole (least squares).
+    step : tuple of float [A], [A], [m]
+        Two neighbouring currents of the table and the gap between which ``dF`` and
+        ``(dpsi/dx) di`` differ most: there the contradiction arises.
+    step_share : float [-]
+        That difference over the largest given force.
+    """
+
+    current: float
+    gap: float
+    given: float
+    derived: float
+    share: float
+    ratio: float
+    step: tuple[float, float, float]
+    step_share: float
+
+    def advice(self) -> str:
+        """Likely reason."""
+        if self.ratio < 0.0:
+            return "the force counts the other way; from a file: force_closing: positive."
+        for factor, words in ((2.0, "2"), (4.0, "4"), (0.5, "0.5")):
+            if abs(self.ratio * factor - 1.0) < _ACCEPTED:
+                return (
+                    f"on the whole it is {self.ratio:.3g} times as large: a part of a model? From "
+                    f"a file: force_factor: {words}."
+                )
+        return "more gaps in the table, and force and linkage from the same computation."
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +148,9 @@ class FluxMap:
         )
         made._require_rising()
         if force is not None:
-            made._compare(psi, x, np.array(force, dtype=float).reshape(psi.shape))
+            given = np.array(force, dtype=float)
+            rest = np.zeros((i.size - len(given), x.size))  # without current, added above
+            made._require_force(i, psi, np.vstack((rest, given)))
         return made
 
     def energy_at(self, linkage: float, gap: float) -> float:
@@ -186,19 +238,44 @@ class FluxMap:
                 hint="put more gaps into the table there, or smooth its noise.",
             )
 
-    def _compare(self, psi: Vector, x: Vector, force: Vector) -> None:
+    def compare_force(
+        self, current: ArrayLike, linkage: ArrayLike, force: ArrayLike
+    ) -> ForceComparison:
+        """Compare a force table, shape (k, n), with the map of a linkage table, by virtual work.
+
+        ``current`` are the ``k`` currents, the gaps are those of the map.
+        """
+        i, psi, given = (np.array(v, dtype=float) for v in (current, linkage, force))
         derived = np.array(
-            [[self.force_at(p, g) for p, g in zip(row, x, strict=True)] for row in psi]
+            [[self.force_at(p, g) for p, g in zip(row, self.gap, strict=True)] for row in psi]
         )
-        worst = float(np.max(np.abs(derived - force)))
-        peak = float(np.max(np.abs(force)))
-        if worst > _ACCEPTED * peak:
-            k, j = np.unravel_index(int(np.argmax(np.abs(derived - force))), force.shape)
+        apart = np.abs(derived - given)
+        peak = float(np.max(np.abs(given))) or 1.0
+        k, j = np.unravel_index(int(np.argmax(apart)), apart.shape)
+        changes = np.abs(np.diff(derived - given, axis=0))
+        s, g = np.unravel_index(int(np.argmax(changes)), changes.shape)
+        return ForceComparison(
+            current=float(i[k]),
+            gap=float(self.gap[j]),
+            given=float(given[k, j]),
+            derived=float(derived[k, j]),
+            share=float(apart[k, j]) / peak,
+            ratio=float(np.sum(given * derived) / (np.sum(derived**2) or 1.0)),
+            step=(float(i[s]), float(i[s + 1]), float(self.gap[g])),
+            step_share=float(changes[s, g]) / peak,
+        )
+
+    def _require_force(self, i: Vector, psi: Vector, force: Vector) -> None:
+        found = self.compare_force(i, psi, force)
+        if found.share > _ACCEPTED:
+            low, high, gap = found.step
             warnings.warn(
-                f"force map: the given force is {force[k, j]:.4g} N at a gap of {x[j]:.4g} m, "
-                f"the linkage gives {derived[k, j]:.4g} N there. The linkage is used, because "
-                "only one of them can conserve energy. Try: more gaps in the table, and force and "
-                "linkage from the same computation.",
+                f"force map: the given force is {found.given:.4g} N at {found.current:.4g} A and a "
+                f"gap of {format_si(found.gap, 'm')}, the linkage gives {found.derived:.4g} N "
+                f"there: {100.0 * found.share:.3g} % of the largest force. dF/di and dpsi/dx "
+                f"differ most between {low:.4g} A and {high:.4g} A at {format_si(gap, 'm')}. The "
+                "linkage is used, because only one of them can conserve energy. Try: "
+                + found.advice(),
                 AccuracyWarning,
                 stacklevel=3,
             )

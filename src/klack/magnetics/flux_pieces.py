@@ -9,8 +9,15 @@ from typing import Any
 
 from klack.compiling.jit import inner
 from klack.magnetics.drive_kernel import crossed_switch, switch_current
-from klack.magnetics.flux_kernel import circuit_current, circuit_gaps, circuit_step, stack
-from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES
+from klack.magnetics.flux_kernel import (
+    circuit_current,
+    circuit_gaps,
+    circuit_heat,
+    circuit_settle,
+    circuit_step,
+    stack,
+)
+from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES, STOPS
 from klack.magnetics.map_kernel import map_current, map_step
 
 __all__ = [
@@ -28,6 +35,7 @@ __all__ = [
     "piece_advance",
     "piece_current",
     "piece_gaps",
+    "piece_settle",
     "piece_to_current",
 ]
 
@@ -185,3 +193,15 @@ def next_state(
     elif when == 3.0:
         clock = cycle + value
     return par[s + 2], max(clock, entered), clock if par[s + 3] != 0.0 else cycle
+
+
+@inner(error_model="numpy", forceinline=True)
+def piece_settle(
+    par: Any, at: int, hints: Any, phi: Any, end: Any, is_open: bool, move: Any
+) -> tuple[float, float]:
+    """Let fluxes spread among loops without eddy currents: energy released, heat of hysteresis."""
+    released = circuit_settle(par, at, hints, phi, end, is_open, move)
+    heat = 0.0
+    if released > 0.0 and par[at + STOPS] != 0.0:
+        heat = circuit_heat(par, at, hints, phi, move)
+    return released, heat

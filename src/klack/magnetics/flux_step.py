@@ -46,9 +46,10 @@ from klack.magnetics.flux_pieces import (
     piece_advance,
     piece_current,
     piece_gaps,
+    piece_settle,
     piece_to_current,
 )
-from klack.magnetics.flux_table import MAP, MOST_TUBES, STOPS, circuit_numbers
+from klack.magnetics.flux_table import MAP, MOST_TUBES, SETTLES, STOPS, circuit_numbers
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.map_kernel import map_energy, map_force, map_numbers
 from klack.magnetics.output_stage import START_VOLTAGE
@@ -62,6 +63,7 @@ __all__ = [
     "BOOKS",
     "CHANNELS",
     "FAILURES",
+    "FLUXES",
     "HYSTERESIS",
     "flux_numbers",
     "flux_rows",
@@ -106,6 +108,8 @@ _MAP_ADVICE = (
 
 _TUBES = MOST_TUBES
 _FRONT, _DIODE = FRONT, DIODE
+FLUXES = FRONT
+"""Number of the first loop flux among the states."""
 _MAP = MAP
 _HEADER = 8
 
@@ -144,8 +148,18 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     per_step = 1.0 / h if h > 0.0 else 0.0
     speed = (x1 - x0) * per_step
     close = 1e-9 * h + 1e-15 * abs(t)
-    if h <= 0.0:
+    settles = par[at + SETTLES] != 0.0
+    spread, settled = stack(out, 6), stack(out, 6)
+    if h <= 0.0 or settles:
         piece_gaps(par, at, hints, x0, x0, middle, final, slope)
+    if h > 0.0 and settles:
+        released, heat = piece_settle(par, at, hints, phi, final, is_open, spread)
+        eddy += released
+        hysteresis += heat
+        for j in range(loops):
+            phi[j] += spread[j]
+        if is_open:
+            pulse += linked(par, at, spread)
     while done < h:
         now = t + done
         block = state_block(par, drive, int(mode))
@@ -254,6 +268,23 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if stops > 0:
             hysteresis += circuit_heat(par, at, hints, phi, change)
         push += force * piece
+        if settles:
+            opens = is_open or which == DIODE_BLOCKS
+            for j in range(loops):
+                settled[j] = phi[j] + change[j]
+            released, warmed = piece_settle(par, at, hints, settled, final, opens, spread)
+            if released > 0.0:
+                eddy += released
+                hysteresis += warmed
+                for j in range(loops):
+                    settled[j] += spread[j]
+                    change[j] += spread[j]
+                if is_open:
+                    pulse += linked(par, at, spread)
+                if not opens:
+                    for j in range(loops):
+                        spread[j] = 0.0 * spread[j]
+                    end = piece_current(par, at, hints, settled, spread, final)
         curve = 0.0
         if last == piece:
             curve = per_time
@@ -358,6 +389,7 @@ def flux_rows(
     base: int,
     current: float = 0.0,
     gap_range: GapRange | None = None,
+    channels: tuple[Channel, ...] = (),
 ) -> None:
     """Add a solenoid to the rows of a network.
 
@@ -381,6 +413,8 @@ def flux_rows(
         with remanence.
     gap_range : GapRange, optional
         That of the tables of the plant by default.
+    channels : tuple of Channel
+        Recorded besides.
 
     Raises
     ------
@@ -403,7 +437,7 @@ def flux_rows(
         state=state,
         at_rest=at_rest if np.any(state[_FRONT:]) else None,
         books=(*books, HYSTERESIS) if parameters[_HEADER + STOPS] else books,
-        channels=stage_channels(state.size) if staged else CHANNELS,
+        channels=(*(stage_channels(state.size) if staged else CHANNELS), *channels),
         failures=FAILURES,
         state_names={
             _FRONT + j: (f"flux of loop {j + 1}", "Wb")

@@ -28,9 +28,11 @@ __all__ = [
     "MAP",
     "MOST_STOPS",
     "MOST_TUBES",
+    "SETTLES",
     "STOPS",
     "circuit_numbers",
     "current_weights",
+    "free_directions",
 ]
 
 Vector = NDArray[np.float64]
@@ -52,6 +54,9 @@ MOST_STOPS = 64
 
 STOPS = 8
 """Number of the header that counts the stops."""
+
+SETTLES = 9
+"""Number of the header that says where the directions without eddy currents stand; 0: none."""
 
 CLOSE = 1e-8
 """Newton step, over the flux at which the iron's curve ends, that leaves round-off: its square."""
@@ -108,12 +113,13 @@ def current_weights(circuit: MagneticCircuit) -> Vector:
 def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     """Flat circuit for :mod:`klack.magnetics.flux_kernel`.
 
-    ``[loops, tubes, most iterations (1 if linear), main tube, sign of its flux, accepted change of
-    a loop flux, whether two loops share one gap, whether it is a map, number of stops, 3 spare]``,
-    the turns of each loop, then per tube ``eddy, reluctance, remanence, gap table, iron table,
-    weight in the current, table of stops, its first stop`` and its row of loops, then the tables
-    (of stops: :mod:`klack.magnetics.stop_kernel`).  Offsets of tables count from the start; 0 says
-    that there is none.
+    ``[loops, tubes, most iterations (1 if linear), main tube, sign of its flux, accepted change
+    of a loop flux, whether two loops share one gap, whether it is a map, number of stops, table
+    of directions without eddy currents (:func:`free_directions`), 2 spare]``, the turns of each
+    loop, then per tube ``eddy, reluctance, remanence, gap table, iron table, weight in the
+    current, table of stops, its first stop`` and its row of loops, then the tables (of stops:
+    :mod:`klack.magnetics.stop_kernel`). Offsets of tables count from the start; 0 says that
+    there is none.
     """
     tubes, main, sign = _tubes(circuit)
     if len(tubes) > MOST_TUBES:
@@ -165,7 +171,25 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
             offset += len(parts)
         numbers = [tube.eddy, tube.reluctance, tube.remanence, *starts, tube.weight, *hysteresis]
         blocks.append(np.concatenate((numbers, tube.row)))
+    directions = free_directions(circuit)
+    touched = [tube for tube in tubes if np.any(np.abs(directions @ tube.row) > _SAFE)]
+    if any(tube.gap.size or tube.iron.size or tube.remanence for tube in touched):
+        head[SETTLES] = offset  # else they always balance
+        tables.append(np.append(float(directions.shape[0] - 1), directions.ravel()))
     return np.concatenate((head, circuit.loop_turns, *blocks, *tables))
+
+
+def free_directions(circuit: MagneticCircuit) -> Vector:
+    """Changes of the loop fluxes that no eddy term opposes, shape (k, n_loops).
+
+    The last one changes the linkage of the coil, the ones before it do not.
+    """
+    C, n = circuit.loops.astype(float), circuit.loop_turns
+    values, vectors = np.linalg.eigh(C.T @ (circuit.eddy[:, None] * C))
+    null = vectors[:, values <= _SAFE * values[-1]] if values[-1] > 0.0 else np.eye(n.size)
+    along = null.T @ n
+    q, _ = np.linalg.qr(np.column_stack((along, np.eye(along.size))))
+    return np.asarray((null @ np.column_stack((q[:, 1:], q[:, :1]))).T)
 
 
 def _tubes(circuit: MagneticCircuit) -> tuple[list[_Tube], int, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from typing import ClassVar, Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
@@ -10,6 +11,8 @@ from klack.input.problem import CaseProblem
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_step import flux_rows
+from klack.magnetics.map_choice import MapFile
+from klack.magnetics.map_file import MapTable
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
@@ -18,6 +21,7 @@ from klack.units import Current, Flux, Force, Length, Resistance, Temperature
 
 __all__ = ["ForceMapSolenoid"]
 
+_TABLE = ("current", "gaps", "linkage", "force")
 _BEYOND = 0.02  # of the largest current: a driver that limits it there overshoots a little
 
 
@@ -31,7 +35,10 @@ class ForceMapSolenoid(Component):
     nor loses energy; see :class:`~klack.magnetics.flux_map.FluxMap`.  A force table is compared
     with that, and a disagreement above 5 % of its peak is warned of.
 
-    The table must hold every gap that the stops allow, and every current: beyond the last current
+    The table stands in the case or in a file of a finite-element program
+    (:class:`~klack.magnetics.map_choice.MapFile`).
+
+    It must hold every gap that the stops allow, and every current: beyond the last current
     the linkage continues linearly, with a warning.
 
     Limits: static map, so no eddy currents and no hysteresis; use
@@ -53,10 +60,20 @@ class ForceMapSolenoid(Component):
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."
     )
-    current: tuple[Current, ...] = Field(min_length=2, description="Currents, increasing from 0.")
-    gaps: tuple[Length, ...] = Field(min_length=3, description="Gaps of the table, increasing.")
-    linkage: tuple[tuple[Flux, ...], ...] = Field(
-        description="Flux linkage of the coil: one row per current, one value per gap."
+    map: MapFile | None = Field(
+        default=None,
+        description="Map from a file of FEMM, JMAG, Ansys Maxwell or another program; otherwise "
+        "current, gaps and linkage.",
+    )
+    current: tuple[Current, ...] | None = Field(
+        default=None, min_length=2, description="Currents, increasing from 0."
+    )
+    gaps: tuple[Length, ...] | None = Field(
+        default=None, min_length=3, description="Gaps of the table, increasing."
+    )
+    linkage: tuple[tuple[Flux, ...], ...] | None = Field(
+        default=None,
+        description="Flux linkage of the coil: one row per current, one value per gap.",
     )
     force: tuple[tuple[Force, ...], ...] | None = Field(
         default=None, description="Force, negative where it closes the gap; compared only."
@@ -67,34 +84,70 @@ class ForceMapSolenoid(Component):
 
     @model_validator(mode="after")
     def _usable(self) -> Self:
-        for name in ("linkage", "force"):
-            table = getattr(self, name)
-            widths = {len(row) for row in table} if table is not None else {len(self.gaps)}
-            if widths != {len(self.gaps)} or (table and len(table) != len(self.current)):
-                raise CaseProblem(
-                    (name,),
-                    got=f"{len(table)} rows of {sorted(widths)} values",
-                    expected=f"a {name} for each of {len(self.current)} currents (rows) and "
-                    f"{len(self.gaps)} gaps",
-                    hint="write one row per current, with one value per gap.",
-                )
+        if self.map is not None:
+            self._refuse_with(_TABLE, "map", "the file has it")
+        else:
+            self._whole_table()
+        table = self.table()
         try:
-            FluxMap.of(current=self.current, gap=self.gaps, linkage=self.linkage, force=self.force)
+            FluxMap.of(
+                current=table.current, gap=table.gap, linkage=table.linkage, force=table.force
+            )
         except InputError as error:
             raise CaseProblem(
-                ("linkage",), got=error.got, expected=error.expected, hint=error.hint
+                ("linkage",) if self.map is None else ("map", "file"),
+                got=error.got,
+                expected=error.expected,
+                hint=error.hint,
             ) from None
         return self
 
+    def _whole_table(self) -> None:
+        """Refuse a table in the case that lacks a part."""
+        for name in _TABLE[:3]:
+            if getattr(self, name) is None:
+                raise CaseProblem(
+                    (),
+                    got=f"neither '{name}' nor 'map'",
+                    expected="a map from a file, or current, gaps and linkage",
+                    hint=f"add {name}, or map: {{file: map.csv}}.",
+                )
+        count, width = len(self.current or ()), len(self.gaps or ())
+        for name in _TABLE[2:]:
+            table = getattr(self, name)
+            widths = {len(row) for row in table} if table is not None else {width}
+            if widths != {width} or (table and len(table) != count):
+                raise CaseProblem(
+                    (name,),
+                    got=f"{len(table)} rows of {sorted(widths)} values",
+                    expected=f"a {name} for each of {count} currents (rows) and {width} gaps",
+                    hint="write one row per current, with one value per gap.",
+                )
+
+    def table(self) -> MapTable:
+        """Return the table of the case or of the file."""
+        if self.map is not None:
+            return self.map.table()
+        return MapTable(
+            current=np.array(self.current),
+            gap=np.array(self.gaps),
+            linkage=np.array(self.linkage),
+            force=None if self.force is None else np.array(self.force),
+        )
+
     def flux_map(self) -> FluxMap:
         """Return the energy surface."""
-        return FluxMap.of(current=self.current, gap=self.gaps, linkage=self.linkage, force=None)
+        return self._map_of(self.table())
+
+    def _map_of(self, table: MapTable) -> FluxMap:
+        return FluxMap.of(current=table.current, gap=table.gap, linkage=table.linkage, force=None)
 
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
+        table = self.table()
         flux_rows(
             rows,
-            self.flux_map(),
+            self._map_of(table),
             resistance=warm_resistance(self.resistance, self.winding_temperature),
             driver=driver_of(rows, "terminals"),
             gap=self.gap,
@@ -103,7 +156,7 @@ class ForceMapSolenoid(Component):
             base=rows.port("base"),
             current=self.start_current,
         )
-        most = max(self.current)
+        most = float(table.current[-1])
         rows.limits.append(
             LimitRow(
                 component=rows.component,

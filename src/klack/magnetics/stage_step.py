@@ -42,8 +42,9 @@ from klack.magnetics.flux_pieces import (
     next_state,
     piece_current,
     piece_gaps,
+    piece_settle,
 )
-from klack.magnetics.flux_table import MAP, MOST_TUBES, STOPS
+from klack.magnetics.flux_table import MAP, MOST_TUBES, SETTLES, STOPS
 from klack.magnetics.map_kernel import map_energy, map_force, map_step
 from klack.magnetics.output_stage import STAGE_HEADER, STAGE_ROW, recharged
 from klack.magnetics.quiet_step import DIODE, FRONT, allowed_bend
@@ -225,8 +226,18 @@ def stage_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     per_step = 1.0 / h if h > 0.0 else 0.0
     speed = (x1 - x0) * per_step
     close = 1e-9 * h + 1e-15 * abs(t)
-    if h <= 0.0:
+    settles = par[at + SETTLES] != 0.0
+    spread, settled = stack(out, 6), stack(out, 6)
+    if h <= 0.0 or settles:
         piece_gaps(par, at, hints, x0, x0, middle, final, slope)
+    if h > 0.0 and settles:
+        released, heat = piece_settle(par, at, hints, phi, final, is_open, spread)
+        eddy += released
+        hysteresis += heat
+        for j in range(loops):
+            phi[j] += spread[j]
+        if is_open:
+            pulse += linked(par, at, spread)
     while done < h:
         now = t + done
         block, path = state_block(par, drive, int(mode)), _path(stage, mode)
@@ -355,6 +366,23 @@ def stage_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if stops > 0:
             hysteresis += circuit_heat(par, at, hints, phi, change)
         push += force * piece
+        if settles:
+            opens = is_open or which == DIODE_BLOCKS
+            for j in range(loops):
+                settled[j] = phi[j] + change[j]
+            released, warmed = piece_settle(par, at, hints, settled, final, opens, spread)
+            if released > 0.0:
+                eddy += released
+                hysteresis += warmed
+                for j in range(loops):
+                    settled[j] += spread[j]
+                    change[j] += spread[j]
+                if is_open:
+                    pulse += linked(par, at, spread)
+                if not opens:
+                    for j in range(loops):
+                        spread[j] = 0.0 * spread[j]
+                    end = piece_current(par, at, hints, settled, spread, final)
         curve = 0.0
         if last == piece:
             curve = per_time

@@ -71,6 +71,7 @@ COMPONENTS = (
     ("gas-face", "klack.pneumatics.gas_face.GasFace"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
+    ("magnetic-network", "klack.magnetics.magnetic_network.MagneticNetwork"),
     ("force-map-solenoid", "klack.magnetics.force_map_solenoid.ForceMapSolenoid"),
     ("voltage-step", "klack.magnetics.voltage_step.VoltageStep"),
     ("voltage-table", "klack.magnetics.voltage_table.VoltageTable"),

@@ -189,7 +189,7 @@ def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
     if part.type in ("pressure-face", "gas-face", "land-face"):
         inner = 0.4 if part.type == "land-face" else 1.0
         return _face(getattr(part, "direction", "") == "closing", inner)
-    if part.type in ("solenoid", "force-map-solenoid"):
+    if part.type in ("solenoid", "magnetic-network", "force-map-solenoid"):
         return _magnet(part)
     if part.type == "constant-force":
         upward = float(getattr(part, "force", 0.0)) >= 0.0

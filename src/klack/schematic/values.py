@@ -22,6 +22,7 @@ _MAIN: Mapping[str, tuple[str, ...]] = {
     "peak-hold": ("boost_voltage", "peak_current", "supply_voltage", "hold_current", "end"),
     "boost-driver": ("capacitance", "boost_voltage", "peak_current", "hold_current"),
     "solenoid": ("turns", "resistance", "gap", "residual_gap", "start_current"),
+    "magnetic-network": ("resistance", "gap", "start_current"),
     "force-map-solenoid": ("resistance", "gap", "start_current"),
     "two-point": ("voltage", "upper", "lower", "end"),
     "pwm": ("voltage", "period", "duty", "end"),
@@ -43,6 +44,7 @@ _AT_START: Mapping[tuple[str, str], str] = {
     ("end-stop", "gap"): "gap(0)",
     ("rubber-stop", "gap"): "gap(0)",
     ("solenoid", "gap"): "gap(0)",
+    ("magnetic-network", "gap"): "gap(0)",
     ("force-map-solenoid", "gap"): "gap(0)",
     ("seat", "lift"): "lift(0)",
     ("rigid-mass", "speed"): "v(0)",
@@ -50,6 +52,7 @@ _AT_START: Mapping[tuple[str, str], str] = {
     ("spring", "preload"): "F(0)",
     ("surging-spring", "preload"): "F(0)",
     ("solenoid", "start_current"): "i(0)",
+    ("magnetic-network", "start_current"): "i(0)",
     ("force-map-solenoid", "start_current"): "i(0)",
 }
 """Symbols of the keys that give the state at the start, by type and key."""

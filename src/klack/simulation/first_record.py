@@ -36,7 +36,8 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
     -------
     acting : array
         Forces of elements [N], flows of branches [kg/s], contact and film force of every
-        interface [N], those of sliders [N], then the sums of each interface [N].
+        interface [N], those of sliders [N], then the sums of each interface [N], and the forces of
+        driven bodies [N].
     states : array
         Recorded states of elements, then of branches.
     """
@@ -46,11 +47,18 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
         for k, row in enumerate(rows.elements)
     ]
     flows = branches.outputs[branches.output0[:-1]]
-    pressing = _interfaces(network, speeds, h)
+    pressing, friction = _interfaces(network, speeds, h), _sliders(network, speeds)
     states = [*_states(elements, rows.elements), *_states(branches, rows.branches)]
     return (
         np.concatenate(
-            [*forces, flows, pressing.ravel(), _sliders(network, speeds), pressing.sum(axis=1)]
+            [
+                *forces,
+                flows,
+                pressing.ravel(),
+                friction,
+                pressing.sum(axis=1),
+                _drives(network, pressing.sum(axis=1), friction),
+            ]
         ),
         np.array(states, dtype=float),
     )
@@ -89,3 +97,25 @@ def _sliders(network: CompiledNetwork, speeds: Vector) -> Vector:
     dry = at.coulomb + at.excess * np.exp(-((speed / at.stribeck) ** 2))
     force = -np.sign(speed) * dry - at.viscous * speed
     return np.column_stack([force, -force]).ravel()
+
+
+def _drives(network: CompiledNetwork, pressing: Vector, friction: Vector) -> Vector:
+    """Force [N] of every driven body: minus the sum of what acts on its ports."""
+    bodies, nodes = network.bodies, network.nodes
+    if bodies.driven == 0:
+        return np.zeros(0)
+    force = np.zeros(bodies.ports + 1)  # the ground last
+    for data in (network.elements, network.branches):
+        for k in range(data.rows):
+            q0, q1, o0 = data.port0[k], data.port0[k + 1], data.output0[k] + data.head
+            np.add.at(force, data.ports[q0:q1], data.outputs[o0 : o0 + q1 - q0])
+    pressure = network.node_state.p[nodes.wall_node]
+    np.add.at(force, nodes.wall_port, nodes.wall_area * (pressure - nodes.ambient))
+    np.add.at(force, network.interfaces.upper, pressing)
+    np.add.at(force, network.interfaces.lower, -pressing)
+    np.add.at(force, network.sliders.upper, friction[0::2])
+    np.add.at(force, network.sliders.lower, friction[1::2])
+    return np.array(
+        [-np.sum(force[bodies.port0[k] : bodies.port1[k]]) for k in bodies.driven_block],
+        dtype=float,
+    )

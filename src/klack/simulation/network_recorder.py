@@ -127,7 +127,7 @@ class Recorder:
         self._fine: list[list[Matrix]] = [[] for _ in range(count)]
         self._room = [_MOST_FINE] * count
         self._complete = [True] * count
-        self._begun = False
+        self._begun = self._driving = False
         self.looked = 0
 
     def begin(self) -> None:
@@ -154,11 +154,16 @@ class Recorder:
         ----------
         acting : array
             Forces of elements [N], flows [kg/s], forces of interfaces and of sliders [N], then
-            peaks of interfaces [N].
+            peaks of interfaces [N] and forces of driven bodies [N]; a state of an earlier version
+            lacks the last.
         states : array, optional
             Recorded states of elements, then of branches; those that the rows hold by default.
         """
-        self._means[:, 0], self._peaks[:, 0] = np.split(acting, [len(self.means)])
+        means, peaks = len(self.means), len(self.peaks)
+        self._means[:, 0], self._peaks[:, 0], drives = np.split(acting, [means, means + peaks])
+        if self._driven and drives.size:
+            self._points[-self._driven :, 0] = drives
+            self._driving = True
         if states is not None:
             end = len(self.points) - len(self._fine) - self._driven
             self._points[end - len(states) : end, 0] = states
@@ -175,7 +180,8 @@ class Recorder:
 
     def last(self, records: int) -> Vector:
         """Return the first values of a continued run: see :meth:`first`."""
-        return np.concatenate([self._means[:, records], self._peaks[:, records]])
+        drives = self._points[len(self.points) - self._driven :, records]
+        return np.concatenate([self._means[:, records], self._peaks[:, records], drives])
 
     def take(self, time: Vector, finder: ImpactFinder) -> None:
         """Take over a chunk of as many looks as there are times [s]."""
@@ -200,7 +206,7 @@ class Recorder:
         ):
             if columns is not self.points and not self._begun:  # state of an earlier version
                 values[:, 0] = values[:, 1]
-            if columns is self.points and self._driven and records:  # none before the first step
+            if columns is self.points and self._driven and records and not self._driving:
                 values[-self._driven :, 0] = values[-self._driven :, 1]
             for column, row in zip(columns, values, strict=True):
                 result[column.name] = ChannelData(unit=column.unit, values=row[: records + 1])

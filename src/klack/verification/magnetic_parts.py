@@ -3,10 +3,12 @@
 from klack.verification.check import Check
 from klack.verification.hysteresis_loops import hysteresis_loops
 from klack.verification.magnets_in_circuits import magnets_in_circuits
+from klack.verification.maps_from_files import maps_from_files
+from klack.verification.networks_of_tubes import networks_of_tubes
 
 __all__ = ["checks"]
 
 
 def checks() -> list[Check]:
     """Return all checks of the group."""
-    return [*hysteresis_loops(), *magnets_in_circuits()]
+    return [*hysteresis_loops(), *magnets_in_circuits(), *maps_from_files(), *networks_of_tubes()]

@@ -1,0 +1,150 @@
+"""A magnetic network of one's own: elements between magnetic nodes, a coil and an armature."""
+
+from collections.abc import Mapping
+from typing import ClassVar, Literal, Self
+
+from pydantic import Field, model_validator
+
+from klack.errors import InputError
+from klack.input.problem import CaseProblem
+from klack.input.section import Name
+from klack.magnetics.circuit import MagneticCircuit
+from klack.magnetics.driver import driver_of
+from klack.magnetics.flux_step import FLUXES, flux_rows
+from klack.magnetics.flux_table import circuit_numbers
+from klack.magnetics.gap_range import GapRange
+from klack.magnetics.network_elements import MovingGap, NetworkElement, WorkingGaps
+from klack.magnetics.network_loops import circuit_of_network, loop_names
+from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.network.component import Component
+from klack.network.port import COIL, ELEMENT, Port
+from klack.network.rows import Channel, Rows
+from klack.units import Current, Length, Resistance, Temperature
+
+__all__ = ["MagneticNetwork"]
+
+
+class MagneticNetwork(Component):
+    r"""Coil and armature with a magnetic circuit of one's own.
+
+    Elements join magnetic nodes, which have no names beyond those in ``between``.  The fluxes into
+    each node add up to zero, the magnetomotive forces round each closed path too:
+
+    .. math::
+
+        \sum_{b \in \text{path}} \pm\bigl[\Theta_b(\varphi_b, x) - \Theta_{0,b}
+            + S_b\dot\varphi_b - N_b i\bigr] = 0, \qquad
+        u = R i + \sum_b N_b \dot\varphi_b, \qquad
+        F = -\tfrac12\sum_b R_b'(x)\,\varphi_b^2 .
+
+    The force is the slope of the co-energy at constant current, and of the energy at constant
+    fluxes.  All elements ``coil`` are in series in one circuit with its driver; windings closed
+    through a resistance (``shorted-coil``) and with a constant current (``bias-coil``) are coupled
+    to it by the fluxes they share, which is their mutual inductance.
+
+    A coil must drive some loop without eddy currents, its leakage; otherwise its current would
+    jump with the voltage.
+
+    Limits: one circuit with a driver, one moving direction, at most 6 independent loops.
+    Sources: Roters 1941; Woodson & Melcher 1968; loops by a spanning tree, Kirchhoff 1847.
+    """
+
+    type: ClassVar[str] = "magnetic-network"
+    ports: ClassVar[Mapping[str, Port]] = {
+        "armature": ELEMENT,
+        "base": Port("mechanical", ELEMENT.role, optional=True),
+        "terminals": COIL,
+    }
+
+    resistance: Resistance = Field(gt=0, description="Of coils and harness, at 20 degC.")
+    winding_temperature: Temperature = Field(
+        default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
+    )
+    gap: Length = Field(gt=0, description="Working gap at the start, without residual gaps.")
+    closes: Literal["upward", "downward"] = Field(
+        default="upward", description="Armature motion that closes the gap; upward opens a valve."
+    )
+    elements: Mapping[Name, NetworkElement] = Field(
+        min_length=2, description="Elements by name, each between two magnetic nodes."
+    )
+    start_current: Current = Field(
+        default=0.0, ge=0, description="Steady current before the start: holding."
+    )
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        kinds = {element.kind for element in self.elements.values()}
+        for kind, words in (("coil", "a coil"), (None, "a gap that moves: kind: pole or face")):
+            if kind not in kinds and (kind or not self._moving()):
+                raise CaseProblem(
+                    ("elements",),
+                    got=f"elements of the kinds {', '.join(sorted(kinds))}",
+                    expected=words,
+                    hint="add it, with the nodes that it lies between.",
+                )
+        low, high = self.gap_range().valid
+        if not low <= self.gap <= high:
+            raise CaseProblem(
+                ("gap",),
+                got=f"{self.gap:g} m",
+                expected=f"{low:g} to {high:g} m, in which all gaps are open",
+                hint="check gap and opens_from.",
+            )
+        try:
+            circuit_numbers(self.circuit())
+        except InputError as error:
+            raise CaseProblem(
+                ("elements",), got=error.got, expected=error.expected, hint=error.hint
+            ) from None
+        return self
+
+    def circuit(self) -> MagneticCircuit:
+        """Return the magnetic circuit; its ``x`` is the working gap without residual gaps."""
+        gaps = WorkingGaps(start=self.gap, usable=self.gap_range().usable)
+        tubes = [tube for name, part in self.elements.items() for tube in part.tubes(name, gaps)]
+        return circuit_of_network(tubes, next(iter(self._moving())), self.gap)
+
+    def gap_range(self) -> GapRange:
+        """Working gaps [m] at which every moving gap is open and narrower than its face.
+
+        A contact that gives way closes some of a residual gap as well: warned of from a quarter,
+        at half of it the run stops.
+        """
+        moving = self._moving().values()
+        bounds = [part.bounds(self.gap) for part in moving]
+        low, high = max(a for a, _ in bounds), min(b for _, b in bounds)
+        residual = min(part.residual_gap for part in moving)
+        closed_above = any(part.opens_from is not None for part in moving)
+        closed_below = any(part.opens_from is None for part in moving)
+        beyond = high - low
+        return GapRange(
+            valid=(low, high),
+            slack=0.25 * residual,
+            usable=(
+                low - (0.5 * residual if closed_below else beyond),
+                high + (0.5 * residual if closed_above else beyond),
+            ),
+        )
+
+    def add_rows(self, rows: Rows) -> None:
+        """Add the coil with its driver."""
+        circuit = self.circuit()
+        flux_rows(
+            rows,
+            circuit,
+            resistance=warm_resistance(self.resistance, self.winding_temperature),
+            driver=driver_of(rows, "terminals"),
+            gap=self.gap,
+            closing=self.closes == "upward",
+            armature=rows.port("armature"),
+            base=rows.port("base"),
+            current=self.start_current,
+            gap_range=self.gap_range(),
+            channels=tuple(
+                Channel(f"flux of {name}", "Wb", FLUXES + k)
+                for k, name in enumerate(loop_names(circuit))
+            ),
+        )
+
+    def _moving(self) -> dict[str, MovingGap]:
+        return {name: e for name, e in self.elements.items() if isinstance(e, MovingGap)}
