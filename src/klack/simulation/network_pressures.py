@@ -41,6 +41,7 @@ _MASS_LEFT = 1e-8  # of what a volume holds: that change of a flow over the step
 _LEAST_THETA = 0.51  # what the implicit step loses outweighs what the curved law could give back
 _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
+_SAME_INTERVAL = 12  # iterations with it
 _MOST_OF = 0.9  # longest step within this interval
 _NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
 
@@ -336,9 +337,13 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
         target = rho[i] + trial.slope[i] * r[i] / theta
         large = abs(r[i]) > _LARGE_STEP * p[i]
         if iteration >= _PLAIN_NEWTON:
-            if iteration == _PLAIN_NEWTON:
-                lower[i], upper[i] = 0.0, np.inf
+            if (iteration - _PLAIN_NEWTON) % _SAME_INTERVAL == 0:
+                lower[i], upper[i] = 0.0, np.inf  # the other volumes may have moved the root
+            wanted = target
             target, lower[i], upper[i] = bracketed(target, rho[i], lower[i], upper[i])
+            if target != wanted:
+                # a step that a narrow interval made short has found no balance
+                worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
             large = True
         if large:
             # boiling: the density takes the step, the pressure follows it
