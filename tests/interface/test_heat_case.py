@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import klack
 from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
 from klack.analyses.heat.log import HEAT_LOG
 from klack.analyses.heat.run import run_heat
@@ -278,6 +279,16 @@ def test_a_stopped_warm_up_resumes_with_the_same_numbers(tmp_path, monkeypatch):
 
 def HEAT_LOG_KEYS(folder: Path) -> list[str]:
     return (folder / HEAT_LOG.file).read_text().splitlines()[1:]
+
+
+def test_a_notebook_soaks_a_valve(tmp_path):
+    path = tmp_path / "small.yaml"
+    path.write_text(SMALL, encoding="utf-8")
+
+    found = klack.run_heat(path, soak=[273.15, 323.15])
+
+    assert found.json["temperature_K"] == {"valve": [273.15, 323.15]}
+    assert "closing delay" in found._repr_html_()
 
 
 def test_a_current_that_does_not_end_is_a_doubt():
