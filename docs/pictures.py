@@ -10,7 +10,8 @@ Of two results of ``klack impact CASE --level reduced,interface,full`` with the
 same two cases comes levels.svg.
 
 Of ``klack calibrate measured --measurement cases/measured/strokes_synthetic.csv`` comes
-calibration.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg.
+calibration.svg, of ``klack noise demo-stroke --variant wet,dry`` click.svg, of ``klack heat
+warm-valve`` warm-up.svg.
 
 Of ``klack stroke`` of a copy of ``docs/how-to/guided_stroke.yaml`` with ``placement: {seed: 4}``,
 without ``shots`` and with ``run: {duration: 0.8 ms, variants: [wet]}`` come off-axis-line-load.svg
@@ -23,6 +24,8 @@ from pathlib import Path
 
 from klack.analyses.calibration.analysis import CALIBRATION
 from klack.analyses.calibration.figures import stroke_chart as calibration_chart
+from klack.analyses.heat.analysis import HEAT
+from klack.analyses.heat.figures import heat_charts
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.figures import force_chart
 from klack.analyses.impact.pressure_figure import draw_pressure
@@ -60,6 +63,9 @@ def main(results: list[Path]) -> None:
         if form == NOISE.form.name:
             chart = click_charts(NOISE.load(result))[0]
             (IMAGES / "click.svg").write_bytes(svg_chart(chart))
+            continue
+        if form == HEAT.form.name:
+            (IMAGES / "warm-up.svg").write_bytes(svg_chart(heat_charts(HEAT.load(result))[0]))
             continue
         impact = IMPACT.load(result)
         if {"interface", "full"} <= impact.levels.keys():

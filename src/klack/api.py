@@ -48,6 +48,7 @@ __all__ = [
     "load_result",
     "noise_of",
     "optimise",
+    "run_heat",
     "run_impact",
     "run_many",
     "run_shots",
@@ -364,6 +365,26 @@ def run_stroke(
     checked = _of_kind(case, ValveCase, "a whole valve")
     wanted = checked.require_variants(tuple(variants) if variants else checked.run.variants)
     return Result(run(checked, variants=wanted, progress=progress, threads=threads), STROKE)
+
+
+def run_heat(
+    case: Given,
+    variant: str | None = None,
+    *,
+    soak: Sequence[float] = (),
+    progress: Progress = silent,
+    threads: int | None = None,
+) -> Result:
+    """Warm a valve up by its strokes, or ``soak`` it at temperatures [K].
+
+    See :func:`klack.analyses.heat.run.run_heat`.
+    """
+    from klack.analyses.heat.analysis import HEAT
+    from klack.analyses.heat.run import run_heat as run
+
+    checked = _of_kind(case, ValveCase, "a whole valve")
+    record = run(checked, variant=variant, soak=soak, progress=progress, threads=threads)
+    return Result(record, HEAT)
 
 
 def run_many(

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import klack
 from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
 from klack.analyses.heat.log import HEAT_LOG
 from klack.analyses.heat.run import run_heat
+from klack.analyses.heat.summary import answer
 from klack.analyses.heat.warm_valve import aspects_of, warm_valve
 from klack.analyses.stroke.run import one_variant
 from klack.assembling.valve import Valve, build_valve
@@ -220,7 +222,10 @@ def test_a_fluid_beyond_its_range_is_taken_from_the_end_with_a_doubt():
     warm = warm_valve(valve, {a: hot for a in aspects_of(valve.case)})
 
     assert warm.valve.network.fluid.temperature == pytest.approx(373.15)
-    assert "'DOT 4' at 127.0 °C: its properties are known from -40 to 100 °C" in warm.doubts[0]
+    assert (
+        "'DOT 4' is known from -40 to 100 °C: beyond that its properties at 100 °C"
+        in warm.doubts[0]
+    )
 
 
 def test_a_fluid_of_fixed_numbers_does_not_follow_and_says_so():
@@ -276,12 +281,24 @@ def HEAT_LOG_KEYS(folder: Path) -> list[str]:
     return (folder / HEAT_LOG.file).read_text().splitlines()[1:]
 
 
+def test_a_notebook_soaks_a_valve(tmp_path):
+    path = tmp_path / "small.yaml"
+    path.write_text(SMALL, encoding="utf-8")
+
+    found = klack.run_heat(path, soak=[273.15, 323.15])
+
+    assert found.json["temperature_K"] == {"valve": [273.15, 323.15]}
+    assert "closing delay" in found._repr_html_()
+
+
 def test_a_current_that_does_not_end_is_a_doubt():
     case = read(
         ("end: 4 ms, decay: 30 V", "end: 6.9 ms, decay: 1 V"), ("duration: 1 s", "duration: 20 ms")
     )
 
-    assert any("A at the end of the stroke" in text for text in run_heat(case).warnings)
+    assert any(
+        "coil current does not end with the stroke" in text for text in run_heat(case).warnings
+    )
 
 
 def test_a_node_that_one_stroke_warms_noticeably_is_a_doubt():
@@ -315,3 +332,30 @@ def test_strokes_in_which_the_valve_does_not_open_are_a_doubt():
     opening = next(x.values for x in study.numbers if x.name == "opening delay")
     assert np.isfinite(opening).tolist() == [True, False]
     assert any("1 of 2 strokes have no opening delay" in text for text in study.warnings)
+
+
+def test_copper_at_a_held_current_runs_away_and_says_so():
+    """The current is held whatever the resistance; truth: its gain alpha P / G is above 1."""
+    case = read(
+        ("  duration: 1 s\n", ""),
+        ("capacity: 0.02 J/K", "capacity: 2 J/K"),
+        ("conductance: 0.025 W/K", "conductance: 0.012 W/K"),
+        ("tolerance: 20 mK", "tolerance: 0.2 K"),
+        (
+            "gap: 100 um, law: {kind: linear, stiffness: 1e8",
+            "gap: 100 um, law: {kind: linear, stiffness: 1e9",
+        ),
+        (
+            "{type: voltage-step, voltage: 12 V, end: 4 ms, decay: 30 V}",
+            "{type: two-point, voltage: 60 V, upper: 4.1 A, lower: 3.9 A, end: 4 ms, decay: 30 V}",
+        ),
+    )
+
+    study = run_heat(case)
+
+    assert study.end == "runaway"
+    power = study.heat[0].values
+    rise = study.temperature[0].values - study.temperature[0].values[0]
+    assert study.gain == pytest.approx((power[-1] - power[-2]) / (rise[-1] - rise[-2]) / 0.012)
+    assert study.gain > 1.0
+    assert "thermal runaway: there is no steady state" in answer(study)

@@ -125,8 +125,8 @@ def _still_driven(result: NetworkResult) -> tuple[str, ...]:
             size = np.abs(channel.values)
             if size[-1] > _LEFT * size.max() > 0.0:
                 found.append(
-                    f"{name}: {size[-1]:.3g} A at the end of the stroke; its heat from there to "
-                    "the next stroke is missing. Give a longer run.duration, or let the driver end."
+                    f"{name} does not end with the stroke: its heat from there to the next stroke "
+                    "is missing. Give a longer run.duration, or let the driver end."
                 )
     return tuple(found)
 

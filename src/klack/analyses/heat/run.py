@@ -48,7 +48,7 @@ class _Strokes:
     log: HeatLog
     progress: Progress
     aspects: tuple[Aspect, ...]
-    asked: int = 0
+    asked: set[str] = field(default_factory=set)
     cpu_time: float = 0.0
     doubts: dict[str, None] = field(default_factory=dict)
 
@@ -61,8 +61,8 @@ class _Strokes:
             for aspect in self.aspects
         }
         key = json.dumps(nodes, sort_keys=True)
-        self.asked += 1
-        self.progress(f"stroke {self.asked}", 0.0)
+        self.asked.add(key)
+        self.progress("strokes", 0.0)
         if key not in self.log.done:
             begin = process_time()
             self.log.add(key, heated_stroke(self.valve, self.roles, self.variant, nodes))
@@ -151,7 +151,7 @@ def run_heat(
         given_off=_named(network.fixed_names, found.slow.given_off if found.slow else ()),
         energy_residual=found.slow.residual if found.slow else 0.0,
         unsent=_unsent(thermal, last.losses),
-        strokes=strokes.asked,
+        strokes=len(strokes.asked),
         repeats=found.slow.repeats if found.slow else 0,
         cpu_time=strokes.cpu_time,
         warnings=(*warned, *strokes.doubts, *found.doubts),

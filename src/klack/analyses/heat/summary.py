@@ -241,7 +241,8 @@ def answer(record: HeatStudy) -> str:
         "steady": f"steady after {time_cell(last)}: {at}",
         "duration": f"the duration ends after {time_cell(last)}: {at}",
         "runaway": f"thermal runaway: there is no steady state. From {time_cell(last)} on the heat "
-        f"grows {record.gain:.3g} times as fast with the temperature as it is given off; then {at}",
+        f"grows {record.gain:.3g} times as fast with the temperature as it is given off; then {at}."
+        " --duration follows it further",
         "hot": f"no steady state below 2000 K: after {time_cell(last)} {at}",
     }
     unsent = ""

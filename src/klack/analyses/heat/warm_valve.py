@@ -156,8 +156,8 @@ def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str
         return temperature, ()
     nearest = min(max(temperature, low), high)
     return nearest, (
-        f"fluid '{definition.name}' at {temperature - _ZERO_CELSIUS:.1f} °C: its properties are "
-        f"known from {low - _ZERO_CELSIUS:.6g} to {high - _ZERO_CELSIUS:.6g} °C only; those of "
+        f"fluid '{definition.name}' is known from {low - _ZERO_CELSIUS:.6g} to "
+        f"{high - _ZERO_CELSIUS:.6g} °C: beyond that its properties at "
         f"{nearest - _ZERO_CELSIUS:.6g} °C are taken.",
     )
 
