@@ -95,8 +95,7 @@ def _margins(record: LinearModel) -> tuple[Table, ...]:
 
 def _swept(record: LinearModel) -> tuple[Table, ...]:
     return tuple(
-        Table(columns=(x.short, *SWEEP_HEADS[1:]), rows=tuple(sweep_rows(x)))
-        for x in record.sweeps
+        Table(columns=(x.short, *SWEEP_HEADS[1:]), rows=tuple(sweep_rows(x))) for x in record.sweeps
     )
 
 

@@ -321,13 +321,13 @@ def _opened(linear: LinearNetwork, name: str) -> int:
 
 def _axis(found: Sequence[Mode], limit: float | None, asked: tuple[float, float] | None) -> Vector:
     """Frequencies [Hz], closer about resonances."""
-    sizes = [abs(mode.root) / (2.0 * np.pi) for mode in found if mode.verdict != 0 or mode.root]
+    sizes = [abs(mode.root) / (2.0 * np.pi) for mode in found if mode.verdict != 0]
     tones = [mode for mode in found if mode.frequency > 0.0]
     if asked is not None:
         low, high = asked
     else:
-        seen = [abs(mode.root) / (2.0 * np.pi) for mode in tones] or sizes or [1e3]
-        low, high = 0.03 * min(seen), 10.0 * min(max(seen), 1e5)
+        fast = [abs(mode.root) / (2.0 * np.pi) for mode in tones] or sizes or [1e3]
+        low, high = 0.03 * min(sizes or [1e3]), 10.0 * min(max(fast), 1e5)
         if limit is not None:
             high = max(limit, 10.0 * low)
         low = max(low, _LEAST)
