@@ -15,7 +15,9 @@ from quoted_output import compare
 from scipy.io import loadmat
 
 from klack.analyses.linearisation.analysis import LINEARISATION
+from klack.case.case_tree import read_case_tree
 from klack.cli.main import main
+from klack.simulation.network_run import simulate_network
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 MAGNET = (HOW_TO / "held_open.yaml").read_text(encoding="utf-8")
@@ -73,6 +75,51 @@ def test_a_relief_valve_on_a_pipe_is_told_unstable_and_where_it_becomes_so(capsy
     stored = LINEARISATION.load(Path("out"))
     assert stored.loops[0].gain_margin < 1.0
     assert stored.shares.sum(axis=1) == pytest.approx(np.ones(len(stored.eigenvalues)))
+
+
+VOICE = """
+klack: 1
+title: A needle on a spring whose force a PID controls
+network:
+  components:
+    needle: {type: rigid-mass, mass: 3 g, points: [tip]}
+    spring: {type: spring, stiffness: 10 N/mm, preload: -3 N, damping: 2 N*s/m}
+    voice:
+      type: controlled-force
+      sample_time: 20 us
+      sensors: {lift: {channel: needle.tip displacement, unit: um, delay: 30 us}}
+      controller:
+        {kind: pid, sensor: lift, setpoint: 300.01, gain: GAIN, integral_time: 5 ms,
+         derivative_time: 1 ms, derivative_filter: 0.1 ms, lower: -20, upper: 20}
+  connections: [[needle.tip, spring.end, voice.end]]
+run: {duration: 12 ms, variants: [dry]}
+"""
+
+
+def test_the_gain_margin_of_a_pid_is_where_runs_in_time_begin_to_swing():
+    Path("voice.yaml").write_text(VOICE.replace("GAIN", "0.002"))
+    assert linearise("voice.yaml", "--loop", "voice", "--no-report", "--quiet", "--out", "out") == 0
+    margin = LINEARISATION.load(Path("out")).loops[0].gain_margin
+
+    growth = []
+    for share in (0.97, 1.03):
+        Path("other.yaml").write_text(VOICE.replace("GAIN", repr(0.002 * margin * share)))
+        network = read_case_tree(Path("other.yaml")).case().network.network()
+        result = simulate_network(network.rows(), duration=12e-3, record=5e-6)
+        lift = result.channels["needle.tip displacement"].values
+        parts = np.array_split(lift, 6)
+        growth.append(np.ptp(parts[5]) / np.ptp(parts[3]))
+
+    assert growth[0] < 0.7
+    assert growth[1] > 1.2
+
+
+def test_a_switching_controller_has_no_margins(capsys):
+    Path("switched.yaml").write_text((HOW_TO / "controlled_valve.yaml").read_text(encoding="utf-8"))
+
+    assert linearise("switched.yaml", "--loop", "driver") == 2
+
+    assert "a switch has no linear law" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 
-from klack.analyses.linearisation.loops import loop_margins
+from klack.analyses.linearisation.loops import loop_margins, return_ratio
 from klack.errors import InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
@@ -121,7 +121,9 @@ def test_margins_of_a_loop_of_three_lags():
     A = [[-1.0, 0.0, -k], [1.0, -1.0, 0.0], [0.0, 1.0, -1.0]]  # closed: input less k times output
     system = plain(A, [1.0, 0.0, 0.0], [0.0, 0.0, -k])
 
-    found = loop_margins(system, 0, 0, 1.0, np.geomspace(0.01, 10.0, 200))
+    opened = return_ratio(system, 0, 0, 1.0)
+
+    found = loop_margins("three lags", opened, np.geomspace(0.01, 10.0, 200))
 
     assert found.gain_margin == pytest.approx(8.0 / k, rel=1e-9)
     assert found.gain_frequency == pytest.approx(sqrt(3.0) / (2.0 * pi), rel=1e-9)

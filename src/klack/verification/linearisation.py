@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, newton
 
-from klack.analyses.linearisation.loops import loop_margins
+from klack.analyses.linearisation.loops import loop_margins, return_ratio
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.flow_source import FlowSource
 from klack.hydraulics.fluid_library import library_fluid
@@ -360,7 +360,9 @@ def _relief_valve() -> list[Check]:
     words = "cubic of poppet and volume, Routh 1877"
     output = _names(linear.system.outputs, "edge.mass_flow")
     margins = loop_margins(
-        linear.system, output, *linear.adds[output], np.geomspace(20.0, 2e4, 300)
+        "edge",
+        return_ratio(linear.system, output, *linear.adds[output]),
+        np.geomspace(20.0, 2e4, 300),
     )
     return [
         _check("relief valve before a volume, inlet pressure [Pa]", valve.p,
