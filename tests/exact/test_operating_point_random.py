@@ -9,6 +9,7 @@ from math import pi, sqrt, tanh
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from klack.analyses.operating_point.run import searched
 from klack.errors import ConvergenceError, InputError
@@ -28,14 +29,21 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.component import Component
 from klack.network.network import Network
-from klack.simulation.network_run import simulate_network
+from klack.simulation.linear_network import linear_network
+from klack.simulation.modal_step import ROW, ROW_V
+from klack.simulation.network_compile import compile_network
+from klack.simulation.network_run import saved_state, simulate_network
 from klack.simulation.operating_point import (
     OperatingPoint,
+    compiled_at,
     far_ends,
     operating_point,
     steady_rows,
 )
+from klack.simulation.static_start import begin_steady
+from klack.simulation.step_sizes import step_sizes
 
+KICK = 1e-6  # [m/s]
 FLUID = library_fluid("n-heptane").at(293.15)
 AMBIENT, MU0 = 101325.0, 4e-7 * pi
 MU = float(FLUID.viscosity(AMBIENT))
@@ -269,3 +277,41 @@ def test_many_random_valves_end_in_a_right_point_or_in_words():
 
     assert found.get("point", 0) >= 200, found
     assert found.get("not found", 0) <= 8, found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [12, 31, 49, 66, 93])
+def test_a_kicked_valve_moves_as_its_linear_model(seed):
+    drawn = Drawn.of(seed)
+    rows = driven(drawn.network(), {"coil": drawn.current}).at_start().rows()
+    point, _, _ = searched(rows, [{}, *far_ends(rows)], set())
+    system = linear_network(compiled_at(rows, point)[0], 20e-9).system
+
+    free = steady_rows(rows)
+    sizes = step_sizes(free, "normal", step=10e-9, coarse=1)
+    network = compile_network(free, sizes)
+    first = {"needle": point.start.displacement["needle.tip"]}
+    begin_steady(network, sizes.step, first=first)
+    clock = np.zeros(8, dtype=np.int64)
+    clock[1] = -1
+    state = saved_state(network, clock)
+    lifts = []
+    for kick in (0.0, KICK):
+        begun = {name: array.copy() for name, array in state.items()}
+        begun["bodies.fine"][ROW * ROW_V] += kick * np.sqrt(rows.bodies[0].body.mass)
+        result = simulate_network(
+            rows, duration=100e-6, record=1e-6, step=10e-9, coarse=1, state=begun
+        )
+        lifts.append(result.channels["needle.tip displacement"].values)
+
+    step = expm(system.A * float(result.time[1] - result.time[0]))
+    names = [x.name for x in system.states]
+    x = np.zeros(len(names))
+    x[names.index("needle.velocity")] = KICK
+    expected = []
+    for _ in result.time:
+        expected.append(x[names.index("needle.displacement")])
+        x = step @ x
+    moved = lifts[1] - lifts[0]
+    error = np.sqrt(np.mean((moved - expected) ** 2) / np.mean(np.square(expected)))
+    assert error < 0.02  # phase of the contact over up to twenty periods

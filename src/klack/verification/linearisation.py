@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq, newton
 
-from klack.analyses.linearisation.loops import loop_margins
+from klack.analyses.linearisation.loops import loop_margins, return_ratio
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.flow_source import FlowSource
 from klack.hydraulics.fluid_library import library_fluid
@@ -204,6 +204,8 @@ def _coil() -> list[Check]:
                1e-9, words),
         _check("coil with a moving armature, admittance at 200 Hz [A/V]", abs(known), abs(G),
                2e-10, words),
+        _check("coil with a moving armature, phase of its admittance at 200 Hz [rad]",
+               float(np.angle(known)), float(np.angle(G)), 5e-10, words),
     ]  # fmt: skip
 
 
@@ -265,6 +267,63 @@ def _contact() -> list[Check]:
         _check("needle on its seat, damping ratio over alpha/2 [-]", 1.0,
                root.damping / (0.5 * alpha), 1e-3, "alpha/2 of the contact alone",
                reason="the spring of 1e-4 of the contact and its indentation take part"),
+        *_in_series(stiffness, alpha),
+        *_open_film(),
+    ]  # fmt: skip
+
+
+def _in_series(stiffness: float, alpha: float) -> list[Check]:
+    """The same contact behind a massless compliance."""
+    series = 2e-8
+    seat = EndStop(
+        gap=0.0,
+        law=LinearStopLaw(kind="linear", stiffness=stiffness),
+        restitution=0.6,
+        series_compliance=series,
+    )
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=MASS, points=("tip",)),
+        "spring": Spring(stiffness=RATE, preload=20.0),
+        "seat": seat,
+    }
+    linear, _, _ = _about(
+        _network(parts, [["needle.tip", "spring.end", "seat.upper"], ["ground", "seat.lower"]])
+    )
+    damping = alpha * sqrt(stiffness * MASS)  # chi F_0 of a contact at rest
+    # (m s^2 + K)(1 + S (k + c s)) + k + c s = 0
+    one = np.polymul([MASS, 0.0, RATE], [series * damping, 1.0 + series * stiffness])
+    expected = np.roots(np.polyadd(one, [damping, stiffness]))
+    tone = complex(expected[np.argmax(expected.imag)])
+    found = _near(linear.system, tone, 1e6)
+    words = "(m s^2 + K)(1 + S (k + c s)) + k + c s = 0"
+    return [
+        _check("needle on its seat, compliance in series, frequency [rad/s]", abs(tone), abs(found),
+               1e-13, words),
+        _check("needle on its seat, compliance in series, decay [1/s]", tone.real, found.real,
+               1e-13, words),
+    ]  # fmt: skip
+
+
+def _open_film() -> list[Check]:
+    """A needle that floats over a narrow ring."""
+    inner, outer, height, cut_off = 1.95e-3, 2e-3, 20e-6, 1e-6
+    film = {"shape": "ring", "inner_radius": inner, "outer_radius": outer, "cut_off": cut_off}
+    stop = {"gap": height, "film": film}
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=MASS, points=("tip",)),
+        "spring": Spring(stiffness=RATE, preload=0.0),
+        "seat": EndStop.model_validate(stop),
+    }
+    linear, _, _ = _about(
+        _network(parts, [["needle.tip", "spring.end", "seat.upper"], ["ground", "seat.lower"]])
+    )
+    viscosity = float(HEPTANE.viscosity(AMBIENT.pressure))
+    length, width = pi * (inner + outer), outer - inner
+    damping = viscosity * length * width**3 / (height + cut_off) ** 3
+    found = modes(linear.system, 1e5)[0][0].root
+    return [
+        _check("needle over a film, decay [1/s]", -damping / (2.0 * MASS), found.real, 1e-3,
+               "narrow strip, F = mu L b^3 v/h^3 (Reynolds)")
     ]  # fmt: skip
 
 
@@ -360,7 +419,9 @@ def _relief_valve() -> list[Check]:
     words = "cubic of poppet and volume, Routh 1877"
     output = _names(linear.system.outputs, "edge.mass_flow")
     margins = loop_margins(
-        linear.system, output, *linear.adds[output], np.geomspace(20.0, 2e4, 300)
+        "edge",
+        return_ratio(linear.system, output, *linear.adds[output]),
+        np.geomspace(20.0, 2e4, 300),
     )
     return [
         _check("relief valve before a volume, inlet pressure [Pa]", valve.p,

@@ -166,7 +166,7 @@ def _eigenvalue_charts(record: LinearModel) -> tuple[Chart, ...]:
                     label=label,
                     colour=colour,  # type: ignore[arg-type]
                     drawn="points",
-                    width=6.0,
+                    width=4.0,
                     names=tuple(n for n, c in zip(names, chosen, strict=True) if c),
                 )
             )

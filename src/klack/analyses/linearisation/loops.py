@@ -13,33 +13,37 @@ from scipy.optimize import brentq
 from klack.analyses.linearisation.record import LoopMargins
 from klack.simulation.linear_system import LinearSystem, transfer
 
-__all__ = ["loop_margins"]
+__all__ = ["loop_margins", "return_ratio"]
 
 Vector = NDArray[np.float64]
 
 
-def loop_margins(
-    system: LinearSystem, output: int, source: int, sign: float, axis: Vector
-) -> LoopMargins:
-    """Margins of the loop through one output, which adds ``sign`` times itself to one input.
-
-    Parameters
-    ----------
-    system : LinearSystem
-    output, source : int
-        What the component gives, and the input at the same place.
-    sign : float
-    axis : array [Hz]
-    """
+def return_ratio(
+    system: LinearSystem, output: int, source: int, sign: float
+) -> Callable[[float], complex]:
+    """Open loop through one output, which adds ``sign`` times itself to one input, over [Hz]."""
 
     def opened(frequency: float) -> complex:
         T = sign * complex(next(transfer(system, np.array([frequency])))[output, source])
         return -T / (1.0 + T)
 
-    T = sign * np.array([G[output, source] for G in transfer(system, axis)])
-    L = -T / (1.0 + T)
+    return opened
+
+
+def loop_margins(name: str, opened: Callable[[float], complex], axis: Vector) -> LoopMargins:
+    """Margins of an open loop, closed by -1.
+
+    Parameters
+    ----------
+    name : str
+    opened : callable
+        Over the frequency [Hz].
+    axis : array [Hz]
+        Between whose points the crossings are searched.
+    """
+    L = np.array([opened(float(f)) for f in axis])
     gain = _nearest(
-        _crossings(axis, L.imag, lambda f: opened(f).imag, (L.real < 0.0)),
+        _crossings(axis, L.imag, lambda f: opened(f).imag, L.real < 0.0),
         lambda f: 1.0 / max(-opened(f).real, 1e-300),
         lambda x: abs(np.log(x)),
     )
@@ -50,7 +54,7 @@ def loop_margins(
     )
     k = int(np.argmin(np.abs(1.0 + L)))
     return LoopMargins(
-        name=system.outputs[output].name,
+        name=name,
         frequency=axis,
         real=L.real.copy(),
         imaginary=L.imag.copy(),

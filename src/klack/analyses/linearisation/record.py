@@ -87,7 +87,8 @@ class Response:
     @property
     def unit(self) -> str:
         """Of the magnitude."""
-        return f"{self.target.unit}/({self.source.unit})"
+        below = self.source.unit
+        return f"{self.target.unit}/{f'({below})' if '/' in below else below}"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

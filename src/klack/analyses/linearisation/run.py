@@ -1,13 +1,14 @@
 """``klack linearise``: from a case to its linear model."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter, process_time
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.linearisation.loops import loop_margins
+from klack.analyses.linearisation.controllers import controllers_of, pid_loop, plain_name
+from klack.analyses.linearisation.loops import loop_margins, return_ratio
 from klack.analyses.linearisation.record import (
     Eigenvalue,
     LinearModel,
@@ -20,6 +21,7 @@ from klack.analyses.operating_point.conditions import Conditions, Origin, Sweep
 from klack.analyses.operating_point.quantities import measured
 from klack.analyses.operating_point.run import PointFound, find_point, valve_at
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.stroke.run import variant_network
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
 from klack.case.case_tree import CaseTree
@@ -29,6 +31,7 @@ from klack.case.variants import Variant
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
 from klack.magnetics.constant_drive import coils_of, driven, resistance_of
+from klack.network.network import Network
 from klack.network.rows import Rows
 from klack.progress import Progress, silent
 from klack.simulation.linear_network import LinearNetwork, linear_network
@@ -55,6 +58,7 @@ _FEW_STATES = 400  # of lines, in the usual band
 _POINTS = 400
 _ABOUT = 12  # points about each resonance, to both sides
 _LEAST = 1e-3  # [Hz]
+_SWITCHING = ("two-point", "peak-hold", "pwm")
 _WORDS = {1: "grows", 0: "neutral", -1: "decays"}
 
 
@@ -157,7 +161,8 @@ def run_linearisation(
     here = linear_point(found, () if conditions.lift is None else (roles.needle,))
     system = here.linear.system
     pairs = _pairs(system, sources, targets)
-    opened = [_opened(here.linear, loop) for loop in loops]
+    own = variant_network(valve, name)
+    opened = [_opened(here.linear, loop, own, found.rows) for loop in loops]
     clock("eigenvalues", 0.0)
     limit = usual_band(system) if band is None else band
     model = rational(system, limit)
@@ -165,9 +170,7 @@ def run_linearisation(
     clock("frequency response", 0.0)
     axis = _axis(found_modes, limit if len(system.delays) else None, frequencies)
     responses = _responses(system, pairs, axis)
-    margins = tuple(
-        loop_margins(system, output, *here.linear.adds[output], axis) for output in opened
-    )
+    margins = tuple(loop_margins(word, L, axis[axis < most]) for word, L, most in opened)
     owners = list(dict.fromkeys([*(x.owner for x in system.states), *system.waves]))
     swept = (
         ()
@@ -203,7 +206,7 @@ def run_linearisation(
         loops=margins,
         sweeps=swept,
         cpu_time=process_time() - taken,
-        warnings=(*warned, *found.notes, *here.linear.doubts, *_notes(found.rows, lost, limit)),
+        warnings=(*warned, *found.notes, *here.linear.doubts, *_notes(own, lost, limit)),
     )
 
 
@@ -253,11 +256,17 @@ def _stability(
     )
 
 
-def _notes(rows: Rows, lost: int, band: float) -> list[str]:
+def _notes(network: Network, lost: int, band: float) -> list[str]:
     told = [
-        f"the controller '{row.component}' holds its output here: the linear model is that of "
-        "the valve with this loop open."
-        for row in rows.controllers
+        f"the controller '{name}' holds the output that it has at the start: the linear model is "
+        "that of the valve with this loop open (--loop gives the margins of a pid)."
+        for name in controllers_of(network)
+    ]
+    told += [
+        f"the driver '{name}' switches on the current of its coil: the coil has a constant voltage "
+        "in its place, the model is that between two switchings."
+        for name, part in network.components.items()
+        if part.type in _SWITCHING
     ]
     if lost:
         told.append(
@@ -280,20 +289,17 @@ def _names(signals: Sequence[Signal]) -> tuple[SignalName, ...]:
     return tuple(SignalName(name=x.name, unit=x.unit) for x in signals)
 
 
-def _plain(name: str) -> str:
-    return name.strip().replace(" ", "_")
-
-
 def _place(option: str, signals: Sequence[Signal], name: str) -> int:
-    names = [_plain(x.name) for x in signals]
-    if _plain(name) not in names:
+    names = [x.name for x in signals]
+    plain = [plain_name(x) for x in names]
+    if plain_name(name) not in plain:
         raise InputError(
             option,
             got=f"'{name}'",
             expected=f"one of: {one_of(names)}" if names else "a valve that has one",
-            hint=nearest(_plain(name), names, "take a name from this list."),
+            hint=nearest(name, names, "take a name from this list."),
         )
-    return names.index(_plain(name))
+    return plain.index(plain_name(name))
 
 
 def _pairs(
@@ -307,27 +313,43 @@ def _pairs(
         raise InputError(
             missing,
             got="nothing beside " + ("--from" if into else "--to"),
-            expected=f"one of: {one_of([_plain(x.name) for x in signals])}",
+            expected=f"one of: {one_of([x.name for x in signals])}",
             hint="name both ends of the response.",
         )
     return [(i, o) for i in dict.fromkeys(into) for o in dict.fromkeys(out)]
 
 
-def _opened(linear: LinearNetwork, name: str) -> int:
-    """Output at which a loop is opened."""
+def _opened(
+    linear: LinearNetwork, name: str, network: Network, rows: Rows
+) -> tuple[str, Callable[[float], complex], float]:
+    """Name of a loop, the open loop, and the highest frequency [Hz] that it holds for."""
+    controllers = controllers_of(network)
+    if name in controllers:
+        return name, *pid_loop(name, network, rows, linear.system)
     signals = [linear.system.outputs[k] for k in linear.adds]
-    return list(linear.adds)[_place("--loop", signals, name)]
+    words = [*(x.name for x in signals), *controllers]
+    if plain_name(name) not in [plain_name(x.name) for x in signals]:
+        raise InputError(
+            "--loop",
+            got=f"'{name}'",
+            expected=f"one of: {one_of(words)}" if words else "a valve that has one",
+            hint=nearest(name, words, "take a name from this list."),
+        )
+    output = list(linear.adds)[_place("--loop", signals, name)]
+    source, sign = linear.adds[output]
+    loop = return_ratio(linear.system, output, source, sign)
+    return linear.system.outputs[output].name, loop, np.inf
 
 
 def _axis(found: Sequence[Mode], limit: float | None, asked: tuple[float, float] | None) -> Vector:
     """Frequencies [Hz], closer about resonances."""
-    sizes = [abs(mode.root) / (2.0 * np.pi) for mode in found if mode.verdict != 0 or mode.root]
+    sizes = [abs(mode.root) / (2.0 * np.pi) for mode in found if mode.verdict != 0]
     tones = [mode for mode in found if mode.frequency > 0.0]
     if asked is not None:
         low, high = asked
     else:
-        seen = [abs(mode.root) / (2.0 * np.pi) for mode in tones] or sizes or [1e3]
-        low, high = 0.03 * min(seen), 10.0 * min(max(seen), 1e5)
+        fast = [abs(mode.root) / (2.0 * np.pi) for mode in tones] or sizes or [1e3]
+        low, high = 0.03 * min(sizes or [1e3]), 10.0 * min(max(fast), 1e5)
         if limit is not None:
             high = max(limit, 10.0 * low)
         low = max(low, _LEAST)

@@ -308,7 +308,7 @@ def loop_rows(record: LinearModel) -> list[tuple[str, ...]]:
 
 def sweep_rows(swept: StabilitySweep) -> list[tuple[str, ...]]:
     """Verdict and least damped oscillation at every value."""
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for i, value in enumerate(swept.values):
         word = "not found" if swept.failures[i] else "unstable" if swept.unstable[i] else "stable"
         known = isfinite(swept.frequency[i])
