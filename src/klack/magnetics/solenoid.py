@@ -122,6 +122,10 @@ class Solenoid(Component):
     start_current: Current = Field(
         default=0.0, ge=0, description="Steady current before the start: holding."
     )
+    start: Literal["demagnetised", "remanent"] = Field(
+        default="demagnetised",
+        description="Iron with hysteresis at the start: as new, or as saturation has left it.",
+    )
 
     @model_validator(mode="after")
     def _few_loops(self) -> Self:
@@ -134,6 +138,17 @@ class Solenoid(Component):
                 got=f"eddy currents of {' + '.join(map(str, terms))} terms",
                 expected=f"at most {MOST_LOOPS - 2} terms beyond the first of each part",
                 hint="give more terms to the part with the largest section, one to the others.",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _something_remanent(self) -> Self:
+        if self.start == "remanent" and not any(part.hysteresis for part in self.iron):
+            raise CaseProblem(
+                ("start",),
+                got="start: remanent without hysteresis",
+                expected="a part of iron with hysteresis",
+                hint="add hysteresis to a part, or remove 'start'.",
             )
         return self
 
@@ -166,6 +181,7 @@ class Solenoid(Component):
             base=rows.port("base"),
             current=self.start_current,
             gap_range=self.gap_range(),
+            remanent=self.start == "remanent",
         )
         if self.off_axis_parts():
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))

@@ -86,7 +86,8 @@ def _circuit(part: IronPart, *, ladder: bool = False) -> MagneticCircuit:
         )  # fmt: skip
         for k, turn in enumerate(given.conductances):
             outer = 0 if k == 0 else k + 1
-            branches.append(MagneticBranch(name=f"turn {k}", law=LinearReluctance(0.0), eddy=turn))
+            shorted = MagneticBranch(name=f"turn {k}", law=LinearReluctance(0.0), eddy=turn)
+            branches.append(shorted)
             rows.append({outer: 1, k + 2: -1} if k < terms - 1 else {outer: 1})
             if k < terms - 1:
                 core = LinearReluctance(given.reluctances[k])
