@@ -78,7 +78,8 @@ def remanent_state(
         )
     stops = []
     for tube in tubes_of(circuit)[0]:
-        flux, sign = tube.row @ found.loop_fluxes, np.sign(tube.row @ strong.loop_fluxes)
+        flux = float(tube.row @ found.loop_fluxes)
+        sign = float(np.sign(tube.row @ strong.loop_fluxes))
         stops += [-sign * part.share * width_of(part, flux) for part in tube.stops]
     return found.loop_fluxes, np.concatenate([np.zeros(0), *stops])
 

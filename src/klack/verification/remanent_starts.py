@@ -1,4 +1,4 @@
-"""Checks of starts at remanence: load lines by hand, the remanence itself, a run that came there."""
+"""Checks of starts at remanence: load lines by hand, the remanence itself, a run back to it."""
 
 from functools import partial
 

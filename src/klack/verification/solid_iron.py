@@ -96,8 +96,8 @@ def _circuit(part: IronPart, *, ladder: bool = False) -> MagneticCircuit:
     else:
         for k, shell in enumerate(part.shells()):
             outer = 0 if k == 0 else k + 1
-            turn = MagneticBranch(name=f"turn {k}", law=LinearReluctance(0.0), eddy=shell.turn)
-            branches += [turn, MagneticBranch(name=f"shell {k}", law=shell.law)]
+            around = MagneticBranch(name=f"turn {k}", law=LinearReluctance(0.0), eddy=shell.turn)
+            branches += [around, MagneticBranch(name=f"shell {k}", law=shell.law)]
             rows += [{outer: 1}, {outer: 1, k + 2: -1} if k < terms - 1 else {outer: 1}]
     loops = np.zeros((len(rows), terms + 1), dtype=np.int64)
     for k, row in enumerate(rows):
