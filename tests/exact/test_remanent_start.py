@@ -8,9 +8,11 @@ import pytest
 from klack.analyses.stroke.loop_figure import loop_chart
 from klack.analyses.stroke.run import run_stroke
 from klack.case.valve_reader import load_valve_case
+from klack.magnetics.constant_drive import driven, hysteretic_coils
 from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.remanent_start import remanent_state
 from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.static import static_state
 from klack.magnetics.voltage_step import VoltageStep
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.rigid_mass import RigidMass
@@ -103,3 +105,38 @@ def test_the_example_of_the_theory_page(tmp_path, start, opens):
     loop, point = chart.panels[0].curves
     assert float(point.y[0]) == pytest.approx(6.828 if start == "remanent" else 0.0, rel=1e-3)
     assert float(np.max(loop.y)) > 90.0
+
+
+def test_a_network_has_operating_points_too():
+    """On the falling branch after saturation, on the mean curve otherwise."""
+    elements = {
+        "iron": {**IRON, "kind": "iron", "between": ["a", "b"]},
+        "coil": {"kind": "coil", "between": ["b", "c"], "turns": 60},
+        "gap": {"kind": "face", "between": ["c", "a"], "area": 3e-5, "residual_gap": 2e-5},
+        "leakage": {"kind": "leakage", "between": ["b", "c"], "permeance": 2e-8},
+    }
+    found = []
+    for start in ("demagnetised", "remanent"):
+        magnet = MagneticNetwork(resistance=1.0, gap=1e-4, start=start, elements=elements)
+        parts = {
+            "needle": RigidMass(mass=3e-3),
+            "spring": Spring(stiffness=1e6, preload=0.0),
+            "coil": magnet,
+            "driver": VoltageStep(voltage=12.0),
+        }
+        nodes = [
+            ["needle.body", "spring.end", "coil.armature"],
+            ["driver.terminals", "coil.terminals"],
+        ]
+        network = Network(parts, nodes)
+        assert hysteretic_coils(network) == ["coil"]
+        held = driven(network, {"coil": 1.0})
+        run = simulate_network(held.rows(), duration=2e-4)
+        flux = run.channels["coil flux"].values
+        assert flux == pytest.approx(flux[0], rel=1e-6)  # it stays there
+        found.append(float(flux[0]))
+        if start == "demagnetised":
+            place = 1e-4 - float(run.channels["needle.body displacement"].values[0])
+            state = static_state(magnet.circuit(), current=1.0, gap=place)
+            assert flux[0] == pytest.approx(state.branch_fluxes[2], rel=1e-9)
+    assert found[1] > 1.05 * found[0]
