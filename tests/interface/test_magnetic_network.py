@@ -145,6 +145,8 @@ def random_network(rng):
         parts["far"] = {"kind": "air", "between": ["g", "d"], "length": 1e-3, "area": 1e-5}
     if rng.random() < 0.5:
         parts["counter"] = {**parts["gap"], "between": ["d", "e"], "opens_from": 1e-4}
+    if rng.random() < 0.4:
+        parts["core"]["eddy"] = {"conductivity": 2e6, "terms": int(rng.integers(1, 3))}
     if rng.random() < 0.5:
         parts["core"]["hysteresis"] = {"coercivity": 300.0, "initial_permeability": 150}
     if rng.random() < 0.6:

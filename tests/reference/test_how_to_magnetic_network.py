@@ -11,7 +11,7 @@ from klack.case.valve_reader import load_valve_case
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "own_magnet.yaml"
 
 
-@pytest.mark.parametrize(("bridge", "opens"), [(True, 0.328), (False, 0.300)])
+@pytest.mark.parametrize(("bridge", "opens"), [(True, 0.358), (False, 0.302)])
 def test_the_bridge_takes_flux(tmp_path, bridge, opens):
     case = yaml.safe_load(CASE.read_text(encoding="utf-8"))
     if not bridge:

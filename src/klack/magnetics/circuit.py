@@ -125,6 +125,11 @@ class MagneticCircuit:
             )
 
     @property
+    def hysteretic(self) -> bool:
+        """Whether some iron has hysteresis."""
+        return any(branch.stops is not None for branch in self.branches)
+
+    @property
     def turns(self) -> NDArray[np.float64]:
         """Turns of the coil per branch, shape (n_branches,) [-]."""
         return np.array([branch.turns for branch in self.branches], dtype=float)

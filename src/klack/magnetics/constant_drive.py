@@ -9,6 +9,7 @@ from klack.input.problem import nearest, one_of
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.force_map_solenoid import ForceMapSolenoid
+from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.magnetics.voltage_table import VoltageTable
@@ -26,7 +27,7 @@ __all__ = [
     "start_currents",
 ]
 
-Coil = Solenoid | ForceMapSolenoid
+Coil = Solenoid | MagneticNetwork | ForceMapSolenoid
 
 
 def coils_of(network: Network) -> dict[str, Coil]:
@@ -45,8 +46,8 @@ def coils_of(network: Network) -> dict[str, Coil]:
             raise InputError(
                 f"components.{name}",
                 got=f"the type '{part.type}'",
-                expected="a solenoid or a force-map-solenoid",
-                hint="an operating point sets the current of these two alone.",
+                expected="a solenoid, a magnetic-network or a force-map-solenoid",
+                hint="an operating point sets the current of these alone.",
             )
     return found
 
@@ -61,7 +62,7 @@ def hysteretic_coils(network: Network) -> list[str]:
     return [
         name
         for name, coil in coils_of(network).items()
-        if isinstance(coil, Solenoid) and any(part.hysteresis is not None for part in coil.iron)
+        if not isinstance(coil, ForceMapSolenoid) and coil.circuit().hysteretic
     ]
 
 

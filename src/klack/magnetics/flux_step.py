@@ -54,6 +54,7 @@ from klack.magnetics.gap_range import GapRange
 from klack.magnetics.map_kernel import map_energy, map_force, map_numbers
 from klack.magnetics.output_stage import START_VOLTAGE
 from klack.magnetics.quiet_step import DIODE, FRONT, allowed_bend, quiet_step
+from klack.magnetics.remanent_start import remanent_state
 from klack.magnetics.stage_step import STAGE_BOOKS, stage_channels, stage_step
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import Book, Channel, LimitRow, Rows
@@ -360,17 +361,23 @@ def flux_numbers(
 
 
 def flux_state(
-    parameters: NDArray[np.float64], fluxes: ArrayLike = (), current: float = 0.0
+    parameters: NDArray[np.float64],
+    fluxes: ArrayLike = (),
+    stops: ArrayLike = (),
+    current: float = 0.0,
 ) -> NDArray[np.float64]:
     """State at the start: the driver in its first state, the coil open if it carries no current.
 
-    ``fluxes`` are those of the loops [Wb], ``current`` that of the coil [A].
+    ``fluxes`` are those of the loops [Wb], ``stops`` those of hysteretic iron [A], ``current`` that
+    of the coil [A].
     """
     state = np.zeros(int(parameters[6]))
     state[3] = 1.0 if current == 0.0 else 0.0
     state[4] = current
     phi = np.array(fluxes, dtype=float).ravel()
     state[_FRONT : _FRONT + phi.size] = phi
+    kept = np.array(stops, dtype=float).ravel()
+    state[state.size - 1 - kept.size : -1] = kept
     state[-1] = np.max(np.abs(phi), initial=0.0)
     if parameters[7] > 0.0:  # behind an output stage
         state[-2] = parameters[int(parameters[7]) + START_VOLTAGE]
@@ -390,6 +397,7 @@ def flux_rows(
     current: float = 0.0,
     gap_range: GapRange | None = None,
     channels: tuple[Channel, ...] = (),
+    remanent: bool = False,
 ) -> None:
     """Add a solenoid to the rows of a network.
 
@@ -415,6 +423,8 @@ def flux_rows(
         That of the tables of the plant by default.
     channels : tuple of Channel
         Recorded besides.
+    remanent : bool
+        Whether hysteretic iron starts as saturation has left it, instead of demagnetised.
 
     Raises
     ------
@@ -425,7 +435,9 @@ def flux_rows(
 
     def at_rest(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
         x = gap + float(parameters[3]) * float(displacement[0] - displacement[1])
-        return flux_state(parameters, steady_fluxes(plant, current=current, gap=x), current)
+        if remanent and isinstance(plant, MagneticCircuit):
+            return flux_state(parameters, *remanent_state(plant, current=current, gap=x), current)
+        return flux_state(parameters, steady_fluxes(plant, current=current, gap=x), (), current)
 
     state = at_rest(np.zeros(2))
     staged = driver.stage is not None

@@ -33,6 +33,7 @@ __all__ = [
     "circuit_numbers",
     "current_weights",
     "free_directions",
+    "tubes_of",
 ]
 
 Vector = NDArray[np.float64]
@@ -121,7 +122,7 @@ def circuit_numbers(circuit: MagneticCircuit) -> Vector:
     :mod:`klack.magnetics.stop_kernel`). Offsets of tables count from the start; 0 says that
     there is none.
     """
-    tubes, main, sign = _tubes(circuit)
+    tubes, main, sign = tubes_of(circuit)
     if len(tubes) > MOST_TUBES:
         raise InputError(
             "magnetic circuit",
@@ -192,7 +193,7 @@ def free_directions(circuit: MagneticCircuit) -> Vector:
     return np.asarray((null @ np.column_stack((q[:, 1:], q[:, :1]))).T)
 
 
-def _tubes(circuit: MagneticCircuit) -> tuple[list[_Tube], int, float]:
+def tubes_of(circuit: MagneticCircuit) -> tuple[list[_Tube], int, float]:
     """Tubes, the one of the main branch, and the sign of the main flux in it."""
     weights = current_weights(circuit)
     groups: dict[tuple[int, ...], list[tuple[float, int]]] = {}

@@ -70,6 +70,10 @@ class MagneticNetwork(Component):
     start_current: Current = Field(
         default=0.0, ge=0, description="Steady current before the start: holding."
     )
+    start: Literal["demagnetised", "remanent"] = Field(
+        default="demagnetised",
+        description="Iron with hysteresis at the start: as new, or as saturation has left it.",
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -82,6 +86,15 @@ class MagneticNetwork(Component):
                     expected=words,
                     hint="add it, with the nodes that it lies between.",
                 )
+        if self.start == "remanent" and not any(
+            getattr(element, "hysteresis", None) for element in self.elements.values()
+        ):
+            raise CaseProblem(
+                ("start",),
+                got="start: remanent without hysteresis",
+                expected="an element of iron with hysteresis",
+                hint="add hysteresis to an element, or remove 'start'.",
+            )
         low, high = self.gap_range().valid
         if not low <= self.gap <= high:
             raise CaseProblem(
@@ -140,6 +153,7 @@ class MagneticNetwork(Component):
             base=rows.port("base"),
             current=self.start_current,
             gap_range=self.gap_range(),
+            remanent=self.start == "remanent",
             channels=tuple(
                 Channel(f"flux of {name}", "Wb", FLUXES + k)
                 for k, name in enumerate(loop_names(circuit))

@@ -84,10 +84,26 @@ class IronElement(IronPart, _Element):
     kind: Literal["iron"]
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:
-        """One branch with the magnetisation curve."""
+        """One branch with the magnetisation curve; a shell and its turn for each term of eddy."""
+        if self.eddy is not None:
+            return self._shells(name)
         law = self.material.curve().law(self.length, self.area)
         branch = MagneticBranch(name=name, law=law, stops=self.stops())
         return (Tube(branch=branch, start=self.between[0], end=self.between[1], rank=_TREE),)
+
+    def _shells(self, name: str) -> tuple[Tube, ...]:
+        at, end = self.between
+        out = []
+        for k, shell in enumerate(self.shells(), 1):
+            inner = f"{name} shell {k}"
+            turn = MagneticBranch(
+                name=f"{name} turn {k}", law=LinearReluctance(0.0), eddy=shell.turn
+            )
+            iron = MagneticBranch(name=inner, law=shell.law, stops=shell.stops)
+            out.append(Tube(branch=turn, start=at, end=inner, rank=_TREE))
+            out.append(Tube(branch=iron, start=inner, end=end, rank=_REST))
+            at = inner
+        return tuple(out)
 
 
 class MovingGap(_Element):

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from klack.input.problem import CaseProblem
 from klack.input.section import Number
-from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.gap_range import GapRange
@@ -60,7 +60,9 @@ class Solenoid(Component):
     ``residual_flux`` sets a constant remanence such that this flux passes the closed gap without
     current; it lets an armature stick. Instead, ``hysteresis`` of an iron part follows its loop
     from the demagnetised state at the start: remanence depends on what the iron has been through.
-    ``magnets`` are permanent ones in series with the main flux.
+    ``magnets`` are permanent ones in series with the main flux. Eddy currents are a ladder beside
+    the iron (``eddy``), or of an iron part itself, with its permeability of the moment
+    (:mod:`klack.magnetics.solid_iron`).
 
     The stops have to end the stroke before the working gap is closed: a case in which they let the
     armature pass through its pole is refused, and a run stops where contacts give way by half of
@@ -120,6 +122,35 @@ class Solenoid(Component):
     start_current: Current = Field(
         default=0.0, ge=0, description="Steady current before the start: holding."
     )
+    start: Literal["demagnetised", "remanent"] = Field(
+        default="demagnetised",
+        description="Iron with hysteresis at the start: as new, or as saturation has left it.",
+    )
+
+    @model_validator(mode="after")
+    def _few_loops(self) -> Self:
+        solid = [part.eddy.terms for part in self.iron if part.eddy is not None]
+        terms = [*(part.terms for part in self.eddy), *solid]
+        loops = 2 + sum(count - 1 for count in terms)
+        if loops > MOST_LOOPS:
+            raise CaseProblem(
+                ("iron",) if solid else ("eddy",),
+                got=f"eddy currents of {' + '.join(map(str, terms))} terms",
+                expected=f"at most {MOST_LOOPS - 2} terms beyond the first of each part",
+                hint="give more terms to the part with the largest section, one to the others.",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _something_remanent(self) -> Self:
+        if self.start == "remanent" and not any(part.hysteresis for part in self.iron):
+            raise CaseProblem(
+                ("start",),
+                got="start: remanent without hysteresis",
+                expected="a part of iron with hysteresis",
+                hint="add hysteresis to a part, or remove 'start'.",
+            )
+        return self
 
     @model_validator(mode="after")
     def _one_remanence(self) -> Self:
@@ -150,6 +181,7 @@ class Solenoid(Component):
             base=rows.port("base"),
             current=self.start_current,
             gap_range=self.gap_range(),
+            remanent=self.start == "remanent",
         )
         if self.off_axis_parts():
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))
@@ -253,6 +285,7 @@ def _circuit(solenoid: Solenoid) -> MagneticCircuit:
             stops=part.stops(),
         )
         for k, part in enumerate(solenoid.iron)
+        if part.eddy is None
     ]
     branches += [
         MagneticBranch(
@@ -266,6 +299,8 @@ def _circuit(solenoid: Solenoid) -> MagneticCircuit:
     )
     loops.append([0, 1])
     _add_ladders(branches, loops, solenoid.eddy)
+    for k, part in enumerate(solenoid.iron):
+        _add_shells(branches, loops, f"iron {k + 1}", part)
     width = max(len(row) for row in loops)
     matrix = np.array([row + [0] * (width - len(row)) for row in loops])
     return MagneticCircuit(branches=tuple(branches), loops=matrix, main="gap")
@@ -318,3 +353,26 @@ def _add_ladders(
             branches.append(MagneticBranch(name=f"core {k + 1}.{term + 1}", law=law))
             loops.append(inner)
             outer, width = width, width + 1
+
+
+def _add_shells(
+    branches: list[MagneticBranch], loops: list[list[int]], name: str, part: IronPart
+) -> None:
+    """Put solid iron in series with the main flux; each shell after the first is a loop more."""
+    shells, outer, width = part.shells(), _MAIN, max(len(row) for row in loops)
+    for k, shell in enumerate(shells):
+        through = [0] * width
+        through[outer] = 1
+        turn = MagneticBranch(
+            name=f"{name} turn {k + 1}", law=LinearReluctance(0.0), eddy=shell.turn
+        )
+        branches.append(turn)
+        loops.append(through)
+        shell_row = list(through)
+        if k < len(shells) - 1:  # what lies further in is not in this shell
+            shell_row.append(-1)
+            outer, width = width, width + 1
+        branches.append(
+            MagneticBranch(name=f"{name} shell {k + 1}", law=shell.law, stops=shell.stops)
+        )
+        loops.append(shell_row)

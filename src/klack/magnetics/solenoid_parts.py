@@ -1,5 +1,6 @@
 """Parts of a solenoid as a case describes them: pole gaps, guides, iron, eddy currents."""
 
+from dataclasses import dataclass
 from math import pi
 from typing import Literal, Self
 
@@ -28,6 +29,8 @@ from klack.magnetics.hysteresis import (
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 from klack.magnetics.iron_choice import IronChoice
 from klack.magnetics.off_axis_gap import eccentric_ring
+from klack.magnetics.reluctance import IronReluctance
+from klack.magnetics.solid_iron import shells
 from klack.units import (
     Angle,
     Area,
@@ -45,9 +48,11 @@ __all__ = [
     "EddyPart",
     "Hysteresis",
     "IronPart",
+    "IronShell",
     "ParasiticGap",
     "PermanentMagnet",
     "PoleGap",
+    "SolidIron",
 ]
 
 Vector = NDArray[np.float64]
@@ -201,6 +206,48 @@ class Hysteresis(Section):
     )
 
 
+class SolidIron(Section):
+    """Eddy currents of a solid piece of iron, with its own magnetisation curve.
+
+    In shells from the surface inwards, see :mod:`klack.magnetics.solid_iron`; not together with an
+    entry of ``eddy`` for the same piece.
+    """
+
+    shape: Literal["cylinder", "sheet"] = Field(
+        default="cylinder", description="Solid round core, or sheet / thin-walled tube."
+    )
+    conductivity: Conductivity = Field(
+        gt=0, description="Of the iron; ferritic stainless 1.3 to 1.7 MS/m, pure iron 10 MS/m."
+    )
+    thickness: Length | None = Field(default=None, gt=0, description="Of a sheet or tube wall.")
+    terms: Count = Field(default=3, le=MOST_TERMS, description="Shells, 1 to 4.")
+    slots: Ratio = Field(
+        default=1.0, gt=0, le=1, description="Factor on the eddy conductance of slotted iron."
+    )
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.shape == "cylinder":
+            return self._refuse_with(("thickness",), "shape: cylinder", "its area is sufficient")
+        if self.thickness is None:
+            raise CaseProblem(
+                (),
+                got="no key 'thickness'",
+                expected="thickness, for shape: sheet",
+                hint="add thickness.",
+            )
+        return self
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class IronShell:
+    """A shell of solid iron behind its shorted turn: conductance [S], curve, stops."""
+
+    turn: float
+    law: IronReluctance
+    stops: IronStops | None
+
+
 class IronPart(Section):
     """A piece of iron that the main flux passes, of constant section."""
 
@@ -209,6 +256,9 @@ class IronPart(Section):
     area: Area = Field(gt=0, description="Cross-section across the flux.")
     hysteresis: Hysteresis | None = Field(
         default=None, description="Remanence and hysteresis loss; the material is the mean curve."
+    )
+    eddy: SolidIron | None = Field(
+        default=None, description="Eddy currents with the permeability of the moment."
     )
 
     @model_validator(mode="after")
@@ -257,10 +307,26 @@ class IronPart(Section):
             return constant_width(curve, given.coercivity, mu)
         return falling_width(curve, given.coercivity, given.remanence, mu)
 
-    def stops(self) -> IronStops | None:
-        """Return the stops of the part; None without hysteresis."""
+    def stops(self, share: float = 1.0) -> IronStops | None:
+        """Return the stops of a share of the section; None without hysteresis."""
         width = self.width()
-        return None if width is None else width.stops(self.length, self.area)
+        return None if width is None else width.stops(self.length, share * self.area)
+
+    def shells(self) -> tuple[IronShell, ...]:
+        """Return the shells of solid iron from the surface inwards; none without ``eddy``."""
+        solid = self.eddy
+        if solid is None:
+            return ()
+        size = solid.slots * solid.conductivity * self.length  # R tau
+        if solid.thickness is None:
+            size /= pi
+        else:
+            size *= solid.thickness**2 / self.area
+        parts, curve = shells(solid.shape, solid.terms), self.material.curve()
+        return tuple(
+            IronShell(q * size, curve.law(self.length, w * self.area), self.stops(w))
+            for w, q in zip(parts.shares, parts.turns, strict=True)
+        )
 
 
 class PermanentMagnet(Section):

@@ -185,14 +185,14 @@ def _virtual_work() -> list[Check]:
             "virtual work: current of that point [A]",
             expected=7.0,
             computed=planted.current,
-            tolerance=1e-12,
+            tolerance=1e-13,
             source=words,
         ),
         _check(
             "virtual work: gap of that point [um]",
             expected=60.0,
             computed=1e6 * planted.gap,
-            tolerance=1e-12,
+            tolerance=1e-13,
             source=words,
         ),
         _check(

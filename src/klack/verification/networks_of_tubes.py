@@ -96,7 +96,7 @@ def _at_rest() -> list[Check]:
                 f"{place}: linkage [mWb]",
                 expected=1e3 * linkage,
                 computed=1e3 * state.linkage,
-                tolerance=2e-7,
+                tolerance=1e-7,
                 source=source,
             )
         )
@@ -106,7 +106,7 @@ def _at_rest() -> list[Check]:
                 f"{place}: force [N]",
                 expected=force,
                 computed=state.force,
-                tolerance=2e-7,
+                tolerance=1e-7,
                 source=f"Maxwell's pull of the flux of that solution; {source}",
             )
         )
@@ -216,7 +216,7 @@ def _polarised() -> list[Check]:
                 f"polarised magnet with two gaps, 2 A, {1e6 * x:.0f} um: force [N]",
                 expected=float(force),
                 computed=state.force,
-                tolerance=1e-12,
+                tolerance=1e-13,
                 source="two linear loops by hand, pull phi^2/(2 mu0 A) at each gap",
             )
         )
@@ -280,7 +280,7 @@ def _voltage_step() -> list[Check]:
             "24 V on iron with a damping ring and a moving gap: energy balance [-]",
             expected=0.0,
             computed=run.residual,
-            tolerance=1e-12,
+            tolerance=1e-13,
             source="supply = heat + heat of the ring + stored energy + work",
         ),
     ]

@@ -216,7 +216,8 @@ def find_point(
     notes += told
     notes += _own_notes(point, rows, held)
     notes += [_other_note(rows, roles, point, other) for other in others]
-    notes += [_loop_note(name) for name in hysteretic_coils(network)]
+    for name in hysteretic_coils(network):
+        notes.append(_loop_note(name, getattr(network.components[name], "start", "")))
     return PointFound(
         point=point, network=network, rows=rows, currents=currents, notes=tuple(notes)
     )
@@ -335,7 +336,12 @@ def _other_note(rows: Rows, roles: ValveRoles, point: OperatingPoint, other: Ope
     )
 
 
-def _loop_note(coil: str) -> str:
+def _loop_note(coil: str, start: str) -> str:
+    if start == "remanent":
+        return (
+            f"'{coil}' has iron with hysteresis and starts at remanence: the point lies on the "
+            "falling branch of its loop. Coming from a smaller current, flux and force are smaller."
+        )
     return (
         f"'{coil}' has iron with hysteresis: the point lies on its mean curve. Coming from a "
         "larger current, flux and force are larger, from a smaller one smaller; a run with such a "

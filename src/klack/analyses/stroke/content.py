@@ -22,6 +22,7 @@ from klack.analyses.stroke.figures import (
     variants_chart,
 )
 from klack.analyses.stroke.film_frames import film_charts
+from klack.analyses.stroke.loop_figure import loop_chart
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
@@ -63,6 +64,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         *_ring_sections(study),
         Section(title="First impacts", charts=_named(*_first_impacts(study))),
         Section(title="Echoes of the lines", charts=_named(*_echoes(study))),
+        Section(title="Loops of the iron", charts=_named(loop_chart(study))),
         _comparison(study, wet=False),
         _impacts(study),
         Section(

@@ -1,0 +1,94 @@
+r"""Where a magnet stands after it was saturated once: iron on the falling branch of its loop.
+
+After a strong positive current has gone, every stop rests at its yield on the other side,
+:math:`s_k = -\rho_k w(B)`, so that iron follows :math:`H = H_\text{an}(B) - w(B)`.  The fluxes
+balance with that at the gap and the current of the start:
+
+.. math:: C^T\bigl[\Theta_b(\varphi_b, x) - \Theta_{0,b} - w_b(\varphi_b) - N_b i\bigr] = 0 .
+
+Limits: iron that came back from its tip by less than twice the flux density of a reversal is a
+little beside that branch.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import ConvergenceError
+from klack.magnetics.circuit import MagneticCircuit
+from klack.magnetics.flux_table import tubes_of
+from klack.magnetics.hysteresis import IronStops
+from klack.magnetics.static import static_state
+
+__all__ = ["remanent_state"]
+
+Vector = NDArray[np.float64]
+
+_STRONG = 1e6  # [A] magnetomotive force that saturates any iron
+_MOST = 200
+_SETTLED = 1e-13
+
+
+def remanent_state(
+    circuit: MagneticCircuit, *, current: float, gap: float
+) -> tuple[Vector, Vector]:
+    """Loop fluxes [Wb] and stops [A], in the order of the compiled step, after saturation.
+
+    Parameters
+    ----------
+    circuit : MagneticCircuit
+    current : float [A]
+        That remains.
+    gap : float [m]
+
+    Raises
+    ------
+    ConvergenceError
+        If the fluxes do not settle.
+    """
+    turns = float(np.max(np.abs(circuit.turns)))
+    strong = static_state(circuit, current=_STRONG / turns, gap=gap)
+    signs = np.sign(strong.branch_fluxes)
+    widths = np.zeros(len(circuit.branches))
+    found = static_state(circuit, current=current, gap=gap)
+    scale = float(np.max(np.abs(strong.branch_fluxes)))
+    for turn in range(_MOST):
+        branches = tuple(
+            replace(branch, remanence=branch.remanence + sign * width)
+            for branch, sign, width in zip(circuit.branches, signs, widths, strict=True)
+        )
+        before = found.branch_fluxes
+        found = static_state(
+            replace(circuit, branches=branches), current=current, gap=gap, start=found.loop_fluxes
+        )
+        now = np.array(
+            [
+                0.0 if branch.stops is None else width_of(branch.stops, flux)
+                for branch, flux in zip(circuit.branches, found.branch_fluxes, strict=True)
+            ]
+        )
+        if turn > 1 and np.max(np.abs(found.branch_fluxes - before)) <= _SETTLED * scale:
+            break
+        widths = now if turn == 0 else 0.5 * (widths + now)  # a falling width could overshoot
+    else:
+        raise ConvergenceError(
+            f"remanent start: the fluxes do not settle at {current:g} A and a gap of {gap:g} m.\n"
+            "Try: a loop that falls less steeply, or start: demagnetised."
+        )
+    stops = []
+    for tube in tubes_of(circuit)[0]:
+        flux = float(tube.row @ found.loop_fluxes)
+        sign = float(np.sign(tube.row @ strong.loop_fluxes))
+        stops += [-sign * part.share * width_of(part, flux) for part in tube.stops]
+    return found.loop_fluxes, np.concatenate([np.zeros(0), *stops])
+
+
+def width_of(stops: IronStops, flux: float) -> float:
+    """Yield of all stops of a part [A] at a flux [Wb]."""
+    table, place = stops.width, abs(flux) * float(stops.width[1])
+    intervals = int(table[0])
+    if not place < intervals:
+        return float(table[2 + 4 * intervals])
+    i = int(place)
+    return float(table[2 + 4 * i : 6 + 4 * i] @ (place - i) ** np.arange(4.0))
