@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from klack.mesh.mesh import FaceBlock, Mesh
 
-__all__ = ["Recovery", "surface_faces"]
+__all__ = ["Recovery", "simplices", "surface_faces"]
 
 # Every face is cut into simplices through all its nodes, mid nodes included.
 _SIMPLICES: dict[str, tuple[tuple[int, ...], ...]] = {
@@ -46,11 +46,12 @@ class Recovery:
 def surface_faces(mesh: Mesh, surfaces: Sequence[str]) -> NDArray[np.int64]:
     """Simplices of some surfaces in node numbers of the mesh, shape (f, dimension)."""
     blocks = [block for name in surfaces for block in mesh.surface(name).blocks]
-    pieces = [_simplices(block) for block in blocks]
+    pieces = [simplices(block) for block in blocks]
     empty = np.empty((0, mesh.dimension), dtype=np.int64)
     return np.concatenate([empty, *pieces])
 
 
-def _simplices(block: FaceBlock) -> NDArray[np.int64]:
+def simplices(block: FaceBlock) -> NDArray[np.int64]:
+    """Simplices of every face through all its nodes, shape (f, dimension)."""
     local = np.array(_SIMPLICES[block.family])
     return block.connectivity[:, local].reshape(-1, local.shape[1])
