@@ -14,7 +14,7 @@ from klack.assembling.problem import build_problem
 from klack.case.reader import load_case, read_case
 from klack.errors import AccuracyWarning
 from klack.exchange.case_models import case_models
-from klack.exchange.results.recovered_motion import recovered_motion
+from klack.analyses.impact.recovered_motion import recovered_motion
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 

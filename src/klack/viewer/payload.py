@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.viewer.skin import Skin
+from klack.mesh.skin import Skin
 from klack.viewer.view import BodyView, ContactView, Curve, MotionView, View
 
 __all__ = ["payload_of"]

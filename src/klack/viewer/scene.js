@@ -43,9 +43,10 @@ const STYLE = `
 .ks-faces{display:flex;flex-wrap:wrap;gap:4px}
 .ks-faces button{padding:1px 7px;font-size:12.5px;overflow-wrap:anywhere;text-align:left}
 .ks-faces button.ks-hot{border-color:var(--accent);background:var(--back)}
-.ks-charts{grid-column:1;border-top:1px solid var(--line);display:flex;flex-wrap:wrap;background:var(--panel)}
-.ks-chart{flex:1 1 300px;min-width:0;padding:6px 8px 2px}
-.ks-chart svg{width:100%;height:190px;display:block;cursor:crosshair;touch-action:none}
+.ks-charts{grid-column:1;border-top:1px solid var(--line);display:grid;grid-template-columns:repeat(auto-fit,minmax(min(225px,100%),1fr));background:var(--panel);max-height:46vh;overflow:auto}
+.ks-narrow .ks-charts{max-height:none}
+.ks-chart{min-width:0;padding:6px 6px 0}
+.ks-chart svg{width:100%;height:176px;display:block;cursor:crosshair;touch-action:none}
 .ks-chart text{fill:var(--soft);font:11.5px system-ui,sans-serif;font-variant-numeric:tabular-nums}
 .ks-chart .ks-title{fill:var(--ink);font-weight:600}
 .ks-chart .ks-grid{stroke:var(--line);stroke-width:1}
@@ -94,8 +95,8 @@ void main(){
   if (!gl_FrontFacing) {
     // a closed body cut by a plane: where its inside is seen first, the plane cuts it
     float hatch = step(.86, fract((gl_FragCoord.x - gl_FragCoord.y) / 8.));
-    vec3 flat_ = mix(colour * .80, colour * .52, hatch);
-    gl_FragColor = vec4(flat_, 1.); return;
+    gl_FragColor = vec4(mix(colour * .86, colour * .60, hatch), 1.);
+    return;
   }
   if (paint > 1.5) base = viridis(clamp(vValue, 0., 1.));
   else if (paint > .5) base = viridis(clamp(vMove, 0., 1.));
@@ -114,15 +115,21 @@ void main(){
 }`;
 
 const LINE_VERTEX = `${MOVED}
-varying vec3 vPlace;
-void main(){ vPlace = position; gl_Position = projectionMatrix * modelViewMatrix * vec4(moved(), 1.); gl_Position.z -= 2e-4; }`;
+varying vec3 vPlace; varying float vFacing;
+void main(){
+  vPlace = position; vFacing = 1.;
+#ifdef FACING
+  vFacing = (mat3(modelViewMatrix) * normal).z;
+#endif
+  gl_Position = projectionMatrix * modelViewMatrix * vec4(moved(), 1.); gl_Position.z -= 2e-4;
+}`;
 const LINE_FRAGMENT = `
-uniform vec3 colour; uniform float cut; uniform float alpha; varying vec3 vPlace;
-void main(){ if (cut > .5 && vPlace.y < -1e-6) discard; gl_FragColor = vec4(colour, alpha); }`;
+uniform vec3 colour; uniform float cut; uniform float alpha; varying vec3 vPlace; varying float vFacing;
+void main(){ if (vFacing < -.02) discard; if (cut > .5 && vPlace.y < -1e-6) discard; gl_FragColor = vec4(colour, alpha); }`;
 
 const RING_VERTEX = `
-attribute vec3 away; uniform float width; varying vec3 vPlace;
-void main(){ vPlace = position; gl_Position = projectionMatrix * modelViewMatrix * vec4(position + width * away, 1.); gl_Position.z -= 1e-3; }`;
+attribute vec3 away; uniform float width; varying vec3 vPlace; varying float vFacing;
+void main(){ vPlace = position; vFacing = 1.; gl_Position = projectionMatrix * modelViewMatrix * vec4(position + width * away, 1.); gl_Position.z -= 1e-3; }`;
 
 const KINDS = {f4: Float32Array, i2: Int16Array, i1: Int8Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array};
 
@@ -278,7 +285,7 @@ class Body {
     this.shapeAttribute = new THREE.BufferAttribute(this.shape, 3);
     this.shapeAttribute.setUsage(THREE.DynamicDrawUsage);
     this.valueAttribute = new THREE.BufferAttribute(value, 1);
-    const shared = {position, shape: this.shapeAttribute};
+    const shared = {position, shape: this.shapeAttribute, normal: new THREE.BufferAttribute(array(packed.normals), 3, true)};
     const pair = new Float32Array(8).fill(-9);
     let found = 0;
     for (const contact of payload.contacts) for (const side of [contact.upper, contact.lower]) {
@@ -291,7 +298,7 @@ class Body {
       fixedColour: {value: rgb(HELD_COLOUR)}};
     const geometry = new THREE.BufferGeometry();
     for (const [name, attribute] of Object.entries(shared)) geometry.setAttribute(name, attribute);
-    geometry.setAttribute('normal', new THREE.BufferAttribute(array(packed.normals), 3, true));
+    geometry.setAttribute('normal', shared.normal);
     geometry.setAttribute('face', new THREE.BufferAttribute(Float32Array.from(this.face), 1));
     geometry.setAttribute('held', new THREE.BufferAttribute(Float32Array.from(held), 1));
     geometry.setAttribute('value', this.valueAttribute);
@@ -306,7 +313,7 @@ class Body {
       for (const [name, attribute] of Object.entries(shared)) own.setAttribute(name, attribute);
       own.setIndex(new THREE.BufferAttribute(array(packed[key]), 1));
       own.boundingSphere = geometry.boundingSphere;
-      return new THREE.LineSegments(own, this.lineMaterial(i ? 0.42 : 0.9));
+      return new THREE.LineSegments(own, this.lineMaterial(i ? 0.42 : 0.9, {FACING: 1}));
     });
     const section = new THREE.BufferGeometry(), places = array(packed.section);
     section.setAttribute('position', new THREE.BufferAttribute(places, 3));
@@ -317,9 +324,9 @@ class Body {
     for (const part of this.group.children) part.frustumCulled = false;
   }
 
-  lineMaterial(alpha) {
+  lineMaterial(alpha, defines = {}) {
     const {amount, rigid, spread, cut} = this.uniforms;
-    return new THREE.ShaderMaterial({uniforms: {amount, rigid, spread, cut, colour: this.lineColour, alpha: {value: alpha}},
+    return new THREE.ShaderMaterial({defines, uniforms: {amount, rigid, spread, cut, colour: this.lineColour, alpha: {value: alpha}},
       vertexShader: LINE_VERTEX, fragmentShader: LINE_FRAGMENT, transparent: true, depthWrite: false});
   }
 
@@ -349,10 +356,11 @@ function ringMesh(points, closed) {
   geometry.setAttribute('position', new THREE.Float32BufferAttribute(position, 3));
   geometry.setAttribute('away', new THREE.Float32BufferAttribute(away, 3));
   geometry.setIndex(index);
-  const material = new THREE.ShaderMaterial({vertexShader: RING_VERTEX, fragmentShader: LINE_FRAGMENT, side: THREE.DoubleSide,
+  const material = new THREE.ShaderMaterial({vertexShader: RING_VERTEX, fragmentShader: LINE_FRAGMENT, side: THREE.DoubleSide, depthTest: false, transparent: true,
     uniforms: {width: {value: 1}, colour: {value: rgb(RING_COLOUR)}, cut: {value: 0}, alpha: {value: 1}}});
   const mesh = new THREE.Mesh(geometry, material);
   mesh.frustumCulled = false;
+  mesh.renderOrder = 5;
   return mesh;
 }
 
@@ -367,8 +375,8 @@ class Chart {
   }
 
   draw() {
-    const {svg, curves} = this, width = Math.max(svg.clientWidth, 240), height = 190;
-    const box = this.box = {left: 56, right: width - 10, top: 24, bottom: height - 34};
+    const {svg, curves} = this, width = Math.max(svg.clientWidth, 200), height = 176;
+    const box = this.box = {left: 46, right: width - 12, top: 24, bottom: height - 34};
     const forward = this.logarithmic ? Math.log10 : x => x;
     svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
     svg.replaceChildren();
@@ -384,7 +392,7 @@ class Chart {
     this.y = v => box.bottom - (forward(v) - y0) / (y1 - y0) * (box.bottom - box.top);
     this.back = px => { const t = x0 + (px - box.left) / (box.right - box.left) * (x1 - x0); return this.logarithmic ? 10 ** t : t; };
     svg.append(svgEl('text', {x: 4, y: 15, class: 'ks-title'}, this.title));
-    for (const [low, high, vertical] of [[x0, x1, true], [y0, y1, false]]) for (const tick of this.ticks(low, high, vertical ? width / 70 : 4)) {
+    for (const [low, high, vertical] of [[x0, x1, true], [y0, y1, false]]) for (const tick of this.ticks(low, high, vertical ? width / 64 : 4)) {
       const value = this.logarithmic ? 10 ** tick : tick, at = vertical ? this.x(value) : this.y(value);
       svg.append(svgEl('line', vertical ? {x1: at, x2: at, y1: box.top, y2: box.bottom, class: 'ks-grid'} : {x1: box.left, x2: box.right, y1: at, y2: at, class: 'ks-grid'}));
       svg.append(svgEl('text', vertical ? {x: at, y: box.bottom + 14, 'text-anchor': 'middle'} : {x: box.left - 5, y: at + 4, 'text-anchor': 'end'}, number(value)));
@@ -451,7 +459,7 @@ class SceneView {
     this.listeners = {pick: [], time: [], mode: []};
     this.undo = [];
     this.frames = 0;
-    this.state = {motion: 'still', mode: null, time: 0, share: 0.08, factor: 1, playing: false, rigid: false};
+    this.state = {motion: 'still', mode: null, time: 0, share: 0.08, factor: 1, playing: false, rigid: true};
     this.root = el('section', {class: 'ks', 'aria-label': `Bodies of ${payload.title}`});
     this.root.append(el('style', {text: STYLE}));
     this.view = el('div', {class: 'ks-view'});
@@ -917,7 +925,7 @@ class SceneView {
     this.timeText = el('div', {class: 'ks-soft'});
     this.sizeBox = el('input', {type: 'range', min: 0, max: 100, value: 50, 'aria-label': 'Magnification', oninput: () => this.setSize(Number(this.sizeBox.value))});
     this.sizeText = el('div', {class: 'ks-soft'});
-    this.rigidBox = this.check('with the motion as a whole', false, on => { this.state.rigid = on; this.measure(); this.place(); });
+    this.rigidBox = this.check('with the motion as a whole', true, on => { this.state.rigid = on; this.measure(); this.place(); });
     this.motionBox = el('div', {hidden: ''}, this.timeBox, this.timeText, this.sizeBox, this.sizeText, this.rigidBox);
     panel.append(this.motionBox);
   }
@@ -1081,13 +1089,13 @@ class SceneView {
     const bodies = [...new Set(payload.transfer.map(c => c.body))];
     for (const name of bodies) {
       const curves = payload.transfer.filter(c => c.body === name).map(decoded);
-      const chart = new Chart(`${name}: transfer function at the contact`, curves, {logarithmic: true, xUnit: curves[0].xUnit, yUnit: curves[0].yUnit,
+      const chart = new Chart(`${name}: transfer function`, curves, {logarithmic: true, xUnit: curves[0].xUnit, yUnit: curves[0].yUnit,
         label: `Transfer function of ${name}; arrow keys step through its modes`});
       chart.body = name;
       const own = this.modes.map((mode, i) => ({mode, i})).filter(({mode}) => mode.body.name === name);
       const value = f => { const {x, y} = curves[0]; let k = 0; while (k < x.length - 2 && x[k + 1] < f) k++; return y[f - x[k] < x[k + 1] - f ? k : k + 1]; };
-      chart.marks = own.filter(({mode}) => mode.frequency >= curves[0].x[0] && mode.frequency <= curves[0].x.at(-1))
-        .map(({mode, i}) => ({x: mode.frequency, y: value(mode.frequency), index: i, text: hertz(mode.frequency)}));
+      chart.marks = own.filter(({mode}) => mode.frequency / 1e3 >= curves[0].x[0] && mode.frequency / 1e3 <= curves[0].x.at(-1))
+        .map(({mode, i}) => ({x: mode.frequency / 1e3, y: value(mode.frequency / 1e3), index: i, text: hertz(mode.frequency)}));
       this.listen(chart.svg, 'pointerdown', e => {
         if (!chart.marks.length) return;
         const box = chart.svg.getBoundingClientRect(), px = (e.clientX - box.left) * chart.svg.viewBox.baseVal.width / box.width;

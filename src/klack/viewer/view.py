@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.viewer.skin import Skin
+from klack.mesh.skin import Skin
 
 __all__ = ["BodyView", "ContactView", "Curve", "MotionView", "View"]
 

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from klack.mesh.boundary import outer_surface
 from klack.mesh.mesh import FaceBlock, Mesh
-from klack.reduction.recovery import simplices
+from klack.mesh.simplices import simplices
 
 __all__ = ["Skin", "skin_of_mesh"]
 
@@ -49,7 +49,7 @@ class Skin:
     element_edges : int array, shape (e, 2)
         Vertices: sides of the elements.
     creases : int array, shape (k, 2)
-        Vertices: where two smooth parts or two named surfaces meet.
+        Vertices: where two smooth parts or two named surfaces meet, once on either side.
     """
 
     points: Floats
@@ -197,7 +197,7 @@ def _split(corners: _Corners, node: Ints, angle: Floats, names: tuple[str, ...])
     kept = np.linalg.norm(normals, axis=1) > 0
     triangles, face, normals = triangles[kept], face[kept], normals[kept]
     unit = normals / np.linalg.norm(normals, axis=1, keepdims=True)
-    part, crease_keys = _smooth_parts(triangles, face, unit, len(corners.points))
+    part, crease_ends, crease_parts = _smooth_parts(triangles, face, unit, len(corners.points))
     keys = part[:, None] * len(corners.points) + triangles
     unique, inverse = np.unique(keys, return_inverse=True)
     own = inverse.reshape(triangles.shape)
@@ -223,7 +223,9 @@ def _split(corners: _Corners, node: Ints, angle: Floats, names: tuple[str, ...])
         faces=names,
         triangles=own,
         element_edges=vertex_of[lines],
-        creases=vertex_of[crease_keys],
+        creases=np.searchsorted(
+            unique, crease_parts.T[:, :, None] * len(corners.points) + crease_ends[None]
+        ).reshape(-1, 2),
     )
 
 
@@ -234,8 +236,8 @@ def _triangle_normals(points: Floats, triangles: Ints) -> Floats:
 
 def _smooth_parts(
     triangles: Ints, face: Ints, unit: Floats, points: int
-) -> tuple[Ints, Ints]:
-    """Number of the smooth part of each triangle, and the edges between parts."""
+) -> tuple[Ints, Ints, Ints]:
+    """Number of the smooth part of each triangle; ends of the edges between parts, and the parts."""
     count = len(triangles)
     ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(count), 3)
@@ -249,4 +251,5 @@ def _smooth_parts(
         (np.ones(int(smooth.sum())), (one[smooth], other[smooth])), shape=(count, count)
     )
     part = connected_components(links, directed=False)[1].astype(np.int64)
-    return part, ends[same[~smooth]]
+    creases = ~smooth
+    return part, ends[same[creases]], np.column_stack([part[one], part[other]])[creases]
