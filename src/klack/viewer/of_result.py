@@ -191,7 +191,7 @@ def _impact_histories(study: ImpactStudy) -> tuple[Curve, ...]:
     ]
     if history.displacement_a.size:
         curves.append(
-            _history(f"displacement of {study.bodies[0].name}", history.edges, history.displacement_a,
+            _history(f"{study.bodies[0].name} displacement", history.edges, history.displacement_a,
                      1e6, "µm")
         )  # fmt: skip
     return tuple(curves)

@@ -43,14 +43,15 @@ const STYLE = `
 .ks-faces{display:flex;flex-wrap:wrap;gap:4px}
 .ks-faces button{padding:1px 7px;font-size:12.5px;overflow-wrap:anywhere;text-align:left}
 .ks-faces button.ks-hot{border-color:var(--accent);background:var(--back)}
-.ks-charts{grid-column:1;border-top:1px solid var(--line);display:grid;grid-template-columns:repeat(auto-fit,minmax(min(225px,100%),1fr));background:var(--panel);max-height:46vh;overflow:auto}
+.ks-charts{grid-column:1;border-top:1px solid var(--line);display:grid;grid-template-columns:repeat(auto-fit,minmax(min(168px,100%),1fr));background:var(--panel);max-height:46vh;overflow:auto}
 .ks-narrow .ks-charts{max-height:none}
-.ks-chart{min-width:0;padding:6px 6px 0}
+.ks-chart{position:relative;min-width:0;padding:6px 6px 0}
 .ks-chart svg{width:100%;height:176px;display:block;cursor:crosshair;touch-action:none}
 .ks-chart text{fill:var(--soft);font:11.5px system-ui,sans-serif;font-variant-numeric:tabular-nums}
 .ks-chart .ks-title{fill:var(--ink);font-weight:600}
 .ks-chart .ks-grid{stroke:var(--line);stroke-width:1}
 .ks-chart .ks-mark{cursor:pointer}
+.ks-cursor{position:absolute;left:6px;top:30px;width:2px;height:118px;background:#d55e00;pointer-events:none;will-change:transform}
 .ks-schematic{background:#fff;border-radius:6px;max-width:100%;border:1px solid var(--line)}
 .ks-said{position:absolute;left:50%;bottom:16px;transform:translateX(-50%);background:var(--ink);color:var(--panel);border-radius:6px;padding:5px 12px;font-size:13px;max-width:92%}
 .ks [hidden]{display:none!important}
@@ -60,6 +61,7 @@ const BODY_COLOURS = [['#9db8d2', '#86a8c9'], ['#d8bd95', '#bd9c6b'], ['#a9c6a4'
 const CONTACT_COLOUR = '#d55e00', HELD_COLOUR = '#0a7f5f', RING_COLOUR = '#c2185b';
 const TURN = Math.PI / 180;
 const UNNAMED = 65535;
+const STRESS_DECADES = 3; // of the colours: the contact has a hundred times the stress of the rest
 
 // viridis as a polynomial (M. Zucker, CC0): the same coefficients in the shader and in the legend
 const VIRIDIS = [
@@ -75,18 +77,18 @@ attribute vec3 shape; uniform float amount; uniform float rigid; uniform float s
 vec3 moved(){ return position + amount * shape + vec3(0., 0., rigid); }`;
 
 const SURFACE_VERTEX = `${MOVED}
-attribute float face; attribute float held; attribute float value;
-varying vec3 vNormal; varying vec3 vPlace; varying float vFace; varying float vHeld; varying float vValue; varying float vMove;
+attribute float face; attribute float held; attribute float value; attribute float role;
+varying vec3 vNormal; varying vec3 vPlace; varying float vFace; varying float vHeld; varying float vValue; varying float vMove; varying float vRole;
 void main(){
-  vPlace = position; vFace = face; vHeld = held; vValue = value; vMove = length(shape) * spread;
+  vPlace = position; vFace = face; vHeld = held; vValue = value; vRole = role; vMove = length(shape) * spread;
   vNormal = normalize(mat3(modelViewMatrix) * normal);
   gl_Position = projectionMatrix * modelViewMatrix * vec4(moved(), 1.);
 }`;
 
 const SURFACE_FRAGMENT = `
 uniform vec3 colour; uniform vec3 contact; uniform vec3 fixedColour; uniform float hover; uniform float cut; uniform float paint;
-uniform float pair[8]; uniform float marks; uniform float dark;
-varying vec3 vNormal; varying vec3 vPlace; varying float vFace; varying float vHeld; varying float vValue; varying float vMove;
+uniform float marks; uniform float dark;
+varying vec3 vNormal; varying vec3 vPlace; varying float vFace; varying float vHeld; varying float vValue; varying float vMove; varying float vRole;
 ${VIRIDIS_GLSL}
 void main(){
   if (cut > .5 && vPlace.y < 0.) discard;
@@ -101,13 +103,12 @@ void main(){
   if (paint > 1.5) base = viridis(clamp(vValue, 0., 1.));
   else if (paint > .5) base = viridis(clamp(vMove, 0., 1.));
   else {
-    float f = floor(vFace + .5);
-    for (int i = 0; i < 8; i++) if (abs(pair[i] - f) < .25) base = mix(base, contact, .82 * marks);
+    if (vRole > .99) base = mix(base, contact, .82 * marks);
     if (vHeld > .99 && marks > .5) base = mix(base, fixedColour, .45 + .45 * stripe);
   }
   vec3 n = normalize(vNormal);
-  float light = .60 + .44 * max(dot(n, normalize(vec3(-.45, .65, .62))), 0.) + .16 * max(dot(n, normalize(vec3(.7, -.2, .5))), 0.);
-  float rim = pow(1. - max(n.z, 0.), 3.);
+  float light = .60 + .44 * max(dot(n, vec3(-.448, .647, .617)), 0.) + .16 * max(dot(n, vec3(.792, -.226, .566)), 0.);
+  float rim = 1. - max(n.z, 0.); rim *= rim * rim;
   base *= light;
   base = mix(base, vec3(dark > .5 ? .92 : .25), .10 * rim);
   if (hover >= 0. && abs(hover - vFace) < .25) base = mix(base, vec3(1.), .38);
@@ -286,15 +287,14 @@ class Body {
     this.shapeAttribute.setUsage(THREE.DynamicDrawUsage);
     this.valueAttribute = new THREE.BufferAttribute(value, 1);
     const shared = {position, shape: this.shapeAttribute, normal: new THREE.BufferAttribute(array(packed.normals), 3, true)};
-    const pair = new Float32Array(8).fill(-9);
-    let found = 0;
+    const pair = [];
     for (const contact of payload.contacts) for (const side of [contact.upper, contact.lower]) {
       const place = side.startsWith(this.name + '.') ? this.faces.indexOf(side.slice(this.name.length + 1)) : -1;
-      if (place >= 0 && found < 8) pair[found++] = place;
+      if (place >= 0) pair.push(place);
     }
     this.pair = pair;
     this.uniforms = {amount: {value: 0}, rigid: {value: 0}, spread: {value: 0}, cut: {value: 0}, hover: {value: -1}, paint: {value: 0}, marks: {value: 1},
-      pair: {value: pair}, dark: {value: 0}, colour: {value: rgb(BODY_COLOURS[index % BODY_COLOURS.length][0])}, contact: {value: rgb(CONTACT_COLOUR)},
+      dark: {value: 0}, colour: {value: rgb(BODY_COLOURS[index % BODY_COLOURS.length][0])}, contact: {value: rgb(CONTACT_COLOUR)},
       fixedColour: {value: rgb(HELD_COLOUR)}};
     const geometry = new THREE.BufferGeometry();
     for (const [name, attribute] of Object.entries(shared)) geometry.setAttribute(name, attribute);
@@ -302,11 +302,12 @@ class Body {
     geometry.setAttribute('face', new THREE.BufferAttribute(Float32Array.from(this.face), 1));
     geometry.setAttribute('held', new THREE.BufferAttribute(Float32Array.from(held), 1));
     geometry.setAttribute('value', this.valueAttribute);
+    geometry.setAttribute('role', new THREE.BufferAttribute(Float32Array.from(this.face, f => pair.includes(f) ? 1 : 0), 1));
     geometry.setIndex(new THREE.BufferAttribute(array(packed.triangles), 1));
     geometry.computeBoundingSphere();
     geometry.computeBoundingBox();
     this.surface = new THREE.Mesh(geometry, new THREE.ShaderMaterial({uniforms: this.uniforms, vertexShader: SURFACE_VERTEX, fragmentShader: SURFACE_FRAGMENT,
-      side: THREE.DoubleSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1}));
+      side: THREE.FrontSide, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 1}));
     this.lineColour = {value: rgb('#222a31')};
     this.lines = ['creases', 'elementEdges'].map((key, i) => {
       const own = new THREE.BufferGeometry();
@@ -370,12 +371,14 @@ class Chart {
   constructor(title, curves, {logarithmic = false, xUnit, yUnit, label}) {
     this.curves = curves; this.logarithmic = logarithmic; this.xUnit = xUnit; this.yUnit = yUnit; this.title = title;
     this.svg = svgEl('svg', {tabindex: 0, role: 'slider', 'aria-label': label, 'aria-valuemin': 0, 'aria-valuemax': 1, 'aria-valuenow': 0});
-    this.node = el('div', {class: 'ks-chart'}, this.svg);
+    this.line = el('i', {class: 'ks-cursor', hidden: ''});
+    this.node = el('div', {class: 'ks-chart'}, this.svg, this.line);
     this.cursor = null; this.marks = [];
   }
 
   draw() {
-    const {svg, curves} = this, width = Math.max(svg.clientWidth, 200), height = 176;
+    const {svg, curves} = this, width = Math.max(svg.clientWidth, 160), height = 176;
+    this.width = width;
     const box = this.box = {left: 46, right: width - 12, top: 24, bottom: height - 34};
     const forward = this.logarithmic ? Math.log10 : x => x;
     svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
@@ -391,14 +394,13 @@ class Chart {
     this.x = v => box.left + (forward(v) - x0) / (x1 - x0) * (box.right - box.left);
     this.y = v => box.bottom - (forward(v) - y0) / (y1 - y0) * (box.bottom - box.top);
     this.back = px => { const t = x0 + (px - box.left) / (box.right - box.left) * (x1 - x0); return this.logarithmic ? 10 ** t : t; };
-    svg.append(svgEl('text', {x: 4, y: 15, class: 'ks-title'}, this.title));
+    svg.append(svgEl('text', {x: 4, y: 15, class: 'ks-title'}, `${this.title} [${this.yUnit}]`));
     for (const [low, high, vertical] of [[x0, x1, true], [y0, y1, false]]) for (const tick of this.ticks(low, high, vertical ? width / 64 : 4)) {
       const value = this.logarithmic ? 10 ** tick : tick, at = vertical ? this.x(value) : this.y(value);
       svg.append(svgEl('line', vertical ? {x1: at, x2: at, y1: box.top, y2: box.bottom, class: 'ks-grid'} : {x1: box.left, x2: box.right, y1: at, y2: at, class: 'ks-grid'}));
       svg.append(svgEl('text', vertical ? {x: at, y: box.bottom + 14, 'text-anchor': 'middle'} : {x: box.left - 5, y: at + 4, 'text-anchor': 'end'}, number(value)));
     }
     svg.append(svgEl('text', {x: box.right, y: height - 5, 'text-anchor': 'end'}, this.xUnit));
-    svg.append(svgEl('text', {x: box.right, y: 15, 'text-anchor': 'end'}, this.yUnit));
     curves.forEach((c, k) => {
       const parts = [];
       for (let i = 0; i < c.x.length; i++) if (Number.isFinite(forward(c.y[i]))) parts.push(`${this.x(c.x[i]).toFixed(1)},${this.y(c.y[i]).toFixed(1)}`);
@@ -413,19 +415,13 @@ class Chart {
       dot.append(svgEl('title', {}, mark.text));
       svg.append(dot);
     }
-    if (this.cursor !== null) {
-      const at = this.x(this.cursor);
-      svg.append(svgEl('line', {x1: at, x2: at, y1: box.top, y2: box.bottom, stroke: '#d55e00', 'stroke-width': 2, class: 'ks-cursor'}));
-    }
+    this.moveCursor(this.cursor);
   }
 
   moveCursor(value) {
-    const fresh = this.cursor === null;
     this.cursor = value;
-    const line = this.svg.querySelector('.ks-cursor');
-    if (fresh || !line) { if (this.x) this.draw(); return; }
-    const at = value === null ? -9 : this.x(value);
-    line.setAttribute('x1', at); line.setAttribute('x2', at);
+    this.line.hidden = value === null;
+    if (value !== null && this.x) this.line.style.transform = `translateX(${this.x(value) * this.svg.clientWidth / this.width}px)`;
   }
 
   ticks(low, high, most) {
@@ -524,13 +520,13 @@ class SceneView {
     this.camera = new THREE.OrthographicCamera(-1, 1, 1, -1, -10 * this.size, 10 * this.size);
     this.camera.up.set(0, 0, 1);
     if (!this.bodies.length) { this.view.hidden = true; return; }
-    try {
-      this.renderer = new THREE.WebGLRenderer({canvas: this.canvas, antialias: this.options.antialias !== false, powerPreference: 'low-power'});
-    } catch (error) {
-      this.view.append(el('p', {class: 'ks-said', text: 'This browser has no WebGL: the bodies cannot be drawn. Names of faces and numbers stand beside.'}));
+    const context = this.context();
+    if (!context) {
+      this.over.append(el('p', {class: 'ks-said', text: 'This browser has no WebGL 2: the bodies cannot be drawn. Names of faces and numbers stand beside.'}));
       this.renderer = null;
       return;
     }
+    this.renderer = new THREE.WebGLRenderer({canvas: this.canvas, context});
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.enableDamping = false;
     this.controls.minZoom = 0.3; this.controls.maxZoom = 3000;
@@ -546,6 +542,20 @@ class SceneView {
       if (name) this.pick(name);
     });
     this.listen(this.canvas, 'keydown', e => this.key(e));
+  }
+
+  // a software renderer has no time for antialiasing: it draws a finer picture when all is still
+  context() {
+    const first = this.canvas.getContext('webgl2', {antialias: true});
+    if (!first) return null;
+    const info = first.getExtension('WEBGL_debug_renderer_info');
+    this.isSlow = /swiftshader|llvmpipe|softpipe|software/i.test(first.getParameter(info ? info.UNMASKED_RENDERER_WEBGL : first.RENDERER));
+    if (!this.isSlow) return first;
+    first.getExtension('WEBGL_lose_context')?.loseContext();
+    const fresh = this.canvas.cloneNode();
+    this.canvas.replaceWith(fresh);
+    this.canvas = fresh;
+    return fresh.getContext('webgl2', {antialias: false});
   }
 
   buildDimensions() {
@@ -610,12 +620,28 @@ class SceneView {
     const width = Math.max(this.view.clientWidth, 10), height = Math.max(this.view.clientHeight, 10);
     if (width === this.width && height === this.height) return;
     this.width = width; this.height = height;
-    this.renderer.setPixelRatio(Math.min(window.devicePixelRatio || 1, 2));
+    this.setRatio(this.ratio(false));
     this.renderer.setSize(width, height, false);
     const half = 0.5 * this.framed / Math.min(1, width / height);
     this.camera.left = -half * width / height; this.camera.right = half * width / height; this.camera.top = half; this.camera.bottom = -half;
     this.camera.updateProjectionMatrix();
     this.invalidate();
+  }
+
+  ratio(fine) {
+    const own = Math.min(window.devicePixelRatio || 1, 2);
+    return this.isSlow ? (fine ? 2 : 1) : own;
+  }
+
+  setRatio(ratio) {
+    if (this.renderer.getPixelRatio() === ratio) return;
+    this.renderer.setPixelRatio(ratio);
+  }
+
+  refine() {
+    if (this.gone || this.state.playing || !this.renderer) return;
+    this.setRatio(this.ratio(true));
+    this.renderer.render(this.world, this.camera);
   }
 
   look(centre, height, direction) {
@@ -627,6 +653,7 @@ class SceneView {
     this.width = 0;
     this.resize();
     this.controls.update();
+    if (this.state.motion === 'impact') this.measure();
     this.invalidate();
   }
 
@@ -747,8 +774,11 @@ class SceneView {
     if (this.renderer) {
       const pixel = (this.camera.top - this.camera.bottom) / this.camera.zoom / this.height;
       for (const ring of this.rings) { ring.material.uniforms.width.value = 2.2 * pixel; ring.material.uniforms.cut.value = this.cut ? 1 : 0; }
+      this.setRatio(this.ratio(false));
       this.renderer.render(this.world, this.camera);
       this.overlay(pixel);
+      clearTimeout(this.refining);
+      if (this.isSlow && !this.state.playing) this.refining = setTimeout(() => this.refine(), 160);
     }
     this.frames++;
     if (this.state.playing) this.invalidate(); else this.last = undefined;
@@ -795,7 +825,10 @@ class SceneView {
   setCut(on) {
     this.cut = on;
     if (this.cutBox) this.cutBox.box.checked = on;
-    for (const body of this.bodies) body.uniforms.cut.value = on ? 1 : 0;
+    for (const body of this.bodies) {
+      body.uniforms.cut.value = on ? 1 : 0;
+      body.surface.material.side = on ? THREE.DoubleSide : THREE.FrontSide;
+    }
     this.linesVisible();
     this.invalidate();
   }
@@ -875,7 +908,7 @@ class SceneView {
     this.stressMost = stress;
     for (const body of this.bodies) if (body.motion && stress > 0) {
       const own = body.value;
-      for (let i = 0; i < own.length; i++) own[i] /= stress;
+      for (let i = 0; i < own.length; i++) own[i] = Math.max(1 + Math.log10(Math.max(own[i], 1e-9) / stress) / STRESS_DECADES, 0);
       body.valueAttribute.needsUpdate = true;
     }
     const c = this.legend.querySelector('canvas').getContext('2d');
@@ -890,10 +923,11 @@ class SceneView {
     if (!this.colourBox) return;
     const kind = this.colourBox.value, moving = this.state.motion !== 'still';
     const on = kind === 'stress' ? 2 : kind === 'move' && moving ? 1 : 0;
-    for (const body of this.bodies) body.uniforms.paint.value = body.motion ? on : 0;
+    const alone = on === 1 && this.state.motion === 'mode' ? this.modes[this.state.mode].body : null;
+    for (const body of this.bodies) body.uniforms.paint.value = body.motion && (!alone || alone === body) ? on : 0;
     this.legend.hidden = on === 0;
     const [title, , ends] = this.legend.children;
-    if (on === 2) { title.textContent = 'von Mises stress at peak force'; ends.lastChild.textContent = `${number(this.stressMost)} MPa`; ends.firstChild.textContent = '0'; }
+    if (on === 2) { title.textContent = 'von Mises stress at peak force (log)'; ends.lastChild.textContent = `${number(this.stressMost)} MPa`; ends.firstChild.textContent = `${number(this.stressMost / 10 ** STRESS_DECADES)} MPa`; }
     if (on === 1) {
       const mode = this.state.motion === 'mode';
       title.textContent = mode ? 'displacement of the mode' : 'displacement';
@@ -971,7 +1005,7 @@ class SceneView {
       scratch.push(most);
     }
     this.spreadMost = Math.max(most, travel) || 1;
-    this.unit = 0.06 * this.size / this.spreadMost;
+    this.unit = 0.06 * (this.framed || this.size) / this.spreadMost;
     this.setSize(50);
     if (this.sizeBox) this.sizeBox.value = 50;
   }
@@ -1089,7 +1123,7 @@ class SceneView {
     const bodies = [...new Set(payload.transfer.map(c => c.body))];
     for (const name of bodies) {
       const curves = payload.transfer.filter(c => c.body === name).map(decoded);
-      const chart = new Chart(`${name}: transfer function`, curves, {logarithmic: true, xUnit: curves[0].xUnit, yUnit: curves[0].yUnit,
+      const chart = new Chart(`${name} receptance`, curves, {logarithmic: true, xUnit: curves[0].xUnit, yUnit: curves[0].yUnit,
         label: `Transfer function of ${name}; arrow keys step through its modes`});
       chart.body = name;
       const own = this.modes.map((mode, i) => ({mode, i})).filter(({mode}) => mode.body.name === name);
@@ -1129,6 +1163,7 @@ class SceneView {
     this.gone = true;
     cancelAnimationFrame(this.asked);
     clearTimeout(this.saying);
+    clearTimeout(this.refining);
     for (const call of this.undo) call();
     this.undo = [];
     this.controls?.dispose();
