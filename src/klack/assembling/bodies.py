@@ -165,9 +165,7 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
         pose=pose,
         gauges=place_gauges(case, {moving.body: (upper, pose), stop.body: (lower, None)}),
         form=placed.form,
-        layer=layer_of_faces(
-            case, upper, placed.upper_surface, lower, placed.lower_surface
-        ),
+        layer=layer_of_faces(case, upper, placed.upper_surface, lower, placed.lower_surface),
     )
 
 

@@ -115,13 +115,12 @@ def _draw_page(
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
     with show_progress(wanted.quiet) as progress:
         view = view_of_source(source, own, unit_length=length, progress=progress)
-    name = source.stem if source.suffix else source.absolute().name
-    file = out if out is not None else Path(f"{name}.html")
+    file = out if out is not None else Path(f"{view.name}.html")
     require_file_target("--out", file)
     page = page_of(view)
     _write(file, page)
     wanted.say(f"{_content(view)}\nPage: {file} ({len(page) / 1e6:.2g} MB); open it in a browser.")
-    wanted.write(lambda: _numbers(name, file, network=named_case(source, own), view=view))
+    wanted.write(lambda: _numbers(view.name, file, network=named_case(source, own), view=view))
     return 0
 
 
@@ -205,7 +204,9 @@ def _numbers(
         "schema": "klack-show/1",
         "case": name,
         "file": str(file),
-        "bodies": {} if view is None else {body.name: list(body.skin.faces) for body in view.bodies},
+        "bodies": {}
+        if view is None
+        else {body.name: list(body.skin.faces) for body in view.bodies},
         "components": {}
         if drawn is None
         else {part_name: part.type for part_name, part in drawn.components.items()},

@@ -24,8 +24,11 @@ Ints = NDArray[np.int64]
 _CREASE = np.cos(np.radians(35.0))
 """Neighbouring triangles whose normals differ by more are parts of their own."""
 
-_TURNS = 72
-"""Segments of a revolved half section, 5 degrees each."""
+_TURNS = (24, 72)
+"""Fewest and most segments of a revolved half section."""
+
+_VERTICES = 30_000
+"""Of a revolved half section, about, above the fewest segments."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -156,27 +159,28 @@ def _revolved_corners(
     off = ~axis[segments].all(axis=1)
     segments, face = segments[off], face[off]
     used = np.unique(segments)
+    turns = int(np.clip(_VERTICES // len(used), *_TURNS))
     # one point for each node on the axis, a ring of them for all others
-    angles = np.linspace(0.0, 2.0 * np.pi, _TURNS, endpoint=False)
-    ring = np.where(axis[used], 1, _TURNS)
+    angles = np.linspace(0.0, 2.0 * np.pi, turns, endpoint=False)
+    ring = np.where(axis[used], 1, turns)
     first = np.concatenate([[0], np.cumsum(ring)[:-1]])
     node = np.repeat(used, ring)
     turn = np.arange(len(node)) - np.repeat(first, ring)
     angle = angles[turn]
     place = np.empty(mesh.node_count, dtype=np.int64)
     place[used] = np.arange(len(used))
-    steps = np.arange(_TURNS)
+    steps = np.arange(turns)
 
     def at(nodes: Ints, k: Ints) -> Ints:
         own = place[nodes][:, None]
-        return np.where(ring[own] == 1, first[own], first[own] + k[None, :] % _TURNS)
+        return np.where(ring[own] == 1, first[own], first[own] + k[None, :] % turns)
 
     a0, a1 = at(segments[:, 0], steps), at(segments[:, 0], steps + 1)
     b0, b1 = at(segments[:, 1], steps), at(segments[:, 1], steps + 1)
     # material to the left of a segment in (r, z), theta from x to y: outwards is a0, a1, b1
     lower = np.stack([a0, a1, b1], axis=2).reshape(-1, 3)
     upper = np.stack([a0, b1, b0], axis=2).reshape(-1, 3)
-    named = np.repeat(face, _TURNS)
+    named = np.repeat(face, turns)
     triangles = np.concatenate([lower, upper])
     triangle_face = np.concatenate([named, named])
     kept = np.all(triangles != np.roll(triangles, 1, axis=1), axis=1)
@@ -237,7 +241,7 @@ def _triangle_normals(points: Floats, triangles: Ints) -> Floats:
 def _smooth_parts(
     triangles: Ints, face: Ints, unit: Floats, points: int
 ) -> tuple[Ints, Ints, Ints]:
-    """Number of the smooth part of each triangle; ends of the edges between parts, and the parts."""
+    """Smooth part of each triangle; ends of the edges between parts, and both parts there."""
     count = len(triangles)
     ends = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     owner = np.repeat(np.arange(count), 3)

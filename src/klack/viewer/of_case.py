@@ -19,10 +19,10 @@ from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import edge_lengths
+from klack.mesh.skin import skin_of_mesh
 from klack.progress import Progress, silent
 from klack.schematic.picture import schematic_svg
 from klack.units import format_si
-from klack.mesh.skin import skin_of_mesh
 from klack.viewer.view import BodyView, ContactView, View
 
 __all__ = ["ALL_ROUND", "body_view", "view_of_case", "view_of_mesh"]
@@ -39,6 +39,7 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
     progress : callable
     """
     view = View(
+        name=case.name,
         title=case.title or case.name,
         source=f"case {case.name}",
         description=case.description.strip(),
@@ -101,6 +102,7 @@ def view_of_mesh(mesh: Mesh, source: str, note: str = "") -> View:
     """The body of a mesh or CAD file, as it is."""
     name = Path(source).stem
     return View(
+        name=name,
         title=source,
         source=source,
         description="",
@@ -154,7 +156,7 @@ def _source(body: CaseBody) -> str:
 
 
 def _mesh_words(mesh: Mesh) -> str:
-    finest = format_si(float(edge_lengths(mesh).min()), "m", 2)
+    finest = format_si(float(edge_lengths(mesh).min()), "m", 2).replace("um", "µm")
     return f"{mesh.node_count} nodes, {mesh.element_count} elements, shortest side {finest}"
 
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +65,7 @@ def view_of_result(
 def _named(view: View, study: ImpactStudy | StrokeStudy, folder: Path) -> View:
     return replace(
         view,
+        name=folder.absolute().name,
         title=study.title or study.case,
         source=f"result {folder.name} of case {study.case}, computed by klack {study.version}",
         description=study.description,
@@ -93,9 +93,14 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
         bodies = tuple(_pictured(study, one, kept[one.body]) for one in study.pictures)
         contacts = _touching(study)
         view = View(
-            title="", source="", description="", version=__version__, bodies=bodies,
+            name="",
+            title="",
+            source="",
+            description="",
+            version=__version__,
+            bodies=bodies,
             contacts=contacts,
-        )  # fmt: skip
+        )
         if left_out:
             notes.append(
                 f"{left_out} of the highest modes are left out, for a page of a few megabytes."
@@ -191,9 +196,14 @@ def _impact_histories(study: ImpactStudy) -> tuple[Curve, ...]:
     ]
     if history.displacement_a.size:
         curves.append(
-            _history(f"{study.bodies[0].name} displacement", history.edges, history.displacement_a,
-                     1e6, "µm")
-        )  # fmt: skip
+            _history(
+                f"{study.bodies[0].name} displacement",
+                history.edges,
+                history.displacement_a,
+                1e6,
+                "µm",
+            )
+        )
     return tuple(curves)
 
 

@@ -1,7 +1,7 @@
 """One self-contained page of a view: no server, no request, nothing but the file.
 
-The component and three.js are modules for other programs; a page that is opened from a file may load
-none, so both become one classic script here.
+The component and three.js are modules for other programs; a page that is opened from a file may
+load none, so both become one classic script here.
 """
 
 import json
@@ -51,9 +51,12 @@ def _script() -> str:
     library = room.joinpath("three.min.js").read_text(encoding="utf-8")
     scene = room.joinpath("scene.js").read_text(encoding="utf-8")
     body, found, names = library.rpartition("export{")
-    assert found and _IMPORT in scene, "three.min.js and scene.js as they are shipped"
+    assert found, "three.min.js as it is shipped"
+    assert _IMPORT in scene, "scene.js as it is shipped"
     listed = re.sub(r"([\w$]+) as ([\w$]+)", r"\2:\1", names.strip().removesuffix("};"))
     scene = re.sub(r"^export ", "", scene.replace(_IMPORT, ""), flags=re.MULTILINE)
-    text = f"const THREE=(()=>{{{body}return{{{listed}}};}})();\n{scene}"
-    assert "</script" not in text and "<!--" not in text
+    licence = room.joinpath("three.LICENSE.txt").read_text(encoding="utf-8").strip()
+    text = f"/*\n{licence}\n*/\nconst THREE=(()=>{{{body}return{{{listed}}};}})();\n{scene}"
+    assert "</script" not in text
+    assert "<!--" not in text
     return text

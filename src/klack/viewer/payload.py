@@ -74,8 +74,9 @@ def _motion(motion: MotionView, skin: Skin) -> dict[str, Any]:
         "angle": _array(skin.angle, "f4"),
         "shapes": _array(motion.shapes, "i2"),
         "scale": _array(motion.scale * _MM, "f4"),
-        "frequency": [None if rest else float(f) for f, rest in
-                      zip(motion.frequency, known, strict=True)],  # fmt: skip
+        "frequency": [
+            None if rest else float(f) for f, rest in zip(motion.frequency, known, strict=True)
+        ],
         "amplitude": _array(motion.amplitude, "f4"),
         "stress": _array(motion.stress * 1e-6, "f4"),
     }

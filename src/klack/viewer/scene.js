@@ -54,6 +54,10 @@ const STYLE = `
 .ks-cursor{position:absolute;left:6px;top:30px;width:2px;height:118px;background:#d55e00;pointer-events:none;will-change:transform}
 .ks-schematic{background:#fff;border-radius:6px;max-width:100%;border:1px solid var(--line)}
 .ks-said{position:absolute;left:50%;bottom:16px;transform:translateX(-50%);background:var(--ink);color:var(--panel);border-radius:6px;padding:5px 12px;font-size:13px;max-width:92%}
+.ks-net{position:absolute;inset:0;background:#fff;overflow:auto;padding:10px}
+.ks.ks-flat{display:flex;flex-direction:column-reverse;height:auto;justify-content:flex-end}
+.ks-flat .ks-charts{display:block;max-height:none;border:0;padding:12px 14px}
+.ks-flat .ks-panel{border:0}
 .ks [hidden]{display:none!important}
 `;
 
@@ -658,7 +662,7 @@ class SceneView {
   }
 
   whole() {
-    this.look(this.extent.getCenter(new THREE.Vector3()), 0.98 * this.size, new THREE.Vector3(0.55, -1, 0.42));
+    this.look(this.extent.getCenter(new THREE.Vector3()), 1.07 * this.size, new THREE.Vector3(0.55, -1, 0.42));
   }
 
   toContact(index = 0) {
@@ -888,8 +892,12 @@ class SceneView {
       let binary = '';
       for (const byte of text) binary += String.fromCharCode(byte);
       const picture = el('img', {class: 'ks-schematic', alt: 'Schematic of the network', src: `data:image/svg+xml;base64,${btoa(binary)}`});
-      if (this.bodies.length) panel.append(el('h3', {text: 'Network'}), picture);
-      else { this.root.style.display = 'block'; this.chartBox.append(picture); }
+      if (this.bodies.length) {
+        const net = el('div', {class: 'ks-net', hidden: '', tabindex: 0, 'aria-label': 'Schematic of the network'}, picture);
+        this.view.append(net);
+        const button = el('button', {type: 'button', text: 'Schematic', 'aria-pressed': 'false', onclick: () => { net.hidden = !net.hidden; button.setAttribute('aria-pressed', String(!net.hidden)); }});
+        panel.append(el('h3', {text: 'Network'}), el('div', {class: 'ks-row'}, button));
+      } else { this.root.classList.add('ks-flat'); this.chartBox.append(picture); }
     }
     if (payload.notes.length) {
       panel.append(el('h3', {text: 'Notes'}));

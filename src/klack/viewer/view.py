@@ -63,8 +63,8 @@ class MotionView:
     shapes: NDArray[np.int16]
     scale: Floats
     frequency: Floats
-    amplitude: Floats
-    stress: Floats
+    amplitude: NDArray[np.floating]
+    stress: NDArray[np.floating]
     node: NDArray[np.int64]
 
 
@@ -124,8 +124,8 @@ class View:
 
     Parameters
     ----------
-    title, source, description : str
-        ``source`` names the case, mesh or result.
+    name, title, source, description : str
+        ``name`` is a short one, for a file; ``source`` says which case, mesh or result this is.
     version : str
         Of klack.
     bodies : tuple of BodyView
@@ -139,6 +139,7 @@ class View:
         What is not shown, and why.
     """
 
+    name: str
     title: str
     source: str
     description: str

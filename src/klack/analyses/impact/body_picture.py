@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.record import BodyPicture, LevelResult
-from klack.analyses.impact.recovered_motion import Recovered, recovered_bodies
+from klack.analyses.impact.recovered_motion import recovered_bodies
 from klack.analyses.impact.section import section_picture
 from klack.assembling.modes import kept_modes
 from klack.assembling.problem import ContactProblem
@@ -62,8 +62,7 @@ def body_pictures(
     reduced = (pair.upper, pair.lower)
     parts = recovered_bodies(problem, pools, pair)
     if ran is None or any(
-        part.shapes.shape[1] != model.mode_count
-        for part, model in zip(parts, reduced, strict=True)
+        part.shapes.shape[1] != model.mode_count for part, model in zip(parts, reduced, strict=True)
     ):
         kept = kept_modes(problem, pools, pair.ports)
         return tuple(  # type: ignore[return-value]
@@ -93,9 +92,7 @@ def body_pictures(
             instants=instants,
             amplitude=amplitude.astype(np.float32),
         )
-        pictures.append(
-            with_peak_stress(moving, problem.case, body, shapes @ amplitude[highest])
-        )
+        pictures.append(with_peak_stress(moving, problem.case, body, shapes @ amplitude[highest]))
     return pictures[0], pictures[1]
 
 
@@ -123,7 +120,9 @@ def section_lines(mesh: Mesh, name: str) -> Floats:
     """Sides of elements in the plane y = 0, shape (s, 2, 3) [m]; none where it misses the body."""
     sides = [np.empty((0, 2, 3))]
     for sign in (1.0, -1.0):
-        turned = mesh if mesh.dimension == 2 else replace(mesh, points=mesh.points * [sign, sign, 1])
+        turned = (
+            mesh if mesh.dimension == 2 else replace(mesh, points=mesh.points * [sign, sign, 1])
+        )
         try:
             cut = section_picture(turned, np.zeros(mesh.dof_count), 0.0, name)
         except InputError:
@@ -143,13 +142,13 @@ def _touch(problem: ContactProblem) -> Floats:
 
 def _still(body: ElasticBody) -> BodyPicture:
     skin = skin_of_mesh(body.mesh)
-    held = np.ones(body.dof_count, dtype=bool)
+    held: NDArray[np.bool_] = np.ones(body.dof_count, dtype=bool)
     held[body.free] = False
     node = np.unique(skin.node)
     return BodyPicture(
         body=body.name,
         skin=skin,
-        held=held.reshape(-1, body.dimension).all(axis=1)[skin.node],
+        held=np.asarray(held.reshape(-1, body.dimension).all(axis=1))[skin.node],
         section=section_lines(body.mesh, body.name),
         finest=float(edge_lengths(body.mesh).min()),
         node=node,
