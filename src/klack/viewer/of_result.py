@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from klack import __version__
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
-from klack.case.valve_reader import read_any_case
+from klack.case.reader import read_case
+from klack.case.valve_reader import read_valve_case
 from klack.errors import InputError
 from klack.network.component import Component
 from klack.progress import Progress, silent
+from klack.report.thinning import thinned
 from klack.viewer.of_case import ALL_ROUND, view_of_case
 from klack.viewer.view import BodyView, ContactView, Curve, MotionView, View
 
@@ -25,7 +27,7 @@ Floats = NDArray[np.float64]
 _BYTES = 3_600_000
 """Of all mode shapes of a page; base64 makes a third more of them."""
 
-_SHOWN = 600  # points of a history
+_COLUMNS = 400  # of a history
 
 
 def view_of_result(
@@ -72,15 +74,9 @@ def _named(view: View, study: ImpactStudy | StrokeStudy, folder: Path) -> View:
     )
 
 
-def _drawn(
-    study: ImpactStudy | StrokeStudy,
-    folder: Path,
-    components: Iterable[type[Component]],
-    progress: Progress,
-) -> View:
-    """Bodies of the case of a result, meshed again."""
-    case = read_any_case(study.case_text, folder.absolute() / f"{study.case}.yaml", components)
-    return view_of_case(case, progress)
+def _place_of_case(study: ImpactStudy | StrokeStudy, folder: Path) -> Path:
+    """Where files are looked for that the case of a result names."""
+    return folder.absolute() / f"{study.case}.yaml"
 
 
 # --------------------------------------------------------------------------- impact
@@ -108,7 +104,8 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
         if not any(body.motion and body.motion.amplitude.size for body in bodies):
             notes.append("The level reduced was not computed: the impact does not move here.")
     else:
-        view = _drawn(study, folder, (), progress)
+        case = read_case(study.case_text, _place_of_case(study, folder))
+        view = view_of_case(case, progress)
         notes.append("This result holds no mode shapes: run klack impact again to see them.")
     time = next((one.instants for one in study.pictures if one.instants.size), np.empty(0))
     if any(one.stress.size for one in study.pictures):
@@ -208,10 +205,8 @@ def _impact_histories(study: ImpactStudy) -> tuple[Curve, ...]:
 
 
 def _history(name: str, time: Floats, values: Floats, factor: float, unit: str) -> Curve:
-    every = max(1, len(time) // _SHOWN)
-    return Curve(
-        name=name, x=time[::every] * 1e6, y=values[::every] * factor, x_unit="µs", y_unit=unit
-    )
+    x, y = thinned(time, np.asarray(values, dtype=float), columns=_COLUMNS)
+    return Curve(name=name, x=x * 1e6, y=y * factor, x_unit="µs", y_unit=unit)
 
 
 # --------------------------------------------------------------------------- stroke
@@ -220,30 +215,36 @@ def _history(name: str, time: Floats, values: Floats, factor: float, unit: str) 
 def _stroke_view(
     study: StrokeStudy, folder: Path, components: Iterable[type[Component]], progress: Progress
 ) -> View:
-    view = _named(_drawn(study, folder, components, progress), study, folder)
+    case = read_valve_case(study.case_text, _place_of_case(study, folder), components)
+    view = _named(view_of_case(case, progress), study, folder)
     variant = next(iter(study.variants.values()))
     lift = variant.channel(study.channels.lift)
     if lift is None:
         return view
-    time, travel = variant.result.time, np.asarray(lift.values, dtype=float)
+    needle = getattr(case.network.components.get(study.needle), "body", study.needle)
+    travel = np.asarray(lift.values, dtype=float)
+    note = (
+        f"Variant {variant.name}: {variant.label}. The needle moves as {study.channels.lift}; "
+        "deformations and modes are in results of klack impact."
+    )
     return replace(
         view,
         bodies=tuple(
-            replace(body, travel=travel) if body.name == study.needle else body
-            for body in view.bodies
+            replace(body, travel=travel) if body.name == needle else body for body in view.bodies
         ),
-        time=time,
+        time=variant.result.time,
         histories=_stroke_histories(study, variant),
+        notes=(*view.notes, note),
     )
 
 
 def _stroke_histories(study: StrokeStudy, variant: StrokeVariant) -> tuple[Curve, ...]:
     """Lift, and the force of each stop."""
-    names = [(study.channels.lift, 1e6, "µm")]
-    names += [(f"{stop.name} force", 1.0, "N") for stop in study.stops]
-    time, curves = variant.result.time, []
-    for name, factor, unit in names:
-        channel = variant.channel(name)
-        if channel is not None:
-            curves.append(_history(f"{name}, {variant.label}", time, channel.values, factor, unit))
-    return tuple(curves)
+    wanted = [(study.channels.lift, "lift", 1e6, "µm")]
+    wanted += [(f"{stop.name} peak force", f"{stop.name} force", 1.0, "N") for stop in study.stops]
+    found = [(variant.channel(name), words, factor, unit) for name, words, factor, unit in wanted]
+    return tuple(
+        _history(words, variant.result.time, channel.values, factor, unit)
+        for channel, words, factor, unit in found
+        if channel is not None
+    )

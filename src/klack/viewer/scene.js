@@ -951,7 +951,7 @@ class SceneView {
     panel.append(el('h3', {text: 'Motion'}));
     this.motionButtons = {};
     const row = el('div', {class: 'ks-row'});
-    for (const [kind, text, there] of [['still', 'Still', true], ['mode', 'Mode', this.modes.length], ['impact', 'Impact', impact]]) if (there) {
+    for (const [kind, text, there] of [['still', 'Still', true], ['mode', 'Mode', this.modes.length], ['impact', this.bodies.some(b => b.travel.length > 1) ? 'Stroke' : 'Impact', impact]]) if (there) {
       const button = el('button', {type: 'button', text, 'aria-pressed': kind === 'still', onclick: () => this.setMotion(kind)});
       this.motionButtons[kind] = button; row.append(button);
     }
@@ -992,6 +992,7 @@ class SceneView {
     this.playButton.hidden = motion === 'still';
     if (this.modeBox) this.modeBox.hidden = motion !== 'mode';
     for (const part of [this.timeBox, this.timeText, this.rigidBox]) part.hidden = motion !== 'impact';
+    if (!this.bodies.some(b => b.motion?.frames > 1)) this.rigidBox.hidden = true;
     this.linesVisible();
     for (const ring of this.rings) ring.visible = motion === 'still';
     for (const chart of this.charts || []) if (chart.isHistory) chart.moveCursor(motion === 'impact' ? this.state.time : null);
@@ -1013,7 +1014,8 @@ class SceneView {
       scratch.push(most);
     }
     this.spreadMost = Math.max(most, travel) || 1;
-    this.unit = 0.06 * (this.framed || this.size) / this.spreadMost;
+    // a stroke is shown in its true size: its gaps are those of the drawing
+    this.unit = most > 0 ? 0.06 * (this.framed || this.size) / this.spreadMost : 1;
     this.setSize(50);
     if (this.sizeBox) this.sizeBox.value = 50;
   }
@@ -1024,7 +1026,7 @@ class SceneView {
       this.sizeText.textContent = `Largest displacement ${number(100 * this.state.share, 2)} % of the overall size; a mode has no amplitude of its own.`;
     } else {
       this.state.factor = Math.max((this.unit || 1) * 10 ** ((position - 50) / 35), 0);
-      this.sizeText.textContent = `Displacements ${number(this.state.factor, 2)} times as large`;
+      this.sizeText.textContent = Math.abs(this.state.factor - 1) < 0.01 ? 'Displacements in true size' : `Displacements ${number(this.state.factor, 2)} times as large`;
     }
     this.place();
   }
