@@ -121,5 +121,6 @@ def test_a_number_that_json_lacks_is_an_error_and_no_broken_page(bad):
     view = brick_view()
     contact = replace(view.contacts[0], gap=bad)
 
+    assert payload_of(replace(view, contacts=(contact,)))["contacts"][0]["gap"] is None
     with pytest.raises(ValueError, match="JSON compliant"):
-        page_of(replace(view, contacts=(contact,)))
+        page_of(replace(view, bodies=(replace(view.bodies[0], finest=bad),)))

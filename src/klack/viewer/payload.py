@@ -4,6 +4,7 @@ Lengths are in millimetres; the type of an array stands beside it.
 """
 
 from base64 import b64encode
+from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -89,7 +90,7 @@ def _contact(contact: ContactView) -> dict[str, Any]:
         "lower": contact.lower,
         "ring": _array(contact.ring * _MM, "f4"),
         "closed": contact.closed,
-        "gap": contact.gap * _MM,
+        "gap": contact.gap * _MM if isfinite(contact.gap) else None,
     }
 
 

@@ -1,5 +1,10 @@
 // Bodies in three dimensions: mount(element, payload, options) draws what payload.py packed.
 // One scene and one WebGL context for each mount; dispose() releases both.
+//
+// options: theme 'light' or 'dark' (default: that of the system), panel false (bodies and curves alone), autoplay false.
+// mount returns {dispose(), setTime(microseconds), showMode(index, share), on(event, call), state(), probe(body, vertex)};
+// events: 'pick' (name of a face), 'time' (microseconds), 'mode' (index). showMode counts the modes of all bodies as they
+// are listed; share is their largest displacement over the overall size.
 import * as THREE from './three.min.js';
 
 const STYLE = `
@@ -7,6 +12,7 @@ const STYLE = `
   color:var(--ink);background:var(--panel);font:14px/1.45 system-ui,"Segoe UI",Roboto,Helvetica,Arial,sans-serif;
   display:grid;grid-template-columns:minmax(0,1fr) 300px;grid-template-rows:minmax(0,1fr) auto;height:100%;min-height:420px;position:relative}
 .ks.ks-narrow{grid-template-columns:minmax(0,1fr);grid-template-rows:360px auto auto;height:auto}
+.ks.ks-bare{grid-template-columns:minmax(0,1fr)}
 .ks.ks-dark{--ink:#e6eaee;--soft:#a9b4bf;--line:#39424c;--panel:#1a1f25;--back:#12161a;--accent:#6cb8ec;--on:#0d1317}
 .ks *{box-sizing:border-box}
 .ks-view{position:relative;background:var(--back);min-height:280px;overflow:hidden}
@@ -460,12 +466,13 @@ class SceneView {
     this.undo = [];
     this.frames = 0;
     this.state = {motion: 'still', mode: null, time: 0, share: 0.08, factor: 1, playing: false, rigid: true};
-    this.root = el('section', {class: 'ks', 'aria-label': `Bodies of ${payload.title}`});
+    this.root = el('section', {class: options.panel === false ? 'ks ks-bare' : 'ks', 'aria-label': `Bodies of ${payload.title}`});
     this.root.append(el('style', {text: STYLE}));
     this.view = el('div', {class: 'ks-view'});
     this.panel = el('div', {class: 'ks-panel'});
     this.chartBox = el('div', {class: 'ks-charts'});
     this.root.append(this.view, this.panel, this.chartBox);
+    if (options.panel === false) this.panel.hidden = true;
     element.replaceChildren(this.root);
     this.bodies = payload.bodies.map((b, i) => new Body(b, i, payload));
     this.times = array(payload.time);
@@ -869,7 +876,7 @@ class SceneView {
       if (this.rings.length) keys.push([RING_COLOUR, 'first touch']);
       if (payload.bodies.some(b => array(b.held).some(x => x))) keys.push([HELD_COLOUR, 'held']);
       if (keys.length) panel.append(el('div', {class: 'ks-row'}, ...keys.map(([colour, text]) => el('span', {class: 'ks-row'}, el('span', {class: 'ks-chip', style: `background:${colour}`}), el('span', {text})))));
-      for (const c of payload.contacts) panel.append(el('div', {class: 'ks-soft', text: `${c.name}: ${c.upper} on ${c.lower}, gap ${millimetres(c.gap)}`}));
+      for (const c of payload.contacts) panel.append(el('div', {class: 'ks-soft', text: `${c.name}: ${c.upper} on ${c.lower}${c.gap === null ? '' : `, gap ${millimetres(c.gap)}`}`}));
     }
     this.buildColour();
     this.buildMotion();

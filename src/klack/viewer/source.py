@@ -12,6 +12,7 @@ from klack.case.valve_reader import load_any_case
 from klack.errors import InputError
 from klack.mesh.files.catalogue import MESH_FORMATS
 from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.quality import PoorElementError
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step
 from klack.mesh.step_content import step_content
@@ -79,5 +80,13 @@ def named_case(source: Path, components: Iterable[type[Component]] = ()) -> Valv
 def _step_view(source: Path) -> View:
     content = step_content(source)
     longest = max(max(b - a for a, b in zip(s.low, s.high, strict=True)) for s in content.solids)
-    mesh = mesh_step(source, MeshSizing(size=longest / _SIDES_ACROSS))
+    try:
+        mesh = mesh_step(source, MeshSizing(size=longest / _SIDES_ACROSS))
+    except PoorElementError as error:
+        raise InputError(
+            str(source),
+            got=f"a shape whose coarse mesh has elements that are inverted ({error.got})",
+            expected="a shape that elements of a twenty-fifth of its length can follow",
+            hint="write a case with element sizes for it, and show the case.",
+        ) from error
     return view_of_mesh(mesh, source.name, note="Meshed coarsely for this picture alone.")

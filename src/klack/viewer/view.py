@@ -28,7 +28,7 @@ class ContactView:
     closed : bool
         The points go round the whole axis.
     gap : float [m]
-        Between both as shown.
+        Between both as shown; nan where it is not known.
     """
 
     name: str
