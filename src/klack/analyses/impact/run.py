@@ -358,7 +358,7 @@ def _study(
             clock("picture", 0.0)
             drawn = for_comparison(
                 "the picture of the bodies",
-                lambda: body_pictures(problem, pools, own, results.get("reduced")),
+                lambda: _pictures(problem, pools, own, results.get("reduced")),
             )
             pictures = drawn or ()
             clock("picture", 1.0)
@@ -605,6 +605,18 @@ def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPic
         section_picture(body.mesh, fields.peak_displacement, time, body.name)
         for body, fields in zip(bodies, run.fields, strict=True)
     )
+
+
+def _pictures(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    own: ReducedPair,
+    ran: LevelResult | None,
+) -> tuple[BodyPicture, ...]:
+    """Pictures of both bodies; what is doubtful about their modes, the level has said already."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        return body_pictures(problem, pools, own, ran)
 
 
 def _with_full_stress(
