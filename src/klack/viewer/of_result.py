@@ -110,7 +110,9 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
     time = next((one.instants for one in study.pictures if one.instants.size), np.empty(0))
     if any(one.stress.size for one in study.pictures):
         level = "full" if "full" in study.levels else "reduced"
-        notes.append(f"Stress at the highest force, level {level}: largest at a node of the mesh.")
+        notes.append(
+            f"The stress at the highest force is that of the level {level}, at the nodes of the surface."
+        )
     return replace(
         _named(view, study, folder),
         time=time,
