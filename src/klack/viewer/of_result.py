@@ -111,7 +111,8 @@ def _impact_view(study: ImpactStudy, folder: Path, progress: Progress) -> View:
     if any(one.stress.size for one in study.pictures):
         level = "full" if "full" in study.levels else "reduced"
         notes.append(
-            f"The stress at the highest force is that of the level {level}, at the nodes of the surface."
+            f"The stress at the highest force is that of the level {level}, at the nodes of the "
+            "surface."
         )
     return replace(
         _named(view, study, folder),
