@@ -60,7 +60,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("case", "report"),
     ("assembling", "terminal", "schematic"),
     ("analyses",),
-    ("exchange",),
+    ("exchange", "viewer"),
     ("verification", "api", "warming"),
     ("cli",),
     ("__main__",),

@@ -34,6 +34,7 @@ collect_ignore_glob = [
     "quoted_output.py",
     "rigid_valve.py",
     "rod_valve.py",
+    "viewer_case.py",
     "data/*.py",
 ]
 

@@ -1,6 +1,7 @@
 """``klack show``: truth = the network of the case, and the exit codes and files it promises."""
 
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -25,8 +26,8 @@ def components_in(file: Path) -> list[str]:
     return sorted(item.get("data-name") for item in root.iter() if item.get("data-name"))
 
 
-def test_it_draws_a_case_into_the_current_folder(tmp_path, capsys):
-    assert main(["show", str(VALVE)]) == 0
+def test_it_draws_the_schematic_of_a_case(tmp_path, capsys):
+    assert main(["show", str(VALVE), "--out", "small_valve.svg"]) == 0
 
     said = capsys.readouterr()
     network = load_valve_case(VALVE).network.network()
@@ -43,8 +44,68 @@ def test_a_shipped_case_and_a_file_of_any_name(tmp_path, capsys):
     assert capsys.readouterr().out == ""
 
 
+RODS = Path(__file__).parents[1] / "data" / "tiny_rods.yaml"
+NEEDLE = Path(__file__).parents[2] / "cases" / "needle-from-inp" / "needle.inp"
+
+
+def payload_of(file: Path) -> dict:
+    page = file.read_text(encoding="utf-8")
+    found = re.search(r'<script type="application/json" id="payload">(.*?)</script>', page, re.S)
+    assert found is not None
+    return json.loads(found[1])
+
+
+def test_a_page_of_a_case_goes_into_the_current_folder(tmp_path, capsys):
+    assert main(["show", str(RODS)]) == 0
+
+    assert [path.name for path in tmp_path.iterdir()] == ["tiny_rods.html"]
+    payload = payload_of(tmp_path / "tiny_rods.html")
+    assert [body["name"] for body in payload["bodies"]] == ["short", "long"]
+    assert payload["contacts"][0]["upper"] == "short.end"
+    said = capsys.readouterr()
+    assert "2 bodies, 1 contact." in said.out
+    assert "Page: tiny_rods.html" in said.out
+
+
+def test_a_valve_without_shapes_is_its_network(tmp_path, capsys):
+    assert main(["show", str(VALVE), "--out", "valve.html", "--json", "numbers.json", "-q"]) == 0
+
+    payload = payload_of(tmp_path / "valve.html")
+    assert payload["bodies"] == []
+    assert payload["schematic"].startswith("<svg")
+    assert any("network only" in note for note in payload["notes"])
+    numbers = json.loads((tmp_path / "numbers.json").read_text())
+    require_documented(numbers)
+    assert numbers["bodies"] == {}
+    assert numbers["components"]["spring"] == "spring"
+
+
+def test_a_mesh_is_drawn_with_its_names(tmp_path, capsys):
+    assert main(["show", str(NEEDLE), "--unit", "mm", "--json", "-"]) == 0
+
+    numbers = json.loads(capsys.readouterr().out)
+    require_documented(numbers)
+    assert "tip" in numbers["bodies"]["needle"]
+    assert numbers["components"] == {}
+    assert (tmp_path / "needle.html").is_file()
+
+
+def test_a_result_has_modes_and_motion(tmp_path, capsys):
+    assert main(["impact", str(RODS), "--no-report", "--no-certify", "-q", "--out", "result"]) == 0
+
+    assert main(["show", "result"]) == 0
+
+    payload = payload_of(tmp_path / "result.html")
+    assert [len([f for f in b["motion"]["frequency"] if f]) for b in payload["bodies"]] == [5, 8]
+    frames = payload["time"]["shape"][0]
+    assert frames > 50
+    assert payload["bodies"][0]["motion"]["amplitude"]["shape"][0] == frames
+    assert payload["histories"][0]["name"] == "contact force"
+    assert "13 modes" in capsys.readouterr().out
+
+
 def test_its_json_has_every_connection(capsys):
-    assert main(["show", str(VALVE), "--json", "-"]) == 0
+    assert main(["show", str(VALVE), "--out", "valve.svg", "--json", "-"]) == 0
 
     found = json.loads(capsys.readouterr().out)
     require_documented(found)
@@ -77,13 +138,16 @@ def test_a_file_that_cannot_be_written_is_one_error_and_no_file(tmp_path, capsys
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["demo-valve"], "a case of an impact, expected a case of a whole valve"),
+        (["demo-valve", "--out", "a.svg"], "a case of an impact, expected a case of a whole valve"),
+        (["from-other-tools"], "reduced models, or nodes without elements, expected bodies with"),
+        ([str(RODS), "--unit", "mm"], "a unit for"),
+        ([str(NEEDLE)], "no unit"),
         (["missing.yaml"], "neither a file nor a shipped case"),
-        ([str(VALVE), "--out", "valve.png"], "the ending '.png', expected .svg"),
-        ([str(VALVE), "--out", "valve"], "a name without an ending, expected .svg"),
+        ([str(VALVE), "--out", "valve.png"], "the ending '.png', expected .html or .svg"),
+        ([str(VALVE), "--out", "valve"], "a name without an ending, expected .html or .svg"),
         ([str(VALVE), "--out", "nowhere/valve.svg"], "a folder that does not exist"),
         ([str(VALVE), "--out", "folder.svg"], "a folder, expected the name of a file"),
-        ([], "CASE: got nothing, expected the case of a valve, or --components"),
+        ([], "SOURCE: got nothing, expected a case, a mesh or the folder of a result, or"),
         ([str(VALVE), "--components"], "it beside --components"),
         (["--components", "--out", "valve.svg"], "it beside --components"),
     ],
@@ -120,7 +184,7 @@ def test_an_own_component_is_drawn_where_it_is_let_in(tmp_path, capsys, monkeypa
 
     assert main(["show", str(case)]) == 2
     assert "--component eddy_brake:EddyBrake" in capsys.readouterr().err
-    assert main(["show", str(case), "--component", "eddy_brake:EddyBrake"]) == 0
+    assert main(["show", str(case), "--out", "a.svg", "--component", "eddy_brake:EddyBrake"]) == 0
 
     picture = (tmp_path / f"{load_name(tmp_path)}.svg").read_text(encoding="utf-8")
     assert "own: eddy-brake" in picture

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses.impact.recovered_motion import recovered_motion
 from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.source import impact_sources
 from klack.analyses.reduction.run import run_reduce
@@ -14,7 +15,6 @@ from klack.assembling.problem import build_problem
 from klack.case.reader import load_case, read_case
 from klack.errors import AccuracyWarning
 from klack.exchange.case_models import case_models
-from klack.exchange.results.recovered_motion import recovered_motion
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 

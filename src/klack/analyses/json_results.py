@@ -119,7 +119,12 @@ class ShowJson(TypedDict):
     schema: Literal["klack-show/1"]
     case: str
     file: str
-    components: Annotated[dict[str, str], Field(description="Type by name.")]
+    bodies: Annotated[
+        dict[str, list[str]], Field(description="Named surfaces of each body that is drawn.")
+    ]
+    components: Annotated[
+        dict[str, str], Field(description="Type by name; none without a network.")
+    ]
     nodes: list[ShownNodeJson]
 
 

@@ -34,10 +34,12 @@ from klack.units import format_si
 
 __all__ = [
     "BodyPair",
+    "PlacedMeshes",
     "assemble_body",
     "build_bodies",
     "find_touch",
     "mesh_body",
+    "place_meshes",
     "warn_far_touch",
 ]
 
@@ -80,14 +82,39 @@ class BodyPair:
         return float(self.pose.shift[2])
 
 
-def build_bodies(case: Case, progress: Progress) -> BodyPair:
-    """Mesh both bodies, place the upper one and assemble stiffness and mass.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlacedMeshes:
+    """Meshes of both bodies of a case, placed for the start of the motion; nothing is assembled.
+
+    Parameters
+    ----------
+    upper, lower : Mesh
+    upper_surface, lower_surface : Surface
+        Where they meet.
+    pose : Pose
+        Where the upper body stands, compared with its drawing.
+    form : FaceForm or None
+        Of both faces, which their meshes do not have.
+    touch : Touch or None
+        First touch of the bodies as drawn; None where no mesh is refined there.
+    """
+
+    upper: Mesh
+    lower: Mesh
+    upper_surface: Surface
+    lower_surface: Surface
+    pose: Pose
+    form: FaceForm | None
+    touch: Touch | None
+
+
+def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
+    """Mesh both bodies and place the upper one.
 
     Raises
     ------
     InputError
-        For geometry, surfaces or supports that cannot be used, and for bodies that penetrate as
-        drawn.
+        For geometry or surfaces that cannot be used, and for bodies that penetrate as drawn.
     """
     _require_surfaces(case)
     progress("mesh", 0.0)
@@ -102,6 +129,29 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     upper = upper.moved(pose.shift[2:] * [0.0, 1.0]) if upper.dimension == 2 else upper.placed(pose)
     _check_refinement(case, upper, upper_surface, lower, lower_surface, touch, pose, form)
     progress("mesh", 1.0)
+    return PlacedMeshes(
+        upper=upper,
+        lower=lower,
+        upper_surface=upper_surface,
+        lower_surface=lower_surface,
+        pose=pose,
+        form=form,
+        touch=touch,
+    )
+
+
+def build_bodies(case: Case, progress: Progress) -> BodyPair:
+    """Mesh both bodies, place the upper one and assemble stiffness and mass.
+
+    Raises
+    ------
+    InputError
+        For geometry, surfaces or supports that cannot be used, and for bodies that penetrate as
+        drawn.
+    """
+    placed = place_meshes(case, progress)
+    moving, stop = case.contact.moving, case.contact.stop
+    upper, lower, pose = placed.upper, placed.lower, placed.pose
     progress("assemble", 0.0)
     bodies = []
     for i, (name, mesh) in enumerate(((moving.body, upper), (stop.body, lower))):
@@ -110,12 +160,12 @@ def build_bodies(case: Case, progress: Progress) -> BodyPair:
     return BodyPair(
         upper=bodies[0],
         lower=bodies[1],
-        upper_surface=upper_surface,
-        lower_surface=lower_surface,
+        upper_surface=placed.upper_surface,
+        lower_surface=placed.lower_surface,
         pose=pose,
         gauges=place_gauges(case, {moving.body: (upper, pose), stop.body: (lower, None)}),
-        form=form,
-        layer=layer_of_faces(case, upper, upper_surface, lower, lower_surface),
+        form=placed.form,
+        layer=layer_of_faces(case, upper, placed.upper_surface, lower, placed.lower_surface),
     )
 
 

@@ -42,6 +42,7 @@ __all__ = [
     "build_valve",
     "build_valve_bodies",
     "filled_network",
+    "mesh_valve_bodies",
     "valve_parts",
 ]
 
@@ -207,7 +208,15 @@ def _built(
 
 
 def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, ElasticBody]:
-    """Mesh every body, fine at the first touch of each of its stops."""
+    """Mesh every body, fine at the first touch of each of its stops, and assemble it."""
+    return {
+        name: assemble_body(case, name, mesh)
+        for name, mesh in mesh_valve_bodies(case, progress).items()
+    }
+
+
+def mesh_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Mesh]:
+    """Mesh every body as drawn, fine at the first touch of each of its stops."""
     progress("mesh", 0.0)
     require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
     places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
@@ -219,8 +228,7 @@ def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Elastic
     result = {}
     for i, (name, given) in enumerate(case.bodies.items()):
         progress("mesh", i / len(case.bodies))
-        mesh = mesh_body(given, name, tuple(places[name]))
-        result[name] = assemble_body(case, name, mesh)
+        result[name] = mesh_body(given, name, tuple(places[name]))
     return result
 
 

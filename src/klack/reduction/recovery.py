@@ -6,19 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.mesh.mesh import FaceBlock, Mesh
+from klack.mesh.mesh import Mesh
+from klack.mesh.simplices import simplices
 
 __all__ = ["Recovery", "surface_faces"]
-
-# Every face is cut into simplices through all its nodes, mid nodes included.
-_SIMPLICES: dict[str, tuple[tuple[int, ...], ...]] = {
-    "line2": ((0, 1),),
-    "line3": ((0, 2), (2, 1)),
-    "tri3": ((0, 1, 2),),
-    "tri6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
-    "quad4": ((0, 1, 2), (0, 2, 3)),
-    "quad8": ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6), (4, 6, 7)),
-}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,11 +37,6 @@ class Recovery:
 def surface_faces(mesh: Mesh, surfaces: Sequence[str]) -> NDArray[np.int64]:
     """Simplices of some surfaces in node numbers of the mesh, shape (f, dimension)."""
     blocks = [block for name in surfaces for block in mesh.surface(name).blocks]
-    pieces = [_simplices(block) for block in blocks]
+    pieces = [simplices(block) for block in blocks]
     empty = np.empty((0, mesh.dimension), dtype=np.int64)
     return np.concatenate([empty, *pieces])
-
-
-def _simplices(block: FaceBlock) -> NDArray[np.int64]:
-    local = np.array(_SIMPLICES[block.family])
-    return block.connectivity[:, local].reshape(-1, local.shape[1])

@@ -15,11 +15,13 @@ from klack.assembling.body_summary import BodySummary
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures
 from klack.gauges.gauge import GaugeRecord
+from klack.mesh.skin import Skin
 from klack.reduction.structure import Structure
 from klack.reduction.transfer import TransferComparison
 
 __all__ = [
     "SETTLED",
+    "BodyPicture",
     "ContactSummary",
     "FrictionRecord",
     "ImpactStudy",
@@ -241,6 +243,56 @@ class SectionPicture:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class BodyPicture:
+    """A body in three dimensions, for a picture that moves: its surface, modes and impact.
+
+    Parameters
+    ----------
+    body : str
+    skin : Skin
+        In its place at the start.
+    held : bool array, shape (v,)
+        Vertices of the skin that are held.
+    section : array, shape (s, 2, 3) [m]
+        Sides of elements in the plane y = 0.
+    finest : float [m]
+        Shortest side of an element.
+    node : int array, shape (n,)
+        Nodes of the mesh on the skin, rising.
+    shapes : int16 array, shape (m, n, dimension)
+        Displacements of these nodes, each in 32767ths of the largest component of its shape: rigid
+        modes, elastic modes, and last the static rest of the contact force if there is one.
+    scale : array, shape (m,)
+        Displacement of 32767 [m] per unit of its amplitude.
+    frequency : array, shape (m,) [Hz]
+        0 of rigid modes; nan of attachment modes and of the static rest.
+    instants : array, shape (frames,) [s]
+        Of the reduced level; empty where it was not computed.
+    amplitude : float32 array, shape (frames, m)
+        Of the modes in sqrt(kg) m, of the static rest in N.
+    stress : float32 array, shape (n,) [Pa]
+        Von Mises at the highest force, of the full level if it was computed; empty without.
+    touch : array, shape (k, 3) [m]
+        Points of first touch of both bodies when centred, in their order round the axis: of the
+        lower body; else, and for faces that touch all at once, none.
+    """
+
+    body: str
+    skin: Skin
+    held: NDArray[np.bool_]
+    section: NDArray[np.float64]
+    finest: float
+    node: NDArray[np.int64]
+    shapes: NDArray[np.int16]
+    scale: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+    instants: NDArray[np.float64] = field(default_factory=lambda: np.empty(0))
+    amplitude: NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0), np.float32))
+    stress: NDArray[np.float32] = field(default_factory=lambda: np.empty(0, np.float32))
+    touch: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 3)))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class RunningIn:
     """Impacts of the same start, one after another on the same faces.
 
@@ -313,6 +365,8 @@ class ImpactStudy(CaseRecord):
         Why a level that was asked for has no result, by its name.
     running_in : RunningIn or None
         Where faces yield and more than one impact was asked for.
+    pictures : tuple of BodyPicture
+        Of both bodies; none in results of earlier versions.
     """
 
     speed: float
@@ -332,6 +386,7 @@ class ImpactStudy(CaseRecord):
     estimate_doubt: str = ""
     failures: Mapping[str, str] = field(default_factory=dict)
     running_in: RunningIn | None = None
+    pictures: tuple[BodyPicture, ...] = ()
 
     @property
     def estimates_settled(self) -> bool:

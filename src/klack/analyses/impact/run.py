@@ -8,6 +8,7 @@ from time import perf_counter
 import numpy as np
 
 from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.body_picture import body_pictures, with_peak_stress
 from klack.analyses.impact.contact_check import (
     ContactCheck,
     check_contact,
@@ -33,6 +34,7 @@ from klack.analyses.impact.interface_level import (
 from klack.analyses.impact.levels import deviations, run_lumped, run_reduced
 from klack.analyses.impact.record import (
     SETTLED,
+    BodyPicture,
     ContactSummary,
     ImpactStudy,
     LawSummary,
@@ -351,6 +353,15 @@ def _study(
                 lambda: compare_transfer(problem, pools, own.ports, progress=clock),
             )
             transfer = found or ()
+        pictures: tuple[BodyPicture, ...] = ()
+        if is_last:
+            clock("picture", 0.0)
+            drawn = for_comparison(
+                "the picture of the bodies",
+                lambda: _pictures(problem, pools, own, results.get("reduced")),
+            )
+            pictures = drawn or ()
+            clock("picture", 1.0)
         worn = case.contact.worn
         static, loaded = _as_loaded(problem, results, peak)
         check = check_contact(
@@ -375,6 +386,7 @@ def _study(
                     threads=threads,
                 )
                 sections = _sections(problem, run)
+                pictures = _with_full_stress(problem, run, pictures)
         attempts.require_one(results)
         check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
     results = doubt_modal_levels(results, **at_once)
@@ -398,6 +410,7 @@ def _study(
         deviations=compared,
         transfer=transfer,
         sections=sections,
+        pictures=pictures,
         warnings=(
             *missing,
             *dict.fromkeys([*bodies.notes, *notes]),
@@ -591,6 +604,31 @@ def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPic
     return tuple(
         section_picture(body.mesh, fields.peak_displacement, time, body.name)
         for body, fields in zip(bodies, run.fields, strict=True)
+    )
+
+
+def _pictures(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    own: ReducedPair,
+    ran: LevelResult | None,
+) -> tuple[BodyPicture, ...]:
+    """Pictures of both bodies; what is doubtful about their modes, the level has said already."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", AccuracyWarning)
+        return body_pictures(problem, pools, own, ran)
+
+
+def _with_full_stress(
+    problem: ContactProblem, run: FullOrderResult, pictures: tuple[BodyPicture, ...]
+) -> tuple[BodyPicture, ...]:
+    bodies = {body.name: body for body in (problem.pair.upper, problem.pair.lower)}
+    moved = {fields.name: fields.peak_displacement for fields in run.fields}
+    return tuple(
+        with_peak_stress(one, problem.case, bodies[one.body], moved[one.body])
+        if one.body in moved
+        else one
+        for one in pictures
     )
 
 

@@ -1,7 +1,7 @@
 """An impact as a film for ParaView: displacement, velocity and stress of both bodies over time.
 
 At the full level the fields are those of the run, node by node; at the reduced level
-:mod:`klack.exchange.results.recovered_motion` recovers them from the modes.
+:mod:`klack.analyses.impact.recovered_motion` recovers them from the modes.
 """
 
 from collections.abc import Sequence
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.full_level import simulate_in_full
+from klack.analyses.impact.recovered_motion import recovered_motion
 from klack.assembling.damping_choice import is_damped
 from klack.assembling.modes import kept_modes, mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
@@ -21,7 +22,6 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.exchange.results.naming import file_stems
-from klack.exchange.results.recovered_motion import recovered_motion
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.progress import Progress, silent
 from klack.transient.result import MotionOfBody, Snapshots

@@ -17,7 +17,7 @@ from klack.assembling.damping_choice import damping_of
 from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.modes import mode_pools, selection_of
 from klack.assembling.problem import ContactProblem
-from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
+from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -27,14 +27,14 @@ from klack.reduction.reduce import reduce_body
 from klack.simulation.impact import simulate
 from klack.transient.result import MotionOfBody
 
-__all__ = ["recovered_motion"]
+__all__ = ["Recovered", "recovered_bodies", "recovered_motion"]
 
 _LEAST = 1e-3
 """Smallest share of the largest static force whose pressure pattern is asked for."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Recovered:
+class Recovered:
     """From modal coordinates and contact force to the displacement of all nodes.
 
     ``missing`` [m/N] is what the modes already hold of the static deflection, with a minus; None
@@ -46,6 +46,12 @@ class _Recovered:
     flexibility: Flexibility
     missing: NDArray[np.float64] | None
 
+    def rest(self, load: NDArray[np.float64]) -> NDArray[np.float64] | None:
+        """Static displacement per force that the modes lack [m/N], shape (n_dof,)."""
+        if self.missing is None:
+            return None
+        return np.asarray(self.flexibility.deflections(load[:, None])[:, 0] + self.missing)
+
     def motion(
         self,
         q: NDArray[np.float64],
@@ -55,8 +61,9 @@ class _Recovered:
     ) -> MotionOfBody:
         """Fields under a contact force [N] with its load pattern, shape (n_dof,)."""
         u = self.shapes @ q
-        if self.missing is not None and force > 0.0:
-            u = u + force * (self.flexibility.deflections(load[:, None])[:, 0] + self.missing)
+        rest = self.rest(load) if force > 0.0 else None
+        if rest is not None:
+            u = u + force * rest
         return MotionOfBody(name=self.name, displacement=u, velocity=self.shapes @ v)
 
 
@@ -67,7 +74,7 @@ def _recovered(
     flexibility: Flexibility,
     port: Port,
     sign: float,
-) -> _Recovered:
+) -> Recovered:
     case = problem.case
     body = reduce_body(
         elastic,
@@ -85,7 +92,19 @@ def _recovered(
     if body.correction == "consistent":
         own = slice(body.rigid_count, None)
         missing = -sign * shapes[:, own] @ (body.port_shapes[own, 0] / body.omega[own] ** 2)
-    return _Recovered(name=elastic.name, shapes=shapes, flexibility=flexibility, missing=missing)
+    return Recovered(name=elastic.name, shapes=shapes, flexibility=flexibility, missing=missing)
+
+
+def recovered_bodies(
+    problem: ContactProblem, pools: Mapping[str, Modes], pair: ReducedPair
+) -> tuple[Recovered, Recovered]:
+    """Recovery of all nodes of both bodies, the upper one first; see :func:`recovered_motion`."""
+    upper, lower = problem.pair.upper, problem.pair.lower
+    # the force pushes the upper body up and the lower one down
+    return (
+        _recovered(problem, pools, upper, problem.flexibility_upper, pair.ports[0], 1.0),
+        _recovered(problem, pools, lower, problem.flexibility_lower, pair.ports[1], -1.0),
+    )
 
 
 def recovered_motion(
@@ -106,16 +125,12 @@ def recovered_motion(
     tuple of float [s] and tuple of MotionOfBody
         The upper body first.
     """
-    case, both = problem.case, problem.pair
+    case = problem.case
     tell_elastic(case, "the recovered motion is that of")
     pools = mode_pools(problem, at_least=1, progress=progress)
     progress("reduced", 0.0)
     pair = own_pair(problem, pools, stiffness=first_stiffness(problem))
-    # the force pushes the upper body up and the lower one down
-    parts = (
-        _recovered(problem, pools, both.upper, problem.flexibility_upper, pair.ports[0], 1.0),
-        _recovered(problem, pools, both.lower, problem.flexibility_lower, pair.ports[1], -1.0),
-    )
+    parts = recovered_bodies(problem, pools, pair)
     system = impact_system(case, pair.upper, pair.lower, pair.law)
     thrown = np.zeros(pair.upper.mode_count)
     thrown[: pair.upper.rigid_count] = -case.motion.speed * pair.upper.rigid_axial

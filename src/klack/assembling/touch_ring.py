@@ -1,0 +1,68 @@
+"""Points of first touch of two bodies, in their order round the axis, for pictures."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
+from klack.case.bodies import CaseBody
+from klack.mesh.mesh import Mesh
+
+__all__ = ["TouchingSide", "touch_ring"]
+
+_POINTS = 90  # of a ring
+_SAME_HEIGHT = 5e-4  # of the width of the bodies: clearances that differ by less are one touch
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TouchingSide:
+    """One of two bodies that meet.
+
+    Parameters
+    ----------
+    body : CaseBody
+    mesh : Mesh
+    surface : str
+    """
+
+    body: CaseBody
+    mesh: Mesh
+    surface: str
+
+
+def touch_ring(upper: TouchingSide, lower: TouchingSide) -> tuple[NDArray[np.float64], float]:
+    """Where two centred bodies touch first, on the lower one, and their distance.
+
+    Returns
+    -------
+    ring : array, shape (n, 3) [m]
+        None for faces that touch all at once.
+    clearance : float [m]
+        Along the axis, between the bodies as drawn or as meshed.
+    """
+    touch = _touch(upper, lower)
+    ring = np.array(touch.lower, dtype=float)
+    if len(ring) and ring.shape[1] == 2:
+        turn = np.linspace(0.0, 2.0 * np.pi, _POINTS, endpoint=False)
+        r, z = ring[0]
+        ring = np.column_stack([r * np.cos(turn), r * np.sin(turn), np.full(_POINTS, z)])
+    ring = ring.reshape(-1, 3)
+    return ring[np.argsort(np.arctan2(ring[:, 1], ring[:, 0]))], touch.clearance
+
+
+def _touch(upper: TouchingSide, lower: TouchingSide) -> Touch:
+    above, below = upper.body.geometry.profile, lower.body.geometry.profile
+    if above is not None and below is not None:
+        drawn, other = above.profiles().values(), below.profiles().values()
+        return first_touch_of_profiles(drawn, upper.surface, other, lower.surface)
+    if upper.mesh.dimension == 2 or lower.mesh.dimension == 2:
+        return Touch((), (), float("nan"))
+    faces = [side.mesh.surface(side.surface) for side in (upper, lower)]
+    width = min(
+        float(np.max(np.ptp(side.mesh.points[face.nodes][:, :2], axis=0)))
+        for side, face in zip((upper, lower), faces, strict=True)
+    )
+    return first_touch_of_meshes(
+        upper.mesh, faces[0], lower.mesh, faces[1], tolerance=_SAME_HEIGHT * width
+    )

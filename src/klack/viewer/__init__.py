@@ -1,0 +1,1 @@
+"""Bodies in three dimensions: one page of HTML, and the component that draws it."""

@@ -1,0 +1,92 @@
+"""What a user names: a case, a mesh or CAD file, or the folder of a result."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from klack.analyses.catalogue import load_result
+from klack.analyses.inspection import STEP_ENDINGS
+from klack.analyses.result_folder import is_result
+from klack.case.shipped import find_case
+from klack.case.valve import ValveCase
+from klack.case.valve_reader import load_any_case
+from klack.errors import InputError
+from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.quality import PoorElementError
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_step
+from klack.mesh.step_content import step_content
+from klack.network.component import Component
+from klack.progress import Progress, silent
+from klack.viewer.of_case import view_of_case, view_of_mesh
+from klack.viewer.of_result import view_of_result
+from klack.viewer.view import View
+
+__all__ = ["named_case", "view_of_source"]
+
+_SIDES_ACROSS = 25  # elements over the longest side of a STEP file, for its picture only
+
+
+def view_of_source(
+    source: Path,
+    components: Iterable[type[Component]] = (),
+    *,
+    unit_length: float | None = None,
+    progress: Progress = silent,
+) -> View:
+    """What a page of this source shows.
+
+    Parameters
+    ----------
+    source : Path
+        Case file or name of a shipped case, mesh or STEP file, folder of a result.
+    components : iterable of type
+        Component classes of the user that a case may name.
+    unit_length : float [m] or None
+        Of a mesh file that does not name it.
+    progress : callable
+
+    Raises
+    ------
+    InputError
+        For a source that is none of these, or has nothing to draw.
+    """
+    ending = source.suffix.lower()
+    if source.is_file() and ending in STEP_ENDINGS:
+        return _step_view(source)
+    if source.is_file() and ending in MESH_FORMATS:
+        model = read_mesh_file(source, unit_length, solids_only=True)
+        return view_of_mesh(model.mesh, source.name)
+    if unit_length is not None:
+        raise InputError(
+            "--unit",
+            got=f"a unit for {source}",
+            expected="--unit with a mesh file only",
+            hint="leave it out: cases, results and STEP files have their units.",
+        )
+    if is_result(source):
+        return view_of_result(load_result(source), source, tuple(components), progress)
+    return view_of_case(load_any_case(find_case(source), components), progress)
+
+
+def named_case(source: Path, components: Iterable[type[Component]] = ()) -> ValveCase | None:
+    """The case of a whole valve, if that is what the source names; None for all others."""
+    if is_result(source) or source.suffix.lower() in (*STEP_ENDINGS, *MESH_FORMATS):
+        return None
+    case = load_any_case(find_case(source), components)
+    return case if isinstance(case, ValveCase) else None
+
+
+def _step_view(source: Path) -> View:
+    content = step_content(source)
+    longest = max(max(b - a for a, b in zip(s.low, s.high, strict=True)) for s in content.solids)
+    try:
+        mesh = mesh_step(source, MeshSizing(size=longest / _SIDES_ACROSS))
+    except PoorElementError as error:
+        raise InputError(
+            str(source),
+            got=f"a shape whose coarse mesh has elements that are inverted ({error.got})",
+            expected="a shape that elements of a twenty-fifth of its length can follow",
+            hint="write a case with element sizes for it, and show the case.",
+        ) from error
+    return view_of_mesh(mesh, source.name, note="Meshed coarsely for this picture alone.")
