@@ -51,6 +51,7 @@ __all__ = [
 
 
 _CAREFUL = 20  # Newton steps; then halved, should they go to and fro between kinks of the stops
+_ROUND_OFF = 1e-13  # of the largest loop flux: what lacks so little does no harm
 _STOPS = 2 * MOST_TUBES  # of what a circuit keeps: places in tables, then the stops
 
 
@@ -523,7 +524,10 @@ def circuit_settle(
             value, _ = stops_mean(par, at, at + int(par[p + 6]), hints, kept, b0, db)
             mean += value
         released -= mean * db
-    if released > 0.0:
+    moved, size = 0.0, 0.0
+    for j in range(loops):
+        moved, size = max(moved, abs(move[j])), max(size, abs(phi[j]))
+    if released > 0.0 and moved > _ROUND_OFF * size:
         return released
     for j in range(loops):
         move[j] = 0.0 * phi[j]
