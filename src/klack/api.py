@@ -355,14 +355,21 @@ def run_stroke(
     case: Given,
     variants: Sequence[str] | None = None,
     *,
+    controllers: Mapping[str, str | Path] | None = None,
     progress: Progress = silent,
     threads: int | None = None,
 ) -> Result:
-    """Compute one actuation of a valve; see :func:`klack.analyses.stroke.run.run_stroke`."""
+    """Compute one actuation of a valve; see :func:`klack.analyses.stroke.run.run_stroke`.
+
+    ``controllers`` are FMUs by the controlled component of the case: their binaries run with your
+    rights.
+    """
     from klack.analyses.stroke.analysis import STROKE
+    from klack.analyses.stroke.controllers import with_controllers
     from klack.analyses.stroke.run import run_stroke as run
 
     checked = _of_kind(case, ValveCase, "a whole valve")
+    checked = with_controllers(checked, {n: Path(f) for n, f in (controllers or {}).items()})
     wanted = checked.require_variants(tuple(variants) if variants else checked.run.variants)
     return Result(run(checked, variants=wanted, progress=progress, threads=threads), STROKE)
 

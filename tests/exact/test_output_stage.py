@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.magnetics.driver import When
@@ -125,6 +125,61 @@ def test_only_a_coil_behind_a_stage_has_its_entries(case):
 
     assert {"battery", "switches", "diodes", "clamp", "converter", "capacitor"} <= set(labels)
     assert Book("electric", "supply") not in [b for row in rows.elements for b in row.books]
+
+
+IRON = "{material: X6Cr17, length: 30 mm, area: 34 mm^2}"
+LOOP = (
+    "{material: X6Cr17, length: 30 mm, area: 34 mm^2, "
+    "hysteresis: {coercivity: 300 A/m, initial_permeability: 150}}"
+)
+EDDY = (
+    "      eddy: [{conductivity: 1.5 MS/m, length: 18 mm, radius: 3.5 mm, slots: 0.3, terms: 3, "
+    "permeability: 500}]\n    driver:\n"
+)
+MAP = """    coil:
+      type: force-map-solenoid
+      resistance: 0.5 ohm
+      gap: 80 um
+      current: [0 A, 4 A, 20 A]
+      gaps: [10 um, 40 um, 80 um, 120 um]
+      linkage:
+        - [0 mWb, 0 mWb, 0 mWb, 0 mWb]
+        - [1.6 mWb, 1 mWb, 0.6667 mWb, 0.5 mWb]
+        - [8 mWb, 5 mWb, 3.3333 mWb, 2.5 mWb]
+"""
+
+
+@pytest.mark.parametrize("coil", ["hysteresis", "eddy", "map"])
+def test_other_coils_balance_behind_a_stage(coil):
+    text = (HOW_TO / "boost_driver.yaml").read_text(encoding="utf-8")
+    if coil == "hysteresis":
+        changed = text.replace(IRON, LOOP)
+    elif coil == "eddy":
+        changed = text.replace("    driver:\n", EDDY)
+    else:
+        changed = text[: text.index("    coil:")] + MAP + text[text.index("    driver:") :]
+    assert changed != text
+
+    case = read_valve_case(changed, HOW_TO / "changed.yaml")
+    run = simulate_network(case.network.network().rows(), duration=1.6e-3, record=2e-6)
+
+    assert run.books.relative_residual < 1e-11
+    assert run.channels["coil current"].values.max() == pytest.approx(12.0, rel=0.05)
+    assert run.channels["coil capacitor voltage"].values.min() < 55.0
+    if coil == "hysteresis":
+        assert run.books.losses["coil hysteresis"] > 0.0
+
+
+def test_a_run_in_two_parts_is_the_run_of_the_whole_time(case):
+    rows, keys = case.network.network().rows(), {"record": 2e-6, "coarse": 10, "step": 20e-9}
+
+    whole = simulate_network(rows, duration=0.9e-3, **keys)
+    first = simulate_network(rows, duration=0.6e-3, **keys)
+    second = simulate_network(rows, duration=0.3e-3, state=first.state, **keys)
+
+    for name in ("coil capacitor voltage", "coil current", "needle.tip displacement"):
+        joined = np.concatenate((first.channels[name].values, second.channels[name].values[1:]))
+        np.testing.assert_array_equal(joined, whole.channels[name].values, err_msg=name)
 
 
 def test_the_page_shows_the_driver_of_the_case():

@@ -1,7 +1,7 @@
 """What every controlled component has: sample time, sensors and a law."""
 
 from collections.abc import Mapping
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
@@ -36,6 +36,9 @@ class Controlled(Component):
 
     Limits: a run with a controller has no derivatives.
     """
+
+    output_unit: ClassVar[str] = "-"
+    """Unit of the output of its controller."""
 
     sample_time: Time = Field(
         gt=0, description="Time between two sampling instants, in whole steps of the time loop."
@@ -73,6 +76,11 @@ class Controlled(Component):
         result._function = function
         return result
 
+    @property
+    def own_law(self) -> Law | LawMaker | None:
+        """What :meth:`by` gave."""
+        return self._function
+
     def control(
         self, rows: Rows, actuator: Literal["voltage", "force", "pressure"], handle: int
     ) -> None:
@@ -83,7 +91,8 @@ class Controlled(Component):
                 ("components", rows.component, "controller"),
                 got="no controller" if law is None else "a law and a function",
                 expected="one of: pid, hysteresis, state-machine; or a function in Python",
-                hint="add 'controller: {kind: pid, ...}', or use .by(function) in Python.",
+                hint="add 'controller: {kind: pid, ...}', or use .by(function) in Python; an FMU: "
+                f"--controller {rows.component}=FILE.fmu.",
             )
 
         def begin() -> RunningControl:

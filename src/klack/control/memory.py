@@ -53,7 +53,10 @@ def generator_words(generator: np.random.Generator) -> NDArray[np.uint64]:
 def put_generator_words(generator: np.random.Generator, words: NDArray[np.generic]) -> None:
     """Put a generator into the state of :func:`generator_words`."""
     low, high, low_step, high_step, kept, rest = (int(word) for word in words)
-    state = dict(generator.bit_generator.state)
-    state["state"] = {"state": low + _WORD * high, "inc": low_step + _WORD * high_step}
-    state["has_uint32"], state["uinteger"] = kept, rest
-    generator.bit_generator.state = state
+    whole = {"state": low + _WORD * high, "inc": low_step + _WORD * high_step}
+    generator.bit_generator.state = {
+        "bit_generator": "PCG64",
+        "state": whole,
+        "has_uint32": kept,
+        "uinteger": rest,
+    }

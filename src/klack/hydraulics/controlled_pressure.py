@@ -25,6 +25,7 @@ class ControlledPressure(Controlled):
     """
 
     type: ClassVar[str] = "controlled-pressure"
+    output_unit: ClassVar[str] = "Pa"
     ports: ClassVar[Mapping[str, Port]] = {"fluid": PRESSURE}
 
     start: Pressure = Field(gt=0, description="Absolute pressure at the start, before it acts.")

@@ -23,6 +23,7 @@ class ControlledVoltage(Controlled, Driver):
     """
 
     type: ClassVar[str] = "controlled-voltage"
+    output_unit: ClassVar[str] = "V"
 
     diode: bool = Field(default=True, description="Whether the current cannot turn negative.")
 

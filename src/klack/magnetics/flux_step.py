@@ -154,12 +154,13 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     if h <= 0.0 or settles:
         piece_gaps(par, at, hints, x0, x0, middle, final, slope)
     if h > 0.0 and settles:
-        released, heat = piece_settle(par, at, hints, phi, final, is_open, spread)
+        held = is_open and par[state_block(par, drive, int(mode)) + 1] != 0.0
+        released, heat = piece_settle(par, at, hints, phi, final, held, spread)
         eddy += released
         hysteresis += heat
         for j in range(loops):
             phi[j] += spread[j]
-        if is_open:
+        if held:
             pulse += linked(par, at, spread)
     while done < h:
         now = t + done

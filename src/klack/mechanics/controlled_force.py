@@ -29,6 +29,7 @@ class ControlledForce(Controlled):
     """
 
     type: ClassVar[str] = "controlled-force"
+    output_unit: ClassVar[str] = "N"
     ports: ClassVar[Mapping[str, Port]] = {"end": ELEMENT}
 
     def add_rows(self, rows: Rows) -> None:

@@ -24,14 +24,12 @@ from pathlib import Path
 from struct import Struct
 from typing import Any
 
-__all__ = ["ADVANCE", "ANSWER", "FORCE", "REQUEST", "RUN", "Fmi2", "Fmi3", "Instance"]
+__all__ = ["ADVANCE", "ANSWER", "FORCE", "RUN", "Fmi2", "Fmi3", "Instance", "request"]
 
-REQUEST = Struct("<B4d")
-"""What to do, time and step [s], displacement and velocity in the units of the FMU."""
 ANSWER = Struct("<BdI")
-"""0 if all went well, force in the unit of the FMU, length of the text that follows."""
+"""0 if all went well, output in the unit of the FMU, length of the text that follows."""
 FORCE, RUN, ADVANCE = 1, 2, 3
-"""Force in the initialisation; end of the initialisation; a step and the force after it."""
+"""Output in the initialisation; end of the initialisation; a step and the output after it."""
 
 _C = ctypes.CDLL(None) if os.name == "posix" else ctypes.CDLL("msvcrt")
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
@@ -47,6 +45,11 @@ _Finished = ctypes.CFUNCTYPE(None, c_void_p, c_int)
 _Logger3 = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
 
+def request(inputs: int) -> Struct:
+    """What to do, time and step [s], and so many inputs in the units of the FMU."""
+    return Struct(f"<B{2 + inputs}d")
+
+
 class _Callbacks2(ctypes.Structure):
     _fields_ = (
         ("logger", _Logger2),
@@ -58,7 +61,7 @@ class _Callbacks2(ctypes.Structure):
 
 
 class Instance(ABC):
-    """One instance of an FMU with a motion in and one force out.
+    """One instance of an FMU with some inputs, mostly a motion, and one output, mostly a force.
 
     Parameters
     ----------
@@ -81,8 +84,8 @@ class Instance(ABC):
         ----------
         given : mapping
             ``token``; ``resources``: a folder; ``parameters``: lists of value reference, kind and
-            value; ``inputs``: value references of displacement and velocity, or None; ``force``:
-            value reference of the output.
+            value; ``inputs``: value references, or None for an input that is not joined;
+            ``force``: value reference of the output.
         """
         made = self._made(str(given["token"]).encode(), Path(given["resources"]))
         if not made:
@@ -277,8 +280,9 @@ def serve(reader: int, writer: int) -> None:
         fmu = (Fmi2 if given["version"] == 2 else Fmi3)(given["library"])
         fmu.begin(given)
         answer(False)
-        while data := _whole(reader, REQUEST.size):
-            what, *numbers = REQUEST.unpack(data)
+        asked = request(len(given["inputs"]))
+        while data := _whole(reader, asked.size):
+            what, *numbers = asked.unpack(data)
             force = 0.0
             if what == ADVANCE:
                 force = fmu.advance(*numbers)

@@ -19,7 +19,7 @@ from typing import Any
 
 from klack.closing import Closing
 from klack.mechanics import fmu_child
-from klack.mechanics.fmu_child import ANSWER, REQUEST
+from klack.mechanics.fmu_child import ANSWER, request
 
 __all__ = ["FmuFailed", "FmuProcess"]
 
@@ -50,6 +50,7 @@ class FmuProcess(Closing):
     """
 
     def __init__(self, given: Mapping[str, Any], time_limit: float) -> None:
+        self._request = request(len(given["inputs"]))
         self._process = subprocess.Popen(
             [sys.executable, "-I", "-S", str(fmu_child.__file__), str(os.getpid())],
             stdin=subprocess.PIPE,
@@ -74,13 +75,13 @@ class FmuProcess(Closing):
             self.close()
             raise
 
-    def call(self, what: int, time: float, step: float, *motion: float) -> float:
-        """Send a request; see :data:`klack.mechanics.fmu_child.REQUEST`.
+    def call(self, what: int, time: float, step: float, *inputs: float) -> float:
+        """Send a request; see :func:`klack.mechanics.fmu_child.request`.
 
         Returns
         -------
         float
-            Force in the unit of the FMU.
+            Output in the unit of the FMU.
 
         Raises
         ------
@@ -88,7 +89,7 @@ class FmuProcess(Closing):
             The process is gone then.
         """
         try:
-            self._send(REQUEST.pack(what, time, step, *motion))
+            self._send(self._request.pack(what, time, step, *inputs))
             return self._receive()
         except BaseException:  # also Ctrl-C: its answer would be taken for that of the next call
             self.close()

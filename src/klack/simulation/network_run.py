@@ -344,7 +344,10 @@ def _run(
             limits.tell(recorder.recording.points[:good], times)
             recorder.take(times, finder)
             if control is not None and failure is None:
-                control.act(recorder.looked, recorder.values(good))
+                try:
+                    control.act(recorder.looked, recorder.values(good))
+                except ConvergenceError as error:  # of an FMU: what there is is kept
+                    failure = error
         progress(recorder.looked / looks)
         if failure is not None:
             return failure

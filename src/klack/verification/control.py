@@ -68,6 +68,7 @@ def checks() -> list[Check]:
         *_position(),
         *_machine(),
         *_sensors(),
+        *_in_parts(),
     ]
 
 
@@ -366,5 +367,39 @@ def _sensors() -> list[Check]:
             float(lag[150]),
             1e-13,
             "shifted ramp",
+        ),
+    ]
+
+
+def _in_parts() -> list[Check]:
+    """A run stored and continued, with a late, noisy sensor and a law that remembers."""
+    sensor = Sensor(
+        channel="mass.body displacement", unit="um", delay=2.3 * SAMPLE, noise=0.4, seed=5,
+        quantisation=0.1,
+    )  # fmt: skip
+    law = PidController(
+        kind="pid", sensor="lift", setpoint=60.0, gain=0.05, integral_time=0.2e-3,
+        derivative_time=SAMPLE, derivative_filter=SAMPLE, lower=-20.0, upper=20.0,
+    )  # fmt: skip
+    parts = {
+        "mass": RigidMass(mass=MASS),
+        "spring": Spring(stiffness=1e4, preload=0.0),
+        "force": ControlledForce(sample_time=SAMPLE, sensors={"lift": sensor}, controller=law),
+    }
+    rows = Network(parts, [["mass.body", "force.end", "spring.end"]]).rows()
+    run = partial(simulate_network, rows, start="free", step=100e-9, record=SAMPLE)
+    whole = run(duration=60 * SAMPLE)
+    first = run(duration=25 * SAMPLE)
+    second = run(duration=35 * SAMPLE, state=first.state)
+    name = "mass.body displacement"
+    joined = np.concatenate((first.channels[name].values, second.channels[name].values[1:]))
+    differ = np.count_nonzero(joined != whole.channels[name].values)
+    return [
+        _check(
+            "run with a PID controller stored and continued, numbers that differ",
+            0.0,
+            float(differ),
+            0.0,
+            "determinism: the memory of controller and sensor is complete",
         ),
     ]

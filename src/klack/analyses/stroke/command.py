@@ -53,6 +53,15 @@ _Continue = Annotated[
         help="Folder of an earlier result of the same case: continue from its end.",
     ),
 ]
+_Controllers = Annotated[
+    list[str] | None,
+    Parameter(
+        name="--controller",
+        negative="",
+        help="NAME=FILE.fmu: an FMU as the controller of the component NAME; its inputs are called "
+        "as the sensors. Its binary runs with your rights; several are allowed.",
+    ),
+]
 
 
 def stroke(
@@ -65,6 +74,7 @@ def stroke(
     accuracy: _Accuracy = None,
     continued: _Continue = None,
     component: Components = None,
+    controller: _Controllers = None,
     at_rest: SteadyAsked = STEADY,
     asked: WantedResult = WANTED_RESULT,
 ) -> int:
@@ -82,6 +92,10 @@ def stroke(
     with show_progress(asked.quiet):
         case_file, components = find_case(case), imported(component)
         checked = _checked_case(case_file, duration, step, accuracy, components)
+        if controller:
+            from klack.analyses.stroke.controllers import controller_files, with_controllers
+
+            checked = with_controllers(checked, controller_files(controller))
     # both "--variant a,b" and "--variant a --variant b"
     wanted = tuple(name for item in variant or () for name in item.split(",") if name)
     wanted = checked.require_variants(wanted or checked.run.variants)

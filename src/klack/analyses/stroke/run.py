@@ -9,6 +9,7 @@ import numpy as np
 
 from klack.analyses.impact.contact_check import check_contact
 from klack.analyses.record import RunFields, case_fields, run_fields
+from klack.analyses.stroke.controllers import controller_notes
 from klack.analyses.stroke.missing import missing_notes
 from klack.analyses.stroke.record import (
     FluidSummary,
@@ -116,7 +117,13 @@ def run_stroke(
         run_fields(begin, clock),
         bodies=body_summaries(valve),
         stops=stops,
-        warnings=(*missing, *notes, *begun, *(note for note in told if note)),
+        warnings=(
+            *missing,
+            *controller_notes(case),
+            *notes,
+            *begun,
+            *(note for note in told if note),
+        ),
         schematic=schematic_svg(case.network.network()),
     )
     if failure is not None:

@@ -1,0 +1,69 @@
+"""Controllers that whoever runs a case gives it: FMUs, by component."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from klack.case.valve import ValveCase
+from klack.control.controlled import Controlled
+from klack.errors import InputError
+from klack.input.problem import nearest, one_of
+from klack.mechanics.fmu_controller import FmuController, controlled_by_fmu
+
+__all__ = ["controller_files", "controller_notes", "with_controllers"]
+
+
+def controller_files(given: Sequence[str]) -> dict[str, Path]:
+    """Files by component, of texts NAME=FILE.fmu.
+
+    Raises
+    ------
+    InputError
+    """
+    files: dict[str, Path] = {}
+    for text in given:
+        name, sign, file = text.partition("=")
+        if not (name and sign and file) or name in files:
+            raise InputError(
+                "--controller",
+                got=f"'{text}'" + (", the second one of that component" if name in files else ""),
+                expected="NAME=FILE.fmu, once for a controlled component of the case",
+                hint="for example: --controller driver=controller.fmu",
+            )
+        files[name] = Path(file)
+    return files
+
+
+def with_controllers(case: ValveCase, files: Mapping[str, Path]) -> ValveCase:
+    """Return a case with FMUs in place of the controllers of some components.
+
+    Raises
+    ------
+    InputError
+        For a component that has no controller, and for an FMU that does not fit.
+    """
+    components = dict(case.network.components)
+    controlled = [name for name, part in components.items() if isinstance(part, Controlled)]
+    for name, file in files.items():
+        part = components.get(name)
+        if not isinstance(part, Controlled):
+            raise InputError(
+                "controller",
+                got=f"'{name}'" + (f", a {part.type}" if part is not None else ""),
+                expected=f"one of: {one_of(controlled)}"
+                if controlled
+                else "a case with a controlled-voltage, controlled-force or controlled-pressure",
+                hint=nearest(name, controlled, "name the controlled component of the case."),
+            )
+        components[name] = controlled_by_fmu(part, file)
+    network = case.network.model_copy(update={"components": components})
+    return case.model_copy(update={"network": network})
+
+
+def controller_notes(case: ValveCase) -> tuple[str, ...]:
+    """Say which FMUs control a run: its record holds the case, not them."""
+    notes = []
+    for name, part in case.network.components.items():
+        law = part.own_law if isinstance(part, Controlled) else None
+        if isinstance(law, FmuController):
+            notes.append(f"the controller of '{name}' is {law.told}.")
+    return tuple(notes)
