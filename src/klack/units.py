@@ -202,13 +202,7 @@ HEAT_CAPACITY = Kind("a heat capacity", "J/K", "14 J/K", ("J/K", "kJ/K"))
 SPECIFIC_HEAT = Kind("a specific heat", "J/kg/K", "385 J/kg/K", ("J/kg/K", "kJ/kg/K"))
 CONDUCTANCE = Kind("a thermal conductance", "W/K", "0.6 W/K", ("W/K", "mW/K"))
 HEAT_TRANSFER = Kind("a heat transfer coefficient", "W/m^2/K", "12 W/m^2/K", ("W/m^2/K",))
-EXPANSION = Kind(
-    "a coefficient over temperature",
-    "1/K",
-    "12e-6 1/K",
-    ("1/K", "%/K", "um/m/K"),
-    {"1/K": 1.0, "%/K": 1e-2, "ppm/K": 1e-6, "um/m/K": 1e-6},
-)
+EXPANSION = Kind("a coefficient over temperature", "1/K", "12e-6 1/K", ("1/K", "um/m/K"))
 RATIO = Kind(
     "a number without unit",
     "-",

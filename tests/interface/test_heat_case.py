@@ -72,7 +72,7 @@ WRONG = {
     "fluid": ("  windings:", "  fluid: copper\n  windings:", "a node for the fluid of a dry valve"),
     "magnets": (
         "  windings:",
-        "  magnets: {coil: {node: copper, coefficient: -0.1 %/K}}\n  windings:",
+        "  magnets: {coil: {node: copper, coefficient: -0.001 1/K}}\n  windings:",
         "solenoid with magnets",
     ),
     "open port": ("[path.b, ambient]", "[driver.terminals]", "two ports or more"),
@@ -205,7 +205,7 @@ def test_a_magnet_weakens_by_its_coefficient():
             "magnets: [{remanence: 1.2 T, recoil_permeability: 1.05, length: 1 mm, "
             "area: 30 mm^2, polarity: with-coil}], poles: [{",
         ),
-        ("  windings:", "  magnets: {coil: {node: copper, coefficient: -0.12 %/K}}\n  windings:"),
+        ("  windings:", "  magnets: {coil: {node: copper, coefficient: -0.0012 1/K}}\n  windings:"),
     )
     hot = {"copper": 393.15, "ambient": 293.15}
 

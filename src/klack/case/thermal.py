@@ -29,7 +29,7 @@ class HeatedMagnet(Section):
 
     node: Name = Field(description="Thermal node.")
     coefficient: Expansion = Field(
-        description="Relative change of the remanence; NdFeB -0.12 %/K, ferrite -0.2 %/K."
+        description="Relative change of the remanence; NdFeB -0.0012 1/K, ferrite -0.002 1/K."
     )
     reference: Temperature = Field(
         default=_REFERENCE, gt=0, description="Where the remanence of the case holds."
