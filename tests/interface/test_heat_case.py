@@ -217,13 +217,13 @@ def test_a_magnet_weakens_by_its_coefficient():
 
 def test_a_fluid_beyond_its_range_is_taken_from_the_end_with_a_doubt():
     valve = build_valve(wet("DOT 4"))
-    hot = {"copper": 400.15, "ambient": 293.15}
+    hot = {"copper": 440.15, "ambient": 293.15}
 
     warm = warm_valve(valve, {a: hot for a in aspects_of(valve.case)})
 
-    assert warm.valve.network.fluid.temperature == pytest.approx(373.15)
+    assert warm.valve.network.fluid.temperature == pytest.approx(413.15)
     assert (
-        "'DOT 4' is known from -40 to 100 °C: beyond that its properties at 100 °C"
+        "'DOT 4' is known from -40 to 140 °C: beyond that its properties at 140 °C"
         in warm.doubts[0]
     )
 
