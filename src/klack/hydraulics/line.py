@@ -49,8 +49,8 @@ class Line(Component):
     Limits: one sound speed and density, those at ``pressure`` (steps of some 10 bar change them by
     a few per cent, free gas by far more: a run in which the pressure at an end makes more than 10 %
     of either says so, with both speeds); laminar friction, which fits transients of ms from rest
-    also above Re = 2300; bends and fittings are a pressure-loss.  A line needs a chamber or a
-    pressure at each end; a tiny chamber closes it.
+    also above Re = 2300; bends and fittings are a pressure-loss.  A line needs a chamber, a
+    junction or a pressure at each end; a junction alone closes it.
     Sources: Wylie & Streeter 1993, ch. 1 (speed in a thin-walled tube that may lengthen), 3 and 8;
     Krus et al. (transmission-line modelling); Kagawa et al. 1983.
     """
