@@ -44,7 +44,11 @@ def draw(seed: int) -> str:
         _line(rng, parts, nodes, (int(a), int(b)), bore)
     for _end in range(int(rng.integers(1, 4))):
         _outlet(rng, parts, nodes[int(rng.integers(1, len(nodes)))], bore)
-    parts["needle"] = {"type": "rigid-mass", "mass": "2 g", "points": ["tip"]}  # a network needs one
+    parts["needle"] = {
+        "type": "rigid-mass",
+        "mass": "2 g",
+        "points": ["tip"],
+    }  # a network needs one
     parts["spring"] = {"type": "spring", "stiffness": "500 N/mm", "preload": "0 N"}
     joints = [*nodes, *parts.pop("joints", []), ["needle.tip", "spring.end"]]
     network = {

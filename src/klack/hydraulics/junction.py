@@ -1,7 +1,6 @@
 """Junction of lines: a node without volume, whose pressure is that at which its flows balance."""
 
 from collections.abc import Mapping
-from math import inf
 from typing import ClassVar
 
 from pydantic import Field
@@ -9,7 +8,7 @@ from pydantic import Field
 from klack.hydraulics.network_fluid import network_fluid
 from klack.network.component import Component
 from klack.network.port import COMPLIANCE, Port
-from klack.network.rows import LimitRow, Rows
+from klack.network.rows import Rows
 from klack.units import Pressure
 
 __all__ = ["Junction"]
@@ -29,11 +28,13 @@ class Junction(Component):
     else is joined there.  A chamber instead delays waves by ``V/K sum Y``, and its volume has to be
     known.
 
+    Where its pressure would fall below that of boiling, a cavity opens there, holds that pressure
+    and takes what flows out, until it is filled again (discrete vapour cavity, as in a line).
+
     Limits: needs the end of a line; no face may move there (its room is a chamber); one pressure,
-    that of fluid at rest, so no loss by mixing (put a pressure-loss into each branch).  Below the
-    vapour pressure a cavity would open there; a junction has no room for it, pulls instead, and
-    the run says so.
-    Source: Wylie & Streeter 1993, ch. 3 (junctions in series and branching).
+    that of fluid at rest, so no loss by mixing (put a pressure-loss into each branch); in a run
+    that begins between pressures far apart, lines begin with the steady flow of their friction.
+    Source: Wylie & Streeter 1993, ch. 3 (junctions in series and branching) and 8 (cavities).
     """
 
     type: ClassVar[str] = "junction"
@@ -47,21 +48,5 @@ class Junction(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Make the node a junction."""
-        fluid, node = network_fluid(rows), rows.port("fluid")
-        rows.junction(node, pressure=self.pressure)
-        rows.limits.append(
-            LimitRow(
-                component=rows.component,
-                quantity="pressure",
-                unit="Pa",
-                valid=(fluid.all_liquid_from, inf),
-                law=f"the junction '{rows.component}'",
-                effect=lambda value: (
-                    "A cavity would open there; the junction has no room for it, and pulls on the "
-                    "fluid in the lines instead."
-                ),
-                advice=f"replace components.{rows.component} by a chamber of the volume of the "
-                "crossing.",
-                node=node,
-            )
-        )
+        network_fluid(rows)
+        rows.junction(rows.port("fluid"), pressure=self.pressure)

@@ -155,7 +155,7 @@ class StepRows(NamedTuple):
 
 
 class Nodes(NamedTuple):
-    """Pressures: volumes first, chambers and then junctions, which hold nothing; then given ones."""
+    """Pressures: volumes first (chambers, then junctions, which hold nothing), then given ones."""
 
     nodes: int
     volumes: int

@@ -291,6 +291,14 @@ def _open_cavities(fluid: Any) -> None:
             trial.r[i] = nodes.boiling - trial.p[i]
             if trial.cavity[i] == 0.0:
                 trial.cavity[i] = _OPEN
+                _forget_intervals(fluid)
+
+
+@phase
+def _forget_intervals(fluid: Any) -> None:
+    """Let the densities be anywhere: a cavity that opened or closed has moved the roots."""
+    for i in range(fluid.nodes.volumes):
+        fluid.trial.lower[i], fluid.trial.upper[i] = 0.0, np.inf
 
 
 @phase
@@ -300,6 +308,8 @@ def _cavities_close(fluid: Any, H: float) -> bool:
     for i in range(nodes.chambers, nodes.volumes):
         if trial.cavity[i] == _OPEN and _fills(fluid, i, H):
             trial.cavity[i], closes = _CLOSED, True
+    if closes:
+        _forget_intervals(fluid)
     return closes
 
 

@@ -16,6 +16,7 @@ from klack.hydraulics.line_friction import (
 )
 from klack.network.rows import LineRow
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.line_junctions import line_junctions
 from klack.verification.single_line import (
     End,
     exponential_decay,
@@ -38,7 +39,7 @@ STEP = DELAY / STEPS
 
 
 def checks() -> list[Check]:
-    """Joukowsky, echoes, slow closure, piston, friction, cavities, energy balance."""
+    """Joukowsky, echoes, slow closure, piston, friction, cavities, energy, junctions."""
     return [
         *_closure(),
         *_slow_closure(),
@@ -49,6 +50,7 @@ def checks() -> list[Check]:
         *_start_up(),
         *_cavity(),
         *_books(),
+        *line_junctions(),
     ]
 
 
