@@ -98,3 +98,25 @@ def test_the_example_rises_by_twice_the_jump_where_its_needle_closes():
     assert mouth[0] == pytest.approx(50e5, rel=1e-9)
     assert mouth.min() > 5e5
     assert mouth.max() > 60e5  # water hammer of the needle that closes
+
+
+def test_a_roughness_belongs_to_turbulent_friction():
+    with pytest.raises(InputError, match=r"(?s)roughness.*friction: kagawa.*turbulent"):
+        Line(**LINE, roughness=1e-6)
+
+
+def test_a_rough_line_takes_more_pressure_and_keeps_its_energy_in_one_account():
+    drops = []
+    for roughness in (0.0, 20e-6):
+        line = Line(**LINE, friction="turbulent", segments=2, roughness=roughness)
+        parts = {"l": line, "end": Junction(), "hole": Orifice(diameter=1.5e-3)}
+        joined = [["source.fluid", "l.a"], ["l.b", "end.fluid", "hole.a"], ["hole.b", "ambient"]]
+        rows = network(parts, joined).rows()
+        result = simulate_network(rows, duration=1e-4, step=50e-9, coarse=4, record=1e-6)
+        drops.append(5e5 - result.start.pressure["end"])
+        assert len(rows.lines) == 3
+        assert sum("waves" in name for name in result.books.stores_after) == 1
+        assert result.books.relative_residual < 1e-12
+        assert result.channels["l friction 1 Reynolds number"].values[0] > 4000.0
+
+    assert drops[1] > 1.3 * drops[0]

@@ -581,6 +581,19 @@ class Rows:
             junction=True,
         )
 
+    def inner_junction(self, label: str) -> int:
+        """Add a junction inside the present component, at no port of it; return its handle."""
+        node = min(self.nodes, default=AMBIENT) - 1
+        self.nodes[node] = NodeRow(
+            component=f"{self.component} {label}",
+            volume=0.0,
+            time=np.zeros(1),
+            pressure=np.array([self.ambient.pressure]),
+            stated=False,
+            junction=True,
+        )
+        return node
+
     @staticmethod
     def _two_kinds(other: str, junction: str) -> InputError:
         return InputError(

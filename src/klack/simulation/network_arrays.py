@@ -307,7 +307,7 @@ class NodeTrial(NamedTuple):
     own: Vector
     stored: Vector  # of ``own``: in the volume itself
     balanced: Vector  # what the pressure changes in flows
-    cavity: Vector  # 1 of a junction with an open cavity, 2 where it closes in this step
+    cavity: Vector  # of a junction: 1 open, 2 closes in this step, 3 cannot; 0 none
     matrix: Vector
 
 

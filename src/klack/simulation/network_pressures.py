@@ -42,7 +42,8 @@ _LEAST_THETA = 0.51  # what the implicit step loses outweighs what the curved la
 _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
 _MOST_OF = 0.9  # longest step within this interval
-_OPEN, _CLOSED = 1.0, 2.0  # cavity at a junction; one that closes in this step
+# cavity at a junction; one that closes in this step; one that did, and cannot
+_OPEN, _CLOSED, _KEPT = 1.0, 2.0, 3.0
 _HELD = 1.0  # [kg/Pa] what holds the pressure of an open one, far more than any flow answers
 _BALANCED = 1e-9  # of the flows of a junction: what its cavity may be filled too much
 _NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
@@ -111,8 +112,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     gamma = shift(nodes.gamma, min(step.level, 1) * max(nodes.volumes, 1))
     _place_walls(fluid, S)
     for i in range(nodes.chambers, nodes.volumes):
-        if trial.cavity[i] == _CLOSED:
-            trial.cavity[i] = 0.0
+        trial.cavity[i] = 1.0 if _is_held(trial.cavity[i]) else 0.0
     for iteration in range(_MOST_NEWTON):
         _look_up(fluid)
         _add_up_volumes(fluid, gamma)
@@ -126,10 +126,10 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             r[0] /= trial.own[0]
         else:
             solve_mass_balance(trial.matrix, trial.own, r, nodes.volumes)
-        _open_cavities(fluid)
+        opens = _open_cavities(fluid)
         worst, total = _limit_steps(fluid, iteration)
         finite = abs(total) < np.inf
-        if finite and worst < _PRESSURE_LEFT:
+        if finite and worst < _PRESSURE_LEFT and not opens:
             if iteration >= _FULL_NEWTON or _flows_follow(fluid, step.H):
                 if not _cavities_close(fluid, step.H):
                     _step_by(fluid, 1.0)
@@ -236,7 +236,7 @@ def _add_up_volumes(fluid: Any, gamma: Any) -> None:
         trial.stored[i] = V[i] * trial.slope[i] / trial.theta[i]
         trial.own[i] = trial.stored[i] + rho[i] * gamma[i]
     for i in range(nodes.chambers, nodes.volumes):
-        if trial.cavity[i] == _OPEN:
+        if _is_held(trial.cavity[i]):
             trial.r[i] = _HELD * (nodes.boiling - p[i])
             trial.stored[i] = trial.own[i] = _HELD
 
@@ -283,15 +283,25 @@ def _add_up_ends(fluid: Any, H: float) -> None:
 
 
 @phase
-def _open_cavities(fluid: Any) -> None:
-    """Hold the pressure of a junction at that of boiling where a Newton step leads below."""
-    nodes, trial = fluid.nodes, fluid.trial
+def _open_cavities(fluid: Any) -> bool:
+    """Hold junctions at the pressure of boiling where a Newton step leads below; whether any is."""
+    nodes, trial, opens = fluid.nodes, fluid.trial, False
     for i in range(nodes.chambers, nodes.volumes):
-        if trial.p[i] + trial.r[i] < nodes.boiling:
+        if trial.p[i] + trial.r[i] < nodes.boiling and not _is_held(trial.cavity[i]):
             trial.r[i] = nodes.boiling - trial.p[i]
             if trial.cavity[i] == 0.0:
                 trial.cavity[i] = _OPEN
-                _forget_intervals(fluid)
+            elif trial.p[i] <= nodes.boiling:  # not an overshoot: it leads below from there
+                trial.cavity[i] = _KEPT
+            opens = True
+    if opens:
+        _forget_intervals(fluid)
+    return opens
+
+
+@phase
+def _is_held(cavity: float) -> bool:
+    return cavity == _OPEN or cavity == _KEPT
 
 
 @phase

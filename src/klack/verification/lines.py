@@ -25,6 +25,7 @@ from klack.verification.single_line import (
     ringing,
     run_line,
 )
+from klack.verification.turbulent_line import turbulent_line
 
 __all__ = ["checks"]
 
@@ -51,6 +52,7 @@ def checks() -> list[Check]:
         *_cavity(),
         *_books(),
         *line_junctions(),
+        *turbulent_line(),
     ]
 
 

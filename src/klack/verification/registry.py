@@ -48,7 +48,7 @@ COVERS = {
     "hydraulic-parts": "Check and relief valves, accumulators, pumps, spool edges, fittings, "
     "walls: formulas, and small networks integrated apart.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy, "
-    "junctions of lines.",
+    "junctions, turbulent lines.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "
     "compliance, order.",
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
