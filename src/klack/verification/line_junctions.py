@@ -129,14 +129,14 @@ def _scattering() -> list[Check]:
                 "on [-]",
                 expected=share,
                 computed=float(_at(result, "tee")[300]) / JUMP,
-                tolerance=1e-9,
+                tolerance=5e-14,
                 source=SCATTERING,
             ),
             _check(
                 f"{count} lines, pressure at a closed end [-]",
                 expected=2.0 * share,
                 computed=float(_at(result, "e1")[500]) / JUMP,
-                tolerance=1e-9,
+                tolerance=5e-14,
                 source="a closed end doubles a wave",
             ),
         ]
@@ -210,7 +210,7 @@ def _network() -> list[Check]:
             "network with a ring and dead ends over 40 passes, largest difference [-]",
             expected=0.0,
             computed=float(max(off)) / JUMP,
-            tolerance=1e-9,
+            tolerance=2e-11,
             source=APART,
             curve=ComparedCurve(
                 x_label="time [us]",
@@ -223,14 +223,14 @@ def _network() -> list[Check]:
             "network with a ring and dead ends, energy that does not balance [-]",
             expected=0.0,
             computed=result.books.relative_residual,
-            tolerance=1e-12,
+            tolerance=2e-13,
             source="conservation of energy",
         ),
         _check(
             "network with a ring and dead ends, energy of the mass left at junctions [-]",
             expected=0.0,
             computed=leak / result.books.scale,
-            tolerance=1e-14,
+            tolerance=5e-14,
             source="the flows of a junction add up to nothing",
         ),
     ]
@@ -261,7 +261,7 @@ def _equal_networks() -> list[Check]:
             f"{words}, largest difference from one line [-]",
             expected=0.0,
             computed=float(np.max(np.abs(_at(result, "end") - one))) / JUMP,
-            tolerance=1e-9,
+            tolerance=5e-14,
             source="identity",
         )
         for words, result in (("line in two pieces", pieces), ("two lines side by side", beside))
@@ -295,14 +295,14 @@ def _orifice() -> list[Check]:
             "throttle at the end of a line, pressure after a jump [bar]",
             expected=expected / BAR,
             computed=p / BAR,
-            tolerance=1e-8,
+            tolerance=1e-12,
             source="one equation, c = p + Z q(p), by Brent's method",
         ),
         _check(
             "throttle at the end of a line, flow after a jump [kg/s]",
             expected=(arriving - wave_pressure(p)) * RHO / Z,
             computed=m,
-            tolerance=1e-9,
+            tolerance=2e-10,
             source="q = (c - p)/Z",
         ),
     ]
@@ -338,7 +338,7 @@ def _cavity() -> list[Check]:
             "cavity at a closed end, largest difference of the pressure [-]",
             expected=0.0,
             computed=float(np.max(np.abs(computed - expected))) / JUMP,
-            tolerance=1e-8,
+            tolerance=3e-9,
             source="discrete vapour cavity of the method of characteristics, written apart",
             curve=ComparedCurve(
                 x_label="time [us]",
@@ -351,14 +351,14 @@ def _cavity() -> list[Check]:
             "cavity at a closed end, steps for which it is open [-]",
             expected=open_for,
             computed=float(np.count_nonzero(computed <= vapour * (1.0 - 1e-9))),
-            tolerance=1e-12,
+            tolerance=5e-14,
             source="discrete vapour cavity of the method of characteristics, written apart",
         ),
         _check(
             "cavity at a closed end, energy that does not balance [-]",
             expected=0.0,
             computed=result.books.relative_residual,
-            tolerance=1e-11,
+            tolerance=2e-13,
             source="conservation of energy; the collapse is a loss",
         ),
     ]
