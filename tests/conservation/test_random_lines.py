@@ -22,3 +22,13 @@ def test_a_random_network_of_lines_runs_and_keeps_its_energy(seed):
 
     assert books.relative_residual <= 1e-10
     assert books.least_loss >= -1e-12 * books.scale
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("seed", [5, 8, 30])
+def test_branched_lines_with_closed_chambers_start_in_their_steady_flow(seed):
+    junction, room = '{"type": "junction"}', '{"type": "chamber", "volume": "5 mm^3"}'
+    result = DRAWS["run"](DRAWS["draw"](seed).replace(junction, room))
+
+    assert result.start is not None
+    assert result.books.relative_residual <= 1e-10
