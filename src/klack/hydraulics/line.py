@@ -11,6 +11,7 @@ from klack.errors import InputError
 from klack.hydraulics.line_friction import KAGAWA, laminar_resistance, unsteady_terms
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.network_fluid import network_fluid
+from klack.hydraulics.pipe_friction import PipeFriction
 from klack.hydraulics.wall_compliance import Wall
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
@@ -24,7 +25,9 @@ __all__ = ["Line"]
 
 _FOLLOWED = 0.1  # error of wave speed and impedance that is not worth a word
 _LOOKED_AT = 400  # pressures, in equal ratios
-_SEGMENTS = 2  # with friction: damps all modes of a fed line as spread friction does
+# two with friction damp all modes of a fed line as spread friction does; turbulent lumps, which
+# are not at the ends, want four
+_PARTS = {"none": 1, "steady": 2, "kagawa": 2, "turbulent": 4}
 
 
 class Line(Component):
@@ -40,8 +43,10 @@ class Line(Component):
 
     Friction ``J`` is lumped between segments and at both ends.  ``kagawa`` remembers how the flow
     changed; ``steady`` is Hagen-Poiseuille, which damps the first mode of a short fuel line fifty
-    times too little.  Where the pressure between two segments would fall below that of vapour, a
-    cavity opens there and collapses later (discrete vapour cavities).
+    times too little.  ``turbulent`` adds to that memory the steady drop of
+    :class:`~klack.hydraulics.pipe_friction.PipeFriction` (Colebrook from Re = 4000 on), in equal
+    lumps between pieces that meet in junctions.  Where the pressure between two segments would fall
+    below that of vapour, a cavity opens there and collapses later (discrete vapour cavities).
 
     Two segments damp every mode of a line that is open at one end, and the odd ones of a closed
     line; oils of 50 mm^2/s and more want 4 to 8, cavities a segment for each place.
@@ -49,8 +54,9 @@ class Line(Component):
     Limits: one sound speed and density, those at ``pressure`` (steps of some 10 bar change them by
     a few per cent, free gas by far more: a run in which the pressure at an end makes more than 10 %
     of either says so, with both speeds); laminar friction, which fits transients of ms from rest
-    also above Re = 2300; bends and fittings are a pressure-loss.  A line needs a chamber or a
-    pressure at each end; a tiny chamber closes it.
+    also above Re = 2300, but for ``turbulent``, whose memory is that of laminar flow as well; bends
+    and fittings are a pressure-loss.  A line needs a chamber, a junction or a pressure at each end;
+    a junction alone closes it.
     Sources: Wylie & Streeter 1993, ch. 1 (speed in a thin-walled tube that may lengthen), 3 and 8;
     Krus et al. (transmission-line modelling); Kagawa et al. 1983.
     """
@@ -76,13 +82,17 @@ class Line(Component):
         default=None,
         description="Hose by its bulk modulus, or a tube of any thickness; instead of both above.",
     )
-    friction: Literal["none", "steady", "kagawa"] = Field(
-        default="kagawa", description="none, steady laminar, or with memory after Kagawa."
+    friction: Literal["none", "steady", "kagawa", "turbulent"] = Field(
+        default="kagawa",
+        description="none, steady laminar, with memory after Kagawa, or that and turbulent.",
+    )
+    roughness: Length | None = Field(
+        default=None, ge=0, description="Of the wall, for turbulent friction; smooth without it."
     )
     segments: Count | None = Field(
         default=None,
         description="Segments between which friction and cavities are lumped; "
-        "default 2, or 1 without friction.",
+        "default 2, 1 without friction, 4 lumps of turbulent friction.",
     )
 
     @model_validator(mode="after")
@@ -95,6 +105,13 @@ class Line(Component):
                 got=f"an elastic wall without {missing[0]}",
                 expected="wall_thickness and wall_modulus together, or none of them",
                 hint=f"add {missing[0]}; leave both out for a bore in a thick body.",
+            )
+        if self.roughness is not None and self.friction != "turbulent":
+            raise CaseProblem(
+                ("roughness",),
+                got=f"a roughness with friction: {self.friction}",
+                expected="it with friction: turbulent alone",
+                hint="leave it out, or choose friction: turbulent.",
             )
         if self.wall is not None:
             self._refuse_with(tuple(given), "wall", "the wall is given twice")
@@ -110,7 +127,7 @@ class Line(Component):
     @property
     def parts(self) -> int:
         """Number of segments in use."""
-        return self.segments or (1 if self.friction == "none" else _SEGMENTS)
+        return self.segments or _PARTS[self.friction]
 
     def wave_speed(self, fluid: NetworkFluid, pressure: float | None = None) -> float:
         r"""Speed of pressure waves [m/s], lowered by the wall: ``1/a^2 + rho D / (E s)``.
@@ -172,19 +189,42 @@ class Line(Component):
             diameter=self.diameter,
             kinematic_viscosity=viscosity / rho,
         )
-        memory = self.friction == "kagawa" and viscosity > 0.0
-        rows.line(
-            a=rows.port("a"),
-            b=rows.port("b"),
-            delay=self.length / a,
-            impedance=scale * rho * a / (0.25 * pi * self.diameter**2),
-            segments=self.parts,
-            resistance=resistance if self.friction != "none" else 0.0,
-            unsteady_gain=gain if memory else (),
-            unsteady_rate=rate if memory else (),
-            vapour_pressure=fluid.vapour_pressure,
-        )
+        memory = self.friction in {"kagawa", "turbulent"} and viscosity > 0.0
+        turbulent = self.friction == "turbulent" and viscosity > 0.0
+        for begin, end, share in self._pieces(rows, viscosity, turbulent=turbulent):
+            rows.line(
+                a=begin,
+                b=end,
+                delay=share * self.length / a,
+                impedance=scale * rho * a / (0.25 * pi * self.diameter**2),
+                segments=1 if turbulent else self.parts,
+                resistance=0.0 if turbulent or self.friction == "none" else resistance,
+                unsteady_gain=share * gain if memory else (),
+                unsteady_rate=rate if memory else (),
+                vapour_pressure=fluid.vapour_pressure,
+            )
         rows.limits += self._limits(rows, fluid, pressure)
+
+    def _pieces(
+        self, rows: Rows, viscosity: float, *, turbulent: bool
+    ) -> list[tuple[int, int, float]]:
+        """Nodes and share of each piece; turbulent friction is between them, in equal lumps."""
+        begin, last = rows.port("a"), rows.port("b")
+        if not turbulent:
+            return [(begin, last, 1.0)]
+        part = PipeFriction(
+            length=self.length / self.parts,
+            diameter=self.diameter,
+            roughness=self.roughness or 0.0,
+        )
+        pieces, share = [], 0.5 / self.parts
+        for k in range(1, self.parts + 1):
+            before = rows.inner_junction(f"before friction {k}")
+            after = rows.inner_junction(f"behind friction {k}")
+            part.add_between(rows, before, after, viscosity, label=f"friction {k}")
+            pieces.append((begin, before, share))
+            begin, share = after, 1.0 / self.parts
+        return [*pieces, (begin, last, 0.5 / self.parts)]
 
     def _limits(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> list[LimitRow]:
         """Pressures at the ends about which its one wave speed and its one impedance hold."""

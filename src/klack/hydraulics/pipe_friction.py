@@ -138,11 +138,16 @@ class PipeFriction(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch."""
         _, viscosity = fixed_viscosity(rows)
+        self.add_between(rows, rows.port("a"), rows.port("b"), viscosity)
+
+    def add_between(self, rows: Rows, a: int, b: int, viscosity: float, label: str = "") -> None:
+        """Add the branch between two nodes of the present component, for a viscosity [Pa s]."""
         rows.branch(
             pipe_friction_step,
-            a=rows.port("a"),
-            b=rows.port("b"),
+            a=a,
+            b=b,
             parameters=self.parameters(viscosity),
             state=(0.0,),
             channels=(Channel("Reynolds number", "-", 0, derived=True),),
+            label=label,
         )

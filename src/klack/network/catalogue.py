@@ -53,6 +53,7 @@ COMPONENTS = (
     ("annulus", "klack.hydraulics.annulus.Annulus"),
     ("inertance", "klack.hydraulics.inertance.Inertance"),
     ("line", "klack.hydraulics.line.Line"),
+    ("junction", "klack.hydraulics.junction.Junction"),
     ("check-valve", "klack.hydraulics.check_valve.CheckValve"),
     ("relief-valve", "klack.hydraulics.relief_valve.ReliefValve"),
     ("accumulator", "klack.hydraulics.accumulator.Accumulator"),

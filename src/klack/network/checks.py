@@ -155,7 +155,8 @@ def _no_compliance(components: Mapping[str, Component], node: Node) -> CaseProbl
         ("connections", node.index),
         got=got,
         expected="a chamber, a prescribed pressure or ambient at every hydraulic node",
-        hint="add the dead volume there as a chamber (a few mm^3), or a pressure source.",
+        hint="add the dead volume there as a chamber (a few mm^3), a junction where lines meet, or "
+        "a pressure source.",
     )
 
 
@@ -238,6 +239,7 @@ def check_rows(rows: Rows) -> None:
             )
     _check_driven(rows)
     _check_node_rows(rows)
+    _check_junctions(rows)
     check_ranges(rows)
     _warn_of_loose_bodies(rows)
 
@@ -269,6 +271,29 @@ def _check_node_rows(rows: Rows) -> None:
                 got="a flow or wall at a node that has no pressure",
                 expected="a chamber, a prescribed pressure or ambient there",
                 hint="a component with a port of the role COMPLIANCE must call rows.chamber.",
+            )
+
+
+def _check_junctions(rows: Rows) -> None:
+    """Raise for a junction without a line, whose pressure nothing sets, or with a moving face."""
+    lines = {node for row in rows.lines for node in (row.a, row.b)}
+    for node, row in rows.nodes.items():
+        if not row.junction:
+            continue
+        if node not in lines:
+            raise CaseProblem(
+                ("components", row.component),
+                got="a junction without the end of a line",
+                expected="at least one line there: its impedance sets the pressure",
+                hint="make it a chamber of the volume of the crossing (a few mm^3).",
+            )
+        moving = [w.component for w in rows.walls if w.node == node and w.port != GROUND]
+        if moving:
+            raise CaseProblem(
+                ("components", moving[0]),
+                got=f"a face that moves at the junction '{row.component}', which has no volume",
+                expected="a chamber there: the face takes and leaves room for fluid",
+                hint="replace the junction by a chamber of the volume before the face.",
             )
 
 

@@ -190,11 +190,12 @@ class BranchRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class NodeRow:
-    """One pressure: a volume with compliance, or a prescribed pressure over time.
+    """One pressure: a volume with compliance, a prescribed pressure over time, or a junction.
 
     ``volume`` [m^3] at zero displacements; 0 for a prescribed pressure, whose ``time`` [s] and
-    ``pressure`` [Pa] are a table (constant beyond its ends).  A volume whose pressure is not
-    ``stated`` starts at that of steady flow.
+    ``pressure`` [Pa] are a table (constant beyond its ends), and for a ``junction``, whose pressure
+    is that at which its flows balance.  Where a pressure that is not prescribed is not ``stated``
+    either, it starts at that of steady flow.
     """
 
     component: str
@@ -202,6 +203,12 @@ class NodeRow:
     time: NDArray[np.float64]
     pressure: NDArray[np.float64]
     stated: bool = True
+    junction: bool = False
+
+    @property
+    def prescribed(self) -> bool:
+        """Whether the pressure is given, whatever flows."""
+        return self.volume <= 0.0 and not self.junction
 
     @property
     def at_start(self) -> float:
@@ -554,6 +561,8 @@ class Rows:
         ``pressure`` [Pa] is that at the start; None for that of steady flow.
         """
         before = self.nodes.get(node)
+        if before is not None and before.junction:
+            raise self._two_kinds(self.component, before.component)
         if before is not None and before.stated:
             pressure = before.pressure[0] if pressure is None else pressure
         if before is not None and before.stated and before.pressure[0] != pressure:
@@ -570,6 +579,41 @@ class Rows:
             time=np.zeros(1),
             pressure=np.array([self.ambient.pressure if pressure is None else pressure]),
             stated=pressure is not None,
+        )
+
+    def junction(self, node: int, *, pressure: float | None) -> None:
+        """Make a node the meeting of lines, without a volume; ``pressure`` as of a chamber."""
+        if node in self.nodes:
+            raise self._two_kinds(self.nodes[node].component, self.component)
+        self.nodes[node] = NodeRow(
+            component=self.component,
+            volume=0.0,
+            time=np.zeros(1),
+            pressure=np.array([self.ambient.pressure if pressure is None else pressure]),
+            stated=pressure is not None,
+            junction=True,
+        )
+
+    def inner_junction(self, label: str) -> int:
+        """Add a junction inside the present component, at no port of it; return its handle."""
+        node = min(self.nodes, default=AMBIENT) - 1
+        self.nodes[node] = NodeRow(
+            component=f"{self.component} {label}",
+            volume=0.0,
+            time=np.zeros(1),
+            pressure=np.array([self.ambient.pressure]),
+            stated=False,
+            junction=True,
+        )
+        return node
+
+    @staticmethod
+    def _two_kinds(other: str, junction: str) -> InputError:
+        return InputError(
+            f"components.{junction}",
+            got=f"a junction where '{other}' is as well",
+            expected="one junction, or a volume, at one node",
+            hint="remove the junction: where there is a volume, lines meet without one.",
         )
 
     def pressure(self, node: int, *, time: ArrayLike, pressure: ArrayLike) -> None:

@@ -115,6 +115,7 @@ _FRAMED: Mapping[str, tuple[Stroke, ...]] = {
     "controlled-voltage": (_AXES, Stroke("M-16,4 q6,-18 12,-4 t12,-4"), Stroke("M4,8 H16", "thin")),
     "gravity": (Stroke(_circle(0, -11, 4), "metal"), Stroke("M0,-7 V14 M-5,6 L0,14 L5,6")),
     "chamber": (Stroke("M-14,-12 H14 a12,12 0 0 1 0,24 H-14 a12,12 0 0 1 0,-24 Z", "fluid"),),
+    "junction": (Stroke(_circle(0, 0, 4), "solid"),),
     "pressure-source": (Stroke("M12,0 L-9,-12 V12 Z", "solid"),),
     "gas-chamber": (Stroke("M-14,-12 H14 a12,12 0 0 1 0,24 H-14 a12,12 0 0 1 0,-24 Z", "paper"),),
     "gas-source": (Stroke("M12,0 L-9,-12 V12 Z", "paper"),),
@@ -150,6 +151,7 @@ FRAMELESS: Mapping[str, tuple[float, float]] = {
     "chamber": (52.0, 24.0),
     "gas-chamber": (52.0, 24.0),
     "gas-source": (24.0, 24.0),
+    "junction": (24.0, 24.0),
     "pressure-source": (24.0, 24.0),
 }
 """Sizes of the symbols that are drawn without a frame."""

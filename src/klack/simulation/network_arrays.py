@@ -155,15 +155,17 @@ class StepRows(NamedTuple):
 
 
 class Nodes(NamedTuple):
-    """Pressures: volumes first, then prescribed ones."""
+    """Pressures: volumes first (chambers, then junctions, which hold nothing), then given ones."""
 
     nodes: int
     volumes: int
+    chambers: int
     walls: int
     ends: int
     fluid: Vector  # table
     ambient: float
     density: float  # at ambient pressure
+    boiling: float  # pressure of an open cavity at a junction
     volume: Vector  # at zero displacements
     gamma: Vector  # (2, volumes) own compliance of the walls in a fine step, A G A; then zeros
     time: Vector  # tables of the prescribed pressures
@@ -178,7 +180,7 @@ class Nodes(NamedTuple):
 class NodeState(NamedTuple):
     """Pressures at the end of a step, and what volumes hold."""
 
-    mass: Vector
+    mass: Vector  # of a junction: what is missing in its cavity, below zero
     held: Vector  # volume at the end of the last step
     p: Vector
     before: Vector
@@ -305,6 +307,7 @@ class NodeTrial(NamedTuple):
     own: Vector
     stored: Vector  # of ``own``: in the volume itself
     balanced: Vector  # what the pressure changes in flows
+    cavity: Vector  # of a junction: 1 open, 2 closes in this step, 3 cannot; 0 none
     matrix: Vector
 
 

@@ -362,9 +362,10 @@ def _step_rows(
 
 
 def _order_nodes(rows: Rows) -> tuple[int, ...]:
-    volumes = [handle for handle, node in rows.nodes.items() if node.volume > 0.0]
-    prescribed = [handle for handle, node in rows.nodes.items() if node.volume <= 0.0]
-    return (*volumes, *prescribed)
+    chambers = [handle for handle, node in rows.nodes.items() if node.volume > 0.0]
+    junctions = [handle for handle, node in rows.nodes.items() if node.junction]
+    prescribed = [handle for handle, node in rows.nodes.items() if node.prescribed]
+    return (*chambers, *junctions, *prescribed)
 
 
 def _nodes(
@@ -372,16 +373,17 @@ def _nodes(
 ) -> tuple[Nodes, NodeState]:
     node_of = {handle: i for i, handle in enumerate(order)}
     given = [rows.nodes[handle] for handle in order]
-    volumes = sum(node.volume > 0.0 for node in given)
+    volumes = sum(not node.prescribed for node in given)
     ambient = rows.ambient.pressure
     fluid = np.zeros(8)
     count = len(order)
     p = np.array([node.at_start for node in given], dtype=float)
-    density, rho, g = 1.0, np.ones(count), np.zeros(count)
+    density, boiling, rho, g = 1.0, 0.0, np.ones(count), np.zeros(count)
     hint = np.zeros(count, np.int64)
     if rows.fluid is not None and count:
         fluid = fluid_table(rows.fluid, ambient)
         density = fluid_at(fluid, ambient, 0)[0]
+        boiling = rows.fluid.all_liquid_from
         for i in range(count):
             rho[i], _, g[i], hint[i] = fluid_at(fluid, p[i], 0)
     tables = [given[i] for i in range(volumes, count)]
@@ -397,11 +399,13 @@ def _nodes(
     nodes = Nodes(
         nodes=count,
         volumes=volumes,
+        chambers=sum(node.volume > 0.0 for node in given),
         walls=len(walls),
         ends=len(lines.node),
         fluid=fluid,
         ambient=ambient,
         density=density,
+        boiling=boiling,
         volume=volume,
         gamma=gamma.ravel(),
         time=np.concatenate([np.zeros(0), *(node.time for node in tables)]),

@@ -99,7 +99,9 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
         name = rows.nodes[network.node_order[i]].component
         stores[f"{name} compression"] = float(state.mass[i] * state.g[i] - excess * state.held[i])
     for k, line in enumerate(rows.lines):
-        stores[f"{line.component} waves"] = float(line_store(network.lines, network.line_state, k))
+        name = f"{line.component} waves"
+        held = float(line_store(network.lines, network.line_state, k))
+        stores[name] = stores.get(name, 0.0) + held
     return stores
 
 
@@ -129,7 +131,8 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
         losses[f"{slider.component} loss"] = float(accounts.friction[s])
     for k, line in enumerate(rows.lines):
         for j, what in enumerate(LINE_LOSSES):
-            losses[f"{line.component} {what}"] = float(accounts.lines[k, j])
+            name = f"{line.component} {what}"
+            losses[name] = losses.get(name, 0.0) + float(accounts.lines[k, j])
     if network.moving is not None:
         return EnergyBooks(
             supplies=supplies | network.moving.supplies(),

@@ -43,6 +43,10 @@ _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
 _SAME_INTERVAL = 12  # iterations with it
 _MOST_OF = 0.9  # longest step within this interval
+# cavity at a junction; one that closes in this step; one that did, and cannot
+_OPEN, _CLOSED, _KEPT = 1.0, 2.0, 3.0
+_HELD = 1.0  # [kg/Pa] what holds the pressure of an open one, far more than any flow answers
+_BALANCED = 1e-9  # of the flows of a junction: what its cavity may be filled too much
 _NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
 
 
@@ -54,6 +58,7 @@ def begin_fluid(fluid: Any) -> None:
         trial.p[i] = trial.end[i] = fluid.state.p[i]
         trial.theta[i] = 1.0
         trial.known[i] = -1.0
+        trial.cavity[i] = 0.0
     for e in range(fluid.nodes.ends):
         flows.Z[e] = 1.0
 
@@ -107,6 +112,8 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     p, r = trial.p, trial.r
     gamma = shift(nodes.gamma, min(step.level, 1) * max(nodes.volumes, 1))
     _place_walls(fluid, S)
+    for i in range(nodes.chambers, nodes.volumes):
+        trial.cavity[i] = 1.0 if _is_held(trial.cavity[i]) else 0.0
     for iteration in range(_MOST_NEWTON):
         _look_up(fluid)
         _add_up_volumes(fluid, gamma)
@@ -120,12 +127,14 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             r[0] /= trial.own[0]
         else:
             solve_mass_balance(trial.matrix, trial.own, r, nodes.volumes)
+        opens = _open_cavities(fluid)
         worst, total = _limit_steps(fluid, iteration)
         finite = abs(total) < np.inf
-        if finite and worst < _PRESSURE_LEFT:
+        if finite and worst < _PRESSURE_LEFT and not opens:
             if iteration >= _FULL_NEWTON or _flows_follow(fluid, step.H):
-                _step_by(fluid, 1.0)
-                break
+                if not _cavities_close(fluid, step.H):
+                    _step_by(fluid, 1.0)
+                    break
         # a root-like law about no drop lets Newton's method swing across for ever
         share = 1.0 if iteration < _FULL_NEWTON else 0.5
         _step_by(fluid, share)
@@ -149,19 +158,22 @@ def _flows_follow(fluid: Any, H: float) -> bool:
     """Whether flows follow the last Newton step, which they take with their slopes.
 
     Where a wide opening holds a small volume at a pressure, a step that is nothing beside the
-    pressure may be as large as the drop that drives the flow.
+    pressure may be as large as the drop that drives the flow.  A junction holds nothing: there it
+    is compared with what the whole pressure would let through in the step.
     """
-    branches, flows, r = fluid.branches, fluid.flows, fluid.trial.r
-    volumes, mass, follow = fluid.nodes.volumes, fluid.state.mass, True
+    branches, flows, trial, r = fluid.branches, fluid.flows, fluid.trial, fluid.trial.r
+    chambers, mass, follow = fluid.nodes.chambers, fluid.state.mass, True
+    volumes = fluid.nodes.volumes
     for k in range(branches.rows):
         a, b = branches.a[k], branches.b[k]
         change, least = 0.0, np.inf
         if a < volumes:
             change += flows.slope_a[k] * r[a]
-            least = mass[a]
+            least = mass[a] if a < chambers else trial.balanced[a] * trial.end[a]
         if b < volumes:
             change += flows.slope_b[k] * r[b]
-            least = min(least, mass[b])
+            held = mass[b] if b < chambers else trial.balanced[b] * trial.end[b]
+            least = min(least, held)
         if abs(change) > _FLOW_LEFT * abs(flows.mdot[k]) and abs(change) * H > _MASS_LEFT * least:
             follow = False
     return follow
@@ -193,13 +205,17 @@ def _step_by(fluid: Any, share: float) -> None:
 def _look_up(fluid: Any) -> None:
     """Density, its slope and pressure energy of every node at the present pressures."""
     nodes, state, trial, hint = fluid.nodes, fluid.state, fluid.trial, fluid.state.hint
-    for i in range(nodes.volumes):
+    for i in range(nodes.chambers):
         theta = trial.theta[i]
         rho, trial.slope[i], g, hint[i] = fluid_at(nodes.fluid, trial.end[i], hint[i])
         trial.rho_end[i], trial.g_end[i] = rho, g
         before = state.mass[i] / state.held[i]
         trial.rho[i] = before + theta * (rho - before)
         trial.g[i] = state.g[i] + theta * (g - state.g[i])
+    for i in range(nodes.chambers, nodes.volumes):
+        rho, trial.slope[i], g, hint[i] = fluid_at(nodes.fluid, trial.end[i], hint[i])
+        trial.rho[i] = trial.rho_end[i] = rho
+        trial.g[i] = trial.g_end[i] = g
     for i in range(nodes.volumes, nodes.nodes):
         if trial.p[i] != trial.known[i]:
             rho, _, g, hint[i] = fluid_at(nodes.fluid, trial.p[i], hint[i])
@@ -220,6 +236,10 @@ def _add_up_volumes(fluid: Any, gamma: Any) -> None:
             trial.matrix[i * nodes.volumes + j] = 0.0
         trial.stored[i] = V[i] * trial.slope[i] / trial.theta[i]
         trial.own[i] = trial.stored[i] + rho[i] * gamma[i]
+    for i in range(nodes.chambers, nodes.volumes):
+        if _is_held(trial.cavity[i]):
+            trial.r[i] = _HELD * (nodes.boiling - p[i])
+            trial.stored[i] = trial.own[i] = _HELD
 
 
 @phase
@@ -261,6 +281,69 @@ def _add_up_ends(fluid: Any, H: float) -> None:
         if i < nodes.volumes:
             trial.r[i] -= H * nodes.density * flows.q[e]
             trial.own[i] += H * nodes.density * (nodes.density / trial.rho_end[i]) / flows.Z[e]
+
+
+@phase
+def _open_cavities(fluid: Any) -> bool:
+    """Hold junctions at the pressure of boiling where a Newton step leads below; whether any is."""
+    nodes, trial, opens = fluid.nodes, fluid.trial, False
+    for i in range(nodes.chambers, nodes.volumes):
+        if trial.p[i] + trial.r[i] < nodes.boiling and not _is_held(trial.cavity[i]):
+            trial.r[i] = nodes.boiling - trial.p[i]
+            if trial.cavity[i] == 0.0:
+                trial.cavity[i] = _OPEN
+            elif trial.p[i] <= nodes.boiling:  # not an overshoot: it leads below from there
+                trial.cavity[i] = _KEPT
+            opens = True
+    if opens:
+        _forget_intervals(fluid)
+    return opens
+
+
+@phase
+def _is_held(cavity: float) -> bool:
+    return cavity == _OPEN or cavity == _KEPT
+
+
+@phase
+def _forget_intervals(fluid: Any) -> None:
+    """Let the densities be anywhere: a cavity that opened or closed has moved the roots."""
+    for i in range(fluid.nodes.volumes):
+        fluid.trial.lower[i], fluid.trial.upper[i] = 0.0, np.inf
+
+
+@phase
+def _cavities_close(fluid: Any, H: float) -> bool:
+    """Whether more flows into the cavity of a junction than it has room for; it is shut then."""
+    nodes, trial, closes = fluid.nodes, fluid.trial, False
+    for i in range(nodes.chambers, nodes.volumes):
+        if trial.cavity[i] == _OPEN and _fills(fluid, i, H):
+            trial.cavity[i], closes = _CLOSED, True
+    if closes:
+        _forget_intervals(fluid)
+    return closes
+
+
+@phase
+def _fills(fluid: Any, i: int, H: float) -> bool:
+    """Whether the flows at the end of a Newton iteration fill the cavity of a junction."""
+    nodes, trial, branches, flows = fluid.nodes, fluid.trial, fluid.branches, fluid.flows
+    net, size, r = 0.0, 0.0, trial.r
+    for k in range(branches.rows):
+        a, b, mdot = branches.a[k], branches.b[k], flows.mdot[k]
+        if i in (a, b):
+            if a < nodes.volumes:
+                mdot += flows.slope_a[k] * r[a]
+            if b < nodes.volumes:
+                mdot += flows.slope_b[k] * r[b]
+            net += mdot if i == b else -mdot
+            size += abs(mdot)
+    for e in range(nodes.ends):
+        if nodes.end_node[e] == i:
+            q = flows.q[e] + nodes.density / trial.rho_end[i] * r[i] / flows.Z[e]
+            net -= nodes.density * q
+            size += nodes.density * abs(q)
+    return fluid.state.mass[i] + H * net > _BALANCED * H * size
 
 
 @phase
@@ -400,12 +483,16 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
     inflow, g = trial.inflow, trial.g
     for i in range(fluid.nodes.nodes):
         inflow[i] = 0.0
-    for i in range(fluid.nodes.volumes):
+    for i in range(fluid.nodes.chambers):
         # the last Newton step: g to second order in it
         last, rho = trial.r[i] / trial.theta[i], trial.rho_end[i]
         change = last / rho * (1.0 - 0.5 * last * trial.slope[i] / rho)
         trial.g_end[i] += change
         g[i] += trial.theta[i] * change
+    for i in range(fluid.nodes.chambers, fluid.nodes.volumes):
+        # to first order, as the flows have it: they add up to nothing
+        g[i] += trial.r[i] / trial.rho_end[i]
+        trial.g_end[i] = g[i]
     for k in range(branches.rows):
         a, b, mdot = branches.a[k], branches.b[k], flows.mdot[k]
         inflow[a] -= H * mdot
@@ -438,7 +525,9 @@ def end_ends(fluid: Any, H: float) -> None:
         if i < nodes.volumes:
             # as the pressure energy follows it: the line gets what the volume gives
             last, rho = trial.r[i] / trial.theta[i], trial.rho_end[i]
-            change = last / rho * (1.0 - 0.5 * last * trial.slope[i] / rho)
+            change = last / rho
+            if i < nodes.chambers:
+                change *= 1.0 - 0.5 * last * trial.slope[i] / rho
             q += nodes.density / flows.Z[e] * trial.theta[i] * change
         flows.q[e] = q
         trial.inflow[i] -= H * nodes.density * q
@@ -458,6 +547,7 @@ def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
         accounts.implicit[i] += was - stored + g[i] * inflow[i] - work
         state.mass[i] = mass
         state.held[i] = V[i]
+    for i in range(nodes.chambers):
         state.rate[i] = trial.balanced[i] / (trial.theta[i] * trial.stored[i] * H)
         if abs(trial.slope[i] - state.slope[i]) > _CURVED * trial.slope[i]:
             state.rate[i] = AT_ONCE  # boiling, or about to fill

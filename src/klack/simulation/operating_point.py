@@ -145,7 +145,7 @@ def without_guesses(rows: Rows) -> Rows:
     """Rows in which the search begins with ambient pressure in every volume."""
     ambient = np.array([rows.ambient.pressure])
     nodes = {
-        handle: node if node.volume <= 0.0 else replace(node, pressure=ambient)
+        handle: node if node.prescribed else replace(node, pressure=ambient)
         for handle, node in rows.nodes.items()
     }
     return replace(rows, nodes=nodes)
@@ -160,7 +160,7 @@ def _clock() -> NDArray[np.int64]:
 def steady_rows(rows: Rows) -> Rows:
     """Rows in which every pressure of a volume is free, and no body begins in flight."""
     nodes = {
-        handle: node if node.volume <= 0.0 else replace(node, stated=False)
+        handle: node if node.prescribed else replace(node, stated=False)
         for handle, node in rows.nodes.items()
     }
     return replace(

@@ -518,10 +518,15 @@ class _Balance:
         bent = self._bent(state)
         stretch = y + np.abs(self.compliance) @ known[: ports - 1]
         settled = bool(np.all(np.abs(bent) <= share * stretch) and not np.any(pushed & self.moves))
-        net, flows = self._net(state), known[ports:].copy()
+        nodes, net, flows = self.network.nodes, self._net(state), known[ports:].copy()
         for (a, b), m in zip(self.ends, state.m, strict=True):
             flows[a] += abs(m)
             flows[b] += abs(m)
+        if nodes.volumes > nodes.chambers or share > _ROUND_OFF:
+            # nothing flows in a dead end but the round-off of all that flows
+            unit = nodes.density * (_LENGTH * self.step) ** 2
+            most = unit + float(np.max(np.abs(state.m), initial=0.0))
+            flows[self.ends.ravel()] += _ROUND_OFF / share * most
         if settled and bool(np.all(np.abs(net) <= share * flows[self.free])):
             rest, scale = self._columns_left(state)
             if np.all(np.abs(rest) <= share * scale):
@@ -909,7 +914,7 @@ class _Balance:
         for i, p in enumerate(state.p):
             now.p[i] = now.before[i] = p
             rho, _, now.g[i], now.hint[i] = fluid_at(nodes.fluid, p, 0)
-            if i < nodes.volumes:
+            if i < nodes.chambers:
                 held = now.held[i] = self.volumes(state.y)[i]
                 if held <= 0.0:
                     raise _emptied(network, i, float(held))

@@ -16,6 +16,7 @@ from klack.hydraulics.line_friction import (
 )
 from klack.network.rows import LineRow
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.line_junctions import line_junctions
 from klack.verification.single_line import (
     End,
     exponential_decay,
@@ -24,6 +25,7 @@ from klack.verification.single_line import (
     ringing,
     run_line,
 )
+from klack.verification.turbulent_line import turbulent_line
 
 __all__ = ["checks"]
 
@@ -38,7 +40,7 @@ STEP = DELAY / STEPS
 
 
 def checks() -> list[Check]:
-    """Joukowsky, echoes, slow closure, piston, friction, cavities, energy balance."""
+    """Joukowsky, echoes, slow closure, piston, friction, cavities, energy, junctions."""
     return [
         *_closure(),
         *_slow_closure(),
@@ -49,6 +51,8 @@ def checks() -> list[Check]:
         *_start_up(),
         *_cavity(),
         *_books(),
+        *line_junctions(),
+        *turbulent_line(),
     ]
 
 

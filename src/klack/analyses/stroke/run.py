@@ -1,5 +1,6 @@
 """``klack stroke``: one actuation of a whole valve, in the requested variants."""
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -508,9 +509,12 @@ def _fluid_summary(rows: Sequence[Rows]) -> FluidSummary | None:
 
 
 def _line_summaries(network: Network, rows: Sequence[Rows]) -> tuple[LineSummary, ...]:
-    found: Mapping[str, float] = {
-        line.component: line.delay for item in reversed(rows) for line in item.lines
-    }
+    found = dict[str, float]()
+    for item in reversed(rows):
+        pieces = defaultdict[str, float](float)
+        for line in item.lines:
+            pieces[line.component] += line.delay
+        found |= pieces
     return tuple(
         LineSummary(
             name=name,
