@@ -123,8 +123,11 @@ class State:
         self._explorers: list[Worker] = []
 
     def start(self) -> None:
-        """Start the processes ahead."""
+        """Start the reading process ahead."""
         self.reader.start()
+
+    def start_spare(self) -> None:
+        """Start the process of the next slider page ahead: its imports take seconds."""
         self._spare.start()
 
     def explorer(self) -> Worker:

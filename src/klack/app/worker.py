@@ -13,6 +13,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
 from typing import Any
 
 from klack.errors import InputError, KlackError
@@ -121,8 +122,5 @@ def _plain(error: KlackError) -> KlackError:
 
 
 if __name__ == "__main__":
-    from klack.analyses.named import named
-    from klack.compiling import prepare_compiling
-
-    prepare_compiling()
-    serve(named(sys.argv[1]))
+    module, _, name = sys.argv[1].partition(":")
+    serve(getattr(import_module(module), name))

@@ -1,4 +1,4 @@
-"""Charts of the pages: the plain data that Plotly draws; colours of text and grid are the page's."""
+"""Charts of the pages: the plain data that Plotly draws.  The page colours text and grid."""
 
 from collections.abc import Sequence
 from typing import Any

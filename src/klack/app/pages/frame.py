@@ -97,6 +97,8 @@ def differing(now: Number, then: Number) -> str:
     """Difference from the pinned value, in the way of the number."""
     if now.value is None or then.value is None:
         return "–"
+    if now is then:
+        return "as pinned"
     change = now.value - then.value
     if now.difference == "%":
         return f"{100 * change / then.value:+.2f} %" if then.value else "–"

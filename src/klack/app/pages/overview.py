@@ -67,6 +67,7 @@ class _Overview:
         with self._results:
             self._results.clear()
             await self._show_results(found.results)
+        self._state.start_spare()
 
     async def _follow(self) -> None:
         """Show runs as they go on; look again for results where one ended."""
@@ -138,9 +139,10 @@ class _Overview:
             ).classes("k-soft")
             return
         with ui.element("div").classes("k-sheet"):
-            rows = [(case, ui.element("div").classes("k-row")) for case in cases]
+            rows = [(case, _reading(case)) for case in cases]
         for case, row in rows:
             checked = await self._checked(case)
+            row.clear()
             with row:
                 self._show_case(case, checked)
 
@@ -265,7 +267,7 @@ class _Overview:
             return
         self._chosen = [name for name in self._chosen if name in results]
         with ui.element("div").classes("k-sheet"):
-            rows = [(name, ui.element("div").classes("k-row")) for name in results]
+            rows = [(name, _reading(name)) for name in results]
 
         def chosen() -> None:
             ready = len(self._chosen) == 2
@@ -281,6 +283,7 @@ class _Overview:
 
         for name, row in rows:
             card = await self._card(name)
+            row.clear()
             with row:
                 self._show_result(name, card, chosen)
         chosen()
@@ -372,6 +375,14 @@ class _Overview:
                 button("Cancel", dialog.close)
                 button("Keep", keep, main=True)
         dialog.open()
+
+
+def _reading(name: str) -> ui.element:
+    """Row of an entry that is not read yet."""
+    with ui.element("div").classes("k-row") as row, ui.element("div"):
+        plain(name, "div").classes("k-title")
+        plain("reading ...", "div").classes("k-soft")
+    return row
 
 
 def _title(text: str) -> None:

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Mapping
 from time import perf_counter
 from typing import Any
+from urllib.parse import urlencode
 
 from nicegui import ui
 
@@ -117,9 +118,9 @@ class _Sliders:
                             plain(f"{slider.written} ")
                             plain("new mesh").classes("k-tag")
                 with ui.element("div").classes("k-pad"):
-                    link("Change them in the case", f"/case?path={self._case}")
+                    link("Change them in the case", f"/case?{urlencode({'path': self._case})}")
         with ui.element("div").classes("k-pad"):
-            button("Write these values as a case", self._write)
+            button("Edit the case with these values", self._write)
 
     def _show_slider(self, slider: Slider) -> None:
         with ui.element("div").classes("k-slider") as row:
@@ -305,8 +306,6 @@ class _Sliders:
         except (KlackError, OSError) as error:
             show_error(error)
             return
-        from urllib.parse import urlencode
-
         ui.navigate.to(f"/case?{urlencode({'path': self._case})}")
 
 
