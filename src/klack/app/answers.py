@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Answer", "Curve", "Judgement", "Number", "ResultCard"]
+__all__ = ["Answer", "Curve", "Hearing", "Judgement", "Number", "ResultCard"]
 
 Floats = NDArray[np.float64]
 
@@ -81,27 +81,38 @@ class Answer:
     seconds: float = 0.0
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
 class Judgement:
-    """What takes longer and follows once the sliders rest.
+    """Whether the numbers can be relied on; follows once the sliders rest.
 
     Parameters
     ----------
     grade : str
         ``"good"``, ``"fair"``, ``"out"`` of range, or ``"none"`` where there is no estimate.
     words : str
-    numbers : tuple of Number
-    spectrogram : tuple of arrays or None
-        Time [ms], frequency [kHz], level [dB re 20 uPa].
-    pattern_wav : bytes
-        The click as often as the drive pattern of the case has it, to the same full scale.
     """
 
     grade: str
     words: str
-    numbers: tuple[Number, ...] = ()
-    spectrogram: tuple[Floats, Floats, Floats] | None = None
-    pattern_wav: bytes = b""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hearing:
+    """What is heard, beside the click; follows once the sliders rest.
+
+    Parameters
+    ----------
+    number : Number
+        Loudness.
+    spectrogram : tuple of arrays
+        Time [ms], frequency [kHz], level [dB re 20 uPa].
+    pattern_wav : bytes
+        The click as often as the drive pattern of the case has it, to the full scale of the clicks.
+    """
+
+    number: Number
+    spectrogram: tuple[Floats, Floats, Floats]
+    pattern_wav: bytes
 
 
 @dataclass(frozen=True, kw_only=True)

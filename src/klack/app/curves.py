@@ -5,18 +5,28 @@ import numpy as np
 from klack.analyses.stroke.record import StrokeChannels, StrokeVariant
 from klack.analyses.stroke.summary import first_impact
 from klack.app.answers import Floats, Number
+from klack.contact.history import ImpactHistory
 from klack.contact.restitution import ImpactMeasures
 from klack.signals import TimeSeries
 
-__all__ = ["drawn", "enveloped", "impact_numbers", "stroke_numbers"]
+__all__ = ["drawn", "enveloped", "impact_numbers", "stroke_numbers", "travelled"]
 
-_DRAWN = 1000  # points of a curve
+_DRAWN = 700  # points of a curve
 
 
 def drawn(x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Every k-th point of a smooth curve."""
     every = max(1, x.size // _DRAWN)
     return x[::every], y[::every]
+
+
+def travelled(history: ImpactHistory) -> tuple[Floats, Floats]:
+    """Displacement of the centre of mass of the moving body since the start, up is positive.
+
+    The integral of its velocity, which every level records.
+    """
+    mean = 0.5 * (history.velocity_a[1:] + history.velocity_a[:-1])
+    return history.edges, np.append(0.0, np.cumsum(mean) * history.step)
 
 
 def enveloped(force: TimeSeries) -> tuple[Floats, Floats]:

@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import force_bands
@@ -32,8 +33,8 @@ from klack.analyses.stroke.run import (
     stop_summaries,
     study_of_run,
 )
-from klack.app.answers import Answer, Curve, Floats, Judgement, Number
-from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers
+from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number
+from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
 from klack.app.sliders import Slider, sliders_of, written
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.any_case import AnyCase
@@ -53,6 +54,7 @@ __all__ = ["Explorer", "Opened"]
 Values = Mapping[str, float]
 """Of sliders, by their keys, in SI."""
 
+_SHOWN = 0.05  # [s] of the spectrogram
 _LONGEST = 5.0  # [s] of a drive pattern
 _HEADROOM = 12.0  # [dB] of the pinned click, for what a slider adds
 _REFERENCE = 20e-6  # [Pa]
@@ -130,6 +132,8 @@ class Explorer:
         self._design: _Design | None = None
         self._sliders: dict[str, Slider] = {}
         self._pinned: TimeSeries | None = None
+        self._last: tuple[dict[str, float], _Computed] | None = None
+        self._pools = ThreadpoolController()
 
     def open(self, text: str, path: str) -> Opened:
         """Build the bodies of a case and compute it as it stands.
@@ -147,7 +151,8 @@ class Explorer:
         found = sliders_of(case, self._tree)
         self._sliders = {slider.key: slider for slider in found}
         self._design = _Strokes(case) if isinstance(case, ValveCase) else _Impacts(case)
-        self._pinned = None
+        self._pinned = self._last = None
+        self._pools = ThreadpoolController()  # with libraries that came since
         first = self.move({}, pin=True)
         return Opened(
             title=case.title or case.name,
@@ -169,8 +174,9 @@ class Explorer:
         """
         begin = perf_counter()
         design = self._require_open()
-        found = design.at(self._case_at(values))
-        bands = [force_bands(stop.force) for stop in found.source.stops]
+        with self._one_thread():
+            found = self._computed(values)
+            bands = [force_bands(stop.force) for stop in found.source.stops]
         energy = np.sum([band.energy for band in bands], axis=0)
         levels = 10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE)
         if pin:
@@ -191,26 +197,30 @@ class Explorer:
         )
 
     def judge(self, values: Values) -> Judgement:
-        """Estimate of the error, loudness and spectrogram at a position of the sliders."""
+        """Estimate of the error at a position of the sliders: once they rest."""
         design = self._require_open()
-        case = self._case_at(values)
-        grade, words = design.judged(case)
-        found = design.at(case)
-        pressure, noise = found.pressure, found.source.noise
-        if pressure is None or self._pinned is None:
-            return Judgement(grade=grade, words=words)
-        pattern = drive_pattern(pressure, noise.drive.rate, min(noise.drive.duration, _LONGEST))
-        loud = time_varying_loudness(pressure)
-        return Judgement(
-            grade=grade,
-            words=words,
-            numbers=(
-                Number(
-                    key="loudness", name="loudness, loudest moment", unit="sone", value=loud.maximum
-                ),
+        with self._one_thread():
+            grade, words = design.judged(self._case_at(values))
+        return Judgement(grade=grade, words=words)
+
+    def listen(self, values: Values) -> Hearing | None:
+        """Loudness, spectrogram and drive pattern of a position: once the sliders rest.
+
+        None if nothing radiates.
+        """
+        with self._one_thread():
+            found = self._computed(values)
+            pressure, drive = found.pressure, found.source.noise.drive
+            if pressure is None:
+                return None
+            pattern = drive_pattern(pressure, drive.rate, min(drive.duration, _LONGEST))
+            loud = time_varying_loudness(pressure)
+        return Hearing(
+            number=Number(
+                key="loudness", name="loudness, loudest moment", unit="sone", value=loud.maximum
             ),
             spectrogram=_spectrogram(pressure),
-            pattern_wav=wav_bytes(pattern, full_scale=full_scale_of(pattern)),
+            pattern_wav=wav_bytes(pattern, full_scale=_common_scale(pattern, self._pinned)),
         )
 
     def text_at(self, values: Values) -> str:
@@ -221,6 +231,16 @@ class Explorer:
             for key, value in values.items()
         }
         return with_values(self._tree, places) if places else self._tree.text
+
+    def _computed(self, values: Values) -> _Computed:
+        """A position; the last one is kept, since what follows asks for it again."""
+        if self._last is None or self._last[0] != values:
+            self._last = dict(values), self._require_open().at(self._case_at(values))
+        return self._last[1]
+
+    def _one_thread(self) -> Any:
+        """Small matrices: threads would wait for each other."""
+        return self._pools.limit(limits=1)
 
     def _case_at(self, values: Values) -> Any:
         assert self._tree is not None
@@ -274,17 +294,12 @@ class _Impacts:
         study = self._study(case, certify=False)
         level = study.levels[self.run]
         source = impact_sources(study, (self.run,), case)[0]
-        history, travel = level.history, level.history.displacement_a
-        lift = (
-            (Curve.scaled("needle", *drawn(history.edges, travel), 1e6, 1e6),)
-            if travel.size
-            else ()
-        )
+        history = level.history
         return _Computed(
             source=source,
             pressure=click_sound(source, self._transfers),
             force=(Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),),
-            lift=lift,
+            lift=(Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),),
             numbers=impact_numbers(level.measures),
             doubts=tuple(filter(None, (*study.warnings, contact_doubt(study.contact)))),
         )
@@ -380,7 +395,7 @@ def _sounds(now: TimeSeries | None, pinned: TimeSeries | None) -> tuple[bytes, b
     """Both clicks to one full scale: that of the pinned one with room above, or of the louder."""
     if now is None or pinned is None:
         return b"", b"", ""
-    scale = max(full_scale_of(pinned, headroom=_HEADROOM), full_scale_of(now, headroom=0.1))
+    scale = _common_scale(now, pinned)
     return (
         wav_bytes(now, full_scale=scale),
         wav_bytes(pinned, full_scale=scale),
@@ -388,11 +403,16 @@ def _sounds(now: TimeSeries | None, pinned: TimeSeries | None) -> tuple[bytes, b
     )
 
 
+def _common_scale(now: TimeSeries, pinned: TimeSeries | None) -> float:
+    louder = full_scale_of(now, headroom=0.1)
+    return louder if pinned is None else max(full_scale_of(pinned, headroom=_HEADROOM), louder)
+
+
 def _spectrogram(pressure: TimeSeries) -> tuple[Floats, Floats, Floats]:
     """Level over time [ms] and frequency [kHz], Hann windows of 5.3 ms."""
     from scipy.signal import spectrogram
 
-    first = pressure.values[: int(0.12 * pressure.rate)]
+    first = pressure.values[: int(_SHOWN * pressure.rate)]
     f, t, power = spectrogram(
         first, pressure.rate, window="hann", nperseg=256, noverlap=208, mode="psd"
     )

@@ -17,7 +17,7 @@ from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import sources_of
 from klack.analyses.stroke.record import StrokeStudy
 from klack.app.answers import Answer, Curve, Number, ResultCard
-from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers
+from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
 from klack.app.form import Checked, checked_text, exchanged_text
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
@@ -108,15 +108,11 @@ def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | Non
     except KlackError as error:
         doubts.append(f"No sound: {error}")
         source = None
+    lift: tuple[Curve, ...]
     if isinstance(record, ImpactStudy):
         history = record.levels[record.reference].history
         force = (Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),)
-        travel = history.displacement_a
-        lift = (
-            (Curve.scaled("needle", *drawn(history.edges, travel), 1e6, 1e6),)
-            if travel.size
-            else ()
-        )
+        lift = (Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),)
         unit = "us"
     else:
         variant = record.reference

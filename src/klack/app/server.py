@@ -1,5 +1,6 @@
 """The server of ``klack app``: pages, sounds and reports of one folder, behind the guard."""
 
+import asyncio
 import socket
 from collections.abc import Callable
 from importlib.resources import files
@@ -41,8 +42,7 @@ _LONGEST_QUERY = 1024  # characters of a path
 def build(state: State, access: Access) -> Guard:
     """The whole application, as it is served."""
     outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
-    outer.add_api_route("/report", lambda request: _report(state, request))
-    outer.add_api_route("/sound/{name}", lambda name: _sound(state, name))
+    _add_files(outer, state)
     _add_static(outer)
     _add_pages(state)
     ui.add_head_html(
@@ -148,27 +148,32 @@ def _add_static(outer: FastAPI) -> None:
             return PlainTextResponse("no such file\n", 404)
         return Response(content[name], media_type=kinds[name])
 
-    outer.add_api_route("/static/{name}", static)
+    outer.add_api_route("/static/{name}", static, response_model=None)
 
 
-async def _report(state: State, request: Request) -> Response:
-    place = request.query_params.get("path", "")[:_LONGEST_QUERY]
-    name = place.rpartition("/")[2]
-    if name not in _REPORTS:
-        return PlainTextResponse("no report\n", 404)
-    try:
-        content = state.folder.read(place)
-    except KlackError as error:
-        return PlainTextResponse(f"{error}\n", 404)
-    headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
-    return Response(content, media_type=_REPORTS[name], headers=headers)
+def _add_files(outer: FastAPI, state: State) -> None:
+    """Reports of the folder, and sounds from memory."""
 
+    async def report(path: str = "") -> Response:
+        place = path[:_LONGEST_QUERY]
+        kind = _REPORTS.get(place.rpartition("/")[2])
+        if kind is None:
+            return PlainTextResponse("no report\n", 404)
+        try:
+            content = await asyncio.to_thread(state.folder.read, place)
+        except KlackError as error:
+            return PlainTextResponse(f"{error}\n", 404)
+        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+        return Response(content, media_type=kind, headers=headers)
 
-async def _sound(state: State, name: str) -> Response:
-    wav = state.sounds.get(name.removesuffix(".wav"))
-    if wav is None:
-        return PlainTextResponse("this sound is not kept any more\n", 404)
-    return Response(wav, media_type="audio/wav", headers={"cache-control": "no-store"})
+    async def sound(name: str) -> Response:
+        wav = state.sounds.get(name.removesuffix(".wav"))
+        if wav is None:
+            return PlainTextResponse("this sound is not kept any more\n", 404)
+        return Response(wav, media_type="audio/wav", headers={"cache-control": "no-store"})
+
+    outer.add_api_route("/report", report, response_model=None)
+    outer.add_api_route("/sound/{name}", sound, response_model=None)
 
 
 _ICON = (

@@ -23,9 +23,9 @@ _FIRST: tuple[tuple[str, ...], ...] = (
     ("preload",),
     ("gap", "lift"),
     ("force",),
-    ("damping", "modal", "loss_factor"),
-    ("cutoff", "film", "height"),
-    ("voltage", "current", "hold", "pull_in", "on_time", "drive"),
+    ("damping", "modal"),
+    ("cut_off", "roughness"),
+    ("voltage", "current"),
     ("stiffness",),
     ("pressure",),
 )
@@ -87,7 +87,7 @@ def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:
         found.append(_slider(place, quantity.kind, quantity.value, needs_mesh))
     if isinstance(case, Case):
         found += _offered(case, tree)
-    moving = sorted((s for s in found if not s.needs_mesh), key=_rank)
+    moving = _in_turns(s for s in found if not s.needs_mesh)
     fixed = [s for s in found if s.needs_mesh and "profile" not in s.place]
     return tuple(moving[:_MOST] + fixed[:_MOST])
 
@@ -155,11 +155,24 @@ def _label(place: Key) -> str:
 def _rank(slider: Slider) -> tuple[int, str]:
     if slider.place[0] == "parameters":  # named by who wrote the case
         return -1, slider.key
-    last = [str(part) for part in slider.place[-2:]]
+    if slider.place[0] == "noise":
+        return len(_FIRST) + 1, slider.key
+    last = str(slider.place[-1])
     for rank, words in enumerate(_FIRST):
         if any(word in last for word in words):
             return rank, slider.key
-    return len(_FIRST) + (slider.place[0] == "noise"), slider.key
+    return len(_FIRST), slider.key
+
+
+def _in_turns(sliders: Iterable[Slider]) -> list[Slider]:
+    """Two of each kind of number, then the next two of each, in the order of :data:`_FIRST`."""
+    counted: dict[int, int] = {}
+    keyed = []
+    for slider in sorted(sliders, key=_rank):
+        rank = _rank(slider)[0]
+        turn = counted[rank] = counted.get(rank, -1) + 1
+        keyed.append(((turn // 2 if rank >= 0 else 0, rank, turn), slider))
+    return [slider for _, slider in sorted(keyed, key=lambda item: item[0])]
 
 
 def _leaves(data: Any, above: Key = ()) -> Iterator[Key]:

@@ -125,7 +125,7 @@ class _Editor:
                 further = [item for item in found if not item.written]
                 if further:
                     with ui.element("details"):
-                        plain(f"{len(further)} further keys", "summary").classes("k-soft")
+                        plain(f"further keys: {len(further)}", "summary").classes("k-soft")
                         for item in further:
                             self._show_field(item)
 

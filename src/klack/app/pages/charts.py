@@ -8,12 +8,23 @@ import numpy as np
 from klack.acoustics.third_octave import nominal_label
 from klack.app.answers import Answer, Curve, Floats
 
-__all__ = ["bands_figure", "curves_figure", "spectrogram_figure"]
+__all__ = ["EMPTY", "bands_figure", "curves_figure", "spectrogram_figure"]
 
 _COLOURS = ("#1f78c8", "#d9742b", "#1b9e77")
 """Blue, orange and green, told apart with any colour vision; on light and dark."""
 _GHOST = "#8b95a1"
 _CONFIG = {"displaylogo": False, "responsive": True, "displayModeBar": False}
+
+EMPTY: dict[str, Any] = {
+    "data": [],
+    "layout": {
+        "xaxis": {"visible": False},
+        "yaxis": {"visible": False},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+    },
+}
+"""Of a chart whose numbers follow."""
 
 
 def curves_figure(

@@ -101,10 +101,13 @@ def differing(now: Number, then: Number) -> str:
         return "as pinned"
     change = now.value - then.value
     if now.difference == "%":
-        return f"{100 * change / then.value:+.2f} %" if then.value else "–"
-    text, unit = {
-        "us": (f"{change:+.2f}", " us"),
-        "dB": (f"{change:+.1f}", " dB(A)"),
-        "1": (f"{change:+.4f}", ""),
-    }[now.difference]
-    return f"{text}{unit}".replace("-", "−")
+        if not then.value:
+            return "–"
+        text = f"{100 * change / then.value:+.2f} %"
+    else:
+        text = {
+            "us": f"{change:+.2f} us",
+            "dB": f"{change:+.1f} dB(A)",
+            "1": f"{change:+.4f}",
+        }[now.difference]
+    return text.replace("-", "−")

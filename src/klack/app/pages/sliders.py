@@ -8,9 +8,9 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from klack.app.answers import Answer, Judgement, Number
+from klack.app.answers import Answer, Hearing, Judgement, Number
 from klack.app.explorer import Opened
-from klack.app.pages.charts import bands_figure, curves_figure, spectrogram_figure
+from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogram_figure
 from klack.app.pages.frame import (
     button,
     differing,
@@ -29,8 +29,8 @@ from klack.units import format_si
 
 __all__ = ["sliders_page"]
 
-_AT_FIRST = 9  # sliders that are seen without "more"
-_REST = 0.45  # [s] without a move until what takes longer is computed
+_AT_FIRST = 10  # sliders that are seen without "more"
+_REST = 0.6  # [s] without a move until what takes longer is computed
 _NAMES = ("now", "pinned")
 
 
@@ -58,7 +58,8 @@ class _Sliders:
         self._values: dict[str, float] = {}
         self._moved = asyncio.Event()
         self._pinned: Answer | None = None
-        self._loudness: dict[str, Number] = {}
+        self._loudness: Number | None = None
+        self._is_pinned = True
 
     async def build(self, text: str) -> None:
         """Open the case while the page is shown already."""
@@ -164,6 +165,7 @@ class _Sliders:
             heading("Hear it")
             self._sound = ui.element("div").classes("k-sound").style("margin-top:8px")
             self._scale = plain("", "p").classes("k-note")
+        self._words = plain("", "p").classes("k-note")
         self._took = plain("", "p").classes("k-note").props("id=k-took")
         with self._sound:
             self._players = {
@@ -206,29 +208,38 @@ class _Sliders:
                 )
 
     async def _judge(self) -> None:
+        """Two requests, so that a move waits for one of them at most."""
         values = dict(self._values)
         try:
             found: Judgement = await self._worker.call("judge", values)
+            if values != self._values:
+                return
+            self._show_judgement(found)
+            heard: Hearing | None = await self._worker.call("listen", values)
         except KlackError:
             return  # the move has told it
-        if values != self._values:
-            return
+        if values == self._values and heard is not None:
+            self._show_hearing(heard)
+
+    def _show_judgement(self, found: Judgement) -> None:
+        words = {
+            "good": "estimate: within 1 %",
+            "fair": "estimate: within 5 %, for comparisons",
+            "out": "out of the range of the reduced level",
+            "none": "no error estimate",
+        }
+        self._badge.set_text(words[found.grade])
+        self._badge.classes(remove="good fair out", add=found.grade)
+        self._badge.props["title"] = found.words
+        self._words.set_text(found.words)
+
+    def _show_hearing(self, heard: Hearing) -> None:
         with self._body:
-            words = {
-                "good": "estimate: within 1 %",
-                "fair": "estimate: within 5 %, for comparisons",
-                "out": "out of the range of the reduced level",
-                "none": "no error estimate",
-            }
-            self._badge.set_text(words[found.grade])
-            self._badge.classes(remove="good fair out", add=found.grade)
-            self._badge.props["title"] = found.words
-            for number in found.numbers:
-                self._loudness[number.key] = number
-            if found.spectrogram is not None:
-                self._spectrogram.update_figure(spectrogram_figure(found.spectrogram))
-            if found.pattern_wav:
-                self._play("pattern", found.pattern_wav)
+            self._spectrogram.update_figure(spectrogram_figure(heard.spectrogram))
+            self._play("pattern", heard.pattern_wav)
+            if self._is_pinned:
+                self._loudness = heard.number
+            self._add_number(heard.number, self._loudness or heard.number)
 
     def _refuse(self, error: KlackError) -> None:
         with self._body:
@@ -238,7 +249,7 @@ class _Sliders:
 
     def _draw(self, answer: Answer) -> None:
         ghost = self._pinned or answer
-        self._now = answer
+        self._is_pinned = ghost is answer
         self._doubts.set_text("\n".join(answer.doubts))
         unit = answer.time_unit
         self._force.update_figure(
@@ -259,12 +270,15 @@ class _Sliders:
         self._figures.clear()
         with self._figures:
             for number in answer.numbers:
-                with ui.element("div").classes("k-figure"):
-                    plain(number.name, "div").classes("k-soft")
-                    with ui.element("b"):
-                        plain(f"{number_text(number)} ")
-                        plain(number.unit, "small")
-                    plain(differing(number, then.get(number.key, number)))
+                self._add_number(number, then.get(number.key, number))
+
+    def _add_number(self, number: Number, then: Number) -> None:
+        with self._figures, ui.element("div").classes("k-figure"):
+            plain(number.name, "div").classes("k-soft")
+            with ui.element("b"):
+                plain(f"{number_text(number)} ")
+                plain(number.unit, "small")
+            plain(differing(number, then))
 
     def _play(self, name: str, wav: bytes) -> None:
         player, save = self._players[name]
@@ -312,7 +326,7 @@ class _Sliders:
 def _chart(title: str, label: str) -> ui.plotly:
     with ui.element("section").classes("k-sheet k-chart"):
         heading(title)
-        chart = ui.plotly({"data": [], "layout": {}}).classes("k-plot")
+        chart = ui.plotly(EMPTY).classes("k-plot")
         chart.props["role"], chart.props["aria-label"] = "img", label
     return chart
 
