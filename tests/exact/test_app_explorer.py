@@ -1,4 +1,4 @@
-"""What sliders show is what a run of the case with these values gives; forms write what is typed."""
+"""What sliders show is the run of the case with these values; forms write what is typed."""
 
 from pathlib import Path
 

@@ -85,7 +85,7 @@ def test_only_yaml_is_a_case_and_only_text(folder):
     (folder.path / "notes.txt").write_text("x")
     (folder.path / "bytes.yaml").write_bytes(b"\xff\xfe")
 
-    with pytest.raises(InputError, match="no .yaml"):
+    with pytest.raises(InputError, match=r"no \.yaml"):
         folder.case_text("notes.txt")
     with pytest.raises(InputError, match="no text"):
         folder.case_text("bytes.yaml")

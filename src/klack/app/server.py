@@ -111,6 +111,7 @@ def _bound(host: str, port: int) -> socket.socket:
         bound = socket.socket(family, kind)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind(address)
+        bound.listen()  # who opens the address before the server is ready waits for it
     except (OSError, OverflowError) as error:
         raise InputError(
             f"--host {host} --port {port}",

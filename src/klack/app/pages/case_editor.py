@@ -1,6 +1,7 @@
 """A case as a form and as text, both ways, with the messages of the checker."""
 
 import asyncio
+import json
 from collections.abc import Mapping
 from itertools import groupby
 from typing import Any
@@ -9,7 +10,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.form import Checked, FormField
-from klack.app.pages.frame import button, frame, heading, link, plain, show_error
+from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
 from klack.app.state import State
 from klack.errors import KlackError
 
@@ -56,9 +57,9 @@ class _Editor:
                 self._form = ui.element("div").classes("k-sheet k-form")
             with ui.element("section").classes("k-sheet"):
                 heading("YAML").classes("k-sr")
-                self._area = ui.element("textarea").props("spellcheck=false autocomplete=off")
+                self._area = plain(self._text, "textarea")
+                self._area.props("id=k-yaml spellcheck=false autocomplete=off")
                 self._area.props["aria-label"] = "case file, YAML"
-                self._area.props["value"] = self._text
                 self._area.on(
                     "input",
                     self._typed,
@@ -158,7 +159,7 @@ class _Editor:
                         option.props["selected"] = True
         else:
             box = ui.element("input").props("type=text maxlength=4000")
-            box.props["value"] = item.written
+            box.props[START_VALUE] = item.written
             if not item.written:
                 box.props["placeholder"] = item.default or item.example
         box.classes("k-input").props["id"] = f"f-{item.key}"
@@ -185,8 +186,9 @@ class _Editor:
     def _set(self, text: str) -> None:
         self._text = text
         self._changes += 1
-        self._area.props["value"] = text
-        self._area.update()
+        self._area.client.run_javascript(
+            f"document.getElementById('k-yaml').value = {json.dumps(text)}"
+        )
 
     # ----------------------------------------------------------------------- keeping it
 

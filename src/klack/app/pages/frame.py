@@ -10,6 +10,7 @@ from klack.app.answers import Number
 from klack.app.state import State
 
 __all__ = [
+    "START_VALUE",
     "button",
     "differing",
     "frame",
@@ -71,6 +72,10 @@ def link(text: str, target: str, *, new: bool = False) -> TextElement:
     if new:
         found.props["target"], found.props["rel"] = "_blank", "noopener"
     return found
+
+
+START_VALUE = "^value"
+"""Attribute of what an input holds at first; Vue would put a property back at each drawing."""
 
 
 def show_error(error: Exception) -> None:

@@ -14,7 +14,16 @@ from klack.analyses.store import RESULT_NAME
 from klack.app.answers import ResultCard
 from klack.app.form import Checked
 from klack.app.jobs import Job
-from klack.app.pages.frame import button, frame, heading, link, number_text, plain, show_error
+from klack.app.pages.frame import (
+    START_VALUE,
+    button,
+    frame,
+    heading,
+    link,
+    number_text,
+    plain,
+    show_error,
+)
 from klack.app.state import State
 from klack.case.shipped import shipped_cases
 from klack.errors import InputError, KlackError
@@ -358,8 +367,8 @@ class _Overview:
         text = {"now": self._state.notes.note(of)}
         with ui.dialog() as dialog, ui.element("div").classes("k-sheet k-pad k-ask k-notes"):
             heading(f"Note on {of}")
-            area = ui.element("textarea").classes("k-input").props("rows=5")
-            area.props["value"], area.props["aria-label"] = text["now"], f"note on {of}"
+            area = plain(text["now"], "textarea").classes("k-input").props("rows=5")
+            area.props["aria-label"] = f"note on {of}"
             area.on(
                 "input",
                 lambda event: text.update(now=str(event.args)),
@@ -394,7 +403,7 @@ def _entry(label: str, value: str, change: Callable[[str], None]) -> None:
     with ui.element("label"):
         plain(label).classes("k-soft")
         box = ui.element("input").classes("k-input").props("type=text maxlength=80")
-        box.props["value"] = value
+        box.props[START_VALUE] = value
         box.on(
             "input", lambda event: change(str(event.args)), js_handler="(e) => emit(e.target.value)"
         )

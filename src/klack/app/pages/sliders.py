@@ -12,6 +12,7 @@ from klack.app.answers import Answer, Hearing, Judgement, Number
 from klack.app.explorer import Opened
 from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogram_figure
 from klack.app.pages.frame import (
+    START_VALUE,
     button,
     differing,
     frame,
@@ -134,7 +135,7 @@ class _Sliders:
             bar = ui.element("input").props("type=range")
             bar.props["id"] = f"s-{slider.key}"
             bar.props["min"], bar.props["max"] = slider.low, slider.high
-            bar.props["step"], bar.props["value"] = slider.step, slider.start
+            bar.props["step"], bar.props[START_VALUE] = slider.step, slider.start
             row.shown, row.bar = shown, bar  # type: ignore[attr-defined]
 
             def move(event: Any) -> None:
