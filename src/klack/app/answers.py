@@ -98,7 +98,7 @@ class Judgement:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Hearing:
-    """What is heard, beside the click; follows once the sliders rest.
+    """Loudness, spectrogram and drive pattern; follows once the sliders rest.
 
     Parameters
     ----------

@@ -114,7 +114,7 @@ class Guard:
         return compare_digest(found.encode(), self._access.session.encode())
 
     def _exchange(self, scope: Scope) -> str | None:
-        """Where to go on after a right token in the URL, which leaves the address with it."""
+        """Path that a right token in the URL leads to; the token leaves the address."""
         if scope["method"] != "GET" or self._access.gate is not None:
             return None
         query = scope.get("query_string", b"").decode("latin-1")
@@ -125,7 +125,7 @@ class Guard:
         return _local(scope["path"]) + (f"?{urlencode(rest)}" if rest else "")
 
     async def _enter(self, send: Send, target: str) -> None:
-        """Set the cookie, on a page that goes on: a redirect from elsewhere would not send it."""
+        """Set the cookie, on a page that leads to the target: a redirect would not send it."""
         cookie = f"{self._access.cookie}={self._access.session}; Path=/; HttpOnly; SameSite=Strict"
         page = _ENTERED.format(target=escape(target))
         await _answer(

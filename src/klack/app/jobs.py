@@ -7,7 +7,7 @@ was killed finds it again, running or ended::
     process.json   number of the process and when it began
     progress.json  stage and fraction
     ending.json    exit code, when it ended
-    cancelled      empty: somebody asked it to stop
+    cancelled      empty: it was asked to stop
     stdout, stderr what the command printed
 """
 

@@ -36,7 +36,7 @@ class Worker:
         self._thread = ThreadPoolExecutor(1)
 
     def start(self) -> None:
-        """Start the process ahead, while nobody waits for it."""
+        """Start the process ahead of the first request."""
         if self._process is not None and self._process.poll() is None:
             return
         self._process = subprocess.Popen(

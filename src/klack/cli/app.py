@@ -38,7 +38,7 @@ def app(
 ) -> int:
     """Show cases, runs and results of a folder in the browser, with sliders that answer.
 
-    Serves this machine alone, at an address with a random token. Runs go on when it is stopped.
+    Serves this machine alone, at an address with a random token. Runs continue when it is stopped.
     """
     if not 0 <= port <= 65535:
         raise InputError(

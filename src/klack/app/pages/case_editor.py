@@ -193,7 +193,7 @@ class _Editor:
     # ----------------------------------------------------------------------- keeping it
 
     async def _save(self) -> None:
-        """Replace the file as a whole; what somebody else wrote meanwhile is not overwritten."""
+        """Replace the file as a whole; what another program wrote meanwhile is not overwritten."""
         text = self._text
         try:
             now = await asyncio.to_thread(self._state.folder.case_text, self._case)

@@ -79,7 +79,7 @@ class _Overview:
         self._state.start_spare()
 
     async def _follow(self) -> None:
-        """Show runs as they go on; look again for results where one ended."""
+        """Show the progress of runs; look again for results where one ended."""
         jobs = await asyncio.to_thread(self._state.jobs.all)
         states = tuple((job.name, job.state) for job in jobs)
         ended = self._seen and states != self._seen
