@@ -99,8 +99,12 @@ def test_the_estimate_is_that_of_the_impact(explorer):
 
 def test_hearing_follows(explorer):
     heard = explorer.listen({})
+    louder = explorer.listen({"motion.speed": 0.6})
 
     assert heard is not None
+    assert louder is not None
+    assert heard.pinned == heard.number == louder.pinned
+    assert louder.number.value > 1.2 * heard.number.value
     assert heard.number.value > 1.0  # sone: it can be heard
     time, frequency, level = heard.spectrogram
     assert level.shape == (frequency.size, time.size)

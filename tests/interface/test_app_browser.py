@@ -200,7 +200,7 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, 
     other.process.wait(20)
 
     page.goto(f"{server.base}/")
-    page.wait_for_selector("text=klack-results/one")
+    page.wait_for_selector("text=done, ")
     shutil.copytree(folder / "klack-results" / "one", folder / "klack-results" / "two")
     page.reload()
     page.locator(".k-row", has_text="klack-results/one").get_by_role("checkbox").wait_for()

@@ -1,6 +1,8 @@
 """Files of the browser application: only below the folder, whole, bounded."""
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -141,6 +143,14 @@ def test_notes_and_drafts_outlive_the_server(folder):
     assert again.draft("other.yaml") == "x"
     with pytest.raises(InputError, match="at most"):
         again.set_note("valve/case.yaml", "x" * 20_001)
+
+
+def test_other_commands_load_no_browser_application():
+    code = (
+        "import sys, klack, klack.cli.main; "
+        "sys.exit(any(name.startswith(('nicegui', 'fastapi', 'klack.app')) for name in sys.modules))"
+    )
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 def test_sounds_are_bounded_and_have_names_that_cannot_be_guessed():

@@ -102,8 +102,8 @@ class Hearing:
 
     Parameters
     ----------
-    number : Number
-        Loudness.
+    number, pinned : Number
+        Loudness now, and of the pinned design.
     spectrogram : tuple of arrays
         Time [ms], frequency [kHz], level [dB re 20 uPa].
     pattern_wav : bytes
@@ -111,6 +111,7 @@ class Hearing:
     """
 
     number: Number
+    pinned: Number
     spectrogram: tuple[Floats, Floats, Floats]
     pattern_wav: bytes
 

@@ -133,6 +133,7 @@ class Explorer:
         self._sliders: dict[str, Slider] = {}
         self._pinned: TimeSeries | None = None
         self._last: tuple[dict[str, float], _Computed] | None = None
+        self._pinned_loudness: Number | None = None
         self._pools = ThreadpoolController()
 
     def open(self, text: str, path: str) -> Opened:
@@ -180,7 +181,7 @@ class Explorer:
         energy = np.sum([band.energy for band in bands], axis=0)
         levels = 10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE)
         if pin:
-            self._pinned = found.pressure
+            self._pinned, self._pinned_loudness = found.pressure, None
         wav, ghost, scale = _sounds(found.pressure, self._pinned)
         return Answer(
             force=found.force,
@@ -214,11 +215,12 @@ class Explorer:
             if pressure is None:
                 return None
             pattern = drive_pattern(pressure, drive.rate, min(drive.duration, _LONGEST))
-            loud = time_varying_loudness(pressure)
+            now = _loudness(pressure)
+            if self._pinned_loudness is None and self._pinned is not None:
+                self._pinned_loudness = _loudness(self._pinned)
         return Hearing(
-            number=Number(
-                key="loudness", name="loudness, loudest moment", unit="sone", value=loud.maximum
-            ),
+            number=now,
+            pinned=self._pinned_loudness or now,
             spectrogram=_spectrogram(pressure),
             pattern_wav=wav_bytes(pattern, full_scale=_common_scale(pattern, self._pinned)),
         )
@@ -389,6 +391,11 @@ def _level_numbers(pressure: TimeSeries | None) -> tuple[Number, ...]:
             key="level", name="sound exposure level", unit="dB(A)", value=level, difference="dB"
         ),
     )
+
+
+def _loudness(pressure: TimeSeries) -> Number:
+    value = time_varying_loudness(pressure).maximum
+    return Number(key="loudness", name="loudness, maximum", unit="sone", value=value)
 
 
 def _sounds(now: TimeSeries | None, pinned: TimeSeries | None) -> tuple[bytes, bytes, str]:

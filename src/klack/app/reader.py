@@ -108,6 +108,7 @@ def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | Non
     except KlackError as error:
         doubts.append(f"No sound: {error}")
         source = None
+    force: tuple[Curve, ...]
     lift: tuple[Curve, ...]
     if isinstance(record, ImpactStudy):
         history = record.levels[record.reference].history

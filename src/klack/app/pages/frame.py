@@ -33,8 +33,8 @@ def frame(state: State, title: str, subtitle: str = "") -> Iterator[None]:
     with ui.element("header").classes("k-top"), ui.element("div"):
         with ui.element("a").props('href="/"').classes("k-mark"):
             plain("klack")
-        place = str(state.folder.path)
-        plain(place).classes("k-place").props["title"] = place
+        place = state.folder.path
+        plain(place.name or str(place)).classes("k-place").props["title"] = str(place)
         link("Cases and results", "/")
         theme = button("Auto").props('id=k-theme aria-label="Colours: auto, light or dark"')
         theme.on("click", js_handler="() => window.klackTheme()")

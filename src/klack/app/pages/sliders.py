@@ -7,6 +7,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
 
 from klack.app.answers import Answer, Hearing, Judgement, Number
 from klack.app.explorer import Opened
@@ -59,7 +60,6 @@ class _Sliders:
         self._values: dict[str, float] = {}
         self._moved = asyncio.Event()
         self._pinned: Answer | None = None
-        self._loudness: Number | None = None
         self._is_pinned = True
 
     async def build(self, text: str) -> None:
@@ -99,7 +99,7 @@ class _Sliders:
     def _show_side(self, opened: Opened) -> None:
         moving = [slider for slider in opened.sliders if not slider.needs_mesh]
         fixed = [slider for slider in opened.sliders if slider.needs_mesh]
-        self._rows: dict[str, ui.element] = {}
+        self._rows: dict[str, tuple[ui.element, TextElement]] = {}
         with ui.element("div").classes("k-pad k-tools").style("justify-content:flex-start"):
             button("Pin this", self._pin)
             button("Back to the case", self._reset)
@@ -126,7 +126,6 @@ class _Sliders:
 
     def _show_slider(self, slider: Slider) -> None:
         with ui.element("div").classes("k-slider") as row:
-            self._rows[slider.key] = row
             with ui.element("label") as label:
                 label.props["for"] = f"s-{slider.key}"
                 label.props["title"] = slider.key
@@ -136,7 +135,7 @@ class _Sliders:
             bar.props["id"] = f"s-{slider.key}"
             bar.props["min"], bar.props["max"] = slider.low, slider.high
             bar.props["step"], bar.props[START_VALUE] = slider.step, slider.start
-            row.shown, row.bar = shown, bar  # type: ignore[attr-defined]
+            self._rows[slider.key] = row, shown
 
             def move(event: Any) -> None:
                 try:
@@ -238,9 +237,7 @@ class _Sliders:
         with self._body:
             self._spectrogram.update_figure(spectrogram_figure(heard.spectrogram))
             self._play("pattern", heard.pattern_wav)
-            if self._is_pinned:
-                self._loudness = heard.number
-            self._add_number(heard.number, self._loudness or heard.number)
+            self._add_number(heard.number, heard.number if self._is_pinned else heard.pinned)
 
     def _refuse(self, error: KlackError) -> None:
         with self._body:
@@ -303,10 +300,10 @@ class _Sliders:
     def _reset(self) -> None:
         sliders = {slider.key: slider for slider in self._opened.sliders}
         self._values.clear()
-        for key, row in self._rows.items():
+        for key, (row, shown) in self._rows.items():
             slider = sliders[key]
             row.classes(remove="moved")
-            row.shown.set_text(format_si(slider.start, slider.unit))  # type: ignore[attr-defined]
+            shown.set_text(format_si(slider.start, slider.unit))
         ui.run_javascript(
             "document.querySelectorAll('.k-slider input').forEach(e => "
             "e.value = e.getAttribute('value'))"
