@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from klack.analyses import store
+from klack.app import folder as app_folder
 from klack.app.folder import LARGEST_CASE, OpenFolder
 from klack.app.state import Notes, Sounds
 from klack.errors import InputError
@@ -116,7 +118,8 @@ def test_new_files_replace_nothing(folder):
 
 
 def test_results_are_found_by_their_store(folder):
-    (folder.path / "klack-results" / "a" / "result.zarr").mkdir(parents=True)
+    assert app_folder.RESULT_NAME == store.RESULT_NAME
+    (folder.path / "klack-results" / "a" / store.RESULT_NAME).mkdir(parents=True)
 
     found = folder.look()
 
@@ -148,9 +151,9 @@ def test_notes_and_drafts_outlive_the_server(folder):
 def test_other_commands_load_no_browser_application():
     code = (
         "import sys, klack, klack.cli.main; "
-        "sys.exit(any(name.startswith(('nicegui', 'fastapi', 'klack.app')) for name in sys.modules))"
+        "sys.exit(any(n.startswith(('nicegui', 'fastapi', 'klack.app')) for n in sys.modules))"
     )
-    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_sounds_are_bounded_and_have_names_that_cannot_be_guessed():

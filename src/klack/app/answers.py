@@ -1,11 +1,25 @@
-"""What the slider page shows of one position of its sliders."""
+"""What the processes that compute tell the pages; light, for the server imports it."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Answer", "Curve", "Hearing", "Judgement", "Number", "ResultCard"]
+from klack.input.problem import Key
+from klack.units import format_si
+
+__all__ = [
+    "Answer",
+    "Checked",
+    "Curve",
+    "FormField",
+    "Hearing",
+    "Judgement",
+    "Number",
+    "Opened",
+    "ResultCard",
+    "Slider",
+]
 
 Floats = NDArray[np.float64]
 
@@ -136,3 +150,122 @@ class ResultCard:
     numbers: tuple[Number, ...]
     doubts: tuple[str, ...]
     compares: bool
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One number of the case that moves.
+
+    Parameters
+    ----------
+    key : str
+        ``"motion.speed"``.
+    place : Key
+    label : str
+    unit : str
+        SI; empty for a pure number.
+    low, high, start, step : float
+        In ``unit``.
+    needs_mesh : bool
+        Whether bodies follow from it, so that it does not move here.
+    written : str
+        What the case has there.
+    """
+
+    key: str
+    place: Key
+    label: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    step: float
+    needs_mesh: bool
+    written: str
+
+    def text(self, value: float) -> str:
+        """Value with its unit, as people read it."""
+        return format_si(value, self.unit)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Opened:
+    """A case that is ready to move.
+
+    Parameters
+    ----------
+    title : str
+    kind : str
+        ``"impact"`` or ``"stroke"``.
+    sliders : tuple of Slider
+    run : str
+        Level or variant.
+    first : Answer
+        At the values of the case, which is pinned.
+    """
+
+    title: str
+    kind: str
+    sliders: tuple[Slider, ...]
+    run: str
+    first: Answer
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormField:
+    """One key of the form.
+
+    Parameters
+    ----------
+    key : str
+    place : Key
+    section, label : str
+    written : str
+        As the file has it; empty where it does not have the key.
+    kind : str
+        ``"a length"``; empty for words and plain numbers.
+    example : str
+        Of a quantity.
+    limits : str
+        ``"> 0"``.
+    choices : tuple of str
+        Words that the schema allows; empty where it allows any.
+    description : str
+    default : str
+        What counts where the file does not have the key.
+    """
+
+    key: str
+    place: Key
+    section: str
+    label: str
+    written: str
+    kind: str = ""
+    example: str = ""
+    limits: str = ""
+    choices: tuple[str, ...] = ()
+    description: str = ""
+    default: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """What the checker says of a text.
+
+    Parameters
+    ----------
+    error : str
+        Its message; empty for a valid case.
+    line : int
+        That the message names; 0 for none.
+    title, kind : str
+        Of a valid case; ``"impact"`` or ``"stroke"``.
+    fields : tuple of FormField
+        Of a valid case.
+    """
+
+    error: str = ""
+    line: int = 0
+    title: str = ""
+    kind: str = ""
+    fields: tuple[FormField, ...] = ()

@@ -33,9 +33,9 @@ from klack.analyses.stroke.run import (
     stop_summaries,
     study_of_run,
 )
-from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number
+from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number, Opened, Slider
 from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
-from klack.app.sliders import Slider, sliders_of, written
+from klack.app.sliders import sliders_of, written
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree, tree_of
@@ -49,7 +49,7 @@ from klack.progress import silent
 from klack.signals import TimeSeries
 from klack.stages import collected_warnings
 
-__all__ = ["Explorer", "Opened"]
+__all__ = ["Explorer"]
 
 Values = Mapping[str, float]
 """Of sliders, by their keys, in SI."""
@@ -58,29 +58,6 @@ _SHOWN = 0.05  # [s] of the spectrogram
 _LONGEST = 5.0  # [s] of a drive pattern
 _HEADROOM = 12.0  # [dB] of the pinned click, for what a slider adds
 _REFERENCE = 20e-6  # [Pa]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Opened:
-    """A case that is ready to move.
-
-    Parameters
-    ----------
-    title : str
-    kind : str
-        ``"impact"`` or ``"stroke"``.
-    sliders : tuple of Slider
-    run : str
-        Level or variant.
-    first : Answer
-        At the values of the case, which is pinned.
-    """
-
-    title: str
-    kind: str
-    sliders: tuple[Slider, ...]
-    run: str
-    first: Answer
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

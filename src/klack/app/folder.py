@@ -12,11 +12,13 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from klack.analyses.store import RESULT_NAME
 from klack.errors import InputError
 from klack.held_folder import HeldFolder, synchronise
 
-__all__ = ["Found", "OpenFolder"]
+__all__ = ["RESULT_NAME", "Found", "OpenFolder"]
+
+RESULT_NAME = "result.zarr"
+"""Of :mod:`klack.analyses.store`, whose import takes seconds."""
 
 LARGEST_CASE = 2 * 2**20  # [byte] of a case file
 LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound

@@ -1,12 +1,12 @@
 """The keys of a case as fields of a form, made from its schema: kind, unit, limits, description."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
+from klack.app.answers import Checked, FormField
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree, tree_of
 from klack.case.inserting import with_values
@@ -15,70 +15,10 @@ from klack.errors import KlackError
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import Section
 
-__all__ = ["Checked", "FormField", "checked_text", "exchanged_text", "form_of"]
+__all__ = ["checked_text", "exchanged_text", "form_of"]
 
 _SIGNS = (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
 _MOST = 400
-
-
-@dataclass(frozen=True, kw_only=True)
-class FormField:
-    """One key of the form.
-
-    Parameters
-    ----------
-    key : str
-    place : Key
-    section, label : str
-    written : str
-        As the file has it; empty where it does not have the key.
-    kind : str
-        ``"a length"``; empty for words and plain numbers.
-    example : str
-        Of a quantity.
-    limits : str
-        ``"> 0"``.
-    choices : tuple of str
-        Words that the schema allows; empty where it allows any.
-    description : str
-    default : str
-        What counts where the file does not have the key.
-    """
-
-    key: str
-    place: Key
-    section: str
-    label: str
-    written: str
-    kind: str = ""
-    example: str = ""
-    limits: str = ""
-    choices: tuple[str, ...] = ()
-    description: str = ""
-    default: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Checked:
-    """What the checker says of a text.
-
-    Parameters
-    ----------
-    error : str
-        Its message; empty for a valid case.
-    line : int
-        That the message names; 0 for none.
-    title, kind : str
-        Of a valid case; ``"impact"`` or ``"stroke"``.
-    fields : tuple of FormField
-        Of a valid case.
-    """
-
-    error: str = ""
-    line: int = 0
-    title: str = ""
-    kind: str = ""
-    fields: tuple[FormField, ...] = ()
 
 
 def checked_text(text: str, path: str) -> Checked:

@@ -16,9 +16,9 @@ from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import sources_of
 from klack.analyses.stroke.record import StrokeStudy
-from klack.app.answers import Answer, Curve, Number, ResultCard
+from klack.app.answers import Answer, Checked, Curve, Number, ResultCard
 from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
-from klack.app.form import Checked, checked_text, exchanged_text
+from klack.app.form import checked_text, exchanged_text
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
 from klack.signals import TimeSeries

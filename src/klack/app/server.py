@@ -58,7 +58,7 @@ def build(state: State, access: Access) -> Guard:
         dark=None,
         tailwind=False,
         language="en-US",
-        reconnect_timeout=30.0,
+        reconnect_timeout=8.0,
         show_welcome_message=False,
     )
     return Guard(outer, access)

@@ -1,11 +1,11 @@
 """Which numbers of a case can be moved while its bodies stay, and how far."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
 from klack.analyses.study.kinds import kind_of
+from klack.app.answers import Slider
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.key_path import quantity_at, written_at
@@ -14,7 +14,7 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 from klack.units import Kind, format_si
 
-__all__ = ["Slider", "sliders_of", "written"]
+__all__ = ["sliders_of", "written"]
 
 _MOST = 60
 _REACH = 2.5  # times the value of the case, up; to a fifth of it, down
@@ -32,42 +32,6 @@ _FIRST: tuple[tuple[str, ...], ...] = (
 """Last words of keys that most people move, in this order."""
 _NEVER = ("study", "calibration", "measurement", "run", "reduction", "include", "lumped", "parts")
 _STEPS = 200
-
-
-@dataclass(frozen=True)
-class Slider:
-    """One number of the case that moves.
-
-    Parameters
-    ----------
-    key : str
-        ``"motion.speed"``.
-    place : Key
-    label : str
-    unit : str
-        SI; empty for a pure number.
-    low, high, start, step : float
-        In ``unit``.
-    needs_mesh : bool
-        Whether bodies follow from it, so that it does not move here.
-    written : str
-        What the case has there.
-    """
-
-    key: str
-    place: Key
-    label: str
-    unit: str
-    low: float
-    high: float
-    start: float
-    step: float
-    needs_mesh: bool
-    written: str
-
-    def text(self, value: float) -> str:
-        """Value with its unit, as people read it."""
-        return format_si(value, self.unit)
 
 
 def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:

@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from klack.app.form import Checked, FormField
+from klack.app.answers import Checked, FormField
 from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
 from klack.app.state import State
 from klack.errors import KlackError

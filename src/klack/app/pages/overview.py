@@ -10,9 +10,8 @@ from urllib.parse import urlencode
 
 from nicegui import ui
 
-from klack.analyses.store import RESULT_NAME
-from klack.app.answers import ResultCard
-from klack.app.form import Checked
+from klack.app.answers import Checked, ResultCard
+from klack.app.folder import RESULT_NAME
 from klack.app.jobs import Job
 from klack.app.pages.frame import (
     START_VALUE,
@@ -25,7 +24,6 @@ from klack.app.pages.frame import (
     show_error,
 )
 from klack.app.state import State
-from klack.case.shipped import shipped_cases
 from klack.errors import InputError, KlackError
 from klack.whole_file import mark_of
 
@@ -191,6 +189,8 @@ class _Overview:
         self._show_jobs()
 
     def _ask_new(self) -> None:
+        from klack.case.shipped import shipped_cases  # with all of the schema
+
         shipped = shipped_cases()
         first = "demo-valve-axisymmetric"
 

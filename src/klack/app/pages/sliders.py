@@ -9,8 +9,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from klack.app.answers import Answer, Hearing, Judgement, Number
-from klack.app.explorer import Opened
+from klack.app.answers import Answer, Hearing, Judgement, Number, Opened, Slider
 from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogram_figure
 from klack.app.pages.frame import (
     START_VALUE,
@@ -23,7 +22,6 @@ from klack.app.pages.frame import (
     plain,
     show_error,
 )
-from klack.app.sliders import Slider
 from klack.app.state import State
 from klack.app.worker import Worker
 from klack.errors import KlackError
