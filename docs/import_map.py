@@ -61,7 +61,7 @@ FLOORS: tuple[tuple[str, ...], ...] = (
     ("assembling", "terminal", "schematic"),
     ("analyses",),
     ("exchange", "viewer"),
-    ("verification", "api", "warming"),
+    ("verification", "api", "warming", "app"),
     ("cli",),
     ("__main__",),
 )

@@ -26,6 +26,7 @@ from cyclopts import App, CycloptsError, UnusedCliTokensError
 
 from klack import __version__
 from klack.analyses.catalogue import commands
+from klack.cli import app as browser_app
 from klack.cli import cache, compare, demo, export, inspect, report, schema, show, verify, warm
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
@@ -68,6 +69,7 @@ COMMANDS: Mapping[Callable[..., int], str] = {
     schema.schema: "klack schema --kind stroke --json valve.schema.json",
     cache.cache: "klack cache --clear",
     warm.warm: "klack warm",
+    browser_app.app: "klack app my-valves",
 }
 """Every command, with the example that its help shows."""
 

@@ -1,16 +1,23 @@
 """Progress of long work, shown from its first second; short work shows nothing."""
 
+import json
+import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from pathlib import Path
 from typing import Any, Protocol
 
-__all__ = ["Progress", "show_progress"]
+__all__ = ["PROGRESS_FILE", "Progress", "show_progress"]
+
+PROGRESS_FILE = "KLACK_PROGRESS_FILE"
+"""Environment variable with the file that gets the progress instead of the terminal."""
 
 _PATIENCE = 2.0  # s that a stage may take without a line
+_OFTEN = 0.2  # s between two lines of one stage in a file
 _SOON = 0.5  # s until the bar is there
 _KINDS = ("numba:compile", "klack:wait")  # the second while another process compiles
 
@@ -26,7 +33,9 @@ class Progress(Protocol):
 @contextmanager
 def show_progress(quiet: bool = False) -> Iterator[Progress]:
     """Give a callback that draws a bar on a terminal and writes a line per stage elsewhere."""
-    if quiet:
+    if file := os.environ.get(PROGRESS_FILE):
+        yield _ToFile(Path(file))
+    elif quiet:
         yield lambda stage, fraction: None
     elif sys.stderr.isatty():
         with _bar() as bar:
@@ -38,6 +47,24 @@ def show_progress(quiet: bool = False) -> Iterator[Progress]:
         finally:
             lines.compiling.forget()
         lines.finish()
+
+
+class _ToFile:
+    """Stage and fraction in a file, for a program that shows them (``klack app``)."""
+
+    def __init__(self, path: Path) -> None:
+        self._path, self._stage, self._next = path, "", 0.0
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        now = time.monotonic()
+        if stage == self._stage and now < self._next:
+            return
+        self._stage, self._next = stage, now + _OFTEN
+        text = json.dumps({"stage": stage, "fraction": fraction})
+        new = self._path.with_suffix(".new")
+        with suppress(OSError):  # the work goes on without being watched
+            new.write_text(text, encoding="utf-8")
+            new.replace(self._path)
 
 
 class _Lines:

@@ -49,7 +49,6 @@ COVERS = {
     "walls: formulas, and small networks integrated apart.",
     "pneumatics": "Gas: flow laws of ISO 6358, vessels that fill and empty, and networks "
     "integrated apart.",
-    "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy, "
     "junctions, turbulent lines.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "

@@ -7,12 +7,19 @@ from klack.analyses.impact.measures import DEVIATION_MEASURES
 from klack.analyses.impact.record import ImpactStudy
 from klack.contact.restitution import Deviation
 
-__all__ = ["ESTIMATE_COLUMNS", "estimate_rows", "estimate_sentence"]
+__all__ = [
+    "ESTIMATE_COLUMNS",
+    "FAIR",
+    "GOOD",
+    "estimate_rows",
+    "estimate_sentence",
+    "worst_error",
+]
 
 _SHOWN = DEVIATION_MEASURES[:5]
 ESTIMATE_COLUMNS = ("", *(measure.name for measure in _SHOWN))
 
-_GOOD, _FAIR = 0.01, 0.05
+GOOD, FAIR = 0.01, 0.05
 """The largest error up to which a level counts as good, and as fair."""
 
 
@@ -61,6 +68,17 @@ def _off(deviation: Deviation) -> str:
     )
 
 
+def worst_error(deviation: Deviation) -> float:
+    """Largest of the errors in peak force, contact time, impulse and restitution [-]."""
+    errors = (
+        deviation.peak_force,
+        deviation.contact_time,
+        deviation.impulse,
+        deviation.restitution,
+    )
+    return max((abs(value) for value in errors if isfinite(value)), default=0.0)
+
+
 def _verdict(deviation: Deviation, doubts: Sequence[str]) -> str:
     """Judge the largest of the four errors, unless the contact itself is in doubt."""
     if doubts:
@@ -68,10 +86,9 @@ def _verdict(deviation: Deviation, doubts: Sequence[str]) -> str:
             "both share the same contact, which cannot be relied on, because "
             f"{' and '.join(doubts)}"
         )
-    errors = [deviation.peak_force, deviation.contact_time, deviation.impulse]
-    worst = max(abs(value) for value in (*errors, deviation.restitution) if isfinite(value))
-    if worst <= _GOOD:
+    worst = worst_error(deviation)
+    if worst <= GOOD:
         return "good enough to rely on"
-    if worst <= _FAIR:
+    if worst <= FAIR:
         return "good enough for comparisons, not for the last per cent"
     return "too large an error; use the interface level for this condition"

@@ -1,0 +1,271 @@
+"""What the processes that compute tell the pages; light, for the server imports it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.input.problem import Key
+from klack.units import format_si
+
+__all__ = [
+    "Answer",
+    "Checked",
+    "Curve",
+    "FormField",
+    "Hearing",
+    "Judgement",
+    "Number",
+    "Opened",
+    "ResultCard",
+    "Slider",
+]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curve:
+    """A line of a chart."""
+
+    name: str
+    x: Floats
+    y: Floats
+
+    @classmethod
+    def scaled(cls, name: str, x: Floats, y: Floats, x_scale: float, y_scale: float) -> "Curve":
+        """A line in the units of the chart."""
+        return cls(name=name, x=x_scale * x, y=y_scale * y)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Number:
+    """A number beside the charts.
+
+    Parameters
+    ----------
+    key, name, unit : str
+    value : float or None
+        In ``unit``.
+    difference : str
+        How a difference is given: ``"%"`` of the pinned one, ``"us"``, ``"dB"`` or ``"1"``.
+    """
+
+    key: str
+    name: str
+    unit: str
+    value: float | None
+    difference: str = "%"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Answer:
+    """Force, motion, bands and sound of one position.
+
+    Parameters
+    ----------
+    force, lift : tuple of Curve
+        Over time in us (impact) or ms (stroke); force in N, lift in um.
+    time_unit : str
+    bands : array [Hz]
+        Middle frequencies.
+    levels : array [dB]
+        Of the force, re 1e-12 N^2 s.
+    numbers : tuple of Number
+    wav, ghost_wav : bytes
+        The click now and that of the pinned design, to one full scale; empty if nothing radiates.
+    scale : str
+        Full scale of both in words.
+    doubts : tuple of str
+        Why the numbers are doubtful; shown at once.
+    seconds : float
+        That it took.
+    """
+
+    force: tuple[Curve, ...]
+    lift: tuple[Curve, ...]
+    time_unit: str
+    bands: Floats
+    levels: Floats
+    numbers: tuple[Number, ...]
+    wav: bytes = b""
+    ghost_wav: bytes = b""
+    scale: str = ""
+    doubts: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Judgement:
+    """Whether the numbers can be relied on; follows once the sliders rest.
+
+    Parameters
+    ----------
+    grade : str
+        ``"good"``, ``"fair"``, ``"out"`` of range, or ``"none"`` where there is no estimate.
+    words : str
+    """
+
+    grade: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hearing:
+    """Loudness, spectrogram and drive pattern; follows once the sliders rest.
+
+    Parameters
+    ----------
+    number, pinned : Number
+        Loudness now, and of the pinned design.
+    spectrogram : tuple of arrays
+        Time [ms], frequency [kHz], level [dB re 20 uPa].
+    pattern_wav : bytes
+        The click as often as the drive pattern of the case has it, to the full scale of the clicks.
+    """
+
+    number: Number
+    pinned: Number
+    spectrogram: tuple[Floats, Floats, Floats]
+    pattern_wav: bytes
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResultCard:
+    """A stored result in short.
+
+    Parameters
+    ----------
+    command, title, case, created : str
+    numbers : tuple of Number
+    doubts : tuple of str
+    compares : bool
+        Whether two of its kind can be compared.
+    """
+
+    command: str
+    title: str
+    case: str
+    created: str
+    numbers: tuple[Number, ...]
+    doubts: tuple[str, ...]
+    compares: bool
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One number of the case that moves.
+
+    Parameters
+    ----------
+    key : str
+        ``"motion.speed"``.
+    place : Key
+    label : str
+    unit : str
+        SI; empty for a pure number.
+    low, high, start, step : float
+        In ``unit``.
+    needs_mesh : bool
+        Whether bodies follow from it, so that it does not move here.
+    written : str
+        What the case has there.
+    """
+
+    key: str
+    place: Key
+    label: str
+    unit: str
+    low: float
+    high: float
+    start: float
+    step: float
+    needs_mesh: bool
+    written: str
+
+    def text(self, value: float) -> str:
+        """Value with its unit, as people read it."""
+        return format_si(value, self.unit)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Opened:
+    """A case that is ready to move.
+
+    Parameters
+    ----------
+    title : str
+    kind : str
+        ``"impact"`` or ``"stroke"``.
+    sliders : tuple of Slider
+    run : str
+        Level or variant.
+    first : Answer
+        At the values of the case, which is pinned.
+    """
+
+    title: str
+    kind: str
+    sliders: tuple[Slider, ...]
+    run: str
+    first: Answer
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormField:
+    """One key of the form.
+
+    Parameters
+    ----------
+    key : str
+    place : Key
+    section, label : str
+    written : str
+        As the file has it; empty where it does not have the key.
+    kind : str
+        ``"a length"``; empty for words and plain numbers.
+    example : str
+        Of a quantity.
+    limits : str
+        ``"> 0"``.
+    choices : tuple of str
+        Words that the schema allows; empty where it allows any.
+    description : str
+    default : str
+        What counts where the file does not have the key.
+    """
+
+    key: str
+    place: Key
+    section: str
+    label: str
+    written: str
+    kind: str = ""
+    example: str = ""
+    limits: str = ""
+    choices: tuple[str, ...] = ()
+    description: str = ""
+    default: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Checked:
+    """What the checker says of a text.
+
+    Parameters
+    ----------
+    error : str
+        Its message; empty for a valid case.
+    line : int
+        That the message names; 0 for none.
+    title, kind : str
+        Of a valid case; ``"impact"`` or ``"stroke"``.
+    fields : tuple of FormField
+        Of a valid case.
+    """
+
+    error: str = ""
+    line: int = 0
+    title: str = ""
+    kind: str = ""
+    fields: tuple[FormField, ...] = ()

@@ -1,0 +1,220 @@
+"""The folder that the application was opened with; nothing outside of it is read or written.
+
+A path that comes from a browser is followed one name at a time from the held folder, never through
+a link, so that neither ``..`` nor a link leads out.
+"""
+
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from klack.errors import InputError
+from klack.held_folder import HeldFolder, synchronise
+
+__all__ = ["RESULT_NAME", "Found", "OpenFolder"]
+
+RESULT_NAME = "result.zarr"
+"""Of :mod:`klack.analyses.store`, whose import takes seconds."""
+
+LARGEST_CASE = 2 * 2**20  # [byte] of a case file
+LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
+_DEEPEST, _MOST = 5, 2000  # levels, and entries that are looked at
+_LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
+_CASE_ENDINGS = (".yaml", ".yml")
+
+
+@dataclass(frozen=True)
+class Found:
+    """Cases and results below the folder.
+
+    Parameters
+    ----------
+    cases : tuple of str
+        Files, by their path from the folder.
+    results : tuple of str
+        Folders that hold a result.
+    is_whole : bool
+        False where there is more than was looked at.
+    """
+
+    cases: tuple[str, ...]
+    results: tuple[str, ...]
+    is_whole: bool
+
+
+class OpenFolder:
+    """A folder and what is below it.
+
+    Parameters
+    ----------
+    path : Path
+        An existing folder.
+    """
+
+    def __init__(self, path: Path) -> None:
+        if not path.is_dir():
+            raise InputError(
+                f"FOLDER {path}",
+                got="no folder",
+                expected="an existing one with case files, or an empty one",
+                hint="klack app, in the folder of your cases.",
+            )
+        self.path = path.resolve()
+
+    def look(self) -> Found:
+        """Find cases and results; links are not followed."""
+        cases: list[str] = []
+        results: list[str] = []
+        seen = 0
+        waiting = [(self.path, 0)]
+        while waiting and seen < _MOST:
+            place, depth = waiting.pop()
+            try:
+                entries = sorted(os.scandir(place), key=lambda entry: entry.name)
+            except OSError:  # not for this user, or gone at this moment
+                continue
+            for entry in entries:
+                seen += 1
+                if entry.name.startswith(".") or entry.name in _LEFT_OUT or entry.is_symlink():
+                    continue
+                here = Path(entry.path).relative_to(self.path).as_posix()
+                if entry.is_dir(follow_symlinks=False):
+                    if entry.name == RESULT_NAME:
+                        results.append(str(PurePosixPath(here).parent))
+                    elif depth < _DEEPEST:
+                        waiting.append((Path(entry.path), depth + 1))
+                elif entry.name.endswith(_CASE_ENDINGS) and _is_case(Path(entry.path)):
+                    cases.append(here)
+        return Found(tuple(sorted(cases)), tuple(sorted(results)), seen < _MOST)
+
+    def read(self, relative: str, *, largest: int = LARGEST_FILE) -> bytes:
+        """Content of a file below the folder.
+
+        Raises
+        ------
+        InputError
+            For a path that leads out, is a link, is no plain file, or is larger than is read.
+        """
+        with self._parent(relative) as (held, name):
+            handle = held.open(name, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+            with os.fdopen(handle, "rb") as file:
+                state = os.fstat(file.fileno())
+                if not stat.S_ISREG(state.st_mode):
+                    raise _refused(relative, "no plain file")
+                if state.st_size > largest:
+                    raise _refused(relative, f"{state.st_size} bytes, more than {largest}")
+                return file.read(largest + 1)
+
+    def case_text(self, relative: str) -> str:
+        """Text of a case file."""
+        if not relative.endswith(_CASE_ENDINGS):
+            raise _refused(relative, "no .yaml file")
+        try:
+            return self.read(relative, largest=LARGEST_CASE).decode("utf-8")
+        except UnicodeDecodeError:
+            raise _refused(relative, "bytes that are no text in UTF-8") from None
+
+    def write(self, relative: str, text: str) -> None:
+        """Replace a text file, or make a new one; it is whole at every moment."""
+        data = text.encode()
+        if len(data) > LARGEST_CASE:
+            raise _refused(relative, f"{len(data)} bytes, more than {LARGEST_CASE}")
+        with self._parent(relative) as (held, name):
+            state = held.state(name)
+            if state is not None and not stat.S_ISREG(state.st_mode):
+                raise _refused(relative, "a link or a folder")
+            _replace(held, name, data)
+
+    def make_file(self, relative: str, text: str) -> None:
+        """Make a new text file, and the folder for it; what is there stays.
+
+        Raises
+        ------
+        InputError
+            If there is something of that name already.
+        """
+        parent, _, _ = relative.rpartition("/")
+        if parent and not self.exists(parent):
+            with self._parent(parent) as (held, name):
+                held.make(name)
+        if self.exists(relative):
+            raise _refused(relative, "a file that is there already")
+        self.write(relative, text)
+
+    def absolute(self, relative: str) -> Path:
+        """Path of an entry below the folder that is there and no link.
+
+        Raises
+        ------
+        InputError
+            For one that leads out, or is not there.
+        """
+        with self._parent(relative) as (held, name):
+            state = held.state(name)
+            if state is None or stat.S_ISLNK(state.st_mode):
+                raise _refused(relative, "nothing there" if state is None else "a link")
+        return self.path / relative
+
+    def exists(self, relative: str) -> bool:
+        """Whether there is an entry, of whatever kind."""
+        try:
+            with self._parent(relative) as (held, name):
+                return held.state(name) is not None
+        except InputError:
+            return False
+
+    @contextmanager
+    def _parent(self, relative: str) -> Iterator[tuple[HeldFolder, str]]:
+        """Folder of an entry, held from the top without a link, and the name of the entry."""
+        parts = relative.split("/")
+        if not relative or "\0" in relative or "\\" in relative or {"", ".", ".."} & set(parts):
+            raise _refused(relative, "a path that is not below the folder")
+        with ExitStack() as stack:
+            try:
+                held = stack.enter_context(HeldFolder(self.path))
+                for part in parts[:-1]:
+                    held = stack.enter_context(held.inner(part))
+                yield held, parts[-1]
+            except OSError as error:
+                raise _refused(relative, error.strerror or str(error)) from None
+
+
+def _replace(held: HeldFolder, name: str, data: bytes) -> None:
+    """Replace a file of a held folder by one rename, once it is on the disk."""
+    new = f".klack-{secrets.token_hex(8)}"
+    try:
+        with os.fdopen(held.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL), "wb") as file:
+            file.write(data)
+            file.flush()
+            synchronise(file.fileno())
+        state = held.state(name)
+        if state is not None:
+            os.chmod(held.steady_path / new, stat.S_IMODE(state.st_mode))
+        held.rename(new, name)
+    except BaseException:
+        held.remove(new)
+        raise
+    held.synchronise()
+
+
+def _is_case(path: Path) -> bool:
+    """Whether a file begins like a case: with its version, in the first lines."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError:
+        return False
+    return any(line.startswith(b"klack:") for line in head.splitlines())
+
+
+def _refused(relative: str, got: str) -> InputError:
+    return InputError(
+        f"file {relative[:200]!r}",
+        got=got,
+        expected="a file below the folder of the application",
+        hint="reload the page.",
+    )

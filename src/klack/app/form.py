@@ -1,0 +1,160 @@
+"""The keys of a case as fields of a form, made from its schema: kind, unit, limits, description."""
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal, get_args, get_origin
+
+from pydantic.fields import FieldInfo
+
+from klack.app.answers import Checked, FormField
+from klack.case.any_case import AnyCase
+from klack.case.case_tree import CaseTree, tree_of
+from klack.case.inserting import with_values
+from klack.case.key_path import kind_at, node_at
+from klack.errors import KlackError
+from klack.input.problem import CaseProblem, Key
+from klack.input.section import Section
+
+__all__ = ["checked_text", "exchanged_text", "form_of"]
+
+_SIGNS = (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
+_MOST = 400
+
+
+def checked_text(text: str, path: str) -> Checked:
+    """Check the text of a case as every command does, and make its form."""
+    try:
+        tree = tree_of(text, Path(path))
+        case = tree.any_case()
+    except KlackError as error:
+        return Checked(error=str(error), line=_line_in(str(error), path))
+    return Checked(
+        title=case.title or case.name,
+        kind="stroke" if "network" in tree.data else "impact",
+        fields=tuple(form_of(case, tree)),
+    )
+
+
+def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
+    """Text with another value at a key; everything else stays as its author wrote it.
+
+    Raises
+    ------
+    InputError
+        If the file cannot have the value there.
+    """
+    return with_values(tree_of(text, Path(path)), {place: _scalar(written)})
+
+
+def form_of(case: AnyCase, tree: CaseTree) -> Iterator[FormField]:
+    """Fields of what the file has, then single values that it could have in the same sections."""
+    written = dict(_leaves(tree.data))
+    count = 0
+    for place in (*written, *_further(case, tree.data)):
+        try:
+            node, info = node_at(case, place)
+        except CaseProblem:
+            continue
+        count += 1
+        if count > _MOST:
+            return
+        kind = kind_at(node, info)
+        yield FormField(
+            key=".".join(map(str, place)),
+            place=place,
+            section=str(place[0]) if len(place) > 1 else "case",
+            label=" ".join(map(str, place[1:] if len(place) > 1 else place)).replace("_", " "),
+            written="" if place not in written else _shown(written[place]),
+            kind="" if kind is None else kind.name,
+            example="" if kind is None else kind.example,
+            limits=_limits(info),
+            choices=_choices(info),
+            description="" if info is None else (info.description or ""),
+            default="" if place in written or info is None else _shown(node),
+        )
+
+
+def _leaves(data: Any, above: Key = ()) -> Iterator[tuple[Key, Any]]:
+    """Single values of the file; coordinates of profiles stay in the YAML."""
+    if "edges" in above or "start" in above[-2:]:
+        return
+    if isinstance(data, dict):
+        for key, value in data.items():
+            yield from _leaves(value, (*above, key))
+    elif isinstance(data, list):
+        for i, value in enumerate(data):
+            yield from _leaves(value, (*above, i))
+    elif above != ("klack",):
+        yield above, data
+
+
+def _further(case: AnyCase, data: Any, above: Key = ()) -> Iterator[Key]:
+    """Keys with one quantity, one word or one number that the sections of the file could have."""
+    if isinstance(data, Mapping):
+        try:
+            node = node_at(case, above)[0] if above else case
+        except CaseProblem:
+            return
+        if isinstance(node, Section):
+            for name, info in type(node).model_fields.items():
+                key = info.alias or name
+                value = getattr(node, name)
+                simple = isinstance(value, float | int | str)
+                if key not in data and (simple or (value is None and _is_quantity(value, info))):
+                    yield (*above, key)
+        for key, value in data.items():
+            yield from _further(case, value, (*above, key))
+
+
+def _is_quantity(value: Any, info: FieldInfo) -> bool:
+    return kind_at(value, info) is not None
+
+
+def _limits(info: FieldInfo | None) -> str:
+    found = [] if info is None else info.metadata
+    words = [
+        f"{sign} {getattr(item, name):g}"
+        for item in found
+        for name, sign in _SIGNS
+        if isinstance(getattr(item, name, None), int | float)
+    ]
+    return ", ".join(words)
+
+
+def _choices(info: FieldInfo | None) -> tuple[str, ...]:
+    annotation = None if info is None else info.annotation
+    options = [annotation, *get_args(annotation)]
+    words = [
+        str(word)
+        for option in options
+        if get_origin(option) is Literal
+        for word in get_args(option)
+    ]
+    return tuple(words)
+
+
+def _shown(value: Any) -> str:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return str(value)
+
+
+def _scalar(text: str) -> str:
+    """YAML of what was typed: a number and true or false stay what they are."""
+    import json
+
+    plain = text.strip()
+    try:
+        float(plain)
+    except ValueError:
+        return plain if plain in ("true", "false") else json.dumps(plain, ensure_ascii=False)
+    return plain
+
+
+def _line_in(message: str, path: str) -> int:
+    """Line that a message names: ``case.yaml:12: ...``."""
+    _, _, rest = message.partition(f"{path}:")
+    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
+    return int(digits) if digits else 0

@@ -1,0 +1,256 @@
+"""What stands between the network and the application; every request passes here first.
+
+1. the ``Host`` header must name this server: a foreign name that was pointed at this machine (DNS
+   rebinding) is refused;
+2. an ``Origin`` that is not our own is refused, and one is required for WebSockets and for
+   everything but reading;
+3. the token in the URL is exchanged for a cookie (HttpOnly, SameSite=Strict); nothing is answered
+   without that cookie;
+4. bodies of requests are bounded;
+5. answers carry a content security policy that allows no other host.
+"""
+
+from collections.abc import Awaitable, Callable, Iterable, MutableMapping
+from hmac import compare_digest
+from html import escape
+from http.cookies import CookieError, SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, parse_qsl, quote, urlencode
+
+from klack.app.access import Access
+
+__all__ = ["LARGEST_BODY", "POLICY", "Guard"]
+
+Scope = MutableMapping[str, Any]
+Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
+Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
+App = Callable[[Scope, Receive, Send], Awaitable[None]]
+
+LARGEST_BODY = 4 * 2**20  # [byte] of a request
+_LONGEST_LOGIN = 4096  # [byte]
+
+POLICY = (
+    "default-src 'none'; "
+    # NiceGUI compiles its templates in the browser, which takes eval; Plotly makes blobs
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval' blob:; "
+    "style-src 'self' 'unsafe-inline'; font-src 'self' data:; "
+    "img-src 'self' data: blob:; media-src 'self' data: blob:; worker-src 'self' blob:; "
+    "connect-src 'self'; frame-src 'self'; "
+    "base-uri 'none'; form-action 'self'; frame-ancestors 'self'; object-src 'none'"
+)
+"""Content security policy of every page of the application: nothing from another host."""
+
+_HEADERS = (
+    (b"x-content-type-options", b"nosniff"),
+    (b"referrer-policy", b"no-referrer"),
+    (b"cross-origin-opener-policy", b"same-origin"),
+    (b"cross-origin-resource-policy", b"same-origin"),
+    (b"x-frame-options", b"SAMEORIGIN"),
+)
+_SAFE = ("GET", "HEAD")
+_LOGIN = "/login"
+
+
+class _TooLarge(Exception):
+    """More came than is taken."""
+
+
+class Guard:
+    """ASGI application around another one.
+
+    Parameters
+    ----------
+    app : ASGI application
+    access : Access
+    largest : int [byte]
+        Of the body of a request.
+    """
+
+    def __init__(self, app: App, access: Access, *, largest: int = LARGEST_BODY) -> None:
+        self.app, self._access, self._largest = app, access, largest
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer one request, or hand it on."""
+        if scope["type"] == "lifespan":
+            await self.app(scope, receive, send)
+            return
+        refusal = self._refusal(scope)
+        if refusal is not None:
+            await _refuse(scope, send, *refusal)
+        elif scope["type"] == "websocket":
+            await self.app(scope, receive, send)
+        elif scope["path"] == _LOGIN and self._access.gate is not None:
+            await self._login(scope, receive, send)
+        elif (target := self._exchange(scope)) is not None:
+            await self._enter(send, target)
+        elif not self._has_session(scope):
+            if self._access.gate is not None and scope["method"] in _SAFE:
+                await _redirect(send, f"{_LOGIN}?next={quote(scope['path'], safe='')}")
+            else:
+                await _refuse(scope, send, 403, _NO_TOKEN)
+        else:
+            await self._hand_on(scope, receive, send)
+
+    def _refusal(self, scope: Scope) -> tuple[int, str] | None:
+        """Status and words for a request that is refused whatever else it shows."""
+        host = _headers(scope, b"host")
+        if len(host) != 1 or not self._access.is_own_host(host[0]):
+            return 421, "This server is not called by that name."
+        origin = _headers(scope, b"origin")
+        is_reading = scope["type"] == "http" and scope["method"] in _SAFE
+        if origin and not (len(origin) == 1 and self._access.is_own_origin(origin[0])):
+            return 403, "A page of another origin asked."
+        if not origin and not is_reading:
+            return 403, "The request does not say from which page it comes."
+        if scope["type"] == "websocket" and not self._has_session(scope):
+            return 403, _NO_TOKEN
+        length = _headers(scope, b"content-length")
+        if length and not (length[0].isdecimal() and int(length[0]) <= self._largest):
+            return 413, f"More than {self._largest} bytes."
+        return None
+
+    def _has_session(self, scope: Scope) -> bool:
+        found = _cookie(_headers(scope, b"cookie"), self._access.cookie)
+        return compare_digest(found.encode(), self._access.session.encode())
+
+    def _exchange(self, scope: Scope) -> str | None:
+        """Path that a right token in the URL leads to; the token leaves the address."""
+        if scope["method"] != "GET" or self._access.gate is not None:
+            return None
+        query = scope.get("query_string", b"").decode("latin-1")
+        given = parse_qs(query).get("token", [""])[0]
+        if not compare_digest(given.encode(), self._access.token.encode()):
+            return None
+        rest = [(key, value) for key, value in parse_qsl(query) if key != "token"]
+        return _local(scope["path"]) + (f"?{urlencode(rest)}" if rest else "")
+
+    async def _enter(self, send: Send, target: str) -> None:
+        """Set the cookie, on a page that leads to the target: a redirect would not send it."""
+        cookie = f"{self._access.cookie}={self._access.session}; Path=/; HttpOnly; SameSite=Strict"
+        page = _ENTERED.format(target=escape(target))
+        await _answer(
+            send, 200, page, b"text/html; charset=utf-8", (b"set-cookie", cookie.encode())
+        )
+
+    async def _login(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Form for the password, and its answer."""
+        query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
+        target = _local(query.get("next", ["/"])[0])
+        if scope["method"] == "GET":
+            await _answer(send, 200, _LOGIN_PAGE, b"text/html; charset=utf-8")
+            return
+        try:
+            body = await _body(receive, _LONGEST_LOGIN)
+        except _TooLarge:
+            await _refuse(scope, send, 413, "More than a password.")
+            return
+        given = parse_qs(body.decode("utf-8", "replace")).get("password", [""])[0]
+        assert self._access.gate is not None
+        if self._access.gate.opens(given):
+            await self._enter(send, target)
+        else:
+            await _refuse(scope, send, 403, "That is not the password. Wait a second, try again.")
+
+    async def _hand_on(self, scope: Scope, receive: Receive, send: Send) -> None:
+        came, begun = 0, False
+
+        async def bounded() -> MutableMapping[str, Any]:
+            nonlocal came
+            message = await receive()
+            came += len(message.get("body", b""))
+            if came > self._largest:
+                raise _TooLarge
+            return message
+
+        async def guarded(message: MutableMapping[str, Any]) -> None:
+            nonlocal begun
+            if message["type"] == "http.response.start":
+                begun = True
+                message["headers"] = _with_headers(message.get("headers", ()))
+            await send(message)
+
+        try:
+            await self.app(scope, bounded, guarded)
+        except _TooLarge:
+            if not begun:
+                await _refuse(scope, send, 413, f"More than {self._largest} bytes.")
+
+
+_NO_TOKEN = "Open the address that klack app printed: it holds the token of this session."
+
+_ENTERED = """<!doctype html><html lang="en"><meta charset="utf-8"><title>klack</title>
+<meta http-equiv="refresh" content="0;url={target}"><a href="{target}">klack</a></html>"""
+
+_LOGIN_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1"><title>klack</title>
+<style>:root{color-scheme:light dark}body{font:16px/1.5 system-ui,sans-serif;display:grid;
+place-items:center;min-height:90vh;margin:0}form{display:grid;gap:.8rem;width:min(20rem,86vw)}
+input,button{font:inherit;padding:.55rem .7rem}</style>
+<form method="post"><h1>klack</h1><label for="p">Password</label>
+<input id="p" type="password" name="password" autofocus required autocomplete="current-password">
+<button>Open</button></form></html>"""
+
+
+def _local(path: str) -> str:
+    """A path of this server: two slashes at the beginning would name another one."""
+    return "/" + quote(path.lstrip("/\\"), safe="/-._~")
+
+
+def _headers(scope: Scope, name: bytes) -> list[str]:
+    return [value.decode("latin-1") for key, value in scope["headers"] if key == name]
+
+
+def _cookie(headers: Iterable[str], name: str) -> str:
+    for header in headers:
+        try:
+            found = SimpleCookie(header).get(name)
+        except CookieError:
+            continue
+        if found is not None:
+            return found.value
+    return ""
+
+
+async def _body(receive: Receive, largest: int) -> bytes:
+    parts, size = [], 0
+    while True:
+        message = await receive()
+        parts.append(message.get("body", b""))
+        size += len(parts[-1])
+        if size > largest:
+            raise _TooLarge
+        if not message.get("more_body") or message["type"] == "http.disconnect":
+            return b"".join(parts)
+
+
+def _with_headers(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, bytes]]:
+    """Headers of an answer with ours, unless it brings its own policy."""
+    own = list(headers)
+    present = {key.lower() for key, _ in own}
+    added = (*_HEADERS, (b"content-security-policy", POLICY.encode()))
+    return own + [item for item in added if item[0] not in present]
+
+
+async def _redirect(send: Send, target: str) -> None:
+    await _answer(send, 303, "", b"text/plain", (b"location", target.encode()))
+
+
+async def _answer(
+    send: Send, status: int, text: str, kind: bytes, *headers: tuple[bytes, bytes]
+) -> None:
+    body = text.encode()
+    own = [
+        (b"content-type", kind),
+        (b"content-length", str(len(body)).encode()),
+        (b"cache-control", b"no-store"),
+        *headers,
+    ]
+    await send({"type": "http.response.start", "status": status, "headers": _with_headers(own)})
+    await send({"type": "http.response.body", "body": body})
+
+
+async def _refuse(scope: Scope, send: Send, status: int, text: str) -> None:
+    if scope["type"] == "websocket":
+        await send({"type": "websocket.close", "code": 1008, "reason": text})
+        return
+    await _answer(send, status, text + "\n", b"text/plain; charset=utf-8")

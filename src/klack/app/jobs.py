@@ -1,0 +1,234 @@
+"""Runs that were started from the application, each in a process of its own.
+
+Everything about a run lies in a folder of its own below ``.klack-app/jobs``, so that a server that
+was killed finds it again, running or ended::
+
+    job.json       what was asked for: command, case, folder of the result
+    process.json   number of the process and when it began
+    progress.json  stage and fraction
+    ending.json    exit code, when it ended
+    cancelled      empty: it was asked to stop
+    stdout, stderr what the command printed
+"""
+
+import json
+import os
+import re
+import secrets
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from shutil import rmtree
+from typing import Any, Literal
+
+import psutil
+
+from klack.app.folder import OpenFolder
+from klack.errors import InputError
+from klack.terminal.progress import PROGRESS_FILE
+from klack.whole_file import whole_file
+
+__all__ = ["COMMANDS", "Job", "Jobs", "State"]
+
+State = Literal["running", "done", "failed", "cancelled", "lost"]
+COMMANDS = ("impact", "stroke", "noise", "shots")
+"""Commands that the application starts."""
+
+_HOME = ".klack-app"
+_NAME = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{8}")
+_MOST_RUNNING = 4
+_TOLD = 4000  # last characters of what a command printed
+_STOPPED = (130, 143)
+_CANCELLED = "cancelled"  # file: a process that only begins has no exit code to tell
+
+
+@dataclass(frozen=True, kw_only=True)
+class Job:
+    """One run.
+
+    Parameters
+    ----------
+    name : str
+        Of its folder.
+    command, case, out : str
+        Command of klack; case file and result by their path from the folder.
+    started : float [s]
+        Since 1970.
+    state : str
+    stage : str
+        What it does now.
+    fraction : float
+        Of the stage.
+    code : int or None
+        Exit code, when it has ended.
+    told : str
+        The last of what it printed.
+    """
+
+    name: str
+    command: str
+    case: str
+    out: str
+    started: float
+    state: State = "running"
+    stage: str = ""
+    fraction: float = 0.0
+    code: int | None = None
+    told: str = ""
+
+
+class Jobs:
+    """All runs of a folder.
+
+    Parameters
+    ----------
+    folder : OpenFolder
+    """
+
+    def __init__(self, folder: OpenFolder) -> None:
+        self._folder = folder
+        self._place = folder.path / _HOME / "jobs"
+        self._children: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, command: str, case: str, out: str, options: Sequence[str] = ()) -> Job:
+        """Start a run that outlives this server.
+
+        Raises
+        ------
+        InputError
+            For an unknown command, a case that is not below the folder, too many runs at a time,
+            or one that writes to the same folder.
+        """
+        if command not in COMMANDS:
+            raise _refused(command, f"one of: {', '.join(COMMANDS)}")
+        path = self._folder.absolute(case)
+        running = [job for job in self.all() if job.state == "running"]
+        if len(running) >= _MOST_RUNNING:
+            raise _refused(f"{len(running)} runs at a time", f"at most {_MOST_RUNNING}")
+        if any(job.out == out for job in running):
+            raise _refused(f"a run that writes to {out}, beside another", "one at a time")
+        name = time.strftime("%Y%m%d-%H%M%S-") + secrets.token_hex(4)
+        place = self._place / name
+        place.mkdir(parents=True, mode=0o700)
+        job = Job(name=name, command=command, case=case, out=out, started=time.time())
+        _write(place / "job.json", asdict(job))
+        arguments = [command, str(path), "--out", str(self._folder.path / out), *options]
+        with (place / "stdout").open("wb") as output, (place / "stderr").open("wb") as errors:
+            child = subprocess.Popen(
+                # -P: not from the opened folder, where a stranger's numpy.py may lie
+                [sys.executable, "-P", "-m", "klack.cli.job_process", str(place), *arguments],
+                cwd=self._folder.path,
+                env=os.environ | {PROGRESS_FILE: str(place / "progress.json")},
+                stdin=subprocess.DEVNULL,
+                stdout=output,
+                stderr=errors,
+                start_new_session=True,
+            )
+        begun = psutil.Process(child.pid).create_time()
+        _write(place / "process.json", {"pid": child.pid, "begun": begun})
+        self._children[name] = child
+        return job
+
+    def all(self) -> list[Job]:
+        """Every run, the latest first."""
+        try:
+            names = sorted(os.listdir(self._place), reverse=True)
+        except OSError:
+            return []
+        found = (self._job(name) for name in names if _NAME.fullmatch(name))
+        return [job for job in found if job is not None]
+
+    def cancel(self, name: str) -> None:
+        """Ask a run to stop; it leaves nothing half written."""
+        process = self._process(_require_name(name))
+        if process is not None:
+            (self._place / name / _CANCELLED).touch()
+            with suppress(psutil.Error):
+                process.send_signal(signal.SIGTERM)
+
+    def forget(self, name: str) -> None:
+        """Remove what is known of a run that has ended; its result stays."""
+        job = self._job(_require_name(name))
+        if job is not None and job.state != "running":
+            rmtree(self._place / name, ignore_errors=True)
+
+    def _job(self, name: str) -> Job | None:
+        place = self._place / name
+        asked = _read(place / "job.json")
+        if asked is None:
+            return None
+        if name in self._children and self._children[name].poll() is not None:
+            del self._children[name]
+        is_running = self._process(name) is not None
+        ending = _read(place / "ending.json")  # after the look at the process
+        progress = _read(place / "progress.json") or {}
+        try:
+            known = {key: asked[key] for key in ("command", "case", "out", "started")}
+            code = None if ending is None else int(ending["code"])
+            return Job(
+                name=name,
+                **known,
+                state=_state(is_running, code, (place / _CANCELLED).exists()),
+                stage=str(progress.get("stage", "starting")),
+                fraction=float(progress.get("fraction", 0.0)),
+                code=code,
+                told=_tail(place / "stderr") if code else "",
+            )
+        except (KeyError, TypeError, ValueError):  # not of this version
+            return None
+
+    def _process(self, name: str) -> psutil.Process | None:
+        """Its process, if that runs: the same number may be another one's by now."""
+        told = _read(self._place / name / "process.json")
+        if told is None:
+            return None
+        try:
+            process = psutil.Process(int(told["pid"]))
+            same = abs(process.create_time() - float(told["begun"])) < 0.01
+            alive = process.status() != psutil.STATUS_ZOMBIE
+            return process if same and alive else None
+        except (psutil.Error, KeyError, TypeError, ValueError):
+            return None
+
+
+def _state(is_running: bool, code: int | None, is_cancelled: bool) -> State:
+    if code is None:
+        return "running" if is_running else "cancelled" if is_cancelled else "lost"
+    if code in _STOPPED:
+        return "cancelled"
+    return "done" if code == 0 else "failed"
+
+
+def _require_name(name: str) -> str:
+    if not _NAME.fullmatch(name):
+        raise _refused(f"run {name[:80]!r}", "one of the list")
+    return name
+
+
+def _refused(got: str, expected: str) -> InputError:
+    return InputError("run", got=got, expected=expected, hint="wait for a run, or cancel it.")
+
+
+def _write(path: Path, values: dict[str, Any]) -> None:
+    with whole_file(path) as new:
+        new.write_text(json.dumps(values), encoding="utf-8")
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _tail(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8", errors="replace")[-_TOLD:].strip()
+    except OSError:
+        return ""

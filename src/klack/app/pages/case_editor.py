@@ -1,0 +1,220 @@
+"""A case as a form and as text, both ways, with the messages of the checker."""
+
+import asyncio
+import json
+from collections.abc import Mapping
+from itertools import groupby
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from klack.app.answers import Checked, FormField
+from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
+from klack.app.state import State
+from klack.errors import KlackError
+
+__all__ = ["case_editor_page"]
+
+_REST = 0.4  # [s] without a key until the text is checked
+
+
+async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
+    """The page of one case."""
+    case = given.get("path", "")
+    try:
+        text = await asyncio.to_thread(state.folder.case_text, case)
+    except KlackError as error:
+        with frame(state, "Case"):
+            plain(str(error), "p").classes("k-error")
+        return
+    with frame(state, "Case", case):
+        _Editor(state, case, text).build()
+
+
+class _Editor:
+    """Form and text of one case; the text is the truth, the form follows from it."""
+
+    def __init__(self, state: State, case: str, saved: str) -> None:
+        self._state, self._case, self._saved = state, case, saved
+        draft = state.notes.draft(case)
+        self._text = saved if draft is None else draft
+        self._changes = 0
+        self._open = {"case", "motion", "contact"}
+
+    def build(self) -> None:
+        """Make the page, then check the text while it is shown already."""
+        with ui.element("div").classes("k-head"):
+            self._status = plain("checking ...").classes("k-badge").props("role=status")
+            plain("").style("flex:1 1 auto")
+            button("Discard changes", self._discard)
+            link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
+            button("Save", self._save, main=True).props("id=k-save")
+        self._message = plain("", "p").classes("k-error").props("role=alert")
+        with ui.element("div").classes("k-editor"):
+            with ui.element("section"):
+                heading("Form").classes("k-sr")
+                self._form = ui.element("div").classes("k-sheet k-form")
+            with ui.element("section").classes("k-sheet"):
+                heading("YAML").classes("k-sr")
+                self._area = plain(self._text, "textarea")
+                self._area.props("id=k-yaml spellcheck=false autocomplete=off")
+                self._area.props["aria-label"] = "case file, YAML"
+                self._area.on(
+                    "input",
+                    self._typed,
+                    js_handler="(e) => emit(e.target.value)",
+                    throttle=0.15,
+                )
+        ui.timer(0.05, self._check, once=True)
+
+    # ----------------------------------------------------------------------- from the text
+
+    async def _typed(self, event: Any) -> None:
+        self._text = str(event.args)
+        self._changes += 1
+        mine = self._changes
+        await asyncio.sleep(_REST)
+        if mine == self._changes:
+            await self._check()
+
+    async def _check(self) -> None:
+        """Keep the draft; say what the checker says; make the form of a valid text."""
+        text, mine = self._text, self._changes
+        try:
+            draft = text if text != self._saved else None
+            await asyncio.to_thread(self._state.notes.set_draft, self._case, draft)
+            found: Checked = await self._state.reader.call("check", text, self._path)
+        except (KlackError, OSError) as error:
+            show_error(error)
+            return
+        if mine != self._changes:
+            return
+        with self._form:
+            self._message.set_text(found.error)
+            unsaved = "not saved" if text != self._saved else "saved"
+            self._status.classes(remove="good fair out", add="out" if found.error else "good")
+            valid = "not valid" if found.error else f"valid {found.kind}"
+            self._status.set_text(f"{valid}, {unsaved}")
+            if not found.error:
+                self._form.clear()
+                self._show_form(found.fields)
+
+    @property
+    def _path(self) -> str:
+        return str(self._state.folder.path / self._case)
+
+    # ----------------------------------------------------------------------- from the form
+
+    def _show_form(self, fields: tuple[FormField, ...]) -> None:
+        ordered = sorted(fields, key=lambda item: item.section != "case")
+        sections: dict[str, list[FormField]] = {}
+        for name, items in groupby(ordered, key=lambda item: item.section):
+            sections.setdefault(name, []).extend(items)
+        for name, found in sections.items():
+            with ui.element("details") as part:
+                if name in self._open:
+                    part.props["open"] = True
+                part.on(
+                    "toggle",
+                    lambda event, name=name: self._toggled(name, bool(event.args)),
+                    js_handler="(e) => emit(e.target.open)",
+                )
+                plain(name.replace("_", " "), "summary")
+                for item in (item for item in found if item.written):
+                    self._show_field(item)
+                further = [item for item in found if not item.written]
+                if further:
+                    with ui.element("details"):
+                        plain(f"further keys: {len(further)}", "summary").classes("k-soft")
+                        for item in further:
+                            self._show_field(item)
+
+    def _toggled(self, name: str, is_open: bool) -> None:
+        (self._open.add if is_open else self._open.discard)(name)
+
+    def _show_field(self, item: FormField) -> None:
+        with ui.element("div").classes("k-field"):
+            with ui.element("div"):
+                with ui.element("label") as label:
+                    label.props["for"] = f"f-{item.key}"
+                    plain(item.label)
+                words = [item.description]
+                if item.kind:
+                    words.append(f"{item.kind}, e.g. {item.example}")
+                if item.limits:
+                    words.append(item.limits)
+                plain(" · ".join(filter(None, words)), "small")
+            self._show_entry(item)
+
+    def _show_entry(self, item: FormField) -> None:
+        box: ui.element
+        if item.choices and (item.written in item.choices or not item.written):
+            box = ui.element("select")
+            with box:
+                for word in (("",) if not item.written else ()) + item.choices:
+                    option = plain(word or f"({item.default or 'not given'})", "option")
+                    option.props["value"] = word
+                    if word == item.written:
+                        option.props["selected"] = True
+        else:
+            box = ui.element("input").props("type=text maxlength=4000")
+            box.props[START_VALUE] = item.written
+            if not item.written:
+                box.props["placeholder"] = item.default or item.example
+        box.classes("k-input").props["id"] = f"f-{item.key}"
+        box.on(
+            "change",
+            lambda event: self._exchange(item, str(event.args)),
+            js_handler="(e) => emit(e.target.value)",
+        )
+
+    async def _exchange(self, item: FormField, value: str) -> None:
+        """Write a value of the form into the text; nothing else of it changes."""
+        if value == item.written or not value.strip():
+            return
+        try:
+            text = await self._state.reader.call(
+                "exchange", self._text, self._path, item.place, value
+            )
+        except KlackError as error:
+            show_error(error)
+            return
+        self._set(text)
+        await self._check()
+
+    def _set(self, text: str) -> None:
+        self._text = text
+        self._changes += 1
+        self._area.client.run_javascript(
+            f"document.getElementById('k-yaml').value = {json.dumps(text)}"
+        )
+
+    # ----------------------------------------------------------------------- keeping it
+
+    async def _save(self) -> None:
+        """Replace the file as a whole; what another program wrote meanwhile is not overwritten."""
+        text = self._text
+        try:
+            now = await asyncio.to_thread(self._state.folder.case_text, self._case)
+            if now not in (self._saved, text):
+                self._message.set_text(
+                    "The file was changed by another program since it was opened. Copy what you "
+                    "need, then Discard changes."
+                )
+                return
+            await asyncio.to_thread(self._state.folder.write, self._case, text)
+        except (KlackError, OSError) as error:
+            show_error(error)
+            return
+        self._saved = text
+        await self._check()
+
+    async def _discard(self) -> None:
+        try:
+            self._saved = await asyncio.to_thread(self._state.folder.case_text, self._case)
+        except KlackError as error:
+            show_error(error)
+            return
+        self._set(self._saved)
+        await self._check()

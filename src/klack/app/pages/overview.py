@@ -1,0 +1,434 @@
+"""Cases, runs and results of the folder."""
+
+import asyncio
+import re
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import PurePosixPath
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from klack.app.answers import Checked, ResultCard
+from klack.app.folder import RESULT_NAME
+from klack.app.jobs import Job
+from klack.app.pages.frame import (
+    START_VALUE,
+    button,
+    frame,
+    heading,
+    link,
+    number_text,
+    plain,
+    show_error,
+)
+from klack.app.state import State
+from klack.errors import InputError, KlackError
+from klack.whole_file import mark_of
+
+__all__ = ["overview_page"]
+
+_EVERY = 1.0  # [s] that runs are looked at
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
+_WORDS = {
+    "running": "runs",
+    "done": "done",
+    "failed": "failed",
+    "cancelled": "cancelled",
+    "lost": "ended without a word",
+}
+
+
+async def overview_page(state: State, given: Mapping[str, str]) -> None:
+    """Everything below the folder, in three lists."""
+    with frame(state, "Cases and results", "Everything below the folder that klack app opened."):
+        await _Overview(state).build()
+
+
+class _Overview:
+    """Lists that are made again when something below the folder changed."""
+
+    def __init__(self, state: State) -> None:
+        self._state = state
+        self._chosen: list[str] = []
+        self._seen: tuple[tuple[str, str], ...] = ()
+
+    async def build(self) -> None:
+        """Make the page, then fill it while it is shown already."""
+        self._jobs = ui.element("section").classes("k-section")
+        self._cases = ui.element("section").classes("k-section")
+        self._results = ui.element("section").classes("k-section")
+        self._show_jobs()
+        with self._cases:
+            _title("Cases")
+            plain("Looking ...", "p").classes("k-soft")
+        ui.timer(0.05, self._fill, once=True)
+        ui.timer(_EVERY, self._follow)
+
+    async def _fill(self) -> None:
+        found = await asyncio.to_thread(self._state.folder.look)
+        with self._cases:
+            self._cases.clear()
+            await self._show_cases(found.cases, found.is_whole)
+        with self._results:
+            self._results.clear()
+            await self._show_results(found.results)
+        self._state.start_spare()
+
+    async def _follow(self) -> None:
+        """Show the progress of runs; look again for results where one ended."""
+        jobs = await asyncio.to_thread(self._state.jobs.all)
+        states = tuple((job.name, job.state) for job in jobs)
+        ended = self._seen and states != self._seen
+        if states != self._seen or any(job.state == "running" for job in jobs):
+            self._show_jobs(jobs)
+        self._seen = states
+        if ended:
+            await self._fill()
+
+    # ----------------------------------------------------------------------- runs
+
+    def _show_jobs(self, jobs: list[Job] | None = None) -> None:
+        found = self._state.jobs.all() if jobs is None else jobs
+        self._jobs.clear()
+        if not found:
+            return
+        with self._jobs:
+            _title("Runs")
+            with ui.element("div").classes("k-sheet"):
+                for job in found[:12]:
+                    self._show_job(job)
+
+    def _show_job(self, job: Job) -> None:
+        with ui.element("div").classes("k-row"):
+            with ui.element("div"):
+                plain(f"klack {job.command} {job.case}").classes("k-title")
+                began = time.strftime("%d %b %H:%M", time.localtime(job.started))
+                if job.state == "running":
+                    percent = round(100 * min(max(job.fraction, 0.0), 1.0))
+                    plain(f"{job.stage}, {percent} %, since {began}", "div").classes("k-soft")
+                    bar = ui.element("div").classes("k-bar")
+                    bar.props["role"], bar.props["aria-valuenow"] = "progressbar", percent
+                    bar.props["aria-label"] = f"{job.case}: {job.stage}"
+                    with bar:
+                        ui.element("i").style(f"width:{percent}%")
+                else:
+                    plain(f"{_WORDS[job.state]}, {began}", "div").classes("k-soft")
+                    if job.told:
+                        plain(job.told, "div").classes("k-error")
+            with ui.element("div").classes("k-tools"):
+                if job.state == "running":
+                    button("Cancel", partial(self._cancel, job.name))
+                else:
+                    button("Dismiss", partial(self._forget, job.name))
+
+    async def _cancel(self, name: str) -> None:
+        await _telling(lambda: self._state.jobs.cancel(name))
+
+    async def _forget(self, name: str) -> None:
+        await _telling(lambda: self._state.jobs.forget(name))
+        self._show_jobs()
+
+    # ----------------------------------------------------------------------- cases
+
+    async def _show_cases(self, cases: tuple[str, ...], is_whole: bool) -> None:
+        with ui.element("div").classes("k-head"):
+            heading("Cases")
+            button("New case", self._ask_new, main=not cases)
+        if not is_whole:
+            plain("There is more below this folder than is looked at.", "p").classes("k-error")
+        if not cases:
+            plain(
+                "No case file (YAML) below this folder yet. New case copies one that comes with "
+                "klack.",
+                "p",
+            ).classes("k-soft")
+            return
+        with ui.element("div").classes("k-sheet"):
+            rows = [(case, _reading(case)) for case in cases]
+        for case, row in rows:
+            checked = await self._checked(case)
+            row.clear()
+            with row:
+                self._show_case(case, checked)
+
+    async def _checked(self, case: str) -> Checked:
+        try:
+            text = await asyncio.to_thread(self._state.folder.case_text, case)
+            found: Checked = await self._state.reader.call(
+                "check", text, str(self._state.folder.path / case)
+            )
+            return found
+        except KlackError as error:
+            return Checked(error=str(error))
+
+    def _show_case(self, case: str, checked: Checked) -> None:
+        query = urlencode({"path": case})
+        with ui.element("div"):
+            plain(checked.title or PurePosixPath(case).name, "div").classes("k-title")
+            kind = f"{checked.kind}, " if checked.kind else ""
+            draft = " · edited, not saved" if self._state.notes.draft(case) is not None else ""
+            plain(f"{kind}{case}{draft}", "div").classes("k-soft")
+            if checked.error:
+                plain(checked.error, "div").classes("k-error")
+            self._show_note(case)
+        with ui.element("div").classes("k-tools"):
+            if not checked.error:
+                button("Run", partial(self._run, case, checked.kind))
+                link("Sliders", f"/sliders?{query}")
+            link("Edit", f"/case?{query}")
+            button("Duplicate", partial(self._ask_copy, case))
+            button("Note", partial(self._ask_note, case))
+
+    async def _run(self, case: str, kind: str) -> None:
+        path = PurePosixPath(case)
+        name = path.parent.name if path.stem == "case" and path.parent.name else path.stem
+        out = f"klack-results/{name}"
+        await _telling(lambda: self._state.jobs.start(kind, case, out))
+        self._show_jobs()
+
+    def _ask_new(self) -> None:
+        from klack.case.shipped import shipped_cases  # with all of the schema
+
+        shipped = shipped_cases()
+        first = "demo-valve-axisymmetric"
+
+        def make(source: str, name: str) -> None:
+            self._state.folder.make_file(f"{name}/case.yaml", shipped[source].read_text("utf-8"))
+
+        self._ask(
+            "New case",
+            "Copies a case that comes with klack into a folder of its own.",
+            tuple(shipped),
+            first,
+            f"{first}-copy" if self._state.folder.exists(first) else first,
+            make,
+        )
+
+    def _ask_copy(self, case: str) -> None:
+        text = self._state.folder.case_text(case)
+        path = PurePosixPath(case)
+
+        def make(source: str, name: str) -> None:
+            self._state.folder.make_file((path.parent / f"{name}.yaml").as_posix(), text)
+
+        self._ask(
+            f"Duplicate {case}",
+            "The copy lies beside it, so that files it names are found.",
+            (),
+            "",
+            f"{path.stem}-2",
+            make,
+        )
+
+    def _ask(
+        self,
+        title: str,
+        words: str,
+        sources: tuple[str, ...],
+        source: str,
+        name: str,
+        make: Callable[[str, str], None],
+    ) -> None:
+        """Ask for a name, and where there is a choice for what is copied."""
+        values = {"source": source, "name": name}
+        with ui.dialog() as dialog, ui.element("div").classes("k-sheet k-pad k-ask"):
+            heading(title)
+            plain(words, "p").classes("k-soft")
+            if sources:
+                _choice("Copy of", sources, source, lambda value: values.update(source=value))
+            _entry("Name", name, lambda value: values.update(name=value))
+            problem = plain("", "p").classes("k-error")
+
+            async def done() -> None:
+                try:
+                    if not _NAME.fullmatch(values["name"]):
+                        raise InputError(
+                            "name",
+                            got=f"'{values['name'][:80]}'",
+                            expected="letters, digits, - and _",
+                            hint="my-valve",
+                        )
+                    if sources and values["source"] not in sources:
+                        return
+                    make(values["source"], values["name"])
+                except (KlackError, OSError) as error:
+                    problem.set_text(str(error))
+                    return
+                dialog.close()
+                await self._fill()
+
+            with ui.element("div").classes("k-tools"):
+                button("Cancel", dialog.close)
+                button("Make", done, main=True)
+        dialog.open()
+
+    # ----------------------------------------------------------------------- results
+
+    async def _show_results(self, results: tuple[str, ...]) -> None:
+        with ui.element("div").classes("k-head"):
+            heading("Results")
+            compare = link("Compare two", "#").props("id=k-compare aria-disabled=true")
+        if not results:
+            compare.delete()
+            plain("None yet: run a case.", "p").classes("k-soft")
+            return
+        self._chosen = [name for name in self._chosen if name in results]
+        with ui.element("div").classes("k-sheet"):
+            rows = [(name, _reading(name)) for name in results]
+
+        def chosen() -> None:
+            ready = len(self._chosen) == 2
+            compare.props["href"] = (
+                f"/compare?{urlencode(dict(zip('ab', self._chosen, strict=True)))}"
+                if ready
+                else "#"
+            )
+            compare.props["aria-disabled"] = "false" if ready else "true"
+            compare.classes(add="k-main-btn" if ready else "", remove="" if ready else "k-main-btn")
+            words = ("Compare two", "Compare: choose one more", "Compare", "Compare: two at most")
+            compare.set_text(words[min(len(self._chosen), 3)])
+
+        for name, row in rows:
+            card = await self._card(name)
+            row.clear()
+            with row:
+                self._show_result(name, card, chosen)
+        chosen()
+
+    async def _card(self, name: str) -> ResultCard | str:
+        place = self._state.folder.path / name
+        try:
+            mark = str(mark_of(place / RESULT_NAME))
+            known = self._state.cards.get(name)
+            if known is not None and known[0] == mark:
+                return known[1]
+            card: ResultCard = await self._state.reader.call("card", str(place))
+            self._state.cards[name] = (mark, card)
+            return card
+        except KlackError as error:
+            return str(error)
+
+    def _show_result(self, name: str, card: ResultCard | str, chosen: Callable[[], None]) -> None:
+        with ui.element("div"):
+            if isinstance(card, str):
+                plain(name, "div").classes("k-title")
+                plain(card, "div").classes("k-error")
+            else:
+                plain(card.title or name, "div").classes("k-title")
+                words = " · ".join(filter(None, (card.command, name, card.created[:16])))
+                plain(words.replace("T", " "), "div").classes("k-soft")
+                with ui.element("div").classes("k-numbers"):
+                    for number in card.numbers:
+                        with ui.element("span"):
+                            plain(f"{number.name} ").classes("k-soft")
+                            plain(f"{number_text(number)} {number.unit}".strip(), "b")
+                if card.doubts:
+                    count = len(card.doubts)
+                    with ui.element("details"):
+                        plain(f"{count} note{'s' * (count > 1)} on this result", "summary").classes(
+                            "k-soft"
+                        )
+                        plain("\n".join(card.doubts), "p").classes("k-note")
+            self._show_note(name)
+        with ui.element("div").classes("k-tools"):
+            for file, word in (("report.html", "Report"), ("report.pdf", "PDF")):
+                if self._state.folder.exists(f"{name}/{file}"):
+                    link(word, f"/report?{urlencode({'path': f'{name}/{file}'})}", new=True)
+            if not isinstance(card, str) and card.compares:
+                self._show_choice(name, chosen)
+            button("Note", partial(self._ask_note, name))
+
+    def _show_choice(self, name: str, chosen: Callable[[], None]) -> None:
+        def change(event: object) -> None:
+            if name in self._chosen:
+                self._chosen.remove(name)
+            else:
+                self._chosen.append(name)
+            chosen()
+
+        with ui.element("label").classes("k-btn"):
+            box = ui.element("input").props("type=checkbox")
+            box.props["aria-label"] = f"compare {name}"
+            if name in self._chosen:
+                box.props["checked"] = True
+            box.on("change", change, args=[])
+            plain(" compare")
+
+    # ----------------------------------------------------------------------- notes
+
+    def _show_note(self, of: str) -> None:
+        note = self._state.notes.note(of)
+        if note:
+            plain(note, "p").classes("k-note")
+
+    def _ask_note(self, of: str) -> None:
+        text = {"now": self._state.notes.note(of)}
+        with ui.dialog() as dialog, ui.element("div").classes("k-sheet k-pad k-ask k-notes"):
+            heading(f"Note on {of}")
+            area = plain(text["now"], "textarea").classes("k-input").props("rows=5")
+            area.props["aria-label"] = f"note on {of}"
+            area.on(
+                "input",
+                lambda event: text.update(now=str(event.args)),
+                js_handler="(e) => emit(e.target.value)",
+            )
+
+            async def keep() -> None:
+                await _telling(lambda: self._state.notes.set_note(of, text["now"]))
+                dialog.close()
+                await self._fill()
+
+            with ui.element("div").classes("k-tools"):
+                button("Cancel", dialog.close)
+                button("Keep", keep, main=True)
+        dialog.open()
+
+
+def _reading(name: str) -> ui.element:
+    """Row of an entry that is not read yet."""
+    with ui.element("div").classes("k-row") as row, ui.element("div"):
+        plain(name, "div").classes("k-title")
+        plain("reading ...", "div").classes("k-soft")
+    return row
+
+
+def _title(text: str) -> None:
+    with ui.element("div").classes("k-head"):
+        heading(text)
+
+
+def _entry(label: str, value: str, change: Callable[[str], None]) -> None:
+    with ui.element("label"):
+        plain(label).classes("k-soft")
+        box = ui.element("input").classes("k-input").props("type=text maxlength=80")
+        box.props[START_VALUE] = value
+        box.on(
+            "input", lambda event: change(str(event.args)), js_handler="(e) => emit(e.target.value)"
+        )
+
+
+def _choice(label: str, words: tuple[str, ...], value: str, change: Callable[[str], None]) -> None:
+    with ui.element("label"):
+        plain(label).classes("k-soft")
+        box = ui.element("select").classes("k-input")
+        with box:
+            for word in words:
+                option = plain(word, "option")
+                option.props["value"] = word
+                if word == value:
+                    option.props["selected"] = True
+        box.on(
+            "change",
+            lambda event: change(str(event.args)),
+            js_handler="(e) => emit(e.target.value)",
+        )
+
+
+async def _telling(act: Callable[[], object]) -> None:
+    """Do something off the event loop; say on the page what goes wrong."""
+    try:
+        await asyncio.to_thread(act)
+    except (KlackError, OSError) as error:
+        show_error(error)

@@ -1,0 +1,336 @@
+"""Sliders that answer: force, motion, bands and sound of the stored bodies."""
+
+import asyncio
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
+
+from klack.app.answers import Answer, Hearing, Judgement, Number, Opened, Slider
+from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogram_figure
+from klack.app.pages.frame import (
+    START_VALUE,
+    button,
+    differing,
+    frame,
+    heading,
+    link,
+    number_text,
+    plain,
+    show_error,
+)
+from klack.app.state import State
+from klack.app.worker import Worker
+from klack.errors import KlackError
+from klack.units import format_si
+
+__all__ = ["sliders_page"]
+
+_AT_FIRST = 10  # sliders that are seen without "more"
+_REST = 0.6  # [s] without a move until what takes longer is computed
+_NAMES = ("now", "pinned")
+
+
+async def sliders_page(state: State, given: Mapping[str, str]) -> None:
+    """The page of one case."""
+    case = given.get("path", "")
+    try:
+        text = await asyncio.to_thread(state.folder.case_text, case)
+        worker = state.explorer()
+    except KlackError as error:
+        with frame(state, "Sliders"):
+            plain(str(error), "p").classes("k-error")
+        return
+    client = ui.context.client
+    client.on_delete(lambda: state.give_back(worker))
+    with frame(state, "Sliders", case):
+        await _Sliders(state, worker, case).build(text)
+
+
+class _Sliders:
+    """Sliders, the pinned design, and the answers as they come."""
+
+    def __init__(self, state: State, worker: Worker, case: str) -> None:
+        self._state, self._worker, self._case = state, worker, case
+        self._values: dict[str, float] = {}
+        self._moved = asyncio.Event()
+        self._pinned: Answer | None = None
+        self._is_pinned = True
+
+    async def build(self, text: str) -> None:
+        """Open the case while the page is shown already."""
+        self._waiting = plain(
+            "Meshing, factorising, finding modes: once for these bodies, later from the cache ...",
+            "p",
+        ).props("role=status")
+        self._body = ui.element("div")
+        path = str(self._state.folder.path / self._case)
+
+        async def opened() -> None:
+            try:
+                found: Opened = await self._worker.call("open", text, path)
+            except KlackError as error:
+                self._waiting.set_text(str(error))
+                self._waiting.classes("k-error")
+                return
+            self._waiting.delete()
+            with self._body:
+                self._show(found)
+            await self._follow()
+
+        ui.timer(0.05, opened, once=True)
+
+    # ----------------------------------------------------------------------- what is seen
+
+    def _show(self, opened: Opened) -> None:
+        self._opened, self._pinned = opened, opened.first
+        with ui.element("div").classes("k-explore"):
+            with ui.element("aside").classes("k-side k-sheet"):
+                self._show_side(opened)
+            with ui.element("div"):
+                self._show_answers(opened)
+        self._draw(opened.first)
+
+    def _show_side(self, opened: Opened) -> None:
+        moving = [slider for slider in opened.sliders if not slider.needs_mesh]
+        fixed = [slider for slider in opened.sliders if slider.needs_mesh]
+        self._rows: dict[str, tuple[ui.element, TextElement]] = {}
+        with ui.element("div").classes("k-pad k-tools").style("justify-content:flex-start"):
+            button("Pin this", self._pin)
+            button("Back to the case", self._reset)
+        for slider in moving[:_AT_FIRST]:
+            self._show_slider(slider)
+        if len(moving) > _AT_FIRST:
+            with ui.element("details"):
+                plain(f"{len(moving) - _AT_FIRST} more", "summary").classes("k-pad")
+                for slider in moving[_AT_FIRST:]:
+                    self._show_slider(slider)
+        if fixed:
+            with ui.element("details"):
+                plain(f"{len(fixed)} that need a new mesh or new laws", "summary").classes("k-pad")
+                for slider in fixed:
+                    with ui.element("div").classes("k-field"):
+                        plain(slider.label, "div")
+                        with ui.element("div"):
+                            plain(f"{slider.written} ")
+                            plain("new mesh").classes("k-tag")
+                with ui.element("div").classes("k-pad"):
+                    link("Change them in the case", f"/case?{urlencode({'path': self._case})}")
+        with ui.element("div").classes("k-pad"):
+            button("Edit the case with these values", self._write)
+
+    def _show_slider(self, slider: Slider) -> None:
+        with ui.element("div").classes("k-slider") as row:
+            with ui.element("label") as label:
+                label.props["for"] = f"s-{slider.key}"
+                label.props["title"] = slider.key
+                plain(slider.label)
+                shown = plain(format_si(slider.start, slider.unit), "output")
+            bar = ui.element("input").props("type=range")
+            bar.props["id"] = f"s-{slider.key}"
+            bar.props["min"], bar.props["max"] = slider.low, slider.high
+            bar.props["step"], bar.props[START_VALUE] = slider.step, slider.start
+            self._rows[slider.key] = row, shown
+
+            def move(event: Any) -> None:
+                try:
+                    value = min(max(float(event.args), slider.low), slider.high)
+                except (TypeError, ValueError):
+                    return
+                shown.set_text(format_si(value, slider.unit))
+                row.classes("moved")
+                self._values[slider.key] = value
+                self._moved.set()
+
+            bar.on("input", move, js_handler="(e) => emit(e.target.value)", throttle=0.02)
+
+    def _show_answers(self, opened: Opened) -> None:
+        with ui.element("div").classes("k-head"):
+            self._badge = plain("estimate follows", "span").classes("k-badge").props("role=status")
+            plain(f"{opened.title}: {opened.kind}, {opened.run}").classes("k-soft")
+        self._doubts = plain("", "p").classes("k-error")
+        self._figures = ui.element("div").classes("k-figures")
+        with ui.element("div").classes("k-grid"):
+            unit = opened.first.time_unit
+            self._force = _chart("Contact force", f"force over time in {unit}")
+            self._lift = _chart("Motion", f"lift over time in {unit}")
+            self._bands = _chart("Third octaves of the force", "level of the force in bands")
+            self._spectrogram = _chart("Spectrogram of the click", "level of the sound")
+        with ui.element("section").classes("k-sheet k-pad").style("margin-top:16px"):
+            heading("Hear it")
+            self._sound = ui.element("div").classes("k-sound").style("margin-top:8px")
+            self._scale = plain("", "p").classes("k-note")
+        self._words = plain("", "p").classes("k-note")
+        self._took = plain("", "p").classes("k-note").props("id=k-took")
+        with self._sound:
+            self._players = {
+                name: _player(words)
+                for name, words in (
+                    ("pinned", "Pinned"),
+                    ("now", "Now"),
+                    ("pattern", "Now, as it is driven"),
+                )
+            }
+
+    # ----------------------------------------------------------------------- what is computed
+
+    async def _follow(self) -> None:
+        """Answer the latest position; what takes longer once the sliders rest."""
+        client = self._body.client
+        judged = False
+        while not client._deleted:
+            try:
+                await asyncio.wait_for(self._moved.wait(), _REST)
+            except TimeoutError:
+                if not judged:
+                    judged = True
+                    await self._judge()
+                continue
+            self._moved.clear()
+            judged = False
+            begin = perf_counter()
+            try:
+                answer: Answer = await self._worker.call("move", dict(self._values))
+            except KlackError as error:
+                self._refuse(error)
+                continue
+            with self._body:
+                self._badge.classes(remove="good fair").set_text("estimate follows")
+                self._draw(answer)
+                self._took.set_text(
+                    f"computed in {1e3 * answer.seconds:.0f} ms, drawn after "
+                    f"{1e3 * (perf_counter() - begin):.0f} ms"
+                )
+
+    async def _judge(self) -> None:
+        """Two requests, so that a move waits for one of them at most."""
+        values = dict(self._values)
+        try:
+            found: Judgement = await self._worker.call("judge", values)
+            if values != self._values:
+                return
+            self._show_judgement(found)
+            heard: Hearing | None = await self._worker.call("listen", values)
+        except KlackError:
+            return  # the move has told it
+        if values == self._values and heard is not None:
+            self._show_hearing(heard)
+
+    def _show_judgement(self, found: Judgement) -> None:
+        words = {
+            "good": "estimate: within 1 %",
+            "fair": "estimate: within 5 %, for comparisons",
+            "out": "out of the range of the reduced level",
+            "none": "no error estimate",
+        }
+        self._badge.set_text(words[found.grade])
+        self._badge.classes(remove="good fair out", add=found.grade)
+        self._badge.props["title"] = found.words
+        self._words.set_text(found.words)
+
+    def _show_hearing(self, heard: Hearing) -> None:
+        with self._body:
+            self._spectrogram.update_figure(spectrogram_figure(heard.spectrogram))
+            self._play("pattern", heard.pattern_wav)
+            self._add_number(heard.number, heard.number if self._is_pinned else heard.pinned)
+
+    def _refuse(self, error: KlackError) -> None:
+        with self._body:
+            self._badge.set_text("not possible")
+            self._badge.classes(remove="good fair", add="out")
+            self._doubts.set_text(str(error))
+
+    def _draw(self, answer: Answer) -> None:
+        ghost = self._pinned or answer
+        self._is_pinned = ghost is answer
+        self._doubts.set_text("\n".join(answer.doubts))
+        unit = answer.time_unit
+        self._force.update_figure(
+            curves_figure(answer.force, ghost.force, f"time [{unit}]", "force [N]", _NAMES)
+        )
+        self._lift.update_figure(
+            curves_figure(answer.lift, ghost.lift, f"time [{unit}]", "lift [um]", _NAMES)
+        )
+        self._bands.update_figure(bands_figure(answer, ghost, _NAMES))
+        self._show_numbers(answer, ghost)
+        if answer.wav:
+            self._play("now", answer.wav)
+            self._play("pinned", answer.ghost_wav)
+            self._scale.set_text(f"All clicks to one scale: {answer.scale}.")
+
+    def _show_numbers(self, answer: Answer, ghost: Answer) -> None:
+        then = {number.key: number for number in ghost.numbers}
+        self._figures.clear()
+        with self._figures:
+            for number in answer.numbers:
+                self._add_number(number, then.get(number.key, number))
+
+    def _add_number(self, number: Number, then: Number) -> None:
+        with self._figures, ui.element("div").classes("k-figure"):
+            plain(number.name, "div").classes("k-soft")
+            with ui.element("b"):
+                plain(f"{number_text(number)} ")
+                plain(number.unit, "small")
+            plain(differing(number, then))
+
+    def _play(self, name: str, wav: bytes) -> None:
+        player, save = self._players[name]
+        address = self._state.sounds.add(wav)
+        player.props["src"] = address
+        player.update()
+        save.props["href"] = address
+        save.update()
+
+    # ----------------------------------------------------------------------- what is asked
+
+    async def _pin(self) -> None:
+        try:
+            self._pinned = await self._worker.call("move", dict(self._values), True)
+        except KlackError as error:
+            show_error(error)
+            return
+        assert self._pinned is not None
+        self._draw(self._pinned)
+
+    def _reset(self) -> None:
+        sliders = {slider.key: slider for slider in self._opened.sliders}
+        self._values.clear()
+        for key, (row, shown) in self._rows.items():
+            slider = sliders[key]
+            row.classes(remove="moved")
+            shown.set_text(format_si(slider.start, slider.unit))
+        ui.run_javascript(
+            "document.querySelectorAll('.k-slider input').forEach(e => "
+            "e.value = e.getAttribute('value'))"
+        )
+        self._moved.set()
+
+    async def _write(self) -> None:
+        """Keep the text as the draft of the case, and open the editor."""
+        try:
+            text = await self._worker.call("text_at", dict(self._values))
+            self._state.notes.set_draft(self._case, text)
+        except (KlackError, OSError) as error:
+            show_error(error)
+            return
+        ui.navigate.to(f"/case?{urlencode({'path': self._case})}")
+
+
+def _chart(title: str, label: str) -> ui.plotly:
+    with ui.element("section").classes("k-sheet k-chart"):
+        heading(title)
+        chart = ui.plotly(EMPTY).classes("k-plot")
+        chart.props["role"], chart.props["aria-label"] = "img", label
+    return chart
+
+
+def _player(name: str) -> tuple[ui.element, ui.element]:
+    with ui.element("figure"):
+        plain(name, "figcaption").classes("k-soft")
+        player = ui.element("audio").props("controls preload=none")
+        player.props["aria-label"] = f"click, {name}"
+        save = plain("Save WAV", "a").classes("k-soft").props("download=klack-click.wav")
+    return player, save

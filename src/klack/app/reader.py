@@ -1,0 +1,153 @@
+"""What the pages read of cases and results, in a process of its own."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from klack.acoustics.force_bands import force_bands
+from klack.acoustics.signal_statistics import sound_statistics
+from klack.acoustics.third_octave import ENERGY_REFERENCE
+from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
+from klack.analyses.catalogue import analysis_in
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.noise.body import Transfers
+from klack.analyses.noise.run import click_sound
+from klack.analyses.noise.source import sources_of
+from klack.analyses.stroke.record import StrokeStudy
+from klack.app.answers import Answer, Checked, Curve, Number, ResultCard
+from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
+from klack.app.form import checked_text, exchanged_text
+from klack.errors import InputError, KlackError
+from klack.input.problem import Key
+from klack.signals import TimeSeries
+
+__all__ = ["Reader"]
+
+_MOST_NUMBERS = 5
+
+
+class Reader:
+    """Checks texts, tells cases and results in short, compares two results."""
+
+    def check(self, text: str, path: str) -> Checked:
+        """See :func:`klack.app.form.checked_text`."""
+        return checked_text(text, path)
+
+    def exchange(self, text: str, path: str, place: Key, written: str) -> str:
+        """See :func:`klack.app.form.exchanged_text`."""
+        return exchanged_text(text, path, place, written)
+
+    def card(self, folder: str) -> ResultCard:
+        """A stored result in short.
+
+        Raises
+        ------
+        InputError
+            For a damaged one.
+        """
+        analysis = analysis_in(Path(folder))
+        record = analysis.load(Path(folder))
+        return ResultCard(
+            command=analysis.form.command,
+            title=getattr(record, "title", "") or getattr(record, "case", ""),
+            case=getattr(record, "case", ""),
+            created=str(getattr(record, "created", "")),
+            numbers=_numbers(record)[:_MOST_NUMBERS],
+            doubts=tuple(getattr(record, "warnings", ())),
+            compares=isinstance(record, ImpactStudy | StrokeStudy),
+        )
+
+    def compare(self, first: str, second: str) -> tuple[Answer, Answer]:
+        """Two results of one kind, with their clicks to one full scale."""
+        records = [analysis_in(Path(f)).load(Path(f)) for f in (first, second)]
+        kinds = {type(record) for record in records}
+        if len(kinds) != 1 or not kinds <= {ImpactStudy, StrokeStudy}:
+            raise InputError(
+                "compare",
+                got="results of two kinds",
+                expected="two impacts, or two strokes",
+                hint="choose two of one kind.",
+            )
+        found = [_answer(record) for record in records]
+        pressures = [pressure for _, pressure in found]
+        known = [pressure for pressure in pressures if pressure is not None]
+        scale = full_scale_of(*known) if known else 1.0
+        wavs = [b"" if p is None else wav_bytes(p, full_scale=scale) for p in pressures]
+        answers = [
+            _with_sound(answer, wav, wavs[0], level_statement(scale) if known else "")
+            for (answer, _), wav in zip(found, wavs, strict=True)
+        ]
+        return answers[0], answers[1]
+
+
+def _with_sound(answer: Answer, wav: bytes, ghost: bytes, scale: str) -> Answer:
+    return replace(answer, wav=wav, ghost_wav=ghost, scale=scale)
+
+
+def _numbers(record: Any) -> tuple[Number, ...]:
+    if isinstance(record, ImpactStudy):
+        return impact_numbers(record.levels[record.reference].measures)
+    if isinstance(record, StrokeStudy):
+        return stroke_numbers(record.reference, record.channels)
+    return ()
+
+
+def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | None]:
+    """Curves, numbers and click of the answer of a result."""
+    doubts = list(record.warnings)
+    pressure, bands, levels = None, np.zeros(0), np.zeros(0)
+    try:
+        source = sources_of(record)[0]
+        pressure = click_sound(source, Transfers())
+        found = [force_bands(stop.force) for stop in source.stops]
+        bands = found[0].middle
+        energy = np.sum([band.energy for band in found], axis=0)
+        levels = 10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE)
+    except KlackError as error:
+        doubts.append(f"No sound: {error}")
+        source = None
+    force: tuple[Curve, ...]
+    lift: tuple[Curve, ...]
+    if isinstance(record, ImpactStudy):
+        history = record.levels[record.reference].history
+        force = (Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),)
+        lift = (Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),)
+        unit = "us"
+    else:
+        variant = record.reference
+        force = tuple(
+            Curve.scaled(stop.name, *enveloped(stop.force), 1e3, 1.0)
+            for stop in (source.stops if source is not None else ())
+        )
+        channel = variant.channel(record.channels.lift)
+        lift = (
+            ()
+            if channel is None
+            else (Curve.scaled("lift", *drawn(variant.result.time, channel.values), 1e3, 1e6),)
+        )
+        unit = "ms"
+    level = (
+        ()
+        if pressure is None
+        else (
+            Number(
+                key="level",
+                name="sound exposure level",
+                unit="dB(A)",
+                value=sound_statistics(pressure).exposure_level_A,
+                difference="dB",
+            ),
+        )
+    )
+    answer = Answer(
+        force=force,
+        lift=lift,
+        time_unit=unit,
+        bands=bands,
+        levels=levels,
+        numbers=(*_numbers(record), *level),
+        doubts=tuple(doubts),
+    )
+    return answer, pressure

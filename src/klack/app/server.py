@@ -1,0 +1,184 @@
+"""The server of ``klack app``: pages, sounds and reports of one folder, behind the guard."""
+
+import asyncio
+import socket
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from fastapi import FastAPI, Request
+from fastapi.responses import PlainTextResponse, Response
+from nicegui import app as pages_app
+from nicegui import ui
+
+from klack.app.access import Access, access_for
+from klack.app.folder import OpenFolder
+from klack.app.guard import LARGEST_BODY, Guard
+from klack.app.pages.case_editor import case_editor_page
+from klack.app.pages.comparing import comparing_page
+from klack.app.pages.overview import overview_page
+from klack.app.pages.sliders import sliders_page
+from klack.app.state import State
+from klack.errors import InputError, KlackError
+
+__all__ = ["REPORT_POLICY", "build", "serve"]
+
+REPORT_POLICY = (
+    # a report may come from anywhere: it runs apart from the application and reaches no server
+    "sandbox allow-scripts allow-downloads; default-src 'none'; "
+    "script-src 'unsafe-inline' 'unsafe-eval' blob:; style-src 'unsafe-inline'; "
+    "img-src data: blob:; media-src data: blob:; font-src data:; worker-src blob:; "
+    "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+_REPORTS = {
+    "report.html": "text/html; charset=utf-8",
+    "report.pdf": "application/pdf",
+}
+_LONGEST_QUERY = 1024  # characters of a path
+
+
+def build(state: State, access: Access) -> Guard:
+    """The whole application, as it is served."""
+    outer = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
+    _add_files(outer, state)
+    _add_static(outer)
+    _add_pages(state)
+    ui.add_head_html(
+        '<link rel="stylesheet" href="/static/klack.css"><script src="/static/klack.js"></script>',
+        shared=True,
+    )
+    pages_app.on_startup(state.start)
+    pages_app.on_shutdown(state.close)
+    ui.run_with(
+        outer,
+        title="klack",
+        favicon=_ICON,
+        dark=None,
+        tailwind=False,
+        language="en-US",
+        reconnect_timeout=8.0,
+        show_welcome_message=False,
+    )
+    return Guard(outer, access)
+
+
+def serve(
+    folder: Path,
+    *,
+    host: str,
+    port: int,
+    password: str | None,
+    ready: Callable[[Access], None],
+) -> None:
+    """Serve a folder until the process is stopped.
+
+    Parameters
+    ----------
+    folder : Path
+    host : str
+    port : int
+        0 takes a free one.
+    password : str or None
+        Needed where the host is not this machine.
+    ready : callable
+        Called with the access once the port is ours.
+
+    Raises
+    ------
+    InputError
+        For a folder that is none, a host without a password, a port that is taken.
+    """
+    access_for(host, port, password)  # refused before a port is opened
+    state = State(OpenFolder(folder))
+    with _bound(host, port) as bound:
+        access = access_for(host, bound.getsockname()[1], password)
+        config = uvicorn.Config(
+            build(state, access),
+            log_level="warning",
+            ws_max_size=LARGEST_BODY,
+            server_header=False,
+            timeout_graceful_shutdown=2,
+        )
+        ready(access)
+        uvicorn.Server(config).run(sockets=[bound])
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    try:
+        family, kind, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+        bound = socket.socket(family, kind)
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        bound.bind(address)
+        bound.listen()  # who opens the address before the server is ready waits for it
+    except (OSError, OverflowError) as error:
+        raise InputError(
+            f"--host {host} --port {port}",
+            got=f"an error: {error}",
+            expected="an address of this machine with a free port",
+            hint="leave --port out: a free one is taken.",
+        ) from None
+    return bound
+
+
+def _add_pages(state: State) -> None:
+    for path, page in (
+        ("/", overview_page),
+        ("/case", case_editor_page),
+        ("/sliders", sliders_page),
+        ("/compare", comparing_page),
+    ):
+        _add_page(state, path, page)
+
+
+def _add_page(state: State, path: str, page: Callable[[State, dict[str, str]], Any]) -> None:
+    @ui.page(path, response_timeout=30.0)
+    async def shown(request: Request) -> None:
+        given = {key: value[:_LONGEST_QUERY] for key, value in request.query_params.items()}
+        await page(state, given)
+
+
+def _add_static(outer: FastAPI) -> None:
+    """Style and script, read once."""
+    kinds = {"klack.css": "text/css", "klack.js": "text/javascript"}
+    content = {name: files("klack.app").joinpath("static", name).read_bytes() for name in kinds}
+
+    async def static(name: str) -> Response:
+        if name not in content:
+            return PlainTextResponse("no such file\n", 404)
+        return Response(content[name], media_type=kinds[name])
+
+    outer.add_api_route("/static/{name}", static, response_model=None)
+
+
+def _add_files(outer: FastAPI, state: State) -> None:
+    """Reports of the folder, and sounds from memory."""
+
+    async def report(path: str = "") -> Response:
+        place = path[:_LONGEST_QUERY]
+        kind = _REPORTS.get(place.rpartition("/")[2])
+        if kind is None:
+            return PlainTextResponse("no report\n", 404)
+        try:
+            content = await asyncio.to_thread(state.folder.read, place)
+        except KlackError as error:
+            return PlainTextResponse(f"{error}\n", 404)
+        headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
+        return Response(content, media_type=kind, headers=headers)
+
+    async def sound(name: str) -> Response:
+        wav = state.sounds.get(name.removesuffix(".wav"))
+        if wav is None:
+            return PlainTextResponse("this sound is not kept any more\n", 404)
+        return Response(wav, media_type="audio/wav", headers={"cache-control": "no-store"})
+
+    outer.add_api_route("/report", report, response_model=None)
+    outer.add_api_route("/sound/{name}", sound, response_model=None)
+
+
+_ICON = (
+    '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 32 32"><rect width="32" height="32" '
+    'rx="7" fill="#0b62a8"/><path d="M4 20h6l3-13 4 19 3-10 2 4h6" fill="none" stroke="#fff" '
+    'stroke-width="2.6" stroke-linejoin="round" stroke-linecap="round"/></svg>'
+)

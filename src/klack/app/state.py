@@ -1,0 +1,161 @@
+"""What all pages share: the folder, its runs, the reading process, sounds that were made."""
+
+import json
+import secrets
+from collections import OrderedDict
+from contextlib import suppress
+from dataclasses import dataclass, field
+from hashlib import sha256
+from typing import Any
+
+from klack.app.answers import ResultCard
+from klack.app.folder import OpenFolder
+from klack.app.jobs import Jobs
+from klack.app.worker import Worker
+from klack.errors import InputError
+from klack.whole_file import whole_file
+
+__all__ = ["Notes", "Sounds", "State"]
+
+_EXPLORER, _READER = "klack.app.explorer:Explorer", "klack.app.reader:Reader"
+_MOST_EXPLORERS = 3
+_LONGEST_NOTE = 20_000  # characters
+
+
+@dataclass
+class Sounds:
+    """The latest sounds in memory, by names that cannot be guessed.
+
+    Parameters
+    ----------
+    most : int
+        Kept; older ones are forgotten.
+    """
+
+    most: int = 200
+    _kept: "OrderedDict[str, bytes]" = field(default_factory=OrderedDict)
+
+    def add(self, wav: bytes) -> str:
+        """Keep a sound; return its address."""
+        name = secrets.token_urlsafe(16)
+        self._kept[name] = wav
+        while len(self._kept) > self.most:
+            self._kept.popitem(last=False)
+        return f"/sound/{name}.wav"
+
+    def get(self, name: str) -> bytes | None:
+        """A sound, if it is still kept."""
+        return self._kept.get(name)
+
+
+class Notes:
+    """Notes on cases and results, and texts that are not saved yet; all in ``.klack-app``.
+
+    Parameters
+    ----------
+    folder : OpenFolder
+    """
+
+    def __init__(self, folder: OpenFolder) -> None:
+        self._home = folder.path / ".klack-app"
+
+    def note(self, of: str) -> str:
+        """Note on a case or result."""
+        return str(self._read("notes.json").get(of, ""))
+
+    def set_note(self, of: str, text: str) -> None:
+        """Keep a note; an empty one is removed."""
+        if len(text) > _LONGEST_NOTE:
+            raise InputError(
+                "note",
+                got=f"{len(text)} characters",
+                expected=f"at most {_LONGEST_NOTE}",
+                hint="write a file.",
+            )
+        self._change("notes.json", of, text)
+
+    def draft(self, of: str) -> str | None:
+        """Text of a case that was not saved."""
+        found = self._read(self._draft_name(of)).get(of)
+        return found if isinstance(found, str) else None
+
+    def set_draft(self, of: str, text: str | None) -> None:
+        """Keep a text that is not saved yet; None once it is."""
+        self._change(self._draft_name(of), of, text or "")
+
+    @staticmethod
+    def _draft_name(of: str) -> str:
+        return f"draft-{sha256(of.encode()).hexdigest()[:16]}.json"
+
+    def _change(self, name: str, of: str, text: str) -> None:
+        kept = self._read(name)
+        kept.pop(of, None)
+        if text:
+            kept[of] = text
+        file = self._home / name
+        if not kept:
+            file.unlink(missing_ok=True)
+            return
+        with whole_file(file) as new:
+            new.write_text(json.dumps(kept), encoding="utf-8")
+
+    def _read(self, name: str) -> dict[str, Any]:
+        with suppress(OSError, ValueError):
+            found = json.loads((self._home / name).read_text(encoding="utf-8"))
+            if isinstance(found, dict):
+                return found
+        return {}
+
+
+class State:
+    """Of one server.
+
+    Parameters
+    ----------
+    folder : OpenFolder
+    """
+
+    def __init__(self, folder: OpenFolder) -> None:
+        self.folder, self.jobs, self.notes = folder, Jobs(folder), Notes(folder)
+        self.sounds, self.reader = Sounds(), Worker(_READER)
+        self.cards: dict[str, tuple[str, ResultCard]] = {}
+        self._spare = Worker(_EXPLORER)
+        self._explorers: list[Worker] = []
+
+    def start(self) -> None:
+        """Start the reading process ahead."""
+        self.reader.start()
+
+    def start_spare(self) -> None:
+        """Start the process of the next slider page ahead: its imports take seconds."""
+        self._spare.start()
+
+    def explorer(self) -> Worker:
+        """A process for a slider page, to be given back.
+
+        Raises
+        ------
+        InputError
+            If too many pages have one.
+        """
+        if len(self._explorers) >= _MOST_EXPLORERS:
+            raise InputError(
+                "sliders",
+                got=f"{len(self._explorers)} open slider pages",
+                expected=f"at most {_MOST_EXPLORERS}, each holds its bodies in memory",
+                hint="close one of them.",
+            )
+        found, self._spare = self._spare, Worker(_EXPLORER)
+        self._explorers.append(found)
+        return found
+
+    def give_back(self, explorer: Worker) -> None:
+        """End the process of a page that was closed."""
+        if explorer in self._explorers:
+            self._explorers.remove(explorer)
+            explorer.close()
+
+    def close(self) -> None:
+        """End all processes but those of runs."""
+        for worker in (self.reader, self._spare, *self._explorers):
+            worker.close()

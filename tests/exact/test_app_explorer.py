@@ -1,0 +1,169 @@
+"""What sliders show is the run of the case with these values; forms write what is typed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from klack.analyses.impact.run import run_impact
+from klack.app.explorer import Explorer
+from klack.app.form import checked_text, exchanged_text
+from klack.app.sliders import sliders_of
+from klack.case.case_tree import tree_of
+from klack.case.reader import read_case
+from klack.case.shipped import find_case
+from klack.errors import InputError
+
+PATH = find_case("demo-valve-axisymmetric")
+TEXT = PATH.read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def explorer() -> Explorer:
+    found = Explorer()
+    found.open(TEXT, str(PATH))
+    return found
+
+
+def test_a_move_is_the_impact_of_the_case_with_these_values(explorer):
+    values = {"motion.speed": 0.45, "motion.force": 20.0, "bodies.needle.damping.modal": 0.01}
+    answer = explorer.move(values)
+    text = explorer.text_at(values)
+    assert "speed: 450 mm/s" in text
+    assert "# meet the air" in text  # comments stay
+
+    study = run_impact(read_case(text, PATH), levels=("reduced",), certify=False)
+    measures = study.levels["reduced"].measures
+    numbers = {number.key: number.value for number in answer.numbers}
+
+    # the same bodies and steps; solutions of sparse matrices differ in their last digits
+    assert numbers["peak"] == pytest.approx(measures.peak_force, rel=1e-9)
+    assert numbers["contact"] == pytest.approx(1e6 * measures.contact_time, rel=1e-9)
+    assert numbers["restitution"] == pytest.approx(measures.restitution, rel=1e-9)
+
+
+def test_the_click_is_louder_by_the_square_of_the_speed(explorer):
+    """An impact that is nearly linear: twice the speed, twice the force, 6.02 dB."""
+    slow, fast = (
+        {number.key: number.value for number in explorer.move({"motion.speed": speed}).numbers}
+        for speed in (0.2, 0.4)
+    )
+
+    # the ring of contact grows with the force, which makes the impact a little shorter
+    assert fast["level"] - slow["level"] == pytest.approx(20.0 * np.log10(2.0), abs=0.1)
+
+
+def test_motion_and_bands_belong_to_the_force(explorer):
+    answer = explorer.move({})
+    (lift,), (force,) = answer.lift, answer.force
+
+    assert lift.y[0] == 0.0
+    slope = (lift.y[1] - lift.y[0]) / (lift.x[1] - lift.x[0])  # [um/us] is [m/s]
+    assert slope == pytest.approx(-0.3, rel=1e-2)
+    turning = lift.x[np.argmin(lift.y)]
+    assert turning == pytest.approx(force.x[np.argmax(force.y)], abs=2.0)
+    assert answer.levels.shape == answer.bands.shape
+
+
+def test_both_clicks_have_one_scale(explorer):
+    from io import BytesIO
+
+    import soundfile
+
+    answer = explorer.move({"motion.speed": 0.6})
+    now, pinned = (soundfile.read(BytesIO(wav))[0] for wav in (answer.wav, answer.ghost_wav))
+
+    ratio = np.abs(now).max() / np.abs(pinned).max()
+    assert ratio == pytest.approx(2.0, rel=0.02)  # 0.6 m/s against 0.3 m/s
+    assert np.abs(now).max() < 1.0
+
+
+def test_values_that_cannot_be_are_refused_and_the_page_goes_on(explorer):
+    with pytest.raises(InputError):
+        explorer.move({"bodies.needle.damping.modal": 1.5})
+    with pytest.raises(InputError, match="does not move"):
+        explorer.move({"bodies.needle.mesh.size": 1e-3})
+    with pytest.raises(InputError, match="does not move"):
+        explorer.move({"run.duration": 1e-3})
+    with pytest.raises(InputError):
+        explorer.move({"motion.speed": float("nan")})
+    assert explorer.move({}).numbers
+
+
+def test_the_estimate_is_that_of_the_impact(explorer):
+    found = explorer.judge({})
+
+    assert found.grade == "good"
+    assert "peak force" in found.words
+
+
+def test_hearing_follows(explorer):
+    heard = explorer.listen({})
+    louder = explorer.listen({"motion.speed": 0.6})
+
+    assert heard is not None
+    assert louder is not None
+    assert heard.pinned == heard.number == louder.pinned
+    assert louder.number.value > 1.2 * heard.number.value
+    assert heard.number.value > 1.0  # sone: it can be heard
+    time, frequency, level = heard.spectrogram
+    assert level.shape == (frequency.size, time.size)
+    assert frequency[-1] == pytest.approx(24.0)
+
+
+def test_sliders_mark_what_needs_new_bodies():
+    tree = tree_of(TEXT, PATH)
+    found = {slider.key: slider for slider in sliders_of(tree.any_case(), tree)}
+
+    assert not found["motion.speed"].needs_mesh
+    assert not found["bodies.housing.damping.modal"].needs_mesh
+    assert found["materials.steel.young"].needs_mesh
+    assert found["bodies.needle.mesh.size"].needs_mesh
+    assert "lumped.stiffness" not in found  # of another level
+    speed = found["motion.speed"]
+    assert speed.low < speed.start == 0.3 < speed.high
+
+
+def test_the_form_has_units_limits_and_words_of_the_schema():
+    checked = checked_text(TEXT, str(PATH))
+    fields = {item.key: item for item in checked.fields}
+
+    assert (checked.kind, checked.error) == ("impact", "")
+    speed = fields["motion.speed"]
+    assert (speed.written, speed.kind, speed.limits) == ("0.3 m/s", "a speed", "> 0")
+    assert "consistent" in fields["reduction.correction"].choices
+    assert fields["motion.force"].written == ""  # could be there
+    assert not [key for key in fields if "edges" in key]
+
+
+def test_a_form_changes_one_value_and_nothing_else():
+    text = exchanged_text(TEXT, str(PATH), ("motion", "speed"), "0.5 m/s")
+
+    changed = [
+        (old, new)
+        for old, new in zip(TEXT.splitlines(), text.splitlines(), strict=True)
+        if old != new
+    ]
+    assert changed == [("motion: {speed: 0.3 m/s}", 'motion: {speed: "0.5 m/s"}')]
+    assert read_case(text, PATH).motion.speed == 0.5
+
+
+@pytest.mark.parametrize(
+    "typed", ['"; x: 1', "{a: 1}", "!!python/object:os.system x", "&a b", "x\ny: 1"]
+)
+def test_what_is_typed_is_one_value_whatever_it_looks_like(typed):
+    text = exchanged_text(TEXT, str(PATH), ("title",), typed)
+
+    assert tree_of(text, PATH).data["title"] == typed.strip()
+    assert set(tree_of(text, PATH).data) == set(tree_of(TEXT, PATH).data)
+
+
+def test_the_checker_names_the_line():
+    broken = TEXT.replace("speed: 0.3 m/s", "speed: 0.3 mm")
+    found = checked_text(broken, str(PATH))
+    line = broken[: broken.index("speed: 0.3 mm")].count("\n") + 1
+
+    assert "motion.speed" in found.error
+    assert found.line == line
+    assert found.fields == ()
+    assert Path(str(PATH)).read_text("utf-8") == TEXT

@@ -1,0 +1,213 @@
+"""The pages in a browser: they answer, stay within the window, and load nothing from elsewhere."""
+
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from klack.case.shipped import find_case
+
+sync_api = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("nicegui")
+CHROMIUM = shutil.which("chromium")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here"),
+]
+
+CASE = "valve/case.yaml"
+WIDTHS = (400, 1000, 1600)
+_LONG = 60_000  # [ms]: a loaded machine meshes, imports and compiles
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("app")
+    (place / "valve").mkdir()
+    text = find_case("demo-valve-axisymmetric").read_text("utf-8")
+    (place / CASE).write_text(text, "utf-8")
+    return place
+
+
+class Server:
+    """``klack app`` on a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "klack", "app", str(folder), "--no-open"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        self.process.stdout.readline()
+        self.address = self.process.stdout.readline().strip()
+
+    @property
+    def base(self) -> str:
+        return self.address.partition("/?")[0]
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[Server]:
+    found = Server(folder)
+    yield found
+    found.process.send_signal(signal.SIGINT)
+    found.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def page(browser: Any, server: Server) -> Iterator[Any]:
+    """A page with the cookie; at its end nothing was complained of or asked of other hosts."""
+    context = browser.new_context(viewport={"width": 1000, "height": 900})
+    found = context.new_page()
+    found.set_default_timeout(_LONG)
+    complaints: list[str] = []
+    found.on(
+        "console",
+        lambda said: complaints.append(said.text) if said.type in ("error", "warning") else None,
+    )
+    found.on("pageerror", lambda error: complaints.append(str(error)))
+    found.on("dialog", lambda dialog: complaints.append(f"dialog: {dialog.message}"))
+    found.on(
+        "request",
+        lambda request: (
+            complaints.append(f"asked {request.url}")
+            if not request.url.startswith((server.base, "data:", "blob:", "ws://127.0.0.1"))
+            else None
+        ),
+    )
+    found.goto(server.address)
+    found.wait_for_selector("#k-body")
+    yield found
+    context.close()
+    assert complaints == []
+
+
+def require_within(page: Any) -> None:
+    """No page is wider than its window, on a telephone or a large screen."""
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(300)
+        over = page.evaluate(
+            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        )
+        assert over <= 0, f"{over} px wider than {width} px"
+
+
+def test_cases_are_listed_and_copied(page, folder):
+    page.wait_for_selector("text=Demo valve, axisymmetric")
+    assert "token" not in page.url
+    page.get_by_role("button", name="Duplicate").first.click()
+    page.get_by_role("button", name="Make").click()
+    page.wait_for_selector("text=valve/case-2.yaml")
+    assert (folder / "valve" / "case-2.yaml").read_text() == (folder / CASE).read_text()
+
+    page.get_by_role("button", name="Duplicate").first.click()
+    page.get_by_label("Name").fill("../outside")
+    page.get_by_role("button", name="Make").click()
+    page.wait_for_selector("text=letters, digits")
+    page.get_by_role("button", name="Cancel").click()
+    (folder / "valve" / "case-2.yaml").unlink()
+    page.wait_for_timeout(500)
+    require_within(page)
+
+
+def test_form_and_text_follow_each_other_and_survive(page, server, folder):
+    page.goto(f"{server.base}/case?path={CASE}")
+    page.wait_for_selector("text=valid impact, saved")
+    area = page.get_by_label("case file, YAML")
+
+    page.get_by_label("speed", exact=True).fill("0.4 m/s")
+    page.get_by_label("speed", exact=True).press("Enter")
+    page.wait_for_function("document.querySelector('textarea').value.includes('0.4 m/s')")
+    page.wait_for_selector("text=valid impact, not saved")
+    page.goto(f"{server.base}/")  # closed without saving
+    page.goto(f"{server.base}/case?path={CASE}")
+    page.wait_for_selector("text=valid impact, not saved")
+    assert "0.4 m/s" in area.input_value()
+    assert "0.4 m/s" not in (folder / CASE).read_text()
+
+    area.fill(area.input_value().replace("0.4 m/s", "0.4 mm"))
+    page.wait_for_selector("text=not valid, not saved")
+    assert "0.4 mm" in area.input_value()  # drawing does not put the former text back
+    page.wait_for_selector("text=motion.speed")
+    area.fill(area.input_value().replace("0.4 mm", "0.35 m/s"))
+    page.wait_for_function("document.getElementById('f-motion.speed').value == '0.35 m/s'")
+    page.keyboard.press("Control+s")
+    page.wait_for_selector("text=valid impact, saved")
+    assert "0.35 m/s" in (folder / CASE).read_text()
+    require_within(page)
+
+
+def test_sliders_answer_by_keyboard(page, server):
+    page.goto(f"{server.base}/sliders?path={CASE}")
+    speed = page.get_by_label("speed")
+    speed.wait_for()
+    page.wait_for_selector(".k-badge.good")
+    force = page.locator(".k-figure").first
+    before = force.inner_text()
+
+    speed.focus()
+    for _ in range(5):
+        page.keyboard.press("ArrowRight")
+    page.wait_for_function(
+        "was => document.querySelector('.k-figure').innerText != was", arg=before
+    )
+    assert float(speed.input_value()) > 0.3 * 1.01  # drawing does not put it back
+    assert "+" in force.inner_text()
+    assert "%" in force.inner_text()
+    page.wait_for_selector(".k-badge.good")
+    wav = page.evaluate(
+        "fetch(document.querySelectorAll('audio')[1].src).then(r => r.arrayBuffer())"
+        ".then(b => b.byteLength)"
+    )
+    assert wav > 10_000
+    page.get_by_role("button", name="Back to the case").click()
+    page.wait_for_function("document.querySelector('.k-figure').innerText.includes('0.00 %')")
+    require_within(page)
+
+
+def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, folder, browser):
+    page.goto(f"{server.base}/")
+    text = (folder / CASE).read_text("utf-8")
+    (folder / "valve" / "one.yaml").write_text(
+        text.replace("[lumped, reduced-none, reduced-attachment, reduced, full]", "[reduced]"),
+        "utf-8",
+    )
+    other = Server(folder)
+    context = browser.new_context()
+    first = context.new_page()
+    first.set_default_timeout(_LONG)
+    first.goto(other.address)
+    row = first.locator(".k-row", has_text="valve/one.yaml").last
+    row.get_by_role("button", name="Run").click()
+    first.wait_for_selector("text=klack impact valve/one.yaml")
+    context.close()
+    other.process.kill()
+    other.process.wait(20)
+
+    page.goto(f"{server.base}/")
+    page.wait_for_selector("text=done, ")
+    shutil.copytree(folder / "klack-results" / "one", folder / "klack-results" / "two")
+    page.reload()
+    page.locator(".k-row", has_text="klack-results/one").get_by_role("checkbox").wait_for()
+    for name in ("one", "two"):
+        page.locator(".k-row", has_text=f"klack-results/{name}").get_by_role("checkbox").check()
+    page.get_by_role("link", name="Compare", exact=True).click()
+    page.wait_for_selector("text=sound exposure level")
+    assert page.locator("tbody tr").first.locator("td").last.inner_text() == "+0.00 %"
+    require_within(page)
+    assert (folder / "klack-results" / "one" / "report.html").is_file()
