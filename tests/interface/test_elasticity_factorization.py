@@ -6,10 +6,12 @@ times round-off); bad matrices are refused with a hint.
 
 import gc
 import sys
+from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csr_array, diags_array, eye_array, kron
+from threadpoolctl import threadpool_limits
 
 from klack.elasticity.body import elastic_body
 from klack.elasticity.factorization import available_backends, factorize
@@ -35,6 +37,26 @@ def system(block):
     B = np.random.default_rng(1).standard_normal((A.shape[0], 5))
     with factorize(A, backend="superlu") as factor:
         return A, B, factor.solve(B)
+
+
+@pytest.mark.skipif("pardiso" not in BACKENDS, reason="needs MKL")
+@pytest.mark.parametrize("limited", ["solve", "factor"])
+def test_factor_and_solve_may_have_different_limits_of_threads(limited):
+    # 64 000 unknowns: smaller factors have one level, and one layout for any number of threads
+    line, one = diags_array([-1.0, 2.0, -1.0], offsets=(-1, 0, 1), shape=(40, 40)), eye_array(40)
+    A = csr_array(
+        kron(kron(line, one), one) + kron(kron(one, line), one) + kron(kron(one, one), line)
+    )
+    b = np.random.default_rng(2).standard_normal(A.shape[0])
+    before = threadpool_limits(1) if limited == "factor" else nullcontext()
+    after = threadpool_limits(1) if limited == "solve" else nullcontext()
+
+    with before:
+        factor = factorize(A, backend="pardiso")
+    with factor, after:
+        x = factor.solve(b)
+
+    assert np.linalg.norm(A @ x - b) < 1e-12 * np.linalg.norm(b)
 
 
 def test_superlu_is_always_there_and_pardiso_comes_first():

@@ -49,7 +49,9 @@ class PardisoFactorization(Closing):
     ) -> None:
         self._mkl = _library()
         self._kind = _SPD if definite else _INDEFINITE
-        self._threads = threads
+        # a factor of two levels is laid out for its threads: a solve with another number of them is
+        # wrong, without an error
+        self._threads = int(self._mkl.MKL_Get_Max_Threads()) if threads is None else threads
         self._type = np.float32 if precision == "single" else np.float64
         self._handle = np.zeros(64, dtype=np.int64)
         self._settings = _settings(precision, definite)
@@ -125,9 +127,7 @@ class PardisoFactorization(Closing):
         self._values = self._indices = self._start = np.empty(0)
 
     def _call(self, phase: int, B: NDArray[Any], X: NDArray[Any], columns: int) -> int:
-        before = None
-        if self._threads is not None:
-            before = self._mkl.MKL_Set_Num_Threads_Local(self._threads)
+        before = self._mkl.MKL_Set_Num_Threads_Local(self._threads)
         try:
             return _pardiso(
                 self._mkl,
@@ -140,8 +140,7 @@ class PardisoFactorization(Closing):
                 (B, X, columns),
             )
         finally:
-            if before is not None:
-                self._mkl.MKL_Set_Num_Threads_Local(before)
+            self._mkl.MKL_Set_Num_Threads_Local(before)
 
 
 @cache  # the search of pypardiso takes half a second
