@@ -1,6 +1,7 @@
 """The fluid of a network at one temperature: liquid, entrained gas and vapour as one density."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -100,6 +101,29 @@ class Fluid:
         """Pressures [Pa] where the second derivative of the density jumps, increasing."""
         places = {*self.liquid.kinks, *self.gas.kinks, *self.vapour.kinks}
         return tuple(sorted(places))
+
+    @property
+    def mixture_mass(self) -> float:
+        """Mass [kg] of a cubic metre of mixture at the reference pressure, with all gas free."""
+        reference = self.gas.reference_pressure
+        liquid = (1.0 - self.gas.fraction) * float(self.liquid.density(reference))
+        return liquid + self.gas.mass
+
+    @property
+    def has_release_times(self) -> bool:
+        """Whether gas leaves and enters the liquid with time constants."""
+        return self.gas.release_time is not None and self.gas.fraction > 0.0
+
+    def all_free(self) -> Self:
+        """Return this fluid with all of its gas free at every pressure."""
+        gas = replace(
+            self.gas,
+            release_pressure=None,
+            saturation_pressure=None,
+            release_time=None,
+            absorption_time=None,
+        )
+        return replace(self, gas=gas)
 
     def density(self, pressure: ArrayLike) -> Values:
         """Density [kg/m^3] at the absolute pressure [Pa]."""

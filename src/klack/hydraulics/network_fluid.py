@@ -20,7 +20,9 @@ def network_fluid(rows: Rows) -> NetworkFluid:
             expected="a fluid, since this component contains it",
             hint="name one in the network section, e.g. fluid: {name: n-heptane}.",
         )
-    return rows.fluid
+    fluid = rows.fluid
+    # energy in flows counts with all gas free: see klack.hydraulics.gas_release
+    return fluid.all_free() if isinstance(fluid, Fluid) and fluid.has_release_times else fluid
 
 
 def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:
