@@ -142,14 +142,14 @@ def _one_chamber() -> list[Check]:
 
 
 def _two_chambers() -> list[Check]:
-    hole = {"area": HOLE, "critical_flow_number": 1.0, "cavitation": None, "discharge": 0.7}
+    hole = Orifice(area=HOLE, critical_flow_number=1.0, cavitation=None, discharge=0.7)
     result = _run(
         {
             "room": Chamber(volume=VOLUME, pressure=10 * BAR),
             "next": Chamber(volume=0.3 * VOLUME, pressure=10 * BAR),
             "supply": PressureSource(pressure=10 * BAR),
-            "inner": Orifice(**hole),
-            "outer": Orifice(**hole),
+            "inner": hole,
+            "outer": hole,
         },
         [
             ["room.fluid", "face.fluid", "inner.a"],
@@ -235,10 +235,10 @@ def _limits() -> list[Check]:
     ) -> Vector:
         return _room(_oil(times, band), start).channels["room pressure"].values
 
-    never, frozen = (
-        pressures(*given, 1.5 * BAR) for given in (((1e12, 1e12), (LOW, HIGH)), (None, None))
-    )
-    once, settled = (pressures(times, (LOW, HIGH), 10 * BAR) for times in ((1e-12, 1e-12), None))
+    never = pressures((1e12, 1e12), (LOW, HIGH), 1.5 * BAR)
+    frozen = pressures(None, None, 1.5 * BAR)
+    once = pressures((1e-12, 1e-12), (LOW, HIGH), 10 * BAR)
+    settled = pressures(None, (LOW, HIGH), 10 * BAR)
     return [
         _check(
             "release and absorption that take for ever: error of the pressure, of it [-]",
