@@ -23,7 +23,9 @@ from klack.hydraulics.pump import Pump
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
+from klack.simulation.linear_network import linear_network
 from klack.simulation.network_run import simulate_network
+from klack.simulation.operating_point import compiled_at, operating_point
 
 BAR, AMBIENT = 1e5, 101325.0
 NEEDLE = {"needle": RigidMass(mass=3e-3, speed=0.5), "spring": Spring(stiffness=2e4, preload=0.0)}
@@ -164,6 +166,28 @@ def test_times_that_mean_nothing_are_refused():
             EntrainedGas(**band, **given)
     with pytest.raises(InputError, match="with release_pressure"):
         EntrainedGas(release_time=1e-3, absorption_time=1.0)
+
+
+def test_stiffness_is_that_of_gas_that_has_no_time_to_dissolve():
+    slow, at_once = oil(1e-3, 5.0), oil(None, None)
+    p, h = 5 * BAR, 1.0
+    law, table = release_numbers(slow, AMBIENT), fluid_table(slow.all_free(), AMBIENT)
+
+    rho = [mixture_at(table, law, p + s * h, 0.5, 0.0, 0.0, 0)[0] for s in (-1, 0, 1)]
+
+    stiffness = rho[1] * 2 * h / (rho[2] - rho[0])
+    assert slow.bulk_modulus(p) == pytest.approx(stiffness, rel=1e-6)
+    assert slow.bulk_modulus(p) > 2.0 * at_once.bulk_modulus(p)
+    assert slow.sound_speed(p) == pytest.approx(np.sqrt(stiffness / rho[1]), rel=1e-6)
+
+
+def test_linearisation_says_that_it_needs_a_barotropic_fluid():
+    parts = NEEDLE | {"room": Chamber(volume=50e-9), "hole": Orifice(diameter=1e-3)}
+    joints = [["needle.body", "spring.end"], ["room.fluid", "hole.a"], ["hole.b", "ambient"]]
+    rows = Network(parts, joints, fluid=oil(1e-3, 5.0)).at_start().rows()
+    network, _ = compiled_at(rows, operating_point(rows))
+    with pytest.raises(InputError, match="linearisation: fluid with release_time"):
+        linear_network(network, 20e-9)
 
 
 def test_the_share_in_equilibrium_is_the_smooth_step():

@@ -130,14 +130,25 @@ class Fluid:
         return 1.0 / self.specific_volume(pressure)[0]
 
     def bulk_modulus(self, pressure: ArrayLike) -> Values:
-        """``rho dp/drho`` [Pa] at the absolute pressure [Pa]."""
-        v, slope = self.specific_volume(pressure)
+        """``rho dp/drho`` [Pa] at the absolute pressure [Pa].
+
+        With time constants of the gas that of changes in which none dissolves.
+        """
+        v, slope = self._fast_volume(pressure)
         return -v / slope
 
     def sound_speed(self, pressure: ArrayLike) -> Values:
         """Speed of pressure waves [m/s] in an unbounded fluid at the absolute pressure [Pa]."""
-        v, slope = self.specific_volume(pressure)
+        v, slope = self._fast_volume(pressure)
         return v / np.sqrt(-slope)
+
+    def _fast_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+        """As :meth:`specific_volume`, its slope without gas that takes time to dissolve."""
+        v, slope = self.specific_volume(pressure)
+        if self.has_release_times:
+            p = np.maximum(np.asarray(pressure, dtype=float), LOWEST_PRESSURE)
+            slope = slope - self.gas.dissolving(p) / self.mixture_mass
+        return v, slope
 
     def viscosity(self, pressure: ArrayLike) -> Values:
         """Dynamic viscosity [Pa s] of the liquid at the absolute pressure [Pa]."""

@@ -125,6 +125,12 @@ class EntrainedGas:
         share, slope = self._free_share(p)
         return share * all_free, all_free * (slope - share / (self.exponent * p))
 
+    def dissolving(self, pressure: ArrayLike) -> Values:
+        """Part of the slope of :meth:`volume` that is gas which dissolves [1/Pa]."""
+        p = np.asarray(pressure, dtype=float)
+        all_free = self.fraction * (self.reference_pressure / p) ** (1.0 / self.exponent)
+        return np.asarray(all_free * self._free_share(p)[1])
+
     def _free_share(self, p: Values) -> tuple[Values, Values]:
         low, high = self.release_pressure, self.saturation_pressure
         if low is None or high is None:

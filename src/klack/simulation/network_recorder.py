@@ -98,7 +98,7 @@ class Recorder:
             *(_Column(f"{port} velocity", "m/s") for port in ports),
             *(_Column(f"{rows.bodies[b].component} velocity", "m/s") for b in free),
             *(_Column(f"{node} pressure", "Pa") for node in nodes),
-            *(_Column(f"{node} free gas", "1") for node in nodes[:slow]),
+            *(_Column(f"{node} free gas", "-") for node in nodes[:slow]),
             *(_Column(name, unit) for _, name, unit in states + branch_states),
             *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
             *(_Column(f"{name} drive force", "N") for name in driven),

@@ -241,14 +241,14 @@ def _limits() -> list[Check]:
     settled = pressures(None, (LOW, HIGH), 10 * BAR)
     return [
         _check(
-            "release and absorption that take for ever: error of the pressure, of it [-]",
+            "release and absorption in 1e12 s: error of the pressure, of it [-]",
             0.0,
             float(np.max(np.abs(never / frozen - 1.0))),
             1e-12,
             "all gas free",
         ),
         _check(
-            "release and absorption at once: error of the pressure, of it [-]",
+            "release and absorption in 1e-12 s: error of the pressure, of it [-]",
             0.0,
             float(np.max(np.abs(once / settled - 1.0))),
             1e-7,
