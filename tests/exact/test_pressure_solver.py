@@ -11,7 +11,7 @@ import pytest
 from numba import njit
 
 from klack.network.step_function import first
-from klack.simulation.network_pressures import solve_mass_balance
+from klack.simulation.mass_balance import solve_mass_balance
 
 
 @njit

@@ -81,6 +81,8 @@ def test_a_table_makes_a_fluid():
         (OWN | {"sound_speed": "1200 m/s"}, "bulk_modulus and sound_speed together"),
         (OWN | {"bulk_modulus": "5 bar"}, "check the unit"),
         (OWN | {"release_pressure": "1 bar"}, "leave both out"),
+        (OWN | {"release_time": "1 ms"}, "one of the two times alone"),
+        (OWN | {"release_time": "1 ms", "absorption_time": "5 s"}, "no release_pressure"),
         (OWN | {"release_pressure": "2 bar", "saturation_pressure": "1 bar"}, "leave both out"),
         (OWN | {"density": 780}, "add a unit"),
         (OWN | {"densty": 780}, "did you mean 'density'?"),

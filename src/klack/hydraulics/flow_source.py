@@ -7,8 +7,8 @@ import numpy as np
 from numba import carray
 from pydantic import Field, model_validator
 
-from klack.hydraulics.fluid_table import fluid_at, fluid_table
-from klack.hydraulics.network_fluid import network_fluid
+from klack.hydraulics.fluid_table import fluid_at
+from klack.hydraulics.network_fluid import energy_table, network_fluid
 from klack.hydraulics.time_table import check_table, step_table, value_at_start
 from klack.input.section import Section
 from klack.network.component import Component
@@ -115,7 +115,7 @@ class FlowSource(Component):
         fluid = network_fluid(rows)
         time, flow = self.history()
         mass_flow = np.array(flow) * float(fluid.density(rows.ambient.pressure))
-        table = fluid_table(fluid, rows.ambient.pressure)
+        table = energy_table(rows)
         numbers = [*time, *mass_flow, *table]
         rows.branch(
             flow_source_step,

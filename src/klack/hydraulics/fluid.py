@@ -1,6 +1,7 @@
 """The fluid of a network at one temperature: liquid, entrained gas and vapour as one density."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -101,19 +102,53 @@ class Fluid:
         places = {*self.liquid.kinks, *self.gas.kinks, *self.vapour.kinks}
         return tuple(sorted(places))
 
+    @property
+    def mixture_mass(self) -> float:
+        """Mass [kg] of a cubic metre of mixture at the reference pressure, with all gas free."""
+        reference = self.gas.reference_pressure
+        liquid = (1.0 - self.gas.fraction) * float(self.liquid.density(reference))
+        return liquid + self.gas.mass
+
+    @property
+    def has_release_times(self) -> bool:
+        """Whether gas leaves and enters the liquid with time constants."""
+        return self.gas.release_time is not None and self.gas.fraction > 0.0
+
+    def all_free(self) -> Self:
+        """Return this fluid with all of its gas free at every pressure."""
+        gas = replace(
+            self.gas,
+            release_pressure=None,
+            saturation_pressure=None,
+            release_time=None,
+            absorption_time=None,
+        )
+        return replace(self, gas=gas)
+
     def density(self, pressure: ArrayLike) -> Values:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         return 1.0 / self.specific_volume(pressure)[0]
 
     def bulk_modulus(self, pressure: ArrayLike) -> Values:
-        """``rho dp/drho`` [Pa] at the absolute pressure [Pa]."""
-        v, slope = self.specific_volume(pressure)
+        """``rho dp/drho`` [Pa] at the absolute pressure [Pa].
+
+        With time constants of the gas that of changes in which none dissolves.
+        """
+        v, slope = self._fast_volume(pressure)
         return -v / slope
 
     def sound_speed(self, pressure: ArrayLike) -> Values:
         """Speed of pressure waves [m/s] in an unbounded fluid at the absolute pressure [Pa]."""
-        v, slope = self.specific_volume(pressure)
+        v, slope = self._fast_volume(pressure)
         return v / np.sqrt(-slope)
+
+    def _fast_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+        """As :meth:`specific_volume`, its slope without gas that takes time to dissolve."""
+        v, slope = self.specific_volume(pressure)
+        if self.has_release_times:
+            p = np.maximum(np.asarray(pressure, dtype=float), LOWEST_PRESSURE)
+            slope = slope - self.gas.dissolving(p) / self.mixture_mass
+        return v, slope
 
     def viscosity(self, pressure: ArrayLike) -> Values:
         """Dynamic viscosity [Pa s] of the liquid at the absolute pressure [Pa]."""

@@ -26,6 +26,7 @@ from klack.units import (
     Pressure,
     Ratio,
     Speed,
+    Time,
 )
 
 __all__ = ["DensityTable", "FluidChoice"]
@@ -149,6 +150,18 @@ class FluidChoice(NamedSection):
     saturation_pressure: Pressure | None = Field(
         default=None, gt=1, description="Above it all gas is dissolved."
     )
+    release_time: Time | None = Field(
+        examples=["1 ms"],
+        default=None,
+        gt=0,
+        description="Time constant of gas that leaves the liquid of chambers; default: at once.",
+    )
+    absorption_time: Time | None = Field(
+        examples=["5 s"],
+        default=None,
+        gt=0,
+        description="Time constant of gas that dissolves; with release_time.",
+    )
     boiling_half_width: Pressure = Field(
         default=2000.0, gt=0, description="Half of the pressure band in which it boils."
     )
@@ -162,6 +175,14 @@ class FluidChoice(NamedSection):
                 got="one of the two alone" if low is None or high is None else "not above it",
                 expected="release_pressure below saturation_pressure, or none of them",
                 hint="leave both out: in strokes of milliseconds the gas stays free.",
+            )
+        times = self.release_time, self.absorption_time
+        if times != (None, None) and (None in times or low is None):
+            raise CaseProblem(
+                ("release_time",) if times[0] is not None else ("absorption_time",),
+                got="one of the two times alone" if None in times else "no release_pressure",
+                expected="release_time, absorption_time, release_pressure, saturation_pressure",
+                hint="add what is missing, or leave both times out.",
             )
         if not any(getattr(self, name) is not None for name in _NUMBERS):
             return self._in_library()
@@ -245,6 +266,8 @@ class FluidChoice(NamedSection):
             gas_exponent=self.gas_exponent,
             release_pressure=self.release_pressure,
             saturation_pressure=self.saturation_pressure,
+            release_time=self.release_time,
+            absorption_time=self.absorption_time,
             boiling_half_width=self.boiling_half_width,
         )
         law = self._law(fluid)

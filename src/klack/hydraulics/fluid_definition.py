@@ -311,6 +311,8 @@ class FluidDefinition:
         gas_exponent: float = 1.4,
         release_pressure: float | None = None,
         saturation_pressure: float | None = None,
+        release_time: float | None = None,
+        absorption_time: float | None = None,
         boiling_half_width: float = 2000.0,
     ) -> Fluid:
         """Fluid at one temperature, with entrained gas.
@@ -320,6 +322,8 @@ class FluidDefinition:
         temperature : float [K]
         gas_fraction, gas_exponent, release_pressure, saturation_pressure
             See :class:`~klack.hydraulics.mixture.EntrainedGas`; the fraction is at one atmosphere.
+        release_time, absorption_time : float [s]
+            Time constants of the gas in chambers, see the same.
         boiling_half_width : float [Pa]
             See :class:`~klack.hydraulics.mixture.Vapour`.
         """
@@ -350,5 +354,7 @@ class FluidDefinition:
                 exponent=gas_exponent,
                 release_pressure=release_pressure,
                 saturation_pressure=saturation_pressure,
+                release_time=release_time,
+                absorption_time=absorption_time,
             ),
         )

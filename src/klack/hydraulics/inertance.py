@@ -8,8 +8,8 @@ from numba import carray
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner
-from klack.hydraulics.fluid_table import fluid_at, fluid_table
-from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
+from klack.hydraulics.fluid_table import fluid_at
+from klack.hydraulics.network_fluid import ambient_viscosity, energy_table, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
@@ -107,7 +107,7 @@ class Inertance(Component):
         """Add one branch that stores kinetic energy."""
         fluid, viscosity = ambient_viscosity(rows)
         density = float(fluid.density(rows.ambient.pressure))
-        table = fluid_table(fluid, rows.ambient.pressure)
+        table = energy_table(rows)
         friction = self.resistance(viscosity) / density**2
         law = viscosity_law(rows)
         numbers = [self.inertia(density), friction, *(law.numbers if law is not None else ())]

@@ -50,6 +50,10 @@ class EntrainedGas:
     reference_pressure : float [Pa]
     release_pressure, saturation_pressure : float [Pa]
         Both or none.
+    release_time, absorption_time : float [s]
+        Time constants with which gas leaves and enters the liquid of the chambers of a network,
+        see :mod:`klack.hydraulics.gas_release`: both or none, with both pressures.  ``theta`` is
+        then the share at equilibrium.
     """
 
     fraction: float = 0.0
@@ -57,6 +61,8 @@ class EntrainedGas:
     reference_pressure: float = ATMOSPHERE
     release_pressure: float | None = None
     saturation_pressure: float | None = None
+    release_time: float | None = None
+    absorption_time: float | None = None
 
     def __post_init__(self) -> None:
         require_positive("EntrainedGas.reference_pressure", self.reference_pressure, "Pa")
@@ -84,6 +90,18 @@ class EntrainedGas:
                 expected="both or none, release below saturation",
                 hint="leave both out for strokes of milliseconds: the gas stays free.",
             )
+        times = self.release_time, self.absorption_time
+        if times == (None, None):
+            return
+        for name, value in zip(("release_time", "absorption_time"), times, strict=True):
+            if value is None or not 0.0 < value or low is None:
+                raise InputError(
+                    f"EntrainedGas.{name}",
+                    got=f"times {times[0]} s and {times[1]} s, release at {low} Pa",
+                    expected="both times above 0, with release_pressure and saturation_pressure",
+                    hint="milliseconds for the release and seconds for the absorption, or leave "
+                    "both out.",
+                )
 
     @property
     def kinks(self) -> tuple[float, ...]:
@@ -106,6 +124,12 @@ class EntrainedGas:
         all_free = self.fraction * (self.reference_pressure / p) ** (1.0 / self.exponent)
         share, slope = self._free_share(p)
         return share * all_free, all_free * (slope - share / (self.exponent * p))
+
+    def dissolving(self, pressure: ArrayLike) -> Values:
+        """Part of the slope of :meth:`volume` that is gas which dissolves [1/Pa]."""
+        p = np.asarray(pressure, dtype=float)
+        all_free = self.fraction * (self.reference_pressure / p) ** (1.0 / self.exponent)
+        return np.asarray(all_free * self._free_share(p)[1])
 
     def _free_share(self, p: Values) -> tuple[Values, Values]:
         low, high = self.release_pressure, self.saturation_pressure

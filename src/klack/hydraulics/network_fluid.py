@@ -2,13 +2,24 @@
 
 import warnings
 
+import numpy as np
+from numpy.typing import NDArray
+
 from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.fluid_table import fluid_table
 from klack.hydraulics.pressure_viscosity import PressureViscosity
 from klack.network.protocols import NetworkFluid
 from klack.network.rows import Rows
 
-__all__ = ["ambient_viscosity", "fixed_viscosity", "network_fluid", "viscosity_law"]
+__all__ = [
+    "ambient_viscosity",
+    "energy_table",
+    "fixed_viscosity",
+    "gas_is_slow",
+    "network_fluid",
+    "viscosity_law",
+]
 
 
 def network_fluid(rows: Rows) -> NetworkFluid:
@@ -21,6 +32,23 @@ def network_fluid(rows: Rows) -> NetworkFluid:
             hint="name one in the network section, e.g. fluid: {name: n-heptane}.",
         )
     return rows.fluid
+
+
+def gas_is_slow(rows: Rows) -> bool:
+    """Whether gas leaves and enters the fluid with time constants."""
+    return isinstance(rows.fluid, Fluid) and rows.fluid.has_release_times
+
+
+def energy_table(rows: Rows) -> NDArray[np.float64]:
+    """Table of the pressure energy that flows carry.
+
+    Where gas leaves and enters the fluid with time constants, they carry that with all gas free:
+    see :mod:`klack.hydraulics.gas_release`.
+    """
+    fluid = network_fluid(rows)
+    if isinstance(fluid, Fluid) and fluid.has_release_times:
+        fluid = fluid.all_free()
+    return fluid_table(fluid, rows.ambient.pressure)
 
 
 def ambient_viscosity(rows: Rows) -> tuple[NetworkFluid, float]:

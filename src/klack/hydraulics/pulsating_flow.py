@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 from numba import carray
 from pydantic import Field
 
-from klack.hydraulics.fluid_table import fluid_at, fluid_table
-from klack.hydraulics.network_fluid import network_fluid
+from klack.hydraulics.fluid_table import fluid_at
+from klack.hydraulics.network_fluid import energy_table, network_fluid
 from klack.input.section import Section
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
@@ -87,7 +87,7 @@ class PulsatingFlow(Component):
             for sine in self.harmonics
             for number in (2.0 * pi * sine.frequency, density * sine.amplitude, sine.phase)
         ]
-        table = fluid_table(fluid, rows.ambient.pressure)
+        table = energy_table(rows)
         numbers = [len(self.harmonics), density * self.mean, *sines, *table]
         rows.branch(
             pulsating_flow_step,

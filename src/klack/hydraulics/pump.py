@@ -7,9 +7,9 @@ from typing import Any, ClassVar, Self
 from numba import carray
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import njit
-from klack.hydraulics.fluid_table import fluid_at, fluid_table
-from klack.hydraulics.network_fluid import network_fluid
+from klack.compiling.jit import inner, njit
+from klack.hydraulics.fluid_table import fluid_at
+from klack.hydraulics.network_fluid import energy_table, gas_is_slow
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
 from klack.network.component import Component
@@ -56,13 +56,9 @@ def swept_share(angle: float, turned: float, pistons: int) -> float:
     return total / (2.0 * pistons)
 
 
-@step_function
-def pump_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Flow that the pistons deliver in the step, at the density before the pump.
-
-    ``par``: 0 size of all, 1 displacement, 2 turns per time, 3 pistons (0: no ripple), 4 angle at
-    time zero, fluid table.  ``state``: places in the fluid table of both ends, volume flow.
-    """
+@inner(error_model="numpy", forceinline=True)
+def _deliver(par: Any, state: Any, inp: Any, out: Any, mixture: bool) -> None:
+    """Flow at the density of the table, or at that of the mixture before the pump."""
     table = carray(par, (int(par[0]),))[5:]
     t, h, omega = inp[0], inp[1], _TURN * par[2]
     flow = par[1] * par[2]
@@ -78,9 +74,28 @@ def pump_step(par: Any, state: Any, inp: Any, out: Any) -> int:
             flow *= pi / pistons * total
     rho, slope, g_a, hint_a = fluid_at(table, inp[2], int(state[0]))
     _, _, g_b, hint_b = fluid_at(table, inp[3], int(state[1]))
+    if mixture:
+        rho = inp[4]
     out[0], out[1], out[2] = rho * flow, slope * flow, 0.0
     out[3], out[4], out[5] = hint_a, hint_b, flow
     out[6] = rho * flow * (g_b - g_a) * h
+
+
+@step_function
+def pump_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Flow that the pistons deliver in the step, at the density before the pump.
+
+    ``par``: 0 size of all, 1 displacement, 2 turns per time, 3 pistons (0: no ripple), 4 angle at
+    time zero, fluid table.  ``state``: places in the fluid table of both ends, volume flow.
+    """
+    _deliver(par, state, inp, out, False)
+    return 0
+
+
+@step_function
+def pump_of_mixture_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """As :func:`pump_step`, of a fluid whose gas takes time to leave and enter it."""
+    _deliver(par, state, inp, out, True)
     return 0
 
 
@@ -172,12 +187,11 @@ class Pump(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add a branch that supplies energy, and one that leaks."""
-        fluid = network_fluid(rows)
-        table = fluid_table(fluid, rows.ambient.pressure)
+        table = energy_table(rows)
         numbers = [self.displacement, self.speed, self.pistons or 0, self.phase, *table]
         a, b = rows.port("a"), rows.port("b")
         rows.branch(
-            pump_step,
+            pump_of_mixture_step if gas_is_slow(rows) else pump_step,
             a=a,
             b=b,
             parameters=[len(numbers) + 1, *numbers],

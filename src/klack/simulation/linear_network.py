@@ -102,6 +102,14 @@ class _Assembly:
         self.port_count = len(network.ports)
         self.y = np.append(network.bodies.at[Y0 : Y0 + self.port_count], 0.0)
         nodes = network.nodes
+        if nodes.slow_gas:
+            raise InputError(
+                "linearisation: fluid with release_time and absorption_time",
+                got="gas that leaves and enters the liquid over time",
+                expected="a fluid whose density follows from the pressure alone",
+                hint="leave both times out: for fast changes the gas is free, or, with "
+                "release_pressure and saturation_pressure alone, in equilibrium.",
+            )
         self.p = network.node_state.p.copy()
         self.fluid = fluids_at(nodes.fluid, self.p) if self.p.size else np.zeros((0, 3))
         self.node_names = [self.rows.nodes[k].component for k in network.node_order]

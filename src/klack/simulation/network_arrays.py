@@ -175,6 +175,9 @@ class Nodes(NamedTuple):
     wall_port: Index
     wall_area: Vector
     end_node: Index  # of line ends
+    slow_gas: int  # 1 where gas leaves and enters the liquid with time constants
+    settled: Vector  # table of the fluid at equilibrium: that of ``fluid`` without time constants
+    gas: Vector  # numbers of the release
 
 
 class NodeState(NamedTuple):
@@ -188,6 +191,8 @@ class NodeState(NamedTuple):
     rate: Vector  # at which flows balance the pressure of a volume [1/s]
     slope: Vector  # of the density over the pressure
     hint: Index
+    free: Vector  # share of the gas with which a step begins, after mixing
+    dissolved: Vector  # mass of fluid whose gas is dissolved at the end of the last step
 
 
 class Interfaces(NamedTuple):
@@ -262,6 +267,7 @@ class Accounts(NamedTuple):
     lines: Matrix  # (lines, 3) losses
     implicit: Vector  # (volumes,) loss of the implicit step
     supply: Vector  # (prescribed nodes,)
+    gas: Vector  # (volumes,) energy from gas that left the liquid
     contact: Vector  # (interfaces,) losses
     film: Vector
     friction: Vector  # (sliders,) losses
@@ -308,6 +314,9 @@ class NodeTrial(NamedTuple):
     stored: Vector  # of ``own``: in the volume itself
     balanced: Vector  # what the pressure changes in flows
     cavity: Vector  # of a junction: 1 open, 2 closes in this step, 3 cannot; 0 none
+    freed: Vector  # way to equilibrium that release goes in the step, first number
+    taken: Vector  # the same of absorption
+    share: Vector  # free share of the gas that is found
     matrix: Vector
 
 

@@ -9,7 +9,9 @@ from numpy.typing import NDArray
 
 from klack.contact.step_constants import LAW_YIELDING, NO_LAW
 from klack.errors import InputError
+from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.gas_release import NO_RELEASE, release_numbers
 from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
 from klack.network.step_function import address_of
 from klack.reduction.reduced_body import ReducedBody
@@ -44,6 +46,7 @@ from klack.simulation.network_arrays import (
     SliderState,
     StepRows,
 )
+from klack.simulation.network_gas import require_chambers, settle_gas
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
 from klack.simulation.step_sizes import StepSizes
@@ -173,6 +176,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
             lines=np.zeros((max(len(rows.lines), 1), 3)),
             implicit=np.zeros(nodes.volumes),
             supply=np.zeros(nodes.nodes - nodes.volumes),
+            gas=np.zeros(nodes.volumes * nodes.slow_gas),
             contact=np.zeros(interfaces.interfaces),
             film=np.zeros(interfaces.interfaces),
             friction=np.zeros(sliders.sliders),
@@ -376,16 +380,23 @@ def _nodes(
     volumes = sum(not node.prescribed for node in given)
     ambient = rows.ambient.pressure
     fluid = np.zeros(8)
+    settled, gas, slow = fluid, NO_RELEASE, False
     count = len(order)
     p = np.array([node.at_start for node in given], dtype=float)
     density, boiling, rho, g = 1.0, 0.0, np.ones(count), np.zeros(count)
     hint = np.zeros(count, np.int64)
     if rows.fluid is not None and count:
-        fluid = fluid_table(rows.fluid, ambient)
+        fluid = settled = fluid_table(rows.fluid, ambient)
+        if isinstance(rows.fluid, Fluid) and rows.fluid.has_release_times:
+            require_chambers(rows)
+            slow, gas = True, release_numbers(rows.fluid, ambient)
+            fluid = fluid_table(rows.fluid.all_free(), ambient)
         density = fluid_at(fluid, ambient, 0)[0]
         boiling = rows.fluid.all_liquid_from
         for i in range(count):
             rho[i], _, g[i], hint[i] = fluid_at(fluid, p[i], 0)
+            if slow:
+                rho[i] = fluid_at(settled, p[i], 0)[0]
     tables = [given[i] for i in range(volumes, count)]
     sizes = [len(node.time) for node in tables]
     volume = np.array([node.volume for node in given[:volumes]], dtype=float)
@@ -415,6 +426,9 @@ def _nodes(
         wall_port=np.array([w[1] for w in walls], dtype=np.int64),
         wall_area=np.array([w[2] for w in walls], dtype=float),
         end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
+        slow_gas=int(slow),
+        settled=settled,
+        gas=gas,
     )
     mass = volume * rho[:volumes]
     state = NodeState(
@@ -426,7 +440,10 @@ def _nodes(
         rate=np.full(count, AT_ONCE),
         slope=np.zeros(count),
         hint=hint,
+        free=np.ones(volumes),
+        dissolved=np.zeros(volumes),
     )
+    settle_gas(nodes, state)
     return nodes, state
 
 

@@ -18,6 +18,7 @@ from klack.simulation.network_arrays import (
     Y0,
 )
 from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
+from klack.simulation.network_gas import dissolution_energy
 from klack.simulation.network_result import BODY_STORE, EnergyBooks
 
 __all__ = ["balance_since", "energy_stores", "reset_accounts"]
@@ -97,7 +98,8 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     for i in range(nodes.volumes):
         excess = state.p[i] - nodes.ambient
         name = rows.nodes[network.node_order[i]].component
-        stores[f"{name} compression"] = float(state.mass[i] * state.g[i] - excess * state.held[i])
+        energy = float(state.mass[i] * state.g[i] - excess * state.held[i])
+        stores[f"{name} compression"] = energy - dissolution_energy(nodes, state, i)
     for k, line in enumerate(rows.lines):
         name = f"{line.component} waves"
         held = float(line_store(network.lines, network.line_state, k))
@@ -124,6 +126,9 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
     for i in range(nodes.volumes):
         name = rows.nodes[network.node_order[i]].component
         losses[f"{name} implicit step"] = float(accounts.implicit[i])
+    for i, energy in enumerate(accounts.gas):
+        name = rows.nodes[network.node_order[i]].component
+        supplies[f"{name} gas release"] = float(energy)
     for c, contact in enumerate(rows.interfaces):
         losses[f"{contact.component} contact"] = float(accounts.contact[c])
         losses[f"{contact.component} film"] = float(accounts.film[c])

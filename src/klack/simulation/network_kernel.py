@@ -284,6 +284,8 @@ def run_network(
                 loop.elements.state,
                 loop.fluid.state.p,
                 loop.fluid.nodes.nodes,
+                loop.fluid.state.free,
+                loop.fluid.nodes.volumes * loop.fluid.nodes.slow_gas,
                 loop.fluid.branches.state,
                 contacts.state.gap,
                 contacts.rows.interfaces,

@@ -7,7 +7,15 @@ import numpy as np
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
+from klack.simulation.mass_balance import solve_mass_balance
 from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
+from klack.simulation.network_gas import (
+    begin_gas,
+    end_energy,
+    end_gas,
+    look_up_mixture,
+    pressure_of_mixture,
+)
 from klack.simulation.phase import phase
 from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
 from klack.simulation.step_status import (
@@ -25,7 +33,6 @@ __all__ = [
     "end_nodes",
     "guess_pressures",
     "push_by_fluid",
-    "solve_mass_balance",
     "solve_pressures",
 ]
 
@@ -99,6 +106,8 @@ def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
         if straight:
             trial.end[i] = max(2.0 * state.p[i] - state.before[i], _LEAST_PRESSURE)
         trial.p[i] = state.p[i] + theta * (trial.end[i] - state.p[i])
+    if nodes.slow_gas > 0:
+        begin_gas(fluid, H)
     for i in range(nodes.volumes, nodes.nodes):
         k = i - nodes.volumes
         p = _table(nodes.time, nodes.pressure, nodes.table0[k], nodes.table0[k + 1], end)
@@ -115,7 +124,10 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     for i in range(nodes.chambers, nodes.volumes):
         trial.cavity[i] = 1.0 if _is_held(trial.cavity[i]) else 0.0
     for iteration in range(_MOST_NEWTON):
-        _look_up(fluid)
+        if nodes.slow_gas > 0:
+            look_up_mixture(fluid)
+        else:
+            _look_up(fluid)
         _add_up_volumes(fluid, gamma)
         failed, code = _add_up_branches(fluid, S, step)
         if code != 0:
@@ -358,36 +370,6 @@ def _compare_storage(fluid: Any) -> None:
         trial.balanced[j] = max(total - trial.stored[j], 0.0)
 
 
-@inner(error_model="numpy", _nrt=False, forceinline=True)
-def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
-    """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
-
-    What leaves a volume fills another: beside the diagonal ``A`` is below zero, and its column sums
-    are what a pressure changes in all volumes together, above zero.  Pivots follow from these sums
-    (Grassmann, Taksar & Heyman 1985), the diagonal is not looked at.  So a wide channel between two
-    almost empty volumes, whose storage is less than the round-off of its flow, is solved as well.
-    """
-    for k in range(n):
-        pivot = own[k]
-        for i in range(k + 1, n):
-            pivot -= A[i * n + k]
-        A[k * n + k] = pivot
-        inverse = 1.0 / pivot
-        share = own[k] * inverse
-        for j in range(k + 1, n):
-            own[j] -= A[k * n + j] * share
-        for i in range(k + 1, n):
-            if A[i * n + k] != 0.0:
-                c = A[i * n + k] * inverse
-                for j in range(k + 1, n):
-                    A[i * n + j] -= c * A[k * n + j]
-                r[i] -= c * r[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            r[k] -= A[k * n + j] * r[j]
-        r[k] /= A[k * n + k]
-
-
 @njit(_nrt=False, error_model="numpy", forceinline=True)
 def bracketed(
     target: float, density: float, lower: float, upper: float
@@ -430,7 +412,10 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
             large = True
         if large:
             # boiling: the density takes the step, the pressure follows it
-            new, hint[i] = pressure_at(nodes.fluid, target, hint[i])
+            if nodes.slow_gas > 0:
+                new = pressure_of_mixture(fluid, i, target)
+            else:
+                new, hint[i] = pressure_at(nodes.fluid, target, hint[i])
             r[i] = theta * (new - trial.end[i])
         worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
     return worst, total
@@ -493,6 +478,8 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
         # to first order, as the flows have it: they add up to nothing
         g[i] += trial.r[i] / trial.rho_end[i]
         trial.g_end[i] = g[i]
+    if fluid.nodes.slow_gas > 0:
+        end_energy(fluid)
     for k in range(branches.rows):
         a, b, mdot = branches.a[k], branches.b[k], flows.mdot[k]
         inflow[a] -= H * mdot
@@ -538,6 +525,8 @@ def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
     """Take over masses, volumes and pressures, with the loss of the implicit step."""
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     p, g, V, inflow = trial.p, trial.g, trial.V, trial.inflow
+    if nodes.slow_gas > 0:
+        end_gas(fluid, H, accounts)
     for i in range(nodes.volumes):
         mass = state.mass[i] + inflow[i]
         stored = mass * trial.g_end[i] - (trial.end[i] - nodes.ambient) * V[i]

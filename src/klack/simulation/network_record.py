@@ -33,11 +33,13 @@ def record_points(
     elements: Any,
     pressures: Any,
     nodes: int,
+    shares: Any,
+    slow: int,
     branches: Any,
     gaps: Any,
     interfaces: int,
 ) -> None:
-    """Columns: port displacements and velocities, centres of mass, pressures, states, gaps, drives.
+    """Columns of ports, centres of mass, pressures, shares of free gas, states, gaps, drives.
 
     The modes are those of a size of step, with no force pending.
     """
@@ -55,6 +57,9 @@ def record_points(
     for i in range(nodes):
         out[place + i] = pressures[i]
     place += nodes
+    for i in range(slow):
+        out[place + i] = shares[i]
+    place += slow
     for i in range(recording.states.size):
         out[place + i] = elements[recording.states[i]]
     place += recording.states.size
@@ -79,6 +84,8 @@ def record_start(recording: Recording, network: NetworkArrays) -> None:
         network.elements.state,
         network.node_state.p,
         network.nodes.nodes,
+        network.node_state.free,
+        network.nodes.volumes * network.nodes.slow_gas,
         network.branches.state,
         network.interface_state.gap,
         network.interfaces.interfaces,

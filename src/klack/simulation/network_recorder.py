@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.hydraulics.fluid import Fluid
 from klack.memory import require_memory
 from klack.network.rows import BranchRow, Channel, ElementRow, Rows
 from klack.simulation.impact_events import ImpactFinder
@@ -91,11 +92,13 @@ class Recorder:
         ]
         ports = [f"{name.component}.{name.port}" for name in network.ports]
         nodes = [rows.nodes[handle].component for handle in network.node_order]
+        slow = network.nodes.volumes * network.nodes.slow_gas
         self.points = [
             *(_Column(f"{port} displacement", "m") for port in ports),
             *(_Column(f"{port} velocity", "m/s") for port in ports),
             *(_Column(f"{rows.bodies[b].component} velocity", "m/s") for b in free),
             *(_Column(f"{node} pressure", "Pa") for node in nodes),
+            *(_Column(f"{node} free gas", "-") for node in nodes[:slow]),
             *(_Column(name, unit) for _, name, unit in states + branch_states),
             *(_Column(f"{row.component} gap", "m") for row in rows.interfaces),
             *(_Column(f"{name} drive force", "N") for name in driven),
@@ -276,6 +279,8 @@ def recorded_columns(rows: Rows) -> int:
     forces = sum(len(row.names) for row in rows.elements) + len(rows.branches)
     forces += 2 * len(rows.sliders)
     free += sum(1 for row in rows.bodies if row.course is not None)
+    if isinstance(rows.fluid, Fluid) and rows.fluid.has_release_times:
+        free += sum(1 for node in rows.nodes.values() if node.volume > 0.0)
     return 2 * ports + free + len(rows.nodes) + states + forces + 4 * len(rows.interfaces)
 
 

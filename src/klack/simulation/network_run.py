@@ -595,8 +595,11 @@ def read_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row:
 
     ``row`` of the ports holds their displacements.
     """
-    table, p = network.nodes.fluid, network.node_state.p
+    table, p = network.nodes.settled, network.node_state.p
     rho = np.array([fluid_at(table, pressure, 0)[0] for pressure in p])
+    if network.nodes.slow_gas:
+        state, volumes = network.node_state, network.nodes.volumes
+        rho[:volumes] = state.mass / state.held
     at = network.bodies.at[row : row + len(speeds)]
     for rows, status in (
         (network.elements, STATUS_ELEMENT),
@@ -638,7 +641,11 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
         "bodies": {"fine": network.bodies.laid_out[: network.bodies.size], "at": network.bodies.at},
         "elements": {"state": network.elements.state},
         "branches": {"state": network.branches.state},
-        "nodes": network.node_state._asdict(),
+        "nodes": {
+            name: array
+            for name, array in network.node_state._asdict().items()
+            if network.nodes.slow_gas or name not in ("free", "dissolved")
+        },
         "line_state": {name: getattr(line, name) for name in LINE_MEMORY},
         "interfaces": network.interface_state._asdict(),
         "sliders": network.slider_state._asdict(),

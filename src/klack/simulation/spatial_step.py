@@ -216,6 +216,8 @@ def record_moment(record: int, network: NetworkArrays, recording: Recording) -> 
         network.elements.state,
         network.node_state.p,
         network.nodes.nodes,
+        network.node_state.free,
+        network.nodes.volumes * network.nodes.slow_gas,
         network.branches.state,
         network.interface_state.gap,
         network.interfaces.interfaces,

@@ -74,7 +74,7 @@ def at_rest(
     """
     rho = np.ones(p.size)
     for i in range(p.size):
-        rho[i] = fluid_at(nodes.fluid, p[i], hint[i])[0]
+        rho[i] = fluid_at(nodes.settled, p[i], 0 if nodes.slow_gas > 0 else hint[i])[0]
     force[:] = 0.0
     inflow[:] = 0.0
     size[:] = 0.0

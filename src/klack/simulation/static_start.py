@@ -49,6 +49,7 @@ from klack.simulation.network_arrays import (
     Y0,
 )
 from klack.simulation.network_compile import CompiledNetwork
+from klack.simulation.network_gas import settle_gas
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
@@ -720,7 +721,11 @@ class _Balance:
 
     def _fluid(self, p: Vector) -> Matrix:
         """Density, slope and pressure energy at each pressure, shape (n, 3)."""
-        return np.asarray(fluids_at(self.network.nodes.fluid, p))
+        nodes = self.network.nodes
+        found = np.asarray(fluids_at(nodes.settled, p))
+        if nodes.slow_gas:  # flows count with all gas free
+            found[:, 2] = np.asarray(fluids_at(nodes.fluid, p))[:, 2]
+        return found
 
     def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
         """Mass in each free volume [kg], its change with the pressure, and the density."""
@@ -914,11 +919,14 @@ class _Balance:
         for i, p in enumerate(state.p):
             now.p[i] = now.before[i] = p
             rho, _, now.g[i], now.hint[i] = fluid_at(nodes.fluid, p, 0)
+            if nodes.slow_gas:
+                rho = fluid_at(nodes.settled, p, 0)[0]
             if i < nodes.chambers:
                 held = now.held[i] = self.volumes(state.y)[i]
                 if held <= 0.0:
                     raise _emptied(network, i, float(held))
                 now.mass[i] = rho * held
+        settle_gas(nodes, now)
         for k in range(branches.rows):
             count = branches.states[k]
             after = branches.output0[k] + branches.head + branches.port0[k + 1] - branches.port0[k]
