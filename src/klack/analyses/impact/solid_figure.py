@@ -225,7 +225,7 @@ def _coloured(scene: list[_Painted], seen: Seen, window: Window) -> NDArray[np.u
     surface = np.where(seen.body < 0, -1, 0)
     slope = np.zeros(shape)
     rows, columns = np.indices(shape)
-    stripe = (rows + columns) % _STRIPES < 0.4 * _STRIPES
+    stripe = np.asarray((rows + columns) % _STRIPES < 0.4 * _STRIPES)
     for place, one in enumerate(scene):
         tint = place % len(_TINTS)
         cut = (seen.body == place) & (seen.triangle < 0)
