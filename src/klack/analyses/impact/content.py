@@ -134,8 +134,8 @@ def _bodies_in_space(study: ImpactStudy) -> Section:
     if study.pictures:
         return Section(title=title, picture=solid_figure(study))
     text = (
-        "No picture: this result holds no surfaces of the bodies. 'klack impact CASE' stores them; "
-        "results of earlier versions have none."
+        "No picture: this result holds no surfaces of the bodies. Those of earlier versions have "
+        "none, 'klack impact CASE' adds them; in a new one the warnings tell what failed."
     )
     return Section(title=title, paragraphs=(text,))
 
