@@ -30,6 +30,10 @@ from klack.network.network import Network
 from klack.network.port import ELEMENT
 from klack.network.rows import Rows
 from klack.network.step_function import python_step
+from klack.pneumatics.gas_chamber import GasChamber
+from klack.pneumatics.gas_library import AIR
+from klack.pneumatics.gas_orifice import GasOrifice
+from klack.pneumatics.gas_source import GasSource
 from klack.simulation.linear_network import LinearNetwork, linear_network
 from klack.simulation.linear_system import LinearSystem, Signal, modes, rational, transfer
 from klack.simulation.operating_point import compiled_at, operating_point
@@ -254,3 +258,38 @@ def test_a_held_body_stays_and_its_fluid_moves_alone():
 
     assert [x.name for x in found.system.states] == ["sac.pressure"]
     assert "needle.force" not in [x.name for x in found.system.inputs]
+
+
+def test_each_gas_chamber_has_states_outputs_and_modes_of_its_own() -> None:
+    """Two chambers that share nothing, one with twice the volume: twice the time constant."""
+    parts: dict[str, Component] = needle(supply=GasSource(pressure=6e5))
+    joints = [["needle.tip", "spring.end"]]
+    for name, volume in (("small", 1e-6), ("large", 2e-6)):
+        parts |= {
+            name: GasChamber(volume=volume, isothermal=True),
+            f"{name}_in": GasOrifice(diameter=2e-4),
+            f"{name}_out": GasOrifice(diameter=3e-4),
+        }
+        joints.append([f"{name}.gas", f"{name}_in.b", f"{name}_out.a"])
+    joints.append(["supply.gas", "small_in.a", "large_in.a"])
+    joints.append(["small_out.b", "large_out.b", "ambient"])
+    rows = Network(parts, joints, gas=AIR).at_start().rows()
+    network, _ = compiled_at(rows, operating_point(rows))
+
+    system = linear_network(network, 1e-6).system
+    found = {
+        max(mode.participation, key=lambda name: mode.participation[name]): mode
+        for mode in modes(system, 1e4)[0]
+    }
+
+    # mass and energy of a gas as warm as its wall are one state
+    assert [x.owner for x in system.states[2:]] == ["small", "large"]
+    assert system.states[2].quantity in ("mass", "energy")
+    names = {signal.name for signal in system.outputs}
+    for name in ("small", "large"):
+        assert {f"{name}.{what}" for what in ("mass", "pressure", "temperature")} <= names
+        assert {f"{name}_in.flow", f"{name}_out.flow"} <= names
+        assert found[name].participation[name] == pytest.approx(1.0, abs=1e-9)
+    # isothermal, equal orifices: equal pressures, so the rates are as 1 / V
+    ratio = found["small"].root.real / found["large"].root.real
+    assert ratio == pytest.approx(2.0, rel=1e-6)

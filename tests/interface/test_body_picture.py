@@ -61,6 +61,13 @@ def test_its_instants_begin_at_rest_and_hold_the_highest_force(pictures, ran):
     assert force.max() == pytest.approx(ran.history.force.max(), rel=1e-6)
 
 
+def test_a_face_with_several_names_belongs_to_the_contact(problem, pictures):
+    for picture, surface in zip(
+        pictures, (problem.pair.upper_surface, problem.pair.lower_surface), strict=True
+    ):
+        assert picture.skin.faces[0] == surface.name  # the first of several names is taken
+
+
 def test_its_surface_moves_as_the_recovered_nodes(problem, pictures):
     force = pictures[0].amplitude[:, -1]
     peak = int(np.argmax(force))

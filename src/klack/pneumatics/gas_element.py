@@ -182,6 +182,12 @@ def close_gas(rows: Rows) -> None:
             books=(Book("energy", "store"), Book("enthalpy", "supply"), Book("heat", "supply")),
             channels=tuple(_channels(found)),
             failures=_FAILURES,
+            state_names={OF_CHAMBER * i + 1: ("energy", "J") for i in range(len(found.chambers))},
+            state_owners={
+                OF_CHAMBER * i + k: chamber.component
+                for i, chamber in enumerate(found.chambers.values())
+                for k in range(OF_CHAMBER)
+            },
             at_rest=net.start,
             at_steady=lambda y: net.start(y, steady=True),
         )

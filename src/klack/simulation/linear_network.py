@@ -242,9 +242,10 @@ class _Assembly:
         every: list[ElementRow | BranchRow] = [*self.rows.elements, *self.rows.branches]
         for row_, found in zip(every, self.linear, strict=True):
             labels = {c.index: (c.label, c.unit) for c in row_.channels} | dict(row_.state_names)
-            self.row_states.append(
-                self._add(row_.component, *(labels.get(j, (f"state {j}", "")) for j in found.kept))
-            )
+            owners = getattr(row_, "state_owners", {})
+            self.row_states.append(len(self.states))
+            for j in found.kept:
+                self._add(owners.get(j, row_.component), labels.get(j, (f"state {j}", "")))
         self.pressures = self._add("", *())
         for i in range(self.network.nodes.volumes):
             self.states.append(Signal(self.node_names[i], "pressure", "Pa"))
@@ -435,11 +436,13 @@ class _Assembly:
                 for p, port in enumerate(ports):
                     self.force[port] += acts[p]
                     label = names[p] if p < len(names) and names[p] else f"port {p + 1}"
-                    self._show(f"{owner}.{label}".replace(" ", "_"), "force", "N", acts[p])
-                    self._adds_force(f"{owner}.{label}.force".replace(" ", "_"), port, 1.0)
+                    # a row of several components names them with its ports
+                    point = (label if "." in label else f"{owner}.{label}").replace(" ", "_")
+                    self._show(point, "force", "N", acts[p])
+                    self._adds_force(f"{point}.force", port, 1.0)
                 for channel, form in zip(row.channels, law.channels @ forms, strict=True):
                     if not any(channel.label.endswith(x) for x in ("driver state",)):
-                        self._show(owner, channel.label, channel.unit, form)
+                        self._show(channel.owner or owner, channel.label, channel.unit, form)
                 k += 1
 
     def _put_contacts(self) -> None:

@@ -57,7 +57,8 @@ def body_pictures(
         The level reduced; without it the modes are there, but no motion and no stress.
     """
     bodies = (problem.pair.upper, problem.pair.lower)
-    upper, lower = (_still(body) for body in bodies)
+    faces = (problem.pair.upper_surface.name, problem.pair.lower_surface.name)
+    upper, lower = (_still(body, face) for body, face in zip(bodies, faces, strict=True))
     plain = (upper, replace(lower, touch=_touch(problem)))
     reduced = (pair.upper, pair.lower)
     parts = recovered_bodies(problem, pools, pair)
@@ -140,8 +141,12 @@ def _touch(problem: ContactProblem) -> Floats:
     )[0]
 
 
-def _still(body: ElasticBody) -> BodyPicture:
-    skin = skin_of_mesh(body.mesh)
+def _still(body: ElasticBody, face: str) -> BodyPicture:
+    """Picture of a body at rest; what belongs to several surfaces belongs to ``face`` first."""
+    surfaces = {
+        name: body.mesh.surfaces[name] for name in dict.fromkeys((face, *body.mesh.surfaces))
+    }
+    skin = skin_of_mesh(replace(body.mesh, surfaces=surfaces))
     held: NDArray[np.bool_] = np.ones(body.dof_count, dtype=bool)
     held[body.free] = False
     node = np.unique(skin.node)

@@ -23,6 +23,7 @@ from klack.analyses.impact.pressure_wording import pressure_rows
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.impact.section_figure import section_figure
+from klack.analyses.impact.solid_figure import in_space, solid_figure
 from klack.analyses.impact.summary import GAUGE_COLUMNS, gauge_rows, no_estimate
 from klack.analyses.impact.wording import answer, leaves_axis
 from klack.analyses.measures import Measure, glossary
@@ -69,7 +70,7 @@ def report_content(study: ImpactStudy) -> Content:
         return tuple(by_name[name] for name in names if name in by_name)
 
     sections = [_estimates(study), _computed(study)]
-    sections.append(_bodies_at_peak(study))
+    sections += [_bodies_in_space(study), _bodies_at_peak(study)]
     sections.append(Section(title="Force over time", charts=named("force")))
     sections.append(_pressure(study))
     sections.append(_friction(study))
@@ -123,6 +124,20 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
         ),
     ]
     return steps
+
+
+def _bodies_in_space(study: ImpactStudy) -> Section:
+    """Picture of solids; without what it shows, why there is none; empty for others."""
+    title = "The bodies in space"
+    if not in_space(study):
+        return Section(title=title)
+    if study.pictures:
+        return Section(title=title, picture=solid_figure(study))
+    text = (
+        "No picture: this result holds no surfaces of the bodies. Those of earlier versions have "
+        "none, 'klack impact CASE' adds them; in a new one the warnings tell what failed."
+    )
+    return Section(title=title, paragraphs=(text,))
 
 
 def _bodies_at_peak(study: ImpactStudy) -> Section:
