@@ -33,7 +33,7 @@ def _pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None
     area, radius = narrowest_mantle(par, base, x)
     gap = area / par[1]
     gap_pass(par, state, inp, out, x, area, gap, gap * gap * gap, law)
-    out[10] = 2.0 * radius
+    out[10] = 2.0 * radius if area <= par[5] else 0.0
 
 
 @step_function
@@ -70,7 +70,7 @@ class ConicalSeat(OpeningComponent):
 
     The channel ``acting diameter`` is that of the needle at the narrowest section: there the
     pressure steps from one side to the other.  Closed it is the sealing diameter, which the
-    ``pressure-face`` of both sides take.
+    ``pressure-face`` of both sides take; it is 0 where the bore is the narrowest section.
 
     Limits: concentric, quasi-steady, rigid; of two narrow sections only the narrower one counts.
     The faces keep their diameters: the shift of the acting diameter is not part of the force.  The
@@ -88,7 +88,7 @@ class ConicalSeat(OpeningComponent):
     }
 
     half_angle: Angle = Field(
-        gt=0, lt=pi / 2, examples=["30 deg"], description="Of the seat: between axis and surface."
+        gt=0, examples=["30 deg"], description="Of the seat: between axis and surface."
     )
     lower_diameter: Length = Field(
         gt=0, examples=["1 mm"], description="Of the seat at its lower end, that of the bore."
@@ -148,6 +148,13 @@ class ConicalSeat(OpeningComponent):
 
     def _check_angles(self) -> None:
         seat = degrees(self.half_angle)
+        if self.half_angle >= pi / 2:
+            raise CaseProblem(
+                ("half_angle",),
+                got=f"{seat:g} deg",
+                expected="less than 90 deg, measured from the axis",
+                hint="half of the angle in a drawing; a flat seat is a seat with shape: flat.",
+            )
         if self.tip_half_angle <= self.half_angle:
             raise CaseProblem(
                 ("tip_half_angle",),
@@ -234,9 +241,10 @@ class ConicalSeat(OpeningComponent):
         return self.contour.numbers(self.half_angle, lower, upper)
 
     def opening(self, lift: float) -> tuple[float, float]:
-        """Flow area [m^2] and acting diameter [m] at a lift [m], zero or more."""
-        area, radius = narrowest_mantle(np.array(self.contours), 0, lift)
-        return min(float(area), pi / 4.0 * self.lower_diameter**2), 2.0 * float(radius)
+        """Flow area [m^2] and acting diameter [m] at a lift [m]; a negative one is closed."""
+        area, radius = narrowest_mantle(np.array(self.contours), 0, max(lift, 0.0))
+        bore = pi / 4.0 * self.lower_diameter**2
+        return (float(area), 2.0 * float(radius)) if area <= bore else (bore, 0.0)
 
     def parameters(self, viscosity: float, vapour_pressure: float) -> tuple[float, ...]:
         """First 16 that :func:`conical_seat_step` takes, for a viscosity [Pa s] and pressure [Pa].

@@ -112,7 +112,7 @@ def smallest_mantle(kind: str, lift: float, upper: float = _UPPER) -> tuple[floa
 
 def conical_seats() -> list[Check]:
     """Areas over the lift, sealing diameters, flow and jet, two seats in series."""
-    return [*_sharp(), *_rounded(), *_chamfered(), *_flow(), _series()]
+    return [*_sharp(), *_rounded(), *_chamfered(), *_flow(), *_double()]
 
 
 def _curve(part: ConicalSeat) -> ComparedCurve:
@@ -134,10 +134,9 @@ def _sharp() -> list[Check]:
             "needle edge on a cone 0.1 um open, area [m^2]",
             pi * tiny * sin(_SEAT) * (2 * _EDGE + tiny * sin(_SEAT) * cos(_SEAT)),
             part.opening(tiny)[0],
-            1e-8,
-            "mantle along the normal of the seat, pi x sin(al) (d + x sin(al) cos(al))",
-            reason="the smallest mantle leans by (h sin(al)/d)^2 from the normal, 4e-10; "
-            "heights of 1 mm round to 1e-9 of the gap",
+            1e-9,
+            "mantle along the normal of the seat, pi x sin(al) (d + x sin(al) cos(al)); the "
+            "smallest one leans by q = h sin(al)/d and is smaller by q^2/2, 1.2e-10",
         ),
         _check(
             "the same 0.2 mm open, area at the edge [m^2]",
@@ -246,10 +245,12 @@ def _flow() -> list[Check]:
     ]
 
 
-def _series() -> Check:
-    """Pressure in the volume between two edges of a double seat at rest."""
+def _double() -> list[Check]:
+    """Two edges on one tip: gap of the second one, pressure between both at rest."""
     d_2 = 1.3e-3
     behind = 0.5 * (2 * _EDGE - d_2) * (1 / tan(_SEAT) - 1 / tan(_TIP))  # gap along the axis
+    both = _part(tip_diameter=d_2)
+    alone = _part(edge_diameter=d_2, tip_half_angle=pi / 2)
     law = {"critical_flow_number": 1e-8, "cavitation": None}
     first = _part(lift=50e-6, **law)
     second = _part(lift=50e-6 + behind, edge_diameter=d_2, **law)
@@ -281,10 +282,19 @@ def _series() -> Check:
         into = a_1**2 * float(OIL.density(supply)) * (supply - p)
         return into - a_2**2 * float(OIL.density(p)) * (p - low)
 
-    return _check(
-        "double seat, pressure between both edges [Pa]",
-        brentq(excess, low, supply, xtol=1e-6),
-        float(run.channels["between pressure"].values[-1]),
-        5e-10,
-        "orifices in series: rho_1 A_1^2 (p_1 - p) = rho A_2^2 (p - p_2)",
-    )
+    return [
+        _check(
+            "blunt end of the tip as second edge, 0.4 mm open, area [m^2]",
+            alone.opening(400e-6 + behind)[0],
+            both.opening(400e-6)[0],
+            1e-13,
+            "that edge alone, higher by (d_1 - d_2)/2 (cot(al) - cot(be))",
+        ),
+        _check(
+            "double seat, pressure between both edges [Pa]",
+            brentq(excess, low, supply, xtol=1e-6),
+            float(run.channels["between pressure"].values[-1]),
+            5e-10,
+            "orifices in series: rho_1 A_1^2 (p_1 - p) = rho A_2^2 (p - p_2)",
+        ),
+    ]
