@@ -90,7 +90,7 @@ def test_a_rounded_edge_opens_along_the_normal_from_nothing(radius):
     part = ConicalSeat(**EDGE, edge_radius=radius)
     for lift in (1e-9, 1e-7, 1e-6):
         h = lift * sin(part.half_angle)
-        # the smallest frustum leans by h/(2 d) or less
+        # the smallest frustum is tilted by h/(2 d) or less
         assert part.opening(lift)[0] == pytest.approx(pi * h * part.sealing_diameter, rel=1e-3)
     assert part.opening(0.0) == (pytest.approx(0.0, abs=1e-17), part.sealing_diameter)
     assert part.opening(-1e-6) == part.opening(0.0)

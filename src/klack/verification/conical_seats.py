@@ -79,8 +79,12 @@ def smallest_mantle(kind: str, lift: float, upper: float = _UPPER) -> tuple[floa
     normal = np.array([cos(_SEAT), -sin(_SEAT)])
     sealing, level = 0.0, -np.inf
     for piece in pieces:
+
+        def inwards(u: Vector, at: Piece = piece) -> float:
+            return -1e3 * float(at(u[0]) @ normal)
+
         found = minimize(
-            lambda u, at=piece: -1e3 * float(at(u[0]) @ normal),
+            inwards,
             [0.5],
             bounds=[(0.0, 1.0)],
             method="Nelder-Mead",
@@ -136,7 +140,7 @@ def _sharp() -> list[Check]:
             part.opening(tiny)[0],
             1e-9,
             "mantle along the normal of the seat, pi x sin(al) (d + x sin(al) cos(al)); the "
-            "smallest one leans by q = h sin(al)/d and is smaller by q^2/2, 1.2e-10",
+            "smallest one is tilted by q = h sin(al)/d and smaller by q^2/2, 1.2e-10",
         ),
         _check(
             "the same 0.2 mm open, area at the edge [m^2]",
