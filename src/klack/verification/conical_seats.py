@@ -29,7 +29,8 @@ _check = partial(compare, "hydraulic-parts")
 
 _LOWER, _UPPER, _EDGE = 0.6e-3, 1.1e-3, 0.8e-3  # radii of seat and edge [m]
 _SEAT, _TIP, _SHANK = radians(30.0), radians(38.0), radians(8.0)
-_RHO, _WIDTH, _CHAMFER = 60e-6, 80e-6, radians(22.0)
+_RHO, _WIDTH = 60e-6, 80e-6
+_CHAMFERS = {"steep chamfer": radians(22.0), "blunt chamfer": radians(34.0)}
 _SEARCH = "search over all pairs of points of both contours (SciPy, Nelder-Mead)"
 
 
@@ -56,8 +57,8 @@ def _needle(kind: str) -> list[Piece]:
     apex, far = edge - _EDGE / sin(_TIP) * tip, edge + 10e-3 * shank
     if kind == "sharp":
         return [_straight(apex, edge), _straight(edge, far)]
-    if kind == "chamfered":
-        way = np.array([sin(_CHAMFER), cos(_CHAMFER)])
+    if kind in _CHAMFERS:
+        way = np.array([sin(_CHAMFERS[kind]), cos(_CHAMFERS[kind])])
         below, above = np.linalg.solve(np.stack([tip, shank], axis=1), _WIDTH * way)
         low, high = edge - below * tip, edge + above * shank
         return [_straight(apex, low), _straight(low, high), _straight(high, far)]
@@ -205,24 +206,27 @@ def _rounded() -> list[Check]:
 
 
 def _chamfered() -> list[Check]:
-    part = _part(chamfer_half_angle=_CHAMFER, chamfer_width=_WIDTH)
-    area, radius = smallest_mantle("chamfered", 200e-6)
-    return [
-        _check(
-            "edge with a chamfer of 80 um, 0.2 mm open, area [m^2]",
-            area,
-            part.opening(200e-6)[0],
-            1e-13,
-            _SEARCH,
-        ),
-        _check(
-            "its sealing diameter [m]",
-            2 * radius,
-            part.sealing_diameter,
-            1e-13,
-            "point of the contour farthest along the normal of the seat, by search",
-        ),
-    ]
+    found = []
+    for kind, angle in _CHAMFERS.items():
+        part = _part(chamfer_half_angle=angle, chamfer_width=_WIDTH)
+        area, radius = smallest_mantle(kind, 200e-6)
+        found += [
+            _check(
+                f"{kind} of 80 um, 0.2 mm open, area [m^2]",
+                area,
+                part.opening(200e-6)[0],
+                1e-13,
+                _SEARCH,
+            ),
+            _check(
+                f"{kind}, sealing diameter [m]",
+                2 * radius,
+                part.sealing_diameter,
+                1e-13,
+                "point of the contour farthest along the normal of the seat, by search",
+            ),
+        ]
+    return found
 
 
 def _flow() -> list[Check]:
