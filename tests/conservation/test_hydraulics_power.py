@@ -5,6 +5,7 @@ import pytest
 
 from klack.hydraulics.annulus import Annulus
 from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.conical_seat import ConicalSeat
 from klack.hydraulics.flow_source import FlowSource
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
@@ -49,6 +50,17 @@ PARTS = {
     ),
     "spool edge": SpoolEdge(
         diameter=4e-3, radial_clearance=3e-6, overlap=20e-6, direction="closing", flow_force={}
+    ),
+    "conical seat": ConicalSeat(
+        half_angle=0.5,
+        lower_diameter=1e-3,
+        upper_diameter=2e-3,
+        edge_diameter=1.5e-3,
+        tip_half_angle=0.6,
+        edge_radius=40e-6,
+        land_width=50e-6,
+        leak_area=1e-9,
+        flow_force={},
     ),
     "pressure loss": PressureLoss(diameter=1e-3, coefficient=0.3, reverse_coefficient=2.0),
     "pipe friction": PipeFriction(length=0.3, diameter=1e-3, roughness=2e-6),

@@ -18,6 +18,7 @@ from klack.contact.yielding_law import YieldingLaw
 from klack.hydraulics.accumulator import Accumulator
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.conical_seat import ConicalSeat
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pipe_friction import PipeFriction
@@ -442,6 +443,15 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
         "bypass": VariableOrifice(lift=[-1e-3, 1e-3], area=[0.0, 2e-7]),
         "switch": VariableOrifice(time=[0.0, 1e-3], area=[0.0, 5e-7]),
         "drain": Orifice(diameter=2e-3),
+        "tip": ConicalSeat(
+            half_angle=0.6,
+            lower_diameter=2e-3,
+            upper_diameter=4e-3,
+            edge_diameter=bore,
+            tip_half_angle=0.8,
+            edge_radius=20e-6,
+            lift=50e-6,
+        ),
         "face": PressureFace(direction="opening", outer_diameter=6e-3),
         "spool": RigidMass(mass=20e-3),
         "spring": Spring(stiffness=2e6, preload=150.0, damping=20.0),
@@ -452,9 +462,9 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
         ["relief.b", "ambient"],
         ["pipe.b", "bend.fluid", "loss.a"],
         ["loss.b", "room.fluid", "edge.a", "bypass.a", "switch.a", "face.fluid"],
-        ["edge.b", "far.fluid", "bypass.b", "switch.b", "drain.a"],
-        ["drain.b", "ambient"],
-        ["spool.body", "spring.end", "face.body", "edge.spool", "bypass.needle"],
+        ["edge.b", "far.fluid", "bypass.b", "switch.b", "drain.a", "tip.a"],
+        ["drain.b", "tip.b", "ambient"],
+        ["spool.body", "spring.end", "face.body", "edge.spool", "bypass.needle", "tip.needle"],
     ]
     return Network(parts, joints, fluid=OIL).rows()
 

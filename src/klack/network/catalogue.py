@@ -50,6 +50,7 @@ COMPONENTS = (
     ("land-face", "klack.hydraulics.land_face.LandFace"),
     ("orifice", "klack.hydraulics.orifice.Orifice"),
     ("seat", "klack.hydraulics.seat.Seat"),
+    ("conical-seat", "klack.hydraulics.conical_seat.ConicalSeat"),
     ("annulus", "klack.hydraulics.annulus.Annulus"),
     ("inertance", "klack.hydraulics.inertance.Inertance"),
     ("line", "klack.hydraulics.line.Line"),

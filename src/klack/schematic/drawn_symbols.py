@@ -185,6 +185,8 @@ def framed_strokes(part: Component) -> tuple[Stroke, ...] | None:
     """Symbol round its middle; None for a type that has none."""
     if part.type == "seat":
         return _SEATS.get(str(getattr(part, "shape", "")))
+    if part.type == "conical-seat":
+        return _SEATS["cone"]
     if part.type == "gas-valve":
         cone = (getattr(part, "half_angle", None) or 1.6) < 1.57
         return _SEATS["cone" if cone else "flat"]

@@ -17,6 +17,7 @@ from klack.hydraulics.variable_orifice import VariableOrifice
 from klack.network.rows import Ambient
 from klack.verification.branch_step import branch_of, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.conical_seats import conical_seats
 from klack.verification.gas_release import gas_release
 from klack.verification.hydraulic_edges import edges
 from klack.verification.supply_networks import OIL, supply_networks
@@ -42,6 +43,7 @@ def checks() -> list[Check]:
         *_pump(),
         _pulsation(),
         *edges(),
+        *conical_seats(),
         *supply_networks(),
         *gas_release(),
     ]
