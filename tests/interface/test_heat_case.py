@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
+from klack.analyses.heat.heated_stroke import _since, _uncommanded, heated_stroke, sent_heat
 from klack.analyses.heat.log import HEAT_LOG
 from klack.analyses.heat.run import run_heat
 from klack.analyses.heat.summary import answer
@@ -359,3 +359,16 @@ def test_copper_at_a_held_current_runs_away_and_says_so():
     assert study.gain == pytest.approx((power[-1] - power[-2]) / (rise[-1] - rise[-2]) / 0.012)
     assert study.gain > 1.0
     assert "thermal runaway: there is no steady state" in answer(study)
+
+
+@pytest.mark.parametrize(
+    ("time", "commands", "delay"),
+    [
+        (2.0, (0.1, 1.5, 3.0), 0.5),  # after the last command before it
+        (0.05, (0.1, 1.5), -0.05),  # before all of them
+        (2.0, (), 2.0),  # no driver says: from the start of the stroke
+    ],
+)
+def test_a_delay_counts_from_the_command_before_it(time, commands, delay):
+    assert _since(time, commands) == pytest.approx(delay, rel=1e-12)
+    assert bool(_uncommanded("closing", delay, commands)) is not bool(commands)
