@@ -181,6 +181,10 @@ def close_gas(rows: Rows) -> None:
             state=net.start(still),
             books=(Book("energy", "store"), Book("enthalpy", "supply"), Book("heat", "supply")),
             channels=tuple(_channels(found)),
+            state_names={
+                OF_CHAMBER * i + 1: (f"{chamber.component}.internal energy", "J")
+                for i, chamber in enumerate(found.chambers.values())
+            },
             failures=_FAILURES,
             at_rest=net.start,
             at_steady=lambda y: net.start(y, steady=True),
