@@ -101,6 +101,7 @@ def heated_stroke(
         doubts=(
             *warm.doubts,
             *_still_driven(result),
+            *_gas(result),
             *_uncommanded("opening", numbers["opening delay"], opens),
             *_uncommanded("closing", numbers["closing delay"], closes),
         ),
@@ -145,6 +146,16 @@ def _still_driven(result: NetworkResult) -> tuple[str, ...]:
                     "is missing. Give a longer run.duration, or let the driver end."
                 )
     return tuple(found)
+
+
+def _gas(result: NetworkResult) -> tuple[str, ...]:
+    """Doubt about gas, which stands apart from the heat network."""
+    if "gas heat" not in result.books.supplies:
+        return ()
+    return (
+        "gas stands apart from the heat network: its walls and sources keep the temperatures of "
+        "the case, and the heat between gas and walls warms no node.",
+    )
 
 
 def sent_heat(thermal: CaseThermal, losses: Mapping[str, float]) -> dict[str, float]:
