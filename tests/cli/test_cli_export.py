@@ -142,3 +142,16 @@ def test_models_do_not_come_from_a_result(stored, capsys):
     told = capsys.readouterr().err
     assert told.startswith(f"klack export: {stored}: got a stored result with --to fmu")
     assert "case" in told
+
+
+def test_the_pair_of_a_valve_says_what_it_leaves_out(tmp_path, capsys):
+    words = ["demo-stroke", "--to", "csv", "--part"]
+    assert main(["export", *words, "pair", "--out", str(tmp_path / "pair")]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert main(["export", *words, "body", "--out", str(tmp_path / "body")]) == 0
+    other = capsys.readouterr().out
+
+    left_out = said.split("Not in the models, yours to add: ")[1].split(" Written")[0].split(", ")
+    assert {"spring", "guide", "coil", "driver", "feed", "sac", "nozzle"} <= set(left_out)
+    assert not {"needle", "housing", "pole", "seat", "opening"} & set(left_out)
+    assert "yours to add" not in other

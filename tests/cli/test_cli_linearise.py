@@ -15,6 +15,7 @@ from quoted_output import compare
 from scipy.io import loadmat
 
 from klack.analyses.linearisation.analysis import LINEARISATION
+from klack.analyses.linearisation.controllers import plain_name
 from klack.case.case_tree import read_case_tree
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
@@ -120,6 +121,30 @@ def test_a_switching_controller_has_no_margins(capsys):
     assert linearise("switched.yaml", "--loop", "driver") == 2
 
     assert "a switch has no linear law" in capsys.readouterr().err
+
+
+def test_every_channel_of_a_gas_network_is_an_output_of_its_own():
+    path = HOW_TO / "pneumatic_valve.yaml"
+    assert linearise(str(path), "--no-report", "--quiet", "--out", "out") == 0
+
+    model = LINEARISATION.load(Path("out"))
+    network = read_case_tree(path).case().network.network()
+    recorded = simulate_network(network.rows(), duration=1e-6).channels
+    apart = ("driver state", "peak force", "film force")  # no small signal
+    wanted = {plain_name(name) for name in recorded if not name.endswith(apart)}
+    assert wanted <= {plain_name(signal.name) for signal in model.outputs}
+    states = [signal.name for signal in model.states]
+    assert len(set(states)) == len(states)
+    assert {"inlet.mass", "working.mass", "working.internal energy"} <= set(states)
+
+
+def test_a_boost_driver_is_told_to_be_no_part_of_the_model(capsys):
+    path = HOW_TO / "boost_driver.yaml"
+    assert linearise(str(path), "--no-report", "--quiet", "--out", "out") == 0
+
+    said = " ".join(capsys.readouterr().err.split())
+    assert "the driver 'driver' switches to and fro" in said
+    assert "the capacitor, diodes and switches of the driver 'driver' are no part" in said
 
 
 @pytest.mark.parametrize(

@@ -118,3 +118,11 @@ def test_the_page_quotes_what_is_printed(capsys):
     assert open_at == {"start": 2.0, "far": 0.75}
     assert "lifts between 1.75 A and 2 A" in " ".join(page.split()).replace("needle lifts", "lifts")
     assert "stays open down to 0.75 A" in " ".join(page.split())
+
+
+def test_a_sweep_that_fits_no_point_is_an_error_of_the_input(capsys):
+    sweep = ("--sweep", "current", "0 A", "1 A", "2")
+    assert main(["stroke", str(HOW_TO / "relief_on_pipe.yaml"), "--steady", *sweep]) == 2
+
+    assert "--current: got a valve without a coil" in capsys.readouterr().err
+    assert not Path("klack-results").exists()

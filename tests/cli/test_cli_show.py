@@ -104,6 +104,25 @@ def test_a_result_has_modes_and_motion(tmp_path, capsys):
     assert "13 modes" in capsys.readouterr().out
 
 
+def test_a_result_whose_case_names_a_file_elsewhere_is_shown_with_a_note(tmp_path, capsys):
+    case = tmp_path / "elsewhere" / "magnet.yaml"
+    case.parent.mkdir()
+    for name in ("magnet_from_a_map.yaml", "magnet_map.csv"):
+        text = (HOW_TO / name).read_text(encoding="utf-8")
+        (case if name.endswith("yaml") else case.parent / name).write_text(text, encoding="utf-8")
+    words = ["--duration", "50 us", "--no-report", "-q", "--out", "result"]
+    assert main(["stroke", str(case), *words]) == 0
+
+    assert main(["show", "result"]) == 0
+    assert main(["show", "result", "--out", "network.svg"]) == 0
+
+    payload = payload_of(tmp_path / "result.html")
+    assert "magnet_map.csv" in " ".join(payload["notes"])
+    assert payload["histories"][0]["name"] == "lift"
+    assert (tmp_path / "network.svg").read_text() == payload["schematic"]
+    assert "coil" in payload["schematic"]
+
+
 def test_its_json_has_every_connection(capsys):
     assert main(["show", str(VALVE), "--out", "valve.svg", "--json", "-"]) == 0
 

@@ -96,6 +96,19 @@ def test_roots_of_a_delayed_feedback_are_those_of_its_equation():
         assert abs(root - complex(s.real, abs(s.imag))) < 1e-11 * abs(s)
 
 
+def test_equal_real_roots_are_no_slow_oscillation():
+    """Four equal coils: round-off makes pairs of their decays, at 1e-13 Hz."""
+    known = np.array([-47.0, -47.0, -47.0, -47.0, -3480.0, -3480.0])
+    turned, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(6, 6)))
+    system = plain(turned @ np.diag(known) @ turned.T, np.ones(6), np.ones(6))
+    assert np.any(np.linalg.eigvals(system.A).imag != 0.0)  # what is to be told apart
+
+    found, _ = modes(system, 3.0)
+
+    assert [mode.frequency for mode in found] == [0.0] * 6
+    assert sorted(mode.root.real for mode in found) == pytest.approx(sorted(known), rel=1e-12)
+
+
 def test_the_rational_delay_is_the_delay_within_the_band():
     band, T = 5.0, 1.0
     system = plain([[-1.0]], [0.0], [1.0], delays=[T], Dz=[[1.0]], Bw=[[1.0]])

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from klack.errors import InputError
+from klack.magnetics.boost_driver import BoostDriver
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.drive_profile import DriveProfile
 from klack.magnetics.driver import (
@@ -211,3 +212,34 @@ def test_peak_and_hold_opens_a_valve_and_lets_it_close():
     assert result.books.losses["coil eddy"] > 0.0
     heat = result.books.losses["coil ohmic"]
     assert heat == pytest.approx(0.8 * np.trapezoid(current**2, result.time), rel=1e-3)
+
+
+BOOST = {
+    "battery": 14.0,
+    "capacitance": 1e-4,
+    "boost_voltage": 65.0,
+    "recharge_power": 10.0,
+    "peak_current": 12.0,
+    "hold_current": 6.0,
+    "hold_band": 1.0,
+    "shots": [{"start": 1e-4, "end": 5e-4}, {"start": 7e-4, "end": 15e-4}],
+}
+
+
+@pytest.mark.parametrize(
+    ("driver", "commands", "switching"),
+    [
+        (VoltageStep(voltage=12.0, start=1e-3, end=2e-3), ((1e-3, 2e-3),), False),
+        (VoltageStep(voltage=12.0, end=2e-3, repeat_every=5e-3), ((0.0, 2e-3),), False),
+        (TwoPoint(voltage=12.0, upper=3.0, lower=2.5), ((0.0, None),), True),
+        (PulseWidth(voltage=12.0, period=1e-4, duty=0.5), ((0.0, None),), True),
+        (PeakHold(**PEAK_HOLD), ((20e-6, 1.2e-3),), True),
+        (BoostDriver(**BOOST), ((1e-4, 5e-4), (7e-4, 15e-4)), True),
+        (DriveProfile(time=(0.0, 1e-3), voltage=(12.0, 12.0)), (), False),
+        (DriveProfile(time=(0.0, 1e-3), current=(3.0, 3.0), supply_voltage=14.0), (), True),
+        (VoltageTable(time=(0.0,), voltage=(12.0,)), (), False),
+    ],
+)
+def test_a_driver_says_its_commands_and_whether_it_switches(driver, commands, switching):
+    assert driver.commands() == commands
+    assert driver.program().switching is switching

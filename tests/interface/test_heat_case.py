@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
+from klack.analyses.heat.heated_stroke import _since, _uncommanded, heated_stroke, sent_heat
 from klack.analyses.heat.log import HEAT_LOG
 from klack.analyses.heat.run import run_heat
 from klack.analyses.heat.summary import answer
@@ -359,3 +359,44 @@ def test_copper_at_a_held_current_runs_away_and_says_so():
     assert study.gain == pytest.approx((power[-1] - power[-2]) / (rise[-1] - rise[-2]) / 0.012)
     assert study.gain > 1.0
     assert "thermal runaway: there is no steady state" in answer(study)
+
+
+@pytest.mark.parametrize(
+    ("time", "commands", "delay"),
+    [
+        (2.0, (0.1, 1.5, 3.0), 0.5),  # after the last command before it
+        (0.05, (0.1, 1.5), -0.05),  # before all of them
+        (2.0, (), 2.0),  # no driver says: from the start of the stroke
+    ],
+)
+def test_a_delay_counts_from_the_command_before_it(time, commands, delay):
+    assert _since(time, commands) == pytest.approx(delay, rel=1e-12)
+    assert bool(_uncommanded("closing", delay, commands)) is not bool(commands)
+
+
+def test_gas_stands_apart_from_the_heat_of_the_fluid_and_says_so():
+    tank = "tank: {type: gas-chamber, volume: 1 cm^3, pressure: 1.2 bar, heat_conductance: 0.1 W/K}"
+    case = read(
+        (
+            "network:\n  components:",
+            "network:\n  gas: air\n  fluid: DOT 4\n  components:\n"
+            f"    {tank}\n    hole: {{type: gas-orifice, diameter: 0.1 mm}}",
+        ),
+        (
+            "[path.b, ambient]",
+            "[path.b, ambient]\n    - [tank.gas, hole.a]\n    - [hole.b, ambient]",
+        ),
+        ("  windings:", "  fluid: copper\n  windings:"),
+        ("variants: [dry]", "variants: [wet]"),
+    )
+    valve = build_valve(case)
+    hot = {"copper": 353.15, "ambient": 293.15}
+
+    warm = warm_valve(valve, {a: hot for a in aspects_of(case)}).valve.network
+
+    (cold,) = (row for row in valve.network.rows().elements if row.component == "gas")
+    (gas,) = (row for row in warm.rows().elements if row.component == "gas")
+    assert np.array_equal(gas.parameters, cold.parameters)
+    assert warm.fluid.temperature == pytest.approx(353.15)
+    found = heated_stroke(valve, find_roles(case), "wet", {a: COLD for a in aspects_of(case)})
+    assert any("gas stands apart from the heat network" in text for text in found.doubts)

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
+from klack.analyses.operating_point.analysis import OPERATING_POINT
 from klack.case.valve_reader import load_valve_case
+from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
@@ -97,3 +99,17 @@ def test_each_injector_injects_once_in_each_cycle(result):
         assert sum(event.approach_speed > 0.5 for event in stops) == 4
     assert min(masses) == pytest.approx(least, abs=0.01)
     assert max(masses) == pytest.approx(most, abs=0.01)
+
+
+def test_at_rest_the_relief_valve_passes_what_the_pump_delivers(tmp_path, monkeypatch):
+    """Behind closed injectors nothing flows, which is no reason to find no operating point."""
+    monkeypatch.chdir(tmp_path)
+    words = ["--steady", "--no-report", "--quiet", "--out", "out"]
+    assert main(["stroke", str(HOW_TO / "common_rail.yaml"), *words]) == 0
+
+    point = OPERATING_POINT.load(tmp_path / "out")
+    value = {(x.component, x.quantity): x.values[0] for x in point.quantities}
+    pump, leak = value["pump", "mass flow"], value["pump", "leak mass flow"]
+    assert value["relief", "mass flow"] == pytest.approx(pump + leak, rel=1e-12)
+    assert 145e5 < value["rail", "pressure"] < 155e5  # set and rated pressure of the relief valve
+    assert value["rail", "pressure"] == pytest.approx(value["outlet", "pressure"], rel=1e-12)

@@ -55,13 +55,22 @@ def export_models(
 
         require_compilers(choice.platforms)
     with show_progress(quiet) as progress:
-        models = chosen(case_models(case, progress, threads=threads), choice)
+        every = case_models(case, progress, threads=threads)
+        models = chosen(every, choice)
         progress(choice.to, 0.0)
         with staged_folder(folder) as stage:
             write_models(models, stage, choice)
             made = Written.of(folder, stage)
         progress(choice.to, 1.0)
-    return replace(made, lines=(*map(described, models), *made.lines))
+    outside = _outside(every.outside) if every.pair in models else ()
+    return replace(made, lines=(*map(described, models), *outside, *made.lines))
+
+
+def _outside(names: Sequence[str]) -> tuple[str, ...]:
+    """What of a valve its pair does not have."""
+    if not names:
+        return ()
+    return (f"Not in the models, yours to add: {', '.join(names)}",)
 
 
 def chosen(models: "CaseModels", choice: ModelChoice) -> tuple["ModalModel", ...]:

@@ -85,9 +85,12 @@ def show(
 def _draw_schematic(
     source: Path, out: Path | None, own: "Sequence[type[Component]]", wanted: Shown
 ) -> int:
+    from klack.analyses.result_folder import is_result
     from klack.case.shipped import find_case
     from klack.case.valve_reader import load_valve_case
 
+    if is_result(source):
+        return _draw_stored(source, out, wanted)
     case = load_valve_case(find_case(source), own)
     file = out if out is not None else Path(f"{case.name}.svg")
     require_file_target("--out", file)
@@ -97,6 +100,27 @@ def _draw_schematic(
         f"{len(network.components)} components, {len(network.nodes)} connections.\nPicture: {file}"
     )
     wanted.write(lambda: _numbers(case.name, file, network=case))
+    return 0
+
+
+def _draw_stored(source: Path, out: Path | None, wanted: Shown) -> int:
+    """The schematic that a result of a stroke holds."""
+    from klack.analyses.catalogue import load_result
+
+    study = load_result(source)
+    picture = getattr(study, "schematic", "")
+    if not picture:
+        raise InputError(
+            str(source),
+            got=f"a stored {type(study).__name__}, which holds no schematic",
+            expected="the result of klack stroke",
+            hint="klack show takes the case itself, and other results as .html.",
+        )
+    file = out if out is not None else Path(f"{source.absolute().name}.svg")
+    require_file_target("--out", file)
+    _write(file, picture)
+    wanted.say(f"The network of {source}.\nPicture: {file}")
+    wanted.write(lambda: _numbers(source.absolute().name, file, network=None))
     return 0
 
 

@@ -39,12 +39,15 @@ class CaseModels:
         All bodies, their contacts and films; what else drives the needle stays outside.
     provenance : Provenance
     step : float [s]
+    outside : tuple of str
+        Components of a valve that no model has.
     """
 
     bodies: tuple[ReducedBody, ...]
     pair: ModalModel
     provenance: Provenance
     step: float
+    outside: tuple[str, ...] = ()
 
     def body_models(self, name: str | None = None) -> tuple[ModalModel, ...]:
         """Linear models of one body or of all."""
@@ -214,6 +217,11 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
         pair=pair,
         provenance=provenance,
         step=case.run.fine_step,
+        outside=tuple(
+            name
+            for name, part in parts.items()
+            if name not in names and not isinstance(part, FlexibleBody)
+        ),
     )
 
 

@@ -155,6 +155,10 @@ class BoostDriver(Driver):
             )
         return self
 
+    def commands(self) -> tuple[tuple[float, float | None], ...]:
+        """Start and end of every shot."""
+        return tuple((shot.start, shot.end) for shot in self.shots)
+
     def program(self) -> DriveProgram:
         """States idle, then those of each shot, with the paths of the output stage."""
         states: list[tuple[str, StagePath, tuple[Switch, ...]]] = []

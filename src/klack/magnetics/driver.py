@@ -183,6 +183,22 @@ class DriveProgram:
         starts = 1 + len(blocks) + np.concatenate(([0], np.cumsum(sizes[:-1])))
         return np.concatenate(([float(len(blocks))], starts, *blocks))
 
+    @property
+    def switching(self) -> bool:
+        """Whether it switches to and fro within a cycle: a state can be reached from itself."""
+        after = {
+            state.name: {switch.to for switch in state.switches if not switch.new_cycle}
+            for state in self.states
+        }
+        for name in after:
+            reached, ahead = set[str](), set(after[name])
+            while ahead:
+                reached |= ahead
+                ahead = set().union(*(after[other] for other in ahead)) - reached
+            if name in reached:
+                return True
+        return False
+
     def stage_numbers(self) -> NDArray[np.float64]:
         """Flat output stage for the compiled step; none without one."""
         if self.stage is None:
@@ -242,6 +258,14 @@ class Driver(Component):
     @abstractmethod
     def program(self) -> DriveProgram:
         """States and switches of this driver."""
+
+    def commands(self) -> tuple[tuple[float, float | None], ...]:
+        """When it is switched on, and off again, in its first cycle [s]; none if it does not say.
+
+        A course over time and a controller do not: which of their changes opens the valve is not
+        known.
+        """
+        return ()
 
     def add_rows(self, rows: Rows) -> None:
         """Add nothing: the coil runs the program."""
@@ -318,6 +342,10 @@ class TimedDriver(DiodeDriver):
             )
         self.require_period(self.end)
         return self
+
+    def commands(self) -> tuple[tuple[float, float | None], ...]:
+        """Its start and end."""
+        return ((self.start, self.end),)
 
     def framed(self, *working: DriveState) -> DriveProgram:
         """Program of the working states, the first one entered at ``start``, with both ends."""

@@ -118,7 +118,7 @@ class ElementRow:
     at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
     point, where they differ.  ``interval`` [s] is that of its exchange with something outside: no
     step is longer.  ``state_names`` are name and unit of states that no channel records, by index;
-    ``state_owners`` are the components to which states belong in a row that stands for several.
+    ``component.name`` in a row that stands for several.
     """
 
     component: str
@@ -135,7 +135,6 @@ class ElementRow:
     at_steady: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
     state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
-    state_owners: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

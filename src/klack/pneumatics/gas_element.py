@@ -181,13 +181,11 @@ def close_gas(rows: Rows) -> None:
             state=net.start(still),
             books=(Book("energy", "store"), Book("enthalpy", "supply"), Book("heat", "supply")),
             channels=tuple(_channels(found)),
-            failures=_FAILURES,
-            state_names={OF_CHAMBER * i + 1: ("energy", "J") for i in range(len(found.chambers))},
-            state_owners={
-                OF_CHAMBER * i + k: chamber.component
+            state_names={
+                OF_CHAMBER * i + 1: (f"{chamber.component}.internal energy", "J")
                 for i, chamber in enumerate(found.chambers.values())
-                for k in range(OF_CHAMBER)
             },
+            failures=_FAILURES,
             at_rest=net.start,
             at_steady=lambda y: net.start(y, steady=True),
         )

@@ -145,12 +145,12 @@ class _Assembly:
         if found.kink > _KINK:
             self.doubts.append(
                 f"'{row.component}' is not smooth at this point: its answers to a small change "
-                f"to one and to the other side differ by {100.0 * found.kink:.2g} % (hysteresis, "
+                f"to one and to the other side differ by {100.0 * found.kink:.3g} % (hysteresis, "
                 "an edge, or a valve about to open). The linear law is the mean of both."
             )
         if found.doubt > _DOUBT:
             self.doubts.append(
-                f"the linear law of '{row.component}' changes by {100.0 * found.doubt:.2g} % "
+                f"the linear law of '{row.component}' changes by {100.0 * found.doubt:.3g} % "
                 "with the time step that it is taken from: something in it is faster than the run."
             )
         return found
@@ -241,11 +241,11 @@ class _Assembly:
         self.row_states = []
         every: list[ElementRow | BranchRow] = [*self.rows.elements, *self.rows.branches]
         for row_, found in zip(every, self.linear, strict=True):
-            labels = {c.index: (c.label, c.unit) for c in row_.channels} | dict(row_.state_names)
-            owners = getattr(row_, "state_owners", {})
+            named = _state_signals(row_)
             self.row_states.append(len(self.states))
-            for j in found.kept:
-                self._add(owners.get(j, row_.component), labels.get(j, (f"state {j}", "")))
+            self.states += [
+                named.get(j, Signal(row_.component, f"state {j}", "")) for j in found.kept
+            ]
         self.pressures = self._add("", *())
         for i in range(self.network.nodes.volumes):
             self.states.append(Signal(self.node_names[i], "pressure", "Pa"))
@@ -436,10 +436,9 @@ class _Assembly:
                 for p, port in enumerate(ports):
                     self.force[port] += acts[p]
                     label = names[p] if p < len(names) and names[p] else f"port {p + 1}"
-                    # a row of several components names them with its ports
-                    point = (label if "." in label else f"{owner}.{label}").replace(" ", "_")
-                    self._show(point, "force", "N", acts[p])
-                    self._adds_force(f"{point}.force", port, 1.0)
+                    place = label if "." in label else f"{owner}.{label}"  # as the run records it
+                    self._show(place.replace(" ", "_"), "force", "N", acts[p])
+                    self._adds_force(f"{place}.force".replace(" ", "_"), port, 1.0)
                 for channel, form in zip(row.channels, law.channels @ forms, strict=True):
                     if not any(channel.label.endswith(x) for x in ("driver state",)):
                         self._show(channel.owner or owner, channel.label, channel.unit, form)
@@ -558,3 +557,12 @@ class _Assembly:
                     - omega**2 * self._unit(place)
                     - 2.0 * float(body.damping[i]) * omega * self._unit(place + 1)
                 )
+
+
+def _state_signals(row: ElementRow | BranchRow) -> dict[int, Signal]:
+    """States of a row by their index, each with the component whose it is."""
+    found = {c.index: Signal(c.owner or row.component, c.label, c.unit) for c in row.channels}
+    for index, (label, unit) in row.state_names.items():
+        owner, dot, quantity = label.partition(".")
+        found[index] = Signal(owner, quantity, unit) if dot else Signal(row.component, label, unit)
+    return found

@@ -41,6 +41,7 @@ MOST_STATES = 1500
 _NEWTON = 40
 _CONVERGED = 1e-11  # last Newton step over the root
 _SAME = 1e-7  # two roots over their distance from zero
+_REAL = 1e-10  # imaginary part over the distance from zero: round-off of equal real roots
 _EPS = float(np.finfo(float).eps)
 
 
@@ -285,7 +286,7 @@ def modes(system: LinearSystem, band: float) -> tuple[list[Mode], int]:
     for i in np.argsort(np.abs(roots)):
         root = complex(roots[i])
         beyond = len(system.delays) > 0 and abs(root) > 2.0 * np.pi * band * 1.05
-        if root.imag < 0.0 or (beyond and root.real <= 0.0):
+        if root.imag < -_REAL * abs(root) or (beyond and root.real <= 0.0):
             continue
         exact = _newton(system, root, own)
         if exact is not None:
@@ -305,6 +306,8 @@ def modes(system: LinearSystem, band: float) -> tuple[list[Mode], int]:
                 continue
         if abs(root) <= 3.0 * unsure:
             unsure = max(unsure, abs(root))
+        if abs(root.imag) <= max(_REAL * abs(root), unsure):
+            root = complex(root.real, 0.0)  # one of several equal real roots
         found.append(Mode(root=root, uncertainty=unsure, participation=_shares(system, product)))
     found.sort(key=lambda mode: (-mode.verdict if mode.verdict > 0 else 0, abs(mode.root)))
     return found, lost

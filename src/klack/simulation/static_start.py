@@ -92,6 +92,7 @@ _UNDAMPED = float(np.finfo(float).tiny)  # [s/m]: known, and nothing
 _SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
 _DEEP = 10.0  # of the way between the stops: nobody means a stop so soft
 _ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
+_IDLE = 1e-6  # of the largest flow: where less flows, behind closed valves, that is the measure
 _NEARLY = 1e-9  # the same where they come no closer
 
 
@@ -528,6 +529,7 @@ class _Balance:
             unit = nodes.density * (_LENGTH * self.step) ** 2
             most = unit + float(np.max(np.abs(state.m), initial=0.0))
             flows[self.ends.ravel()] += _ROUND_OFF / share * most
+        flows = np.maximum(flows, _IDLE * np.max(flows, initial=0.0))
         if settled and bool(np.all(np.abs(net) <= share * flows[self.free])):
             rest, scale = self._columns_left(state)
             if np.all(np.abs(rest) <= share * scale):
@@ -803,8 +805,15 @@ class _Balance:
         left = self.left_on_bodies()
         name = max(left, key=lambda key: abs(left[key])) if left else "the network"
         force = format_si(abs(left.get(name, 0.0)), "N", 3)
+        flows = self._net(state)
+        flowing = ""
+        if flows.size and np.any(flows != 0.0):
+            most = int(np.argmax(np.abs(flows)))
+            volume = self.network.rows.nodes[self.network.node_order[self.free[most]]].component
+            flow = abs(float(flows[most])) / self.network.nodes.density
+            flowing = f", {format_si(flow, 'm^3/s', 3)} into or out of '{volume}'"
         return ConvergenceError(
-            f"static equilibrium not found: {force} remain on '{name}' at a "
+            f"static equilibrium not found: {force} remain on '{name}'{flowing} at a "
             f"displacement of {format_si(float(np.max(np.abs(state.y))), 'm', 3)}.\n"
             "Try: check for an unsupported body, a magnet stronger "
             "than its counterforce, or a gap outside its map; in Python, "

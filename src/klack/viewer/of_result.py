@@ -218,10 +218,16 @@ def _history(name: str, time: Floats, values: Floats, factor: float, unit: str) 
 def _stroke_view(
     study: StrokeStudy, folder: Path, components: Iterable[type[Component]], progress: Progress
 ) -> View:
-    case = read_valve_case(study.case_text, _place_of_case(study, folder), components)
-    view = _named(view_of_case(case, progress), study, folder)
+    given = tuple(components)
     variant = next(iter(study.variants.values()))
     lift = variant.channel(study.channels.lift)
+    try:
+        case = read_valve_case(study.case_text, _place_of_case(study, folder), given)
+    except InputError as error:
+        if not study.schematic or not set(study.own_components) <= {kind.type for kind in given}:
+            raise
+        return _without_case(study, folder, variant, str(error))
+    view = _named(view_of_case(case, progress), study, folder)
     if lift is None:
         return view
     needle = getattr(case.network.components.get(study.needle), "body", study.needle)
@@ -239,6 +245,26 @@ def _stroke_view(
         histories=_stroke_histories(study, variant),
         notes=(*view.notes, note),
     )
+
+
+def _without_case(study: StrokeStudy, folder: Path, variant: StrokeVariant, error: str) -> View:
+    """What the result itself holds, where a file that its case names does not lie beside it."""
+    view = View(
+        name="",
+        title="",
+        source="",
+        description="",
+        version=__version__,
+        bodies=(),
+        schematic=study.schematic,
+        time=variant.result.time,
+        histories=_stroke_histories(study, variant),
+        notes=(
+            "The case of this result cannot be read beside the result, so that bodies are not "
+            f"shown: {error.splitlines()[0]}",
+        ),
+    )
+    return _named(view, study, folder)
 
 
 def _stroke_histories(study: StrokeStudy, variant: StrokeVariant) -> tuple[Curve, ...]:

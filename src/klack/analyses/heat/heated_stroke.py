@@ -1,7 +1,8 @@
 """One stroke at given temperatures: its losses, and the numbers that a warm-up follows."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from klack.case.valve_roles import ValveRoles
 from klack.case.variants import Variant
 from klack.errors import ConvergenceError, InputError
 from klack.input.problem import nearest, one_of
-from klack.magnetics.driver import TimedDriver
+from klack.magnetics.driver import Driver
 from klack.progress import silent
 from klack.simulation.network_result import NetworkResult
 from klack.stages import trial
@@ -77,15 +78,11 @@ def heated_stroke(
         raise ConvergenceError(f"stroke at {', '.join(sorted(shown))}: {run.failure}")
     result = run.variant.result
     times = run.variant.needle_times
-    off = max(
-        (
-            part.end
-            for part in valve.network.components.values()
-            if isinstance(part, TimedDriver) and part.end is not None
-        ),
-        default=0.0,
-    )
-    opens, closes = (0.0, off) if times.starts == "closed" else (off, 0.0)
+    drivers = [part for part in valve.network.components.values() if isinstance(part, Driver)]
+    commands = [command for driver in drivers for command in driver.commands()]
+    on = [start for start, _ in commands]
+    off = [end for _, end in commands if end is not None]
+    opens, closes = (on, off) if times.starts == "closed" else (off, on)
     seat = next((item for item in result.events if item.stop == roles.seat), None)
     stop = next((item for item in result.events if item.stop == roles.opening_stop), None)
     nan = float("nan")
@@ -101,12 +98,32 @@ def heated_stroke(
         losses=dict(result.books.losses),
         numbers=numbers,
         values=warm.values,
-        doubts=(*warm.doubts, *_still_driven(result)),
+        doubts=(
+            *warm.doubts,
+            *_still_driven(result),
+            *_gas(result),
+            *_uncommanded("opening", numbers["opening delay"], opens),
+            *_uncommanded("closing", numbers["closing delay"], closes),
+        ),
     )
 
 
-def _since(time: float | None, command: float) -> float:
-    return float("nan") if time is None else time - command
+def _since(time: float | None, commands: Sequence[float]) -> float:
+    """Time after the last command before it; after the start of the stroke without commands."""
+    if time is None:
+        return float("nan")
+    before = [command for command in commands if command <= time]
+    return time - max(before, default=min(commands, default=0.0))
+
+
+def _uncommanded(way: str, delay: float, commands: Sequence[float]) -> tuple[str, ...]:
+    """Doubt about a delay that no driver begins."""
+    if commands or isnan(delay):
+        return ()
+    return (
+        f"no driver says when its command for {way} is: the {way} delay counts from the start of "
+        "the stroke. Its changes with temperature are those of the valve all the same.",
+    )
 
 
 def _rebound(result: NetworkResult, roles: ValveRoles, touch: float | None) -> float:
@@ -129,6 +146,16 @@ def _still_driven(result: NetworkResult) -> tuple[str, ...]:
                     "is missing. Give a longer run.duration, or let the driver end."
                 )
     return tuple(found)
+
+
+def _gas(result: NetworkResult) -> tuple[str, ...]:
+    """Doubt about gas, which stands apart from the heat network."""
+    if "gas heat" not in result.books.supplies:
+        return ()
+    return (
+        "gas stands apart from the heat network: its walls and sources keep the temperatures of "
+        "the case, and the heat between gas and walls warms no node.",
+    )
 
 
 def sent_heat(thermal: CaseThermal, losses: Mapping[str, float]) -> dict[str, float]:

@@ -8,10 +8,10 @@ from klack.assembling.valve import Valve, filled_network
 from klack.case.thermal import CaseThermal
 from klack.case.valve import ValveCase
 from klack.errors import InputError
+from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties
 from klack.magnetics.winding import warm_resistance
 from klack.network.component import Component
-from klack.network.network import Network
 from klack.units import format_si
 
 __all__ = ["ASPECTS", "Aspect", "WarmValve", "aspects_of", "warm_valve"]
@@ -107,12 +107,11 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
         thick, doubts = _within_range(valve.case, at["viscosity"][thermal.fluid])
         dense, others = _within_range(valve.case, at["density"][thermal.fluid])
         doubts = tuple(dict.fromkeys((*doubts, *others)))
-        ambient = section.ambient.model_copy(update={"temperature": dense})
-        section = section.model_copy(update={"ambient": ambient})
     case = valve.case.model_copy(update={"network": section})
     network = filled_network(case, valve.reduced, valve.laws)
-    if thermal.fluid is not None and thick != dense:
-        network = _with_viscosity(network, section.fluid.at(thick))
+    if thermal.fluid is not None:  # the surroundings, which gas takes, stay as they are
+        fluid = _with_viscosity(section.fluid.at(dense), section.fluid.at(thick))
+        network = replace(network, fluid=fluid)
     return WarmValve(valve=replace(valve, case=case, network=network), values=values, doubts=doubts)
 
 
@@ -162,12 +161,11 @@ def _within_range(case: ValveCase, temperature: float) -> tuple[float, tuple[str
     )
 
 
-def _with_viscosity(network: Network, warm: Any) -> Network:
-    """Network whose fluid has the viscosity of another temperature, and nothing else of it."""
-    fluid = replace(
-        network.fluid,  # type: ignore[type-var]
+def _with_viscosity(fluid: Fluid, warm: Fluid) -> Fluid:
+    """Fluid with the viscosity of another temperature, and nothing else of it."""
+    return replace(
+        fluid,
         base_viscosity=warm.base_viscosity,
         pressure_viscosity=warm.pressure_viscosity,
         viscosity_law=warm.viscosity_law,
     )
-    return replace(network, fluid=fluid)

@@ -31,6 +31,7 @@ from klack.case.variants import Variant
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
 from klack.magnetics.constant_drive import coils_of, driven, resistance_of
+from klack.magnetics.driver import Driver
 from klack.network.network import Network
 from klack.network.rows import Rows
 from klack.progress import Progress, silent
@@ -58,7 +59,6 @@ _FEW_STATES = 400  # of lines, in the usual band
 _POINTS = 400
 _ABOUT = 12  # points about each resonance, to both sides
 _LEAST = 1e-3  # [Hz]
-_SWITCHING = ("two-point", "peak-hold", "pwm")
 _WORDS = {1: "grows", 0: "neutral", -1: "decays"}
 
 
@@ -263,10 +263,16 @@ def _notes(network: Network, lost: int, band: float) -> list[str]:
         for name in controllers_of(network)
     ]
     told += [
-        f"the driver '{name}' switches on the current of its coil: the coil has a constant voltage "
-        "in its place, the model is that between two switchings."
+        f"the driver '{name}' switches to and fro: the coil has a constant voltage in its place, "
+        "the model is that between two switchings."
         for name, part in network.components.items()
-        if part.type in _SWITCHING
+        if isinstance(part, Driver) and part.program().switching
+    ]
+    told += [
+        f"the capacitor, diodes and switches of the driver '{name}' are no part of the model: the "
+        "coil has a constant voltage and its own resistance alone."
+        for name, part in network.components.items()
+        if isinstance(part, Driver) and part.program().stage is not None
     ]
     if lost:
         told.append(

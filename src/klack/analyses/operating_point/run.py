@@ -140,7 +140,7 @@ def run_operating_points(
         valve = build_valve(case, clock, threads=threads)
     asked = point_conditions(base or Conditions(), sweeps)
     found: list[Measured | None] = []
-    failures, doubts = list[str](), list[str]()
+    failures, doubts, errors = list[str](), list[str](), list[KlackError]()
     drive: dict[str, float] = {}
     spent = 0.0
     for i, conditions in enumerate(asked):
@@ -154,6 +154,7 @@ def run_operating_points(
                 raise
             found.append(None)
             failures.append(str(error))
+            errors.append(error)
             doubts.append("")
             continue
         spent += process_time() - taken
@@ -161,6 +162,8 @@ def run_operating_points(
         found.append(measures)
         failures.append("")
         doubts.append("\n".join(now.notes))
+    if not any(found) and all(isinstance(error, InputError) for error in errors):
+        raise errors[0]  # what is asked for fits no point of this case
     if not any(found):
         raise ConvergenceError(
             f"operating points: none of {len(asked)} was found; the first one: {failures[0]}"

@@ -32,7 +32,7 @@ from klack.case.variants import Variant
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import ConvergenceError, InputError
-from klack.magnetics.driver import TimedDriver
+from klack.magnetics.driver import Driver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
 from klack.network.port import Role
@@ -386,7 +386,8 @@ def _lift(rows: Rows, needle: str) -> float | None:
 
 def _switch_off(network: Network) -> float | None:
     """When the drivers' command ends [s]; None if no driver says."""
-    ends = [part.end for part in network.components.values() if isinstance(part, TimedDriver)]
+    drivers = [part for part in network.components.values() if isinstance(part, Driver)]
+    ends = [end for driver in drivers for _, end in driver.commands()]
     return max((end for end in ends if end is not None), default=None)
 
 
