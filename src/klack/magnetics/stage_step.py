@@ -230,14 +230,12 @@ def stage_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     spread, settled = stack(out, 6), stack(out, 6)
     if h <= 0.0 or settles:
         piece_gaps(par, at, hints, x0, x0, middle, final, slope)
-    if h > 0.0 and settles:
-        released, heat = piece_settle(par, at, hints, phi, final, is_open, spread)
+    if h > 0.0 and settles:  # at constant linkage: what an open coil lets go went at the end
+        released, heat = piece_settle(par, at, hints, phi, final, False, spread)
         eddy += released
         hysteresis += heat
         for j in range(loops):
             phi[j] += spread[j]
-        if is_open:
-            pulse += linked(par, at, spread)
     while done < h:
         now = t + done
         block, path = state_block(par, drive, int(mode)), _path(stage, mode)
