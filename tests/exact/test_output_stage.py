@@ -11,6 +11,7 @@ from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.magnetics.driver import When
+from klack.magnetics.remanent_start import remanent_state
 from klack.network.rows import Book
 from klack.simulation.network_run import simulate_network
 from klack.verification.drivers import injector, linear_coil
@@ -223,3 +224,17 @@ def test_the_energies_are_those_of_the_page(result):
         ("converter", converter),
     ):
         assert losses[f"coil {name}"] == pytest.approx(value, abs=0.1e-3)
+
+
+def test_a_magnet_with_remanence_starts_so_behind_a_stage():
+    text = (HOW_TO / "boost_driver.yaml").read_text(encoding="utf-8").replace(IRON, LOOP)
+    text = text.replace("    coil:\n", "    coil:\n      start: remanent\n")
+    network = read_valve_case(text, HOW_TO / "remanent.yaml").network.network()
+    (coil,) = (row for row in network.rows().elements if row.component == "coil")
+
+    circuit, gap = network.components["coil"].circuit(), float(coil.parameters[2])
+    fluxes, stops = remanent_state(circuit, current=0.0, gap=gap)
+
+    assert coil.state[-2] == 65.0  # the capacitor
+    assert list(coil.state[-2 - len(stops) : -2]) == list(stops)
+    assert coil.state[-1] == np.abs(fluxes).max() > 0.0

@@ -375,9 +375,11 @@ def flux_state(
     phi = np.array(fluxes, dtype=float).ravel()
     state[_FRONT : _FRONT + phi.size] = phi
     kept = np.array(stops, dtype=float).ravel()
-    state[state.size - 1 - kept.size : -1] = kept
+    staged = parameters[7] > 0.0  # behind an output stage: its capacitor stands before the last one
+    last = state.size - (2 if staged else 1)
+    state[last - kept.size : last] = kept
     state[-1] = np.max(np.abs(phi), initial=0.0)
-    if parameters[7] > 0.0:  # behind an output stage
+    if staged:
         state[-2] = parameters[int(parameters[7]) + START_VOLTAGE]
     return state
 

@@ -103,7 +103,7 @@ def run_stage(
     fluxes = plant.loop_turns * 0.0
     if current:
         fluxes = steady_fluxes(plant, current=current, gap=_GAP)
-    state = flux_state(par, fluxes, current)
+    state = flux_state(par, fluxes, (), current)
     size, books = state.size, len(STAGE_BOOKS)
     _, out = evaluate(stage_step, par, state, [0.0, 0.0, y[0], y[0], 0.0, 0.0], 2 + size + books)
     before, sums, work = out[2 + size :].copy(), np.zeros(books), 0.0
