@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 def grounded_inverse(links: Array, ground: Array) -> Array:
     r"""Temperatures of all nodes over 1 W into each of them, the ground at zero.
 
-    .. math:: (\mathrm{diag}(g + \textstyle\sum_j W_{ij}) - W)^{-1}
+    .. math:: (\mathrm{diag}(g + \sum_j W_{ij}) - W)^{-1}
 
     Node after node is removed, and what it joined is joined by the star-mesh transform.  Only sums,
     products and quotients of positive numbers occur, so that every entry is exact to some units in
