@@ -7,20 +7,11 @@ engineer might ask for, runs each, and prints what failed and the largest energy
 say why: one of klack's own errors counts as told, anything else as failed.
 """
 
-import argparse
 import json
-import sys
-import traceback
-import warnings
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from klack.case.valve_reader import read_valve_case
-from klack.errors import KlackError
-from klack.simulation.network_result import NetworkResult
-from klack.simulation.network_run import simulate_network
+from drawn_networks import run, run_draws
 
 __all__ = ["draw", "main", "run"]
 
@@ -248,51 +239,9 @@ def _fluid(rng: Rng) -> Any:
     return {"name": name, "gas_fraction": _log(rng, 1e-5, 1e-2)}
 
 
-def run(text: str) -> NetworkResult:
-    """Run one draw."""
-    case = read_valve_case(text, Path("draw.yaml"))
-    return simulate_network(
-        case.network.network().rows(),
-        duration=case.run.duration,
-        step=case.run.step,
-        record=case.run.record,
-    )
-
-
 def main() -> int:
     """Run draws, and print what failed and the largest residual."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", type=int)
-    chosen = parser.parse_args()
-    warnings.simplefilter("ignore")
-    seeds = range(chosen.seed, chosen.seed + chosen.count)
-    if chosen.only is not None:
-        sys.stdout.write(draw(chosen.only) + "\n")
-        seeds = range(chosen.only, chosen.only + 1)
-    worst, least, told, failed = 0.0, 0.0, 0, 0
-    for seed in seeds:
-        try:
-            result = run(draw(seed))
-        except KlackError as error:
-            told += 1
-            sys.stdout.write(f"{seed}: {' '.join(str(error).split())[:300]}\n")
-        except Exception:
-            failed += 1
-            sys.stdout.write(f"{seed}: {traceback.format_exc()}\n")
-        else:
-            residual, loss = result.books.relative_residual, result.books.least_loss
-            worst = max(worst, residual)
-            least = min(least, loss / (result.books.scale or 1.0))
-            if not (residual <= 1e-9 and loss >= -1e-9 * result.books.scale):
-                sys.stdout.write(f"{seed}: energy residual {residual:.2e}, loss {loss:.2e} J\n")
-    count = len(seeds)
-    sys.stdout.write(
-        f"{count - told - failed} of {count} ran, {told} stopped with an error, {failed} failed; "
-        f"largest energy residual {worst:.2e}, least loss {least:.2e}\n"
-    )
-    return int(failed > 0)
+    return run_draws(draw, about=__doc__, count=300)
 
 
 if __name__ == "__main__":

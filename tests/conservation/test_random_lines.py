@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_lines.py"))
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(ROOT / "benchmarks")
+    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_lines.py"))
 
 # 34, 100: cavities at junctions; 161: one that closes after many iterations; 20, 30: dead ends
 SAMPLE = (*range(6), 20, 30, 34, 100, 161)

@@ -11,7 +11,9 @@ import pytest
 from klack.simulation.network_result import IncompleteRunError
 
 ROOT = Path(__file__).parents[2]
-DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_supplies.py"))
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(ROOT / "benchmarks")
+    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_supplies.py"))
 
 # 52, 80: a volume that boils at the end of a line; 217: closed behind a check valve; 8, 31, 120: a
 # valve that opens within the step, where an interval that the other volumes had moved the root out
