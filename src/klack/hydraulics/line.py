@@ -1,6 +1,6 @@
 """Line with water hammer: a bore in which pressure travels as waves."""
 
-from math import pi
+from math import inf, pi
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -10,8 +10,9 @@ from pydantic import Field, model_validator
 from klack.errors import InputError
 from klack.hydraulics.line_friction import KAGAWA, laminar_resistance, unsteady_terms
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
+from klack.hydraulics.local_line import LocalLine
 from klack.hydraulics.network_fluid import network_fluid
-from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pipe_friction import LAMINAR, PipeFriction
 from klack.hydraulics.wall_compliance import Wall
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
@@ -24,6 +25,7 @@ from klack.units import Length, Modulus, Pressure
 __all__ = ["Line"]
 
 _FOLLOWED = 0.1  # error of wave speed and impedance that is not worth a word
+_CELLS = 50  # of a line with local properties
 _LOOKED_AT = 400  # pressures, in equal ratios
 # two with friction damp all modes of a fed line as spread friction does; turbulent lumps, which
 # are not at the ends, want four
@@ -94,6 +96,14 @@ class Line(Component):
         description="Segments between which friction and cavities are lumped; "
         "default 2, 1 without friction, 4 lumps of turbulent friction.",
     )
+    properties: Literal["fixed", "local"] = Field(
+        default="fixed",
+        description="fixed: density, sound speed and viscosity at one pressure; local: in cells, "
+        "following the pressure, where ``pressure`` has no meaning.",
+    )
+    cells: Count | None = Field(
+        default=None, ge=4, description="Of a line with local properties; default 50."
+    )
 
     @model_validator(mode="after")
     def _whole_wall(self) -> Self:
@@ -112,6 +122,14 @@ class Line(Component):
                 got=f"a roughness with friction: {self.friction}",
                 expected="it with friction: turbulent alone",
                 hint="leave it out, or choose friction: turbulent.",
+            )
+        wrong = "segments" if self.properties == "local" else "cells"
+        if getattr(self, wrong) is not None:
+            raise CaseProblem(
+                (wrong,),
+                got=f"{wrong} in a line with properties: {self.properties}",
+                expected="segments with properties: fixed, cells with properties: local",
+                hint="leave it out, or change properties.",
             )
         if self.wall is not None:
             self._refuse_with(tuple(given), "wall", "the wall is given twice")
@@ -175,8 +193,11 @@ class Line(Component):
         return max((end.at_start for end in stated or ends), default=rows.ambient.pressure)
 
     def add_rows(self, rows: Rows) -> None:
-        """Add the delay line."""
+        """Add the delay line, or the row of its cells."""
         fluid = network_fluid(rows)
+        if self.properties == "local":
+            rows.waves.append(self._local().row(rows, self._speeds))
+            return
         pressure = self.working_pressure(rows)
         rho = float(fluid.density(pressure))
         # the network counts P = rho_ref g and q = mdot / rho_ref, with rho_ref at ambient pressure
@@ -202,8 +223,29 @@ class Line(Component):
                 unsteady_gain=share * gain if memory else (),
                 unsteady_rate=rate if memory else (),
                 vapour_pressure=fluid.vapour_pressure,
+                laminar_flow=self._laminar_flow(rows, fluid, viscosity),
             )
         rows.limits += self._limits(rows, fluid, pressure)
+
+    def _laminar_flow(self, rows: Rows, fluid: NetworkFluid, viscosity: float) -> float:
+        """Flow of Re = 2300 as the network counts it; infinite without laminar friction."""
+        if self.friction not in ("steady", "kagawa") or viscosity <= 0.0:
+            return inf
+        reference = float(fluid.density(rows.ambient.pressure))
+        return LAMINAR * 0.25 * pi * self.diameter * viscosity / reference
+
+    def _local(self) -> LocalLine:
+        stretch = 0.0 if self.wall is None else self.wall.area_compliance
+        if self.wall_modulus is not None and self.wall_thickness is not None:
+            stretch = self.diameter / (self.wall_modulus * self.wall_thickness)
+        return LocalLine(
+            length=self.length,
+            diameter=self.diameter,
+            stretch=stretch,
+            friction=self.friction,
+            roughness=self.roughness or 0.0,
+            cells=self.cells or _CELLS,
+        )
 
     def _pieces(
         self, rows: Rows, viscosity: float, *, turbulent: bool
@@ -261,7 +303,8 @@ class Line(Component):
                 law=f"the line '{rows.component}' with the fluid of {1e-5 * pressure:.4g} bar",
                 effect=effect,
                 advice=f"give components.{rows.component}.pressure the working pressure of "
-                "the relevant waves, and compare two runs with pressures around it.",
+                "the relevant waves, or let its properties follow the pressure with properties: "
+                "local.",
                 key="pressure",
                 node=node,
             )

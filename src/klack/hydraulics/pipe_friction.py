@@ -13,16 +13,26 @@ from klack.network.component import Component
 from klack.network.port import FLOW, Port
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
-from klack.units import Length
+from klack.units import Length, format_si
 
-__all__ = ["PipeFriction", "pipe_friction_step", "reynolds_of"]
+__all__ = [
+    "LAMINAR",
+    "PipeFriction",
+    "laminar_doubt",
+    "pipe_friction_step",
+    "reynolds_of",
+    "root_of",
+]
 
-_LAMINAR, _TURBULENT = 2300.0, 4000.0
-"""Reynolds numbers at which laminar flow ends and turbulent flow is developed."""
+LAMINAR = 2300.0
+"""Reynolds number at which laminar flow ends."""
 
-_LAST = sqrt(64.0 * _LAMINAR)  # Re sqrt(f) where laminar flow ends
+_TURBULENT = 4000.0  # turbulent flow is developed
+_LAST = sqrt(64.0 * LAMINAR)  # Re sqrt(f) where laminar flow ends
 _ROUGHEST = 0.05  # of the diameter, in the diagram of Moody
 _OVER_LN10 = 1.0 / log(10.0)
+_MOST_NEWTON = 30
+_SETTLED = 1e-7  # Newton step over the root; what is left is its square
 
 
 @njit(error_model="numpy")
@@ -60,8 +70,37 @@ def reynolds_of(x: float, rough: float, first: float) -> tuple[float, float]:
     if x >= first:
         return _colebrook(x, rough)
     top, _ = _colebrook(first, rough)
-    slope = (top - _LAMINAR) / (first - _LAST)
-    return _LAMINAR + slope * (x - _LAST), slope
+    slope = (top - LAMINAR) / (first - _LAST)
+    return LAMINAR + slope * (x - _LAST), slope
+
+
+def laminar_doubt(component: str, reynolds: float, time: float) -> str:
+    """Sentence on laminar friction beyond its range."""
+    return (
+        f"'{component}': the flow in this line, whose friction is laminar, reaches a Reynolds "
+        f"number of {reynolds:.3g} {format_si(time, 's', 4)} after the start; steady laminar flow "
+        f"ends at {LAMINAR:g}. In the first milliseconds of a change it stays laminar above that, "
+        "later the pressure drop is higher than computed.\n"
+        f"Try: components.{component}.friction: turbulent."
+    )
+
+
+@njit(error_model="numpy", _nrt=False)
+def root_of(reynolds: float, rough: float, first: float) -> float:
+    """``x = Re sqrt(f)`` of a Reynolds number: the inverse of :func:`reynolds_of`."""
+    if reynolds <= LAMINAR:
+        return 8.0 * sqrt(reynolds)
+    top, _ = _colebrook(first, rough)
+    if reynolds < top:
+        return _LAST + (reynolds - LAMINAR) * (first - _LAST) / (top - LAMINAR)
+    x = first * reynolds / top  # Newton's method on a concave function, from below
+    for _ in range(_MOST_NEWTON):
+        found, slope = _colebrook(x, rough)
+        step = (reynolds - found) / slope
+        x += step
+        if abs(step) < _SETTLED * x:
+            break
+    return x
 
 
 @step_function

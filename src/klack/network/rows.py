@@ -4,7 +4,7 @@ Handles are plain integers: of a mechanical port (a degree of freedom along +z o
 a hydraulic node (one pressure).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from typing import TYPE_CHECKING, Literal
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 __all__ = [
     "AMBIENT",
     "GROUND",
+    "WAVE_BEGIN",
+    "WAVE_END",
+    "WAVE_STORE",
     "Ambient",
     "BodyRow",
     "Book",
@@ -41,6 +44,7 @@ __all__ = [
     "SideRow",
     "SliderRow",
     "WallRow",
+    "WaveRow",
 ]
 
 GROUND = -1
@@ -314,6 +318,8 @@ class LineRow:
         ``dp = resistance q + sum_k gain_k int exp(-rate_k (t - s)) dq/ds ds``.
     vapour_pressure : float [Pa]
         Below it a cavity opens between two segments.
+    laminar_flow : float [m^3/s]
+        At which the friction, which is laminar, ends to hold: that of a Reynolds number of 2300.
     """
 
     component: str
@@ -326,6 +332,63 @@ class LineRow:
     unsteady_gain: NDArray[np.float64]
     unsteady_rate: NDArray[np.float64]
     vapour_pressure: float
+    laminar_flow: float = inf
+
+
+WAVE_BEGIN, WAVE_END, WAVE_STORE = 0.0, 1.0, 2.0
+"""What the step function of a :class:`WaveRow` is asked for, its first input."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WaveRow:
+    """Part that stores fluid between two nodes and answers at both with a wave of its own.
+
+    Its step function writes its state in place; with ``B`` [J/kg] the energy per mass at an end,
+    which is the pressure energy of the node, and flows [kg/s] into the part:
+
+    =============  ==================================  =========================================
+    first input    inputs behind it                    outputs
+    =============  ==================================  =========================================
+    ``WAVE_BEGIN`` ``H``                               ``B, flow, dflow/dB`` of what leaves a, b
+    ``WAVE_END``   ``H``, ``B, flow`` found at a, b    losses [J]: friction, of the waves
+    ``WAVE_STORE`` none                                energy [J], mass [kg], Reynolds number, time
+    =============  ==================================  =========================================
+
+    Parameters
+    ----------
+    a, b : int
+    step : StepFunction
+    parameters : array
+    states : int
+        Length of the state.
+    start : callable
+        State of the steady flow [kg/s] from a to b between two pressures [Pa].
+    drop : callable
+        Energy per mass [J/kg] that a flow [kg/s] from a to b loses, given the pressure [Pa] at a,
+        and its slope.
+    crossing : float [s]
+        No step may be longer.
+    failures : mapping of int to str
+        Meaning of a status.
+    losses : tuple of str
+        Names of both losses.
+    doubts : callable
+        Sentences on a finished run, of losses and throughput [J], largest Reynolds number and its
+        time [s].
+    """
+
+    component: str
+    a: int
+    b: int
+    step: StepFunction
+    parameters: NDArray[np.float64]
+    states: int
+    start: Callable[[float, float, float], NDArray[np.float64]]
+    drop: Callable[[float, float], tuple[float, float]]
+    crossing: float
+    failures: Mapping[int, str]
+    losses: tuple[str, str]
+    doubts: Callable[[NDArray[np.float64], float, float], Iterable[str]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -428,6 +491,7 @@ class Rows:
     interfaces: list[InterfaceRow] = field(default_factory=list)
     sliders: list[SliderRow] = field(default_factory=list)
     lines: list[LineRow] = field(default_factory=list)
+    waves: list[WaveRow] = field(default_factory=list)
     limits: list[LimitRow] = field(default_factory=list)
     sides: list[SideRow] = field(default_factory=list)
     controllers: list[ControllerRow] = field(default_factory=list)
@@ -689,6 +753,7 @@ class Rows:
         unsteady_gain: ArrayLike = (),
         unsteady_rate: ArrayLike = (),
         vapour_pressure: float = 0.0,
+        laminar_flow: float = inf,
     ) -> None:
         """Add a delay line; see :class:`LineRow`."""
         self.lines.append(
@@ -703,5 +768,6 @@ class Rows:
                 unsteady_gain=np.array(unsteady_gain, dtype=float),
                 unsteady_rate=np.array(unsteady_rate, dtype=float),
                 vapour_pressure=vapour_pressure,
+                laminar_flow=laminar_flow,
             )
         )

@@ -154,6 +154,10 @@ class LineState(NamedTuple):
         Scratch: waves that leave each segment in the present step, as in ``Lines.start``.
     scatter : array, shape (n,) [J]
         Scratch: energy that interpolation and averaging take in the present step.
+    fastest : array, shape (n,) [m^3/s]
+        Largest flow through an end since the start of the run, whichever its direction.
+    moment : array of int, shape (n, 2)
+        Fine steps since then until that flow, and until now.
     """
 
     samples: Vector
@@ -162,6 +166,8 @@ class LineState(NamedTuple):
     cavity: Vector
     incoming: Matrix
     scatter: Vector
+    fastest: Vector
+    moment: Integers
 
 
 def compile_lines(
@@ -240,6 +246,8 @@ def compile_lines(
         cavity=np.zeros(len(depth)),
         incoming=np.zeros((len(depth), 2)),
         scatter=np.zeros(len(rows)),
+        fastest=np.zeros(len(rows)),
+        moment=np.zeros((len(rows), 2), dtype=np.int64),
     )
     return lines, state
 
@@ -442,6 +450,10 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
         own_heat = shift(first(heating), k0)
         Z, R = lines.impedance[line], lines.resistance[line]
         q_a, q_b = q[2 * line], q[2 * line + 1]
+        state.moment[line, 1] += m
+        if max(abs(q_a), abs(q_b)) > state.fastest[line]:
+            state.fastest[line] = max(abs(q_a), abs(q_b))
+            state.moment[line, 0] = state.moment[line, 1]
         heat = 0.5 * duration * R * (q_a * q_a + q_b * q_b)
         if terms > 0:
             last = shift(memory, terms * (s1 - s0))

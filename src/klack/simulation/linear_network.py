@@ -102,6 +102,13 @@ class _Assembly:
         self.port_count = len(network.ports)
         self.y = np.append(network.bodies.at[Y0 : Y0 + self.port_count], 0.0)
         nodes = network.nodes
+        if network.rows.waves:
+            raise InputError(
+                f"linearisation: components.{network.rows.waves[0].component}.properties",
+                got="a line of local properties",
+                expected="properties: fixed, whose waves are linear",
+                hint="give the line properties: fixed and the pressure of the operating point.",
+            )
         if nodes.slow_gas:
             raise InputError(
                 "linearisation: fluid with release_time and absorption_time",

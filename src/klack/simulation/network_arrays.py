@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.simulation.delay_line import Lines, LineState
+from klack.simulation.wave_rows import Waves
 
 __all__ = [
     "AHEAD",
@@ -265,6 +266,7 @@ class Accounts(NamedTuple):
 
     rows: Vector  # of elements and branches: what they store, supply and lose
     lines: Matrix  # (lines, 3) losses
+    waves: Matrix  # (rows of waves, 3) losses, and what passed their ends
     implicit: Vector  # (volumes,) loss of the implicit step
     supply: Vector  # (prescribed nodes,)
     gas: Vector  # (volumes,) energy from gas that left the liquid
@@ -283,6 +285,7 @@ class NetworkArrays(NamedTuple):
     node_state: NodeState
     lines: Lines
     line_state: LineState
+    waves: Waves
     interfaces: Interfaces
     interface_state: InterfaceState
     sliders: Sliders

@@ -50,6 +50,7 @@ from klack.simulation.network_gas import require_chambers, settle_gas
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
 from klack.simulation.step_sizes import StepSizes
+from klack.simulation.wave_rows import Waves, compile_waves, start_wave
 from klack.simulation.yielding_step import settle
 
 __all__ = [
@@ -86,8 +87,8 @@ class CompiledNetwork:
 
     Parameters
     ----------
-    bodies, elements, branches, nodes, lines, interfaces, sliders
-        What stays, with the states of bodies, elements and branches.
+    bodies, elements, branches, nodes, lines, waves, interfaces, sliders
+        What stays, with the states of bodies, elements, branches and waves.
     node_state, line_state, interface_state, slider_state
         What changes from step to step.
     accounts : Accounts
@@ -111,6 +112,7 @@ class CompiledNetwork:
     node_state: NodeState
     lines: Lines
     line_state: LineState
+    waves: Waves
     interfaces: Interfaces
     interface_state: InterfaceState
     sliders: Sliders
@@ -153,9 +155,14 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
         near=sizes.near,
         ambient_pressure=rows.ambient.pressure,
     )
-    nodes, node_state = _nodes(rows, node_order, port_of, bodies, lines)
-    if nodes.ends:
-        start_lines(lines, line_state, nodes.density * node_state.g[nodes.end_node])
+    ends = [*lines.node, *(node for row in rows.waves for node in (row.a, row.b))]
+    nodes, node_state = _nodes(rows, node_order, port_of, bodies, ends)
+    of_lines = nodes.end_node[: len(lines.node)]
+    if of_lines.size:
+        start_lines(lines, line_state, nodes.density * node_state.g[of_lines])
+    waves = compile_waves(rows.waves, len(lines.node), nodes.density)
+    for k, row in enumerate(rows.waves):
+        start_wave(waves, rows.waves, k, *(node_state.p[node_of[node]] for node in (row.a, row.b)))
     interfaces, interface_state = _interfaces(rows, port_of, bodies)
     sliders, slider_state = _sliders(rows, port_of, bodies, blocks, sizes.seconds)
     return CompiledNetwork(
@@ -167,6 +174,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
         node_state=node_state,
         lines=lines,
         line_state=line_state,
+        waves=waves,
         interfaces=interfaces,
         interface_state=interface_state,
         sliders=sliders,
@@ -174,6 +182,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
         accounts=Accounts(
             rows=np.zeros(len(accounts.kinds)),
             lines=np.zeros((max(len(rows.lines), 1), 3)),
+            waves=np.zeros((len(rows.waves), 3)),
             implicit=np.zeros(nodes.volumes),
             supply=np.zeros(nodes.nodes - nodes.volumes),
             gas=np.zeros(nodes.volumes * nodes.slow_gas),
@@ -373,7 +382,11 @@ def _order_nodes(rows: Rows) -> tuple[int, ...]:
 
 
 def _nodes(
-    rows: Rows, order: Sequence[int], port_of: Mapping[int, int], bodies: Bodies, lines: Lines
+    rows: Rows,
+    order: Sequence[int],
+    port_of: Mapping[int, int],
+    bodies: Bodies,
+    ends: Sequence[int],
 ) -> tuple[Nodes, NodeState]:
     node_of = {handle: i for i, handle in enumerate(order)}
     given = [rows.nodes[handle] for handle in order]
@@ -412,7 +425,7 @@ def _nodes(
         volumes=volumes,
         chambers=sum(node.volume > 0.0 for node in given),
         walls=len(walls),
-        ends=len(lines.node),
+        ends=len(ends),
         fluid=fluid,
         ambient=ambient,
         density=density,
@@ -425,7 +438,7 @@ def _nodes(
         wall_node=np.array([w[0] for w in walls], dtype=np.int64),
         wall_port=np.array([w[1] for w in walls], dtype=np.int64),
         wall_area=np.array([w[2] for w in walls], dtype=float),
-        end_node=np.array([node_of[int(node)] for node in lines.node], dtype=np.int64),
+        end_node=np.array([node_of[int(node)] for node in ends], dtype=np.int64),
         slow_gas=int(slow),
         settled=settled,
         gas=gas,

@@ -20,6 +20,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_compile import CompiledNetwork, body_energy, modal_state
 from klack.simulation.network_gas import dissolution_energy
 from klack.simulation.network_result import BODY_STORE, EnergyBooks
+from klack.simulation.wave_rows import wave_store
 
 __all__ = ["balance_since", "energy_stores", "reset_accounts"]
 
@@ -104,6 +105,8 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
         name = f"{line.component} waves"
         held = float(line_store(network.lines, network.line_state, k))
         stores[name] = stores.get(name, 0.0) + held
+    for k, wave in enumerate(rows.waves):
+        stores[f"{wave.component} waves"] = float(wave_store(network.waves, rows.waves, k)[0])
     return stores
 
 
@@ -138,6 +141,9 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
         for j, what in enumerate(LINE_LOSSES):
             name = f"{line.component} {what}"
             losses[name] = losses.get(name, 0.0) + float(accounts.lines[k, j])
+    for k, wave in enumerate(rows.waves):
+        for j, what in enumerate(wave.losses):
+            losses[f"{wave.component} {what}"] = float(accounts.waves[k, j])
     if network.moving is not None:
         return EnergyBooks(
             supplies=supplies | network.moving.supplies(),

@@ -123,6 +123,7 @@ from klack.simulation.step_status import (
     STATUS_MET,
     STATUS_REFUSED,
 )
+from klack.simulation.wave_rows import Waves, waves_commit, waves_incoming
 
 __all__ = [
     "CLOCK",
@@ -163,10 +164,12 @@ class _Loop(NamedTuple):
     sliding: Sliding
     lines: Lines
     line_state: LineState
+    waves: Waves
     ends: FlowTrial
     accounts: Accounts
     kind: Index
     line_losses: Matrix
+    wave_losses: Matrix
     recording: Recording
     sums: Vector  # of elements, then branches, interfaces, sliders
     peaks: Vector
@@ -240,6 +243,7 @@ def run_network(
             guess_pressures(loop.fluid, step.t + step.H, step.H, straight)
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
+                waves_incoming(loop.waves, step.H, loop.ends.c, loop.ends.Z)
             status = _settle(step, sub, parts, flight, loop, first(clock), first(report))
             if status > STATUS_DONE:
                 return status
@@ -329,10 +333,12 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
         ),
         lines=network.lines,
         line_state=network.line_state,
+        waves=network.waves,
         ends=scratch.flows,
         accounts=pointers(network.accounts),
         kind=first(network.account_kind),
         line_losses=network.accounts.lines,
+        wave_losses=network.accounts.waves,
         recording=recording,
         sums=first(scratch.sums),
         peaks=first(scratch.peaks),
@@ -472,6 +478,7 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
         end_ends(fluid, H)
         if fluid.nodes.ends > 0:
             lines_commit(loop.lines, loop.line_state, step.steps, loop.ends.q, loop.line_losses)
+            waves_commit(loop.waves, H, loop.ends.c, loop.ends.Z, loop.ends.q, loop.wave_losses)
         end_nodes(fluid, H, accounts)
     end_far_films(loop.contacts, step, accounts, loop.recording, _interface_sums(loop), loop.peaks)
     if step.level != FINE:  # fine steps owe nothing but round-off

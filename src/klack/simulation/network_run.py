@@ -22,6 +22,7 @@ from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
+from klack.simulation.line_doubts import line_doubts
 from klack.simulation.network_arrays import (
     EXCESS,
     PARTS,
@@ -256,6 +257,8 @@ def simulate_network(
                 AccuracyWarning,
                 stacklevel=2,
             )
+    for doubt in line_doubts(network, step * first_step):
+        warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure
     scale = books.scale or 1.0
@@ -496,6 +499,13 @@ def scratch_of(network: CompiledNetwork, recording: Recording) -> Scratch:
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:
     time = float(report[2])
+    for row, code in zip(network.rows.waves, network.waves.failed, strict=True):
+        if code != 0:
+            words = row.failures.get(int(code), f"status {code} of its step function")
+            return ConvergenceError(
+                f"{row.component}: {words}, {format_si(time, 's', 8)} after the start.\n"
+                "Try: a smaller step; some entrained gas; a slower change of pressure."
+            )
     wrong = _not_finite_part(network)
     if wrong:
         return _not_a_number(wrong, time)
@@ -575,6 +585,7 @@ def _not_finite_account(network: CompiledNetwork) -> str:
     for values, what in (
         (network.line_state.samples, "waves in a line"),
         (network.accounts.lines, "energy of a line"),
+        (network.accounts.waves, "energy of a line in cells"),
         (network.node_state.mass, "mass in a chamber"),
         (network.accounts.implicit, "energy of a chamber"),
         (network.accounts.contact, "energy of a contact"),
@@ -647,6 +658,7 @@ def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, C
             if network.nodes.slow_gas or name not in ("free", "dissolved")
         },
         "line_state": {name: getattr(line, name) for name in LINE_MEMORY},
+        "waves": {"state": network.waves.state} if network.waves.rows else {},
         "interfaces": network.interface_state._asdict(),
         "sliders": network.slider_state._asdict(),
         "laws": {

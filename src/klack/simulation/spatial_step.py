@@ -59,6 +59,7 @@ from klack.simulation.network_pressures import (
 )
 from klack.simulation.network_record import record_means, record_points
 from klack.simulation.step_status import STATUS_DONE, STATUS_REFUSED, STATUS_REPEAT
+from klack.simulation.wave_rows import waves_commit, waves_incoming
 
 __all__ = ["answer_step", "begin_step", "end_step", "record_moment"]
 
@@ -96,6 +97,7 @@ def begin_step(
     guess_pressures(fluid, t + H, H, ratio == 1.0)
     if fluid.nodes.ends > 0:
         lines_incoming(network.lines, network.line_state, steps, scratch.flows.c, scratch.flows.Z)
+        waves_incoming(network.waves, H, scratch.flows.c, scratch.flows.Z)
 
 
 @njit(_nrt=False, error_model="numpy")
@@ -193,6 +195,14 @@ def end_step(
         if fluid.nodes.ends > 0:
             lines_commit(
                 network.lines, network.line_state, steps, scratch.flows.q, network.accounts.lines
+            )
+            waves_commit(
+                network.waves,
+                H,
+                scratch.flows.c,
+                scratch.flows.Z,
+                scratch.flows.q,
+                network.accounts.waves,
             )
         end_nodes(fluid, H, accounts)
     for p in range(bodies.ports):

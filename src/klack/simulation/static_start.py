@@ -63,6 +63,7 @@ from klack.simulation.static_newton import (
     newton_system,
 )
 from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
+from klack.simulation.wave_rows import start_wave
 from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si
 
@@ -448,6 +449,7 @@ class _Balance:
         friction: list[float] = []
         self.column_branch: list[int] = []
         self.column_line: list[int] = []
+        self.column_wave: list[int] = []
         for k, branch in enumerate(network.rows.branches):
             if branch.column is not None:
                 self.column_rows[k] = 1
@@ -462,6 +464,12 @@ class _Balance:
                 ends.append((a, b))
                 friction.append(line.resistance / density**2)
                 self.column_line.append(k)
+        for k, wave in enumerate(network.rows.waves):
+            a, b = place[wave.a], place[wave.b]
+            if a in free or b in free:
+                ends.append((a, b))
+                friction.append(wave.drop(float(network.node_state.p[a]), 0.0)[1])
+                self.column_wave.append(k)
         self.ends = np.array(ends, np.int64).reshape(-1, 2)
         self.friction = np.array(friction, dtype=float)
 
@@ -719,6 +727,10 @@ class _Balance:
         fluid = self._fluid(at_ends.ravel()).reshape(-1, 2, 3)
         g, size = fluid[:, :, 2], np.abs(fluid[:, :, 2]) + at_ends / fluid[:, :, 0]
         drop = self.friction * state.m
+        first = drop.size - len(self.column_wave)
+        for place, k in enumerate(self.column_wave, first):
+            at_a, flow = float(at_ends[place, 0]), float(state.m[place])
+            drop[place], self.friction[place] = self.network.rows.waves[k].drop(at_a, flow)
         return drop - (g[:, 0] - g[:, 1]), np.abs(drop) + size.sum(axis=1)
 
     def _fluid(self, p: Vector) -> Matrix:
@@ -942,16 +954,23 @@ class _Balance:
             if self.column_rows[k] == 0:
                 begin = branches.state0[k]
                 branches.state[begin : begin + count] = branches.outputs[after : after + count]
-        lines = np.zeros(len(network.rows.lines))
+        lines, waves = np.zeros(len(network.rows.lines)), np.zeros(len(network.rows.waves))
         for place, m in enumerate(state.m):
             if place < len(self.column_branch):
                 branches.state[branches.state0[self.column_branch[place]]] = m
+                continue
+            place -= len(self.column_branch)
+            if place < len(self.column_line):
+                lines[self.column_line[place]] = m / nodes.density
             else:
-                line = self.column_line[place - len(self.column_branch)]
-                lines[line] = m / nodes.density
+                waves[self.column_wave[place - len(self.column_line)]] = m
         if lines.size:
-            pressure = nodes.density * now.g[nodes.end_node]
+            pressure = nodes.density * now.g[nodes.end_node[: 2 * lines.size]]
             start_lines(network.lines, network.line_state, pressure, lines)
+        for k, flow in enumerate(waves):
+            ends = nodes.end_node[2 * lines.size + 2 * k :]
+            p_a, p_b = (float(now.p[i]) for i in ends[:2])
+            start_wave(network.waves, network.rows.waves, k, p_a, p_b, float(flow))
 
     def _put_interfaces(self, state: _State) -> None:
         network = self.network
@@ -991,6 +1010,7 @@ class _Balance:
         }
         columns = [rows.branches[k].component for k in self.column_branch]
         columns += [rows.lines[k].component for k in self.column_line]
+        columns += [rows.waves[k].component for k in self.column_wave]
         flow |= {name: float(m) for name, m in zip(columns, state.m, strict=True)}
         return StaticStart(
             displacement={

@@ -91,6 +91,7 @@ def step_sizes(
 def _chosen(rows: Rows, macro: float, h: float) -> int:
     """Fine steps of a macro step: a power of two, unless an exchange interval asks for another."""
     longest = min([macro, *(_segment(line) for line in rows.lines)])
+    longest = min([longest, *(wave.crossing for wave in rows.waves)])
     intervals = [row.interval for row in rows.elements if row.interval is not None]
     intervals += [row.period for row in rows.controllers]
     longest = min([longest, *intervals])

@@ -319,6 +319,14 @@ class _Running:
                 expected="a valve without controllers",
                 hint="take differences of runs (klack study), or a driver without signals.",
             )
+        if rows.waves:
+            raise InputError(
+                f"components.{rows.waves[0].component}.properties",
+                got="derivatives of a run with a line of local properties",
+                expected="properties: fixed",
+                hint="take differences of runs (klack study), or properties: fixed with the "
+                "working pressure.",
+            )
         self.rows, self.directions, self.sizes = rows, tuple(directions), sizes
         self.grid = grid_of(duration, sizes, record)
         network = compile_network(rows, sizes)
