@@ -56,9 +56,9 @@ ambient pressure, diameter, 0 to 3 (no, laminar, laminar with memory, turbulent 
 memory), relative roughness over 3.7, first turbulent root, places of the tables of the fluid and of
 the viscosity, spacing and number of the intervals of the latter."""
 
-SCALARS = 4
+SCALARS = 6
 """Numbers of the state before the cells: 1 where the scratch of the cells belongs to their masses,
-time, largest Reynolds number, its time."""
+time, largest Reynolds number, its time, last ``B`` of a and b."""
 
 PER_CELL = 4 + TERMS + 8
 """Numbers of the state per cell: mass and momentum per length, pressure, place in the table,
@@ -68,6 +68,7 @@ _COURANT = 0.7
 _AT_FRONTS = 3.0  # 0 would leave overshoots of 20 % behind shocks
 _ALIKE = 1e-3  # jump of the mass below which a series replaces a quotient of differences
 _MOST = 60
+_SUBSONIC = 0.3  # of the wave speed
 _SETTLED = 1e-6  # Newton step over the pressure; what is left is its square
 _LAST_STEP = 1e-11  # the same where it is taken
 _RATES, _FACTORS = KAGAWA.rates, KAGAWA.factors
@@ -183,23 +184,44 @@ def _rates(n: int, dx: float, M: Any, work: Any, ends: Any, dM: Any, dJ: Any) ->
 
 
 @njit(error_model="numpy", _nrt=False)
-def _leaving(par: Any, M: Any, p: Any, hint: Any, work: Any, H: float, side: int) -> Any:
-    """``B`` [J/kg], flow into the line [kg/s], ``rho A / a`` of the wave that reaches an end."""
+def _leaving(
+    par: Any, p: Any, hint: Any, work: Any, H: float, side: int, known: bool, last: float
+) -> tuple[float, float, float]:
+    """``B`` [J/kg], flow into the line [kg/s] and its slope over ``B`` of what reaches an end.
+
+    The slope is that of a small wave, ``rho A / a``; where the end was denser in the ``last`` step,
+    that of the shock to there: a boiling cell answers a small wave in quite another way.
+    """
     n, dx, area, stretch, ambient = int(par[0]), par[1], par[2], par[3], par[4]
-    first, step = (0, 1) if side == 0 else (n - 1, -1)
-    g, u = work[first], step * work[2 * n + first]
-    a = work[3 * n + first]
-    where = min(0.5 * H * a / dx, 1.0) - 0.5  # cells from the middle of the first, inwards
-    if n > 2:
-        i, j = first + step, first + 2 * step
-        g += where * _slope(work[i] - work[first], work[j] - work[i])
-        u += where * step * _slope(work[2 * n + i] - work[2 * n + first], work[2 * n + j] - work[2 * n + i])
-    rho0, _, _, place = fluid_at(shift(par, int(par[9])), p[first], int(hint[first]))
-    there = p[first] + rho0 * (g - work[first])
-    rho, slope, g, _ = fluid_at(shift(par, int(par[9])), max(there, 0.5 * p[first]), place)
-    bore = area * (1.0 + stretch * (max(there, 0.5 * p[first]) - ambient))
-    a = sqrt(bore / (slope * bore + rho * area * stretch))
-    return g + 0.5 * u * u, rho * bore * u, rho * bore / a
+    table = shift(par, int(par[9]))
+    near, step = (0, 1) if side == 0 else (n - 1, -1)
+    g, u = shift(work, near), shift(work, 2 * n + near)
+    where = min(0.5 * H * work[3 * n + near] / dx, 1.0) - 0.5  # cells from its middle, inwards
+    d_g = where * _slope(g[step] - g[0], g[2 * step] - g[step])
+    speed = step * (u[0] + where * _slope(u[step] - u[0], u[2 * step] - u[step]))
+    rho, _, _, place = fluid_at(table, p[near], int(hint[near]))
+    there = max(p[near] + rho * d_g, 0.5 * p[near])
+    rho, slope, energy, place = fluid_at(table, there, place)
+    excess = there - ambient
+    bore = area * (1.0 + stretch * excess)
+    mass, by_p = rho * bore, slope * bore + rho * area * stretch
+    total, flow = energy + 0.5 * speed * speed, mass * speed
+    wave = sqrt(bore / by_p)
+    answer = mass / max(wave, abs(speed))
+    if known and last > total:
+        found, place = pressure_of_total(par, last, 0.0, there, place)
+        rho, _, energy, _ = fluid_at(table, found, place)
+        above = found - ambient
+        behind = rho * area * (1.0 + stretch * above)
+        if behind - mass > _ALIKE * mass:
+            pushed = area * (above * (1.0 + 0.5 * stretch * above))
+            pushed -= area * (excess * (1.0 + 0.5 * stretch * excess))
+            speed += sqrt(max(pushed * (1.0 / mass - 1.0 / behind), 0.0))
+            rise = energy + 0.5 * speed * speed - total
+            change = behind * speed - flow
+            if rise > 0.0 and change > 0.0:
+                answer = change / rise
+    return total, flow, answer
 
 
 @njit(error_model="numpy", _nrt=False)
@@ -269,13 +291,26 @@ def pressure_of_total(
 
 
 @njit(error_model="numpy", _nrt=False)
-def _end_flux(par: Any, total: float, flow: float, p: float, hint: int) -> float:
-    """Flux of momentum [N] at an end where ``g + u^2/2`` and the flow towards b are known."""
-    p, hint = pressure_of_total(par, total, flow, p, hint)
-    rho, _, _, _ = fluid_at(shift(par, int(par[9])), p, hint)
-    excess = p - par[4]
-    u = flow / (rho * par[2] * (1.0 + par[3] * excess))
-    return par[2] * excess * (1.0 + 0.5 * par[3] * excess) + flow * u
+def _end_flux(
+    par: Any, M: Any, p: Any, hint: Any, work: Any, side: int, total: float, flow: float
+) -> float:
+    """Flux of momentum [N] at an end where ``g + u^2/2`` and the flow towards b are known.
+
+    Where the flow would reach a good part of the wave speed there (the end boils), that of one wave
+    into the first cell.
+    """
+    n = int(par[0])
+    near = 0 if side == 0 else n - 1
+    u_1, a_1 = work[2 * n + near], work[3 * n + near]
+    found, place = pressure_of_total(par, total, flow, p[near], int(hint[near]))
+    rho, slope, _, _ = fluid_at(shift(par, int(par[9])), found, place)
+    excess = found - par[4]
+    bore = par[2] * (1.0 + par[3] * excess)
+    u, by_p = flow / (rho * bore), slope * bore + rho * par[2] * par[3]
+    if abs(u) < _SUBSONIC * sqrt(bore / by_p):
+        return par[2] * excess * (1.0 + 0.5 * par[3] * excess) + flow * u
+    speed = u_1 + a_1 if side == 0 else u_1 - a_1
+    return work[n + near] + M[near] * u_1 * u_1 + speed * (flow - M[near] * u_1)
 
 
 @njit(error_model="numpy", _nrt=False)
@@ -334,14 +369,15 @@ def line_cells_step(par: Any, state: Any, inp: Any, out: Any) -> int:
         return 0
     H = inp[1]
     if inp[0] == WAVE_BEGIN:
-        out[0], out[1], out[2] = _leaving(par, M, p, hint, work, H, 0)
-        out[3], out[4], out[5] = _leaving(par, M, p, hint, work, H, 1)
+        out[0], out[1], out[2] = _leaving(par, p, hint, work, H, 0, state[1] > 0.0, state[4])
+        out[3], out[4], out[5] = _leaving(par, p, hint, work, H, 1, state[1] > 0.0, state[5])
         return 0
     before = _energy(par, M, J, memory, work)
     ends = out  # scratch until the losses are known
-    ends[0], ends[1] = inp[3], _end_flux(par, inp[2], inp[3], p[0], int(hint[0]))
-    ends[2] = -inp[5]
-    ends[3] = _end_flux(par, inp[4], -inp[5], p[n - 1], int(hint[n - 1]))
+    ends[0], ends[2] = inp[3], -inp[5]
+    ends[1] = _end_flux(par, M, p, hint, work, 0, inp[2], inp[3])
+    ends[3] = _end_flux(par, M, p, hint, work, 1, inp[4], -inp[5])
+    state[4], state[5] = inp[2], inp[4]
     fastest = 0.0
     for i in range(n):
         fastest = max(fastest, abs(work[2 * n + i]) + work[3 * n + i])

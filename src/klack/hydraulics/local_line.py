@@ -26,7 +26,7 @@ from klack.network.rows import Rows, WaveRow
 from klack.network.step_function import first
 from klack.units import format_si
 
-__all__ = ["FRICTIONS", "LocalLine"]
+__all__ = ["FRICTIONS", "LocalLine", "steady_state"]
 
 Vector = NDArray[np.float64]
 
@@ -64,7 +64,7 @@ class LocalLine:
     def row(self, rows: Rows, speeds: Callable[[NetworkFluid, ArrayLike], Vector]) -> WaveRow:
         """Row between the ports of the present component; ``speeds``: of waves over pressure."""
         fluid = network_fluid(rows)
-        parameters = self._parameters(fluid, rows.ambient.pressure)
+        parameters = self.parameters(fluid, rows.ambient.pressure)
         component, fastest = rows.component, fluid.pressure_range.usable
         highest = min(fastest, HIGHEST_PRESSURE)
         pressures = np.linspace(rows.ambient.pressure, highest, 200)
@@ -75,7 +75,7 @@ class LocalLine:
             step=line_cells_step,
             parameters=parameters,
             states=SCALARS + PER_CELL * self.cells,
-            start=lambda p_a, p_b, flow: _filled(parameters, p_a, p_b, flow),
+            start=lambda p_a, p_b, flow: steady_state(parameters, p_a, p_b, flow),
             drop=lambda p_a, flow: _drop(parameters, p_a, flow),
             crossing=self.length / self.cells / float(np.max(speeds(fluid, pressures))),
             failures={1: "a cell of the line is empty", 2: "the line holds what is no number"},
@@ -83,7 +83,8 @@ class LocalLine:
             doubts=lambda passed, reynolds, time: self._doubts(component, passed, reynolds, time),
         )
 
-    def _parameters(self, fluid: NetworkFluid, ambient: float) -> Vector:
+    def parameters(self, fluid: NetworkFluid, ambient: float) -> Vector:
+        """Parameters of the step function of the cells."""
         table = fluid_table(fluid, ambient)
         rows = int(HIGHEST_PRESSURE / _SPACING) + 2
         viscosity = np.asarray(fluid.viscosity(_SPACING * np.arange(rows)), dtype=float)
@@ -150,7 +151,7 @@ def _drop(par: Vector, p_a: float, flow: float) -> tuple[float, float]:
     return float(here), float(more - less) / (2.0 * way)
 
 
-def _filled(par: Vector, p_a: float, p_b: float, flow: float) -> Vector:
+def steady_state(par: Vector, p_a: float, p_b: float, flow: float) -> Vector:
     """State of a steady flow; what the ends still differ by is spread along the line."""
     n, area, stretch, ambient = int(par[0]), par[2], par[3], par[4]
     p = np.zeros(n)

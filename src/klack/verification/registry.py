@@ -50,7 +50,7 @@ COVERS = {
     "pneumatics": "Gas: flow laws of ISO 6358, vessels that fill and empty, and networks "
     "integrated apart.",
     "lines": "Water hammer: Joukowsky, echoes, laminar friction of Zielke, cavities, energy, "
-    "junctions, turbulent lines.",
+    "junctions, turbulent lines, local properties.",
     "films": "Squeeze films between faces: Reynolds' equation, impulse, fall, series "
     "compliance, order.",
     "magnetics": "Magnetic circuits at rest: force, co-energy, iron curves, edge fields, eddy "
