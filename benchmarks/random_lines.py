@@ -41,6 +41,7 @@ def draw(seed: int) -> str:
         "points": ["tip"],
     }  # a network needs one
     parts["spring"] = {"type": "spring", "stiffness": "500 N/mm", "preload": "0 N"}
+    _other_kinds(np.random.default_rng([4, seed]), parts)
     joints = [*nodes, *parts.pop("joints", []), ["needle.tip", "spring.end"]]
     network = {
         "components": parts,
@@ -96,6 +97,18 @@ def _line(
         parts[name]["wall"] = {"bulk_modulus": f"{_log(rng, 1e8, 1e10)} Pa"}
     for port, node in zip("ab", ends, strict=True):
         nodes[node].append(f"{name}.{port}")
+
+
+def _other_kinds(rng: Rng, parts: dict[str, Any]) -> None:
+    """Make some lines turbulent, and some of local properties."""
+    for part in parts.values():
+        if not isinstance(part, dict) or part["type"] != "line":
+            continue
+        if rng.random() < 0.35:
+            part |= {"friction": "turbulent", "roughness": f"{_log(rng, 1e-7, 1e-5)} m"}
+        if rng.random() < 0.15:
+            part |= {"properties": "local", "cells": int(rng.integers(10, 80))}
+            del part["segments"]
 
 
 def _outlet(rng: Rng, parts: dict[str, Any], node: list[str], bore: float) -> None:

@@ -17,9 +17,10 @@ less a share of the jumps of ``g`` and ``u``, never against their signs: so no f
 The share is that of third differences where waves are smooth (second order), and one at fronts.
 Time advances in the three stages of Shu and Osher.  What the cells lose is counted.
 
-At the ends ``B = g + u^2/2`` of the line is the ``g`` of the node, so that the power there is
-``B mdot`` to round-off, and lines in a row lose nothing where they meet; the wave that leaves an
-end is read where it was half a step before.
+The ``g`` of the node is ``g + u^2/2`` of an end where fluid enters the line, and everywhere at a
+junction, so that lines in a row lose nothing where they meet.  Fluid that leaves into a chamber has
+the ``g`` of the chamber itself, and its kinetic energy is lost.  The wave that leaves an end is
+read where it was half a step before.
 
 Friction acts once in a step on every cell, implicit in the flow of the cell: its steady part
 (laminar, or turbulent after :mod:`klack.hydraulics.pipe_friction`) and, with memory, the terms of
@@ -42,6 +43,7 @@ __all__ = [
     "PER_CELL",
     "SCALARS",
     "TERMS",
+    "kinetic_energy",
     "line_cells_step",
     "loss_per_length",
     "pressure_of",
@@ -54,11 +56,12 @@ HEAD = 16
 """Parameters before the tables: number of cells, their length, area, its growth per pressure,
 ambient pressure, diameter, 0 to 3 (no, laminar, laminar with memory, turbulent friction with
 memory), relative roughness over 3.7, first turbulent root, places of the tables of the fluid and of
-the viscosity, spacing and number of the intervals of the latter."""
+the viscosity, spacing and number of the intervals of the latter; 1 for an end a, then b, at a
+junction."""
 
 SCALARS = 6
 """Numbers of the state before the cells: 1 where the scratch of the cells belongs to their masses,
-time, largest Reynolds number, its time, last ``B`` of a and b."""
+time, largest Reynolds number, its time, last energy of the nodes at a and b."""
 
 PER_CELL = 4 + TERMS + 8
 """Numbers of the state per cell: mass and momentum per length, pressure, place in the table,
@@ -68,6 +71,7 @@ _COURANT = 0.7
 _AT_FRONTS = 3.0  # 0 would leave overshoots of 20 % behind shocks
 _ALIKE = 1e-3  # jump of the mass below which a series replaces a quotient of differences
 _MOST = 60
+_DENSER = 1e-7  # a smaller jump of the mass is round-off
 _SUBSONIC = 0.3  # of the wave speed
 _SETTLED = 1e-6  # Newton step over the pressure; what is left is its square
 _LAST_STEP = 1e-11  # the same where it is taken
@@ -187,7 +191,7 @@ def _rates(n: int, dx: float, M: Any, work: Any, ends: Any, dM: Any, dJ: Any) ->
 def _leaving(
     par: Any, p: Any, hint: Any, work: Any, H: float, side: int, known: bool, last: float
 ) -> tuple[float, float, float]:
-    """``B`` [J/kg], flow into the line [kg/s] and its slope over ``B`` of what reaches an end.
+    """Energy of the node [J/kg], flow into the line [kg/s] and its slope of what reaches an end.
 
     The slope is that of a small wave, ``rho A / a``; where the end was denser in the ``last`` step,
     that of the shock to there: a boiling cell answers a small wave in quite another way.
@@ -205,19 +209,22 @@ def _leaving(
     excess = there - ambient
     bore = area * (1.0 + stretch * excess)
     mass, by_p = rho * bore, slope * bore + rho * area * stretch
-    total, flow = energy + 0.5 * speed * speed, mass * speed
+    kinetic = 0.5 if speed > 0.0 or par[13 + side] > 0.0 else 0.0
+    total, flow = energy + kinetic * speed * speed, mass * speed
     wave = sqrt(bore / by_p)
     answer = mass / max(wave, abs(speed))
+    if kinetic == 0.0 and abs(speed) < _SUBSONIC * wave:
+        answer *= 1.0 + speed / wave
     if known and last > total:
         found, place = pressure_of_total(par, last, 0.0, there, place)
         rho, _, energy, _ = fluid_at(table, found, place)
         above = found - ambient
         behind = rho * area * (1.0 + stretch * above)
-        if behind - mass > _ALIKE * mass:
+        if behind - mass > _DENSER * mass:
             pushed = area * (above * (1.0 + 0.5 * stretch * above))
             pushed -= area * (excess * (1.0 + 0.5 * stretch * excess))
             speed += sqrt(max(pushed * (1.0 / mass - 1.0 / behind), 0.0))
-            rise = energy + 0.5 * speed * speed - total
+            rise = energy + kinetic * speed * speed - total
             change = behind * speed - flow
             if rise > 0.0 and change > 0.0:
                 answer = change / rise
@@ -271,6 +278,14 @@ def loss_per_length(par: Any, p: float, flow: float) -> float:
 
 
 @njit(error_model="numpy", _nrt=False)
+def kinetic_energy(par: Any, p: float, flow: float) -> float:
+    """``u^2/2`` [J/kg] of a flow [kg/s] at a pressure [Pa]."""
+    rho, _, _, _ = fluid_at(shift(par, int(par[9])), p, 0)
+    u = flow / (rho * par[2] * (1.0 + par[3] * (p - par[4])))
+    return 0.5 * u * u
+
+
+@njit(error_model="numpy", _nrt=False)
 def pressure_of_total(
     par: Any, total: float, flow: float, p: float, hint: int
 ) -> tuple[float, int]:
@@ -294,7 +309,7 @@ def pressure_of_total(
 def _end_flux(
     par: Any, M: Any, p: Any, hint: Any, work: Any, side: int, total: float, flow: float
 ) -> float:
-    """Flux of momentum [N] at an end where ``g + u^2/2`` and the flow towards b are known.
+    """Flux of momentum [N] at an end where the energy of the node and the flow to b are known.
 
     Where the flow would reach a good part of the wave speed there (the end boils), that of one wave
     into the first cell.
@@ -302,7 +317,10 @@ def _end_flux(
     n = int(par[0])
     near = 0 if side == 0 else n - 1
     u_1, a_1 = work[2 * n + near], work[3 * n + near]
-    found, place = pressure_of_total(par, total, flow, p[near], int(hint[near]))
+    whole = flow
+    if par[13 + side] == 0.0 and (flow < 0.0 if side == 0 else flow > 0.0):
+        whole = 0.0
+    found, place = pressure_of_total(par, total, whole, p[near], int(hint[near]))
     rho, slope, _, _ = fluid_at(shift(par, int(par[9])), found, place)
     excess = found - par[4]
     bore = par[2] * (1.0 + par[3] * excess)
@@ -403,7 +421,13 @@ def line_cells_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     if not _look_up(par, M, J, p, hint, work):
         return _EMPTY
     after = _energy(par, M, J, memory, work)
-    waves = before + H * (inp[2] * inp[3] + inp[4] * inp[5]) - after
+    left = 0.0
+    for side in range(2):
+        flow = inp[3 + 2 * side]
+        if flow < 0.0 and par[13 + side] == 0.0:
+            u = flow / M[side * (n - 1)]
+            left -= 0.5 * H * flow * u * u
+    waves = before + H * (inp[2] * inp[3] + inp[4] * inp[5]) - after - left
     heat = 0.0
     state[1] += H
     if par[6] > 0.0:
@@ -414,5 +438,5 @@ def line_cells_step(par: Any, state: Any, inp: Any, out: Any) -> int:
             work[2 * n + i] = J[i] / M[i]
     if not abs(after) < 1e300:
         return _LOST
-    out[0], out[1] = heat, waves
+    out[0], out[1], out[2] = heat, waves, left
     return 0

@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.compiling.jit import njit
+from klack.errors import InputError
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.line_cells import (
     HEAD,
     PER_CELL,
     SCALARS,
     TERMS,
+    kinetic_energy,
     line_cells_step,
     loss_per_length,
     pressure_of_total,
@@ -37,6 +39,7 @@ _SPACING = 1e6  # [Pa] of the table of the viscosity
 _STEEP = 0.01  # of the energy that passed the ends: loss in fronts that is worth a word
 _SLOPE = 1e-3  # of a flow, for the slope of its drop
 _SLOWEST = 1e-9  # [kg/s]
+_LEAST = 10.0  # [Pa] of a steady flow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +68,8 @@ class LocalLine:
         """Row between the ports of the present component; ``speeds``: of waves over pressure."""
         fluid = network_fluid(rows)
         parameters = self.parameters(fluid, rows.ambient.pressure)
+        ends = [rows.nodes.get(rows.port(port)) for port in ("a", "b")]
+        parameters[13:15] = [node is not None and node.junction for node in ends]
         component, fastest = rows.component, fluid.pressure_range.usable
         highest = min(fastest, HIGHEST_PRESSURE)
         pressures = np.linspace(rows.ambient.pressure, highest, 200)
@@ -75,11 +80,11 @@ class LocalLine:
             step=line_cells_step,
             parameters=parameters,
             states=SCALARS + PER_CELL * self.cells,
-            start=lambda p_a, p_b, flow: steady_state(parameters, p_a, p_b, flow),
+            start=lambda p_a, p_b, flow: steady_state(parameters, p_a, p_b, flow, component),
             drop=lambda p_a, flow: _drop(parameters, p_a, flow),
             crossing=self.length / self.cells / float(np.max(speeds(fluid, pressures))),
             failures={1: "a cell of the line is empty", 2: "the line holds what is no number"},
-            losses=("friction", "wave dissipation"),
+            losses=("friction", "wave dissipation", "outflow"),
             doubts=lambda passed, reynolds, time: self._doubts(component, passed, reynolds, time),
         )
 
@@ -114,9 +119,9 @@ class LocalLine:
         self, component: str, passed: Vector, reynolds: float, time: float
     ) -> Iterator[str]:
         """Sentences on a finished run."""
-        if passed[1] > _STEEP * passed[2]:
+        if passed[1] > _STEEP * passed[3]:
             yield (
-                f"'{component}': {100.0 * passed[1] / passed[2]:.2g} % of the energy that passed "
+                f"'{component}': {100.0 * passed[1] / passed[3]:.2g} % of the energy that passed "
                 f"the ends of this line was lost in steep fronts. A front is some cells of "
                 f"{format_si(self.length / self.cells, 'm', 3)} wide, so that a part of this comes "
                 "from the cells; a shock loses the rest.\n"
@@ -128,13 +133,15 @@ class LocalLine:
 
 @njit(error_model="numpy")
 def _profile(par: Vector, p: float, flow: float, more: float, found: Vector) -> float:
-    """Pressures in the middle of all cells of a steady flow; ``g + u^2/2`` lost on the way.
+    """Pressures in the middle of all cells of a steady flow; energy per mass lost on the way.
 
-    ``more`` is added to that energy, in equal parts along the line.
+    ``more`` is added to the energy, in equal parts along the line.
     """
     numbers, dx, n = first(par), par[1], found.size
     _, _, total, hint = fluid_at(par[HEAD:], p, 0)
     lost = 0.0
+    if flow < 0.0 and par[13] == 0.0:
+        lost = -kinetic_energy(numbers, p, flow)
     for i in range(n):
         for half in range(2):
             there = total - lost + more * (i + 0.5 * half) / n
@@ -142,6 +149,9 @@ def _profile(par: Vector, p: float, flow: float, more: float, found: Vector) -> 
             if half == 1:
                 found[i] = p
             lost += 0.5 * dx * loss_per_length(numbers, p, flow)
+    if flow > 0.0 and par[14] == 0.0:
+        p, hint = pressure_of_total(numbers, total - lost + more, flow, p, hint)
+        lost += kinetic_energy(numbers, p, flow)
     return lost
 
 
@@ -151,7 +161,9 @@ def _drop(par: Vector, p_a: float, flow: float) -> tuple[float, float]:
     return float(here), float(more - less) / (2.0 * way)
 
 
-def steady_state(par: Vector, p_a: float, p_b: float, flow: float) -> Vector:
+def steady_state(
+    par: Vector, p_a: float, p_b: float, flow: float, component: str = "line"
+) -> Vector:
     """State of a steady flow; what the ends still differ by is spread along the line."""
     n, area, stretch, ambient = int(par[0]), par[2], par[3], par[4]
     p = np.zeros(n)
@@ -160,6 +172,14 @@ def steady_state(par: Vector, p_a: float, p_b: float, flow: float) -> Vector:
     _profile(par, p_a, flow, more, p)
     rho = np.array([fluid_at(par[HEAD:], x, 0)[0] for x in p])
     mass = rho * area * (1.0 + stretch * (p - ambient))
+    if not np.min(p) > _LEAST:
+        raise InputError(
+            f"components.{component}: steady flow at the start",
+            got=f"{format_si(abs(flow), 'kg/s', 3)} through its bore, for which the pressure there "
+            "does not suffice",
+            expected="a flow that does not boil in the line",
+            hint="check its diameter, and the openings behind it; or start with a closed opening.",
+        )
     memory = np.repeat(flow / np.sqrt(mass), TERMS)
     state = np.concatenate([np.zeros(SCALARS), mass, np.full(n, flow), p, np.zeros(n), memory])
     return np.append(state, np.zeros(SCALARS + PER_CELL * n - state.size))

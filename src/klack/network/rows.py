@@ -343,14 +343,14 @@ WAVE_BEGIN, WAVE_END, WAVE_STORE = 0.0, 1.0, 2.0
 class WaveRow:
     """Part that stores fluid between two nodes and answers at both with a wave of its own.
 
-    Its step function writes its state in place; with ``B`` [J/kg] the energy per mass at an end,
-    which is the pressure energy of the node, and flows [kg/s] into the part:
+    Its step function writes its state in place; with ``B`` [J/kg] the pressure energy per mass of
+    the node at an end, and flows [kg/s] into the part:
 
     =============  ==================================  =========================================
     first input    inputs behind it                    outputs
     =============  ==================================  =========================================
     ``WAVE_BEGIN`` ``H``                               ``B, flow, dflow/dB`` of what leaves a, b
-    ``WAVE_END``   ``H``, ``B, flow`` found at a, b    losses [J]: friction, of the waves
+    ``WAVE_END``   ``H``, ``B, flow`` found at a, b    losses [J]: friction, waves, outflow
     ``WAVE_STORE`` none                                energy [J], mass [kg], Reynolds number, time
     =============  ==================================  =========================================
 
@@ -371,7 +371,7 @@ class WaveRow:
     failures : mapping of int to str
         Meaning of a status.
     losses : tuple of str
-        Names of both losses.
+        Names of the three losses.
     doubts : callable
         Sentences on a finished run, of losses and throughput [J], largest Reynolds number and its
         time [s].
@@ -387,7 +387,7 @@ class WaveRow:
     drop: Callable[[float, float], tuple[float, float]]
     crossing: float
     failures: Mapping[int, str]
-    losses: tuple[str, str]
+    losses: tuple[str, str, str]
     doubts: Callable[[NDArray[np.float64], float, float], Iterable[str]]
 
 

@@ -266,7 +266,7 @@ class Accounts(NamedTuple):
 
     rows: Vector  # of elements and branches: what they store, supply and lose
     lines: Matrix  # (lines, 3) losses
-    waves: Matrix  # (rows of waves, 3) losses, and what passed their ends
+    waves: Matrix  # (rows of waves, 4) losses, and what passed their ends
     implicit: Vector  # (volumes,) loss of the implicit step
     supply: Vector  # (prescribed nodes,)
     gas: Vector  # (volumes,) energy from gas that left the liquid

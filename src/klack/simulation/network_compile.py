@@ -50,7 +50,7 @@ from klack.simulation.network_gas import require_chambers, settle_gas
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
 from klack.simulation.step_sizes import StepSizes
-from klack.simulation.wave_rows import Waves, compile_waves, start_wave
+from klack.simulation.wave_rows import WAVE_THROUGHPUT, Waves, compile_waves, start_wave
 from klack.simulation.yielding_step import settle
 
 __all__ = [
@@ -182,7 +182,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
         accounts=Accounts(
             rows=np.zeros(len(accounts.kinds)),
             lines=np.zeros((max(len(rows.lines), 1), 3)),
-            waves=np.zeros((len(rows.waves), 3)),
+            waves=np.zeros((len(rows.waves), WAVE_THROUGHPUT + 1)),
             implicit=np.zeros(nodes.volumes),
             supply=np.zeros(nodes.nodes - nodes.volumes),
             gas=np.zeros(nodes.volumes * nodes.slow_gas),

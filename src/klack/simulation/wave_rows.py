@@ -31,8 +31,8 @@ Index = NDArray[np.int64]
 WAVE_NUMBERS = 6
 """Inputs of a step function of waves, and its outputs."""
 
-WAVE_THROUGHPUT = 2
-"""Column of the accounts behind both losses."""
+WAVE_THROUGHPUT = 3
+"""Column of the accounts behind the losses."""
 
 
 class Waves(NamedTuple):
@@ -115,7 +115,7 @@ def waves_commit(waves: Waves, H: float, c: Vector, Z: Vector, q: Vector, losses
 
     Parameters
     ----------
-    losses : array, shape (n, 3) [J]
+    losses : array, shape (n, 4) [J]
         Of each row since the start; energy that passed its ends.
     """
     for k in range(waves.rows):
@@ -128,8 +128,8 @@ def waves_commit(waves: Waves, H: float, c: Vector, Z: Vector, q: Vector, losses
         status = _ask(waves, k)
         if status != 0:
             waves.failed[k] = status
-        losses[k, 0] += waves.outputs[0]
-        losses[k, 1] += waves.outputs[1]
+        for j in range(WAVE_THROUGHPUT):
+            losses[k, j] += waves.outputs[j]
 
 
 @njit(error_model="numpy", _nrt=False)

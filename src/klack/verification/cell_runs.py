@@ -42,8 +42,8 @@ class CellRun:
         Middle of each step.
     total, flow : array, shape (n, 2) [J/kg], [kg/s]
         At both ends, means over each step; flow into the line.
-    losses : array, shape (n, 2) [J]
-        Of each step: friction, waves.
+    losses : array, shape (n, 3) [J]
+        Of each step: friction, waves, outflow.
     pressure, velocity : array, shape (cells,) [Pa], [m/s]
         At the end.
     energy_residual, mass_residual : float [-]
@@ -79,7 +79,7 @@ def run_cells(
 ) -> CellRun:
     """Run one line from a state, which is left as it ends."""
     (flow_a, value_a), (flow_b, value_b) = a.values(steps), b.values(steps)
-    total, flow, losses = np.zeros((steps, 2)), np.zeros((steps, 2)), np.zeros((steps, 2))
+    total, flow, losses = np.zeros((steps, 2)), np.zeros((steps, 2)), np.zeros((steps, 3))
     held = np.zeros((2, 2))
     status = _run(
         address_of(line_cells_step), parameters, state, h, flow_a, value_a, flow_b, value_b,
@@ -130,5 +130,5 @@ def _run(
         status = max(status, call(function, numbers, cells, into, back))
         if status != 0:
             return int(status)
-        losses[step] = out[:2]
+        losses[step] = out[:3]
     return 0

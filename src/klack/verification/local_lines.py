@@ -9,11 +9,23 @@ from numpy.typing import NDArray
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
+from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.junction import Junction
+from klack.hydraulics.line import Line
 from klack.hydraulics.line_friction import KAGAWA
 from klack.hydraulics.local_line import LocalLine, steady_state
 from klack.hydraulics.mixture import EntrainedGas
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.variable_orifice import VariableOrifice
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.network.component import Component
+from klack.network.network import Network
 from klack.network.protocols import NetworkFluid
+from klack.network.rows import Ambient
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 from klack.verification.cell_runs import CellEnd, CellRun, cell_state, run_cells
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.single_line import exponential_decay, ringing
@@ -43,6 +55,7 @@ def local_lines() -> list[Check]:
         *_decay(),
         *_steady_friction(),
         *_balances(),
+        *_networks(),
     ]
 
 
@@ -59,6 +72,11 @@ def _energy(p: float, fluid: NetworkFluid = HEPTANE) -> float:
     """``g`` [J/kg] by quadrature."""
     found = quad(lambda x: float(fluid.specific_volume(x)[0]), AMBIENT, p, epsrel=1e-12)
     return float(found[0])
+
+
+def _pressure(energy: float, fluid: NetworkFluid) -> float:
+    """Pressure [Pa] at which ``g`` is an energy [J/kg]."""
+    return float(brentq(lambda p: _energy(p, fluid) - energy, BAR, 1e3 * BAR, rtol=1e-14))
 
 
 def _speed_behind(low: float, high: float) -> float:
@@ -359,7 +377,7 @@ def _decay() -> list[Check]:
 
 
 def _lost(fluid: NetworkFluid, friction: str, length: float, top: float, flow: float) -> float:
-    """``g + u^2/2`` [J/kg] that a steady flow loses, by an integration of its pressure."""
+    """Energy [J/kg] that a steady flow loses, with its outflow, by integration of its pressure."""
 
     def speed(p: float) -> float:
         return flow / (float(fluid.density(p)) * AREA)
@@ -376,7 +394,7 @@ def _lost(fluid: NetworkFluid, friction: str, length: float, top: float, flow: f
 
     first = brentq(lambda p: energy(p) - _energy(top, fluid), 0.9 * top, top, rtol=1e-14)
     found = solve_ivp(slope, (0.0, length), [first], rtol=1e-10, atol=1.0)
-    return energy(first) - energy(float(found.y[0, -1]))
+    return energy(first) - _energy(float(found.y[0, -1]), fluid)
 
 
 def _steady_friction() -> list[Check]:
@@ -390,7 +408,7 @@ def _steady_friction() -> list[Check]:
         lost = _lost(fluid, friction, length, top, flow)
         parameters = _numbers(line, fluid)
         after = _energy(top, fluid) - lost
-        below = brentq(lambda p: _energy(p, fluid) - after, BAR, top, rtol=1e-14)
+        below = _pressure(after, fluid)
         state = steady_state(parameters, top, below, flow)
         h = 0.4 * length / 50 / float(fluid.sound_speed(top))
         ends = CellEnd(total=_energy(top, fluid)), CellEnd(total=after)
@@ -402,7 +420,7 @@ def _steady_friction() -> list[Check]:
                 expected=1e3 * flow,
                 computed=1e3 * float(run.flow[-1, 0]),
                 tolerance=tolerance,
-                source="pressure integrated along the line with density and viscosity over pressure",
+                source="pressure integrated along the line, density and viscosity of each place",
             )
         )
     return checks
@@ -441,5 +459,70 @@ def _balances() -> list[Check]:
             computed=min(float(np.min(run.losses)), 0.0) / float(np.mean(run.losses)),
             tolerance=5e-14,
             source="second law",
+        ),
+    ]
+
+
+def _closing(pieces: int, cells: int, supply: float, area: float, properties: str) -> NetworkResult:
+    """A pressure, a line of half a metre in pieces, a small chamber, a valve that closes."""
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=1e-3),
+        "spring": Spring(stiffness=1e4, preload=0.0),
+        "source": PressureSource(pressure=supply),
+        "room": Chamber(volume=20e-9),
+        "valve": VariableOrifice(time=(0.0, 50e-6, 150e-6), area=(area, area, 0.0)),
+    }
+    joints = [["needle.body", "spring.end"], ["valve.b", "ambient"]]
+    for k in range(pieces):
+        size = {"length": 0.5 / pieces, "diameter": BORE, "pressure": supply}
+        count = {"cells": cells // pieces} if properties == "local" else {}
+        parts[f"l{k}"] = Line.model_validate(size | count | {"properties": properties})
+        if k > 0:
+            parts[f"tee{k}"] = Junction()
+            joints.append([f"l{k - 1}.b", f"tee{k}.fluid", f"l{k}.a"])
+    joints += [["source.fluid", "l0.a"], [f"l{pieces - 1}.b", "room.fluid", "valve.a"]]
+    rows = Network(parts, joints, Ambient(), HEPTANE).rows()
+    return simulate_network(rows, duration=3e-3, step=100e-9, record=1.6e-6)
+
+
+def _networks() -> list[Check]:
+    """A valve that closes: small waves, a line in two pieces, mass and energy."""
+    small = [_closing(1, 100, 50 * BAR, 0.005e-6, kind) for kind in ("fixed", "local")]
+    near, local = (run.channels["room pressure"].values for run in small)
+    whole = _closing(1, 100, 300 * BAR, 0.2e-6, "local")
+    halves = _closing(2, 100, 300 * BAR, 0.2e-6, "local")
+    one, two = (run.channels["room pressure"].values for run in (whole, halves))
+    time = 1e3 * small[0].time
+    return [
+        _check(
+            "local line of 100 cells behind a closing valve, small waves, rms difference from "
+            "fixed properties over the jump [-]",
+            expected=0.0,
+            computed=float(np.sqrt(np.mean((local - near) ** 2)) / (np.max(near) - near[0])),
+            tolerance=3e-2,
+            source="delay line with the same friction",
+            curve=ComparedCurve(
+                x_label="time [ms]",
+                y_label="pressure at the valve [bar]",
+                expected=(time, near / BAR),
+                computed=(time, local / BAR),
+            ),
+        ),
+        _check(
+            "local line in two pieces, rms difference from one line over the jump [-]",
+            expected=0.0,
+            computed=float(np.sqrt(np.mean((two - one) ** 2)) / (np.max(one) - one[0])),
+            tolerance=1e-2,
+            source="identity, but for the cells",
+        ),
+        *(
+            _check(
+                f"local line {words} in a network, energy that does not balance [-]",
+                expected=0.0,
+                computed=run.books.relative_residual,
+                tolerance=1e-12,
+                source="conservation of energy",
+            )
+            for words, run in (("in one piece", whole), ("in two pieces", halves))
         ),
     ]
