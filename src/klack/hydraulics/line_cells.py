@@ -46,6 +46,7 @@ __all__ = [
     "kinetic_energy",
     "line_cells_step",
     "loss_per_length",
+    "mach_number",
     "pressure_of",
     "pressure_of_total",
 ]
@@ -283,6 +284,14 @@ def kinetic_energy(par: Any, p: float, flow: float) -> float:
     rho, _, _, _ = fluid_at(shift(par, int(par[9])), p, 0)
     u = flow / (rho * par[2] * (1.0 + par[3] * (p - par[4])))
     return 0.5 * u * u
+
+
+@njit(error_model="numpy", _nrt=False)
+def mach_number(par: Any, p: float, flow: float) -> float:
+    """Velocity of a flow [kg/s] over the wave speed at a pressure [Pa]."""
+    rho, slope, _, _ = fluid_at(shift(par, int(par[9])), p, 0)
+    bore = par[2] * (1.0 + par[3] * (p - par[4]))
+    return abs(flow) / (rho * bore) * sqrt((slope * bore + rho * par[2] * par[3]) / bore)
 
 
 @njit(error_model="numpy", _nrt=False)

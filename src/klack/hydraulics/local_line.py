@@ -18,6 +18,7 @@ from klack.hydraulics.line_cells import (
     kinetic_energy,
     line_cells_step,
     loss_per_length,
+    mach_number,
     pressure_of_total,
 )
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
@@ -39,7 +40,7 @@ _SPACING = 1e6  # [Pa] of the table of the viscosity
 _STEEP = 0.01  # of the energy that passed the ends: loss in fronts that is worth a word
 _SLOPE = 1e-3  # of a flow, for the slope of its drop
 _SLOWEST = 1e-9  # [kg/s]
-_LEAST = 10.0  # [Pa] of a steady flow
+_SUBSONIC = 0.3  # of the wave speed: fastest steady flow
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,6 +83,7 @@ class LocalLine:
             states=SCALARS + PER_CELL * self.cells,
             start=lambda p_a, p_b, flow: steady_state(parameters, p_a, p_b, flow, component),
             drop=lambda p_a, flow: _drop(parameters, p_a, flow),
+            parts=self.cells,
             crossing=self.length / self.cells / float(np.max(speeds(fluid, pressures))),
             failures={1: "a cell of the line is empty", 2: "the line holds what is no number"},
             losses=("friction", "wave dissipation", "outflow"),
@@ -135,6 +137,7 @@ class LocalLine:
 def _profile(par: Vector, p: float, flow: float, more: float, found: Vector) -> float:
     """Pressures in the middle of all cells of a steady flow; energy per mass lost on the way.
 
+    Not a number where the pressure does not suffice for the flow.
     ``more`` is added to the energy, in equal parts along the line.
     """
     numbers, dx, n = first(par), par[1], found.size
@@ -146,6 +149,8 @@ def _profile(par: Vector, p: float, flow: float, more: float, found: Vector) -> 
         for half in range(2):
             there = total - lost + more * (i + 0.5 * half) / n
             p, hint = pressure_of_total(numbers, there, flow, p, hint)
+            if mach_number(numbers, p, flow) > _SUBSONIC:
+                return np.nan
             if half == 1:
                 found[i] = p
             lost += 0.5 * dx * loss_per_length(numbers, p, flow)
@@ -156,9 +161,24 @@ def _profile(par: Vector, p: float, flow: float, more: float, found: Vector) -> 
 
 
 def _drop(par: Vector, p_a: float, flow: float) -> tuple[float, float]:
-    cells, way = np.zeros(int(par[0])), max(_SLOPE * abs(flow), _SLOWEST)
-    less, here, more = (_profile(par, p_a, m, 0.0, cells) for m in (flow - way, flow, flow + way))
-    return float(here), float(more - less) / (2.0 * way)
+    way = max(_SLOPE * abs(flow), _SLOWEST)
+    cells = np.zeros(int(par[0]))
+    drops = [_profile(par, p_a, m, 0.0, cells) for m in (flow - way, flow, flow + way)]
+    if not np.all(np.isfinite(drops)):  # on the way to an equilibrium: the fluid of the first end
+        drops = [_plain_drop(par, p_a, m) for m in (flow - way, flow, flow + way)]
+    less, here, more = (float(drop) for drop in drops)
+    return here, (more - less) / (2.0 * way)
+
+
+@njit(error_model="numpy")
+def _plain_drop(par: Vector, p: float, flow: float) -> float:
+    """Energy that any flow loses in the fluid of one pressure, with its outflow."""
+    numbers = first(par)
+    lost = par[0] * par[1] * loss_per_length(numbers, p, flow)
+    if par[14 if flow > 0.0 else 13] == 0.0:
+        kinetic = kinetic_energy(numbers, p, flow)
+        lost += kinetic if flow > 0.0 else -kinetic
+    return float(lost)
 
 
 def steady_state(
@@ -168,11 +188,11 @@ def steady_state(
     n, area, stretch, ambient = int(par[0]), par[2], par[3], par[4]
     p = np.zeros(n)
     ends = [fluid_at(par[HEAD:], x, 0)[2] for x in (p_a, p_b)]
-    more = ends[1] - ends[0] + _profile(par, p_a, flow, 0.0, p)
-    _profile(par, p_a, flow, more, p)
+    lost = _profile(par, p_a, flow, 0.0, p)
+    lost += _profile(par, p_a, flow, ends[1] - ends[0] + lost, p)
     rho = np.array([fluid_at(par[HEAD:], x, 0)[0] for x in p])
     mass = rho * area * (1.0 + stretch * (p - ambient))
-    if not np.min(p) > _LEAST:
+    if not np.isfinite(lost):
         raise InputError(
             f"components.{component}: steady flow at the start",
             got=f"{format_si(abs(flow), 'kg/s', 3)} through its bore, for which the pressure there "

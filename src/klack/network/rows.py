@@ -366,8 +366,10 @@ class WaveRow:
     drop : callable
         Energy per mass [J/kg] that a flow [kg/s] from a to b loses, given the pressure [Pa] at a,
         and its slope.
+    parts : int
+        Cells.
     crossing : float [s]
-        No step may be longer.
+        No step may be longer: the shortest time of a wave through one of them.
     failures : mapping of int to str
         Meaning of a status.
     losses : tuple of str
@@ -385,6 +387,7 @@ class WaveRow:
     states: int
     start: Callable[[float, float, float], NDArray[np.float64]]
     drop: Callable[[float, float], tuple[float, float]]
+    parts: int
     crossing: float
     failures: Mapping[int, str]
     losses: tuple[str, str, str]

@@ -160,7 +160,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
     of_lines = nodes.end_node[: len(lines.node)]
     if of_lines.size:
         start_lines(lines, line_state, nodes.density * node_state.g[of_lines])
-    waves = compile_waves(rows.waves, len(lines.node), nodes.density)
+    waves = compile_waves(rows.waves, len(lines.node), nodes.density, sizes.coarse * sizes.step)
     for k, row in enumerate(rows.waves):
         start_wave(waves, rows.waves, k, *(node_state.p[node_of[node]] for node in (row.a, row.b)))
     interfaces, interface_state = _interfaces(rows, port_of, bodies)

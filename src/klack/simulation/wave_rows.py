@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import njit
+from klack.errors import InputError
 from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE, WaveRow
 from klack.network.step_function import address_of, call, evaluate, first, shift
+from klack.units import format_si
 
 __all__ = [
     "WAVE_NUMBERS",
@@ -27,6 +29,9 @@ __all__ = [
 
 Vector = NDArray[np.float64]
 Index = NDArray[np.int64]
+
+_A_WHOLE = 1e-9  # [-] a step this little too long is round-off
+_FEWEST = 4  # cells of a line
 
 WAVE_NUMBERS = 6
 """Inputs of a step function of waves, and its outputs."""
@@ -51,8 +56,24 @@ class Waves(NamedTuple):
     failed: Index  # status of each row
 
 
-def compile_waves(rows: Sequence[WaveRow], first_end: int, density: float) -> Waves:
-    """Lay out the rows, at rest at the ambient pressure."""
+def compile_waves(rows: Sequence[WaveRow], first_end: int, density: float, longest: float) -> Waves:
+    """Lay out the rows, empty, for steps of at most ``longest`` [s].
+
+    Raises
+    ------
+    InputError
+        If a wave crosses a part of a row in less than that.
+    """
+    for row in rows:
+        if row.crossing < longest * (1.0 - _A_WHOLE):
+            fits = int(row.parts * row.crossing / longest)
+            cure = f"steps of {format_si(row.crossing, 's', 3)} or less"
+            raise InputError(
+                f"components.{row.component}.cells",
+                got=f"{row.parts} cells, which a wave crosses in {format_si(row.crossing, 's', 3)}",
+                expected=f"cells that take at least a step of {format_si(longest, 's', 3)}",
+                hint=f"use {fits} cells, or {cure}." if fits >= _FEWEST else f"use {cure}.",
+            )
     sizes = [len(row.parameters) for row in rows]
     states = [row.states for row in rows]
     return Waves(

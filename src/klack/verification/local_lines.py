@@ -474,7 +474,12 @@ def _closing(pieces: int, cells: int, supply: float, area: float, properties: st
     }
     joints = [["needle.body", "spring.end"], ["valve.b", "ambient"]]
     for k in range(pieces):
-        size = {"length": 0.5 / pieces, "diameter": BORE, "pressure": supply}
+        size = {
+            "length": 0.5 / pieces,
+            "diameter": BORE,
+            "pressure": supply,
+            "friction": "turbulent" if supply > 100 * BAR else "kagawa",
+        }
         count = {"cells": cells // pieces} if properties == "local" else {}
         parts[f"l{k}"] = Line.model_validate(size | count | {"properties": properties})
         if k > 0:
