@@ -51,6 +51,17 @@ PARTS = {
     "spool edge": SpoolEdge(
         diameter=4e-3, radial_clearance=3e-6, overlap=20e-6, direction="closing", flow_force={}
     ),
+    "notched edge": SpoolEdge(
+        diameter=4e-3,
+        radial_clearance=3e-6,
+        overlap=20e-6,
+        direction="closing",
+        flow_force={"damping_length": 0.0},
+        notches=[
+            {"shape": shape, "count": 2, "width": 40e-6, "depth": 20e-6, "length": 30e-6}
+            for shape in ("rectangular", "triangular", "round")
+        ],
+    ),
     "conical seat": ConicalSeat(
         half_angle=0.5,
         lower_diameter=1e-3,

@@ -438,6 +438,12 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
             overlap=overlap,
             direction="opening",
             flow_force={"velocity_coefficient": 0.98},
+            notches=[
+                {"shape": "rectangular", "count": 1, "width": 8e-5, "length": 1e-4, "depth": 1e-4},
+                {"shape": "triangular", "count": 2, "width": 1e-4, "length": 3e-4, "depth": 1e-4},
+                {"shape": "round", "count": 1, "width": 8e-5, "length": 2e-4, "depth": 1e-4},
+                {"shape": "hole", "count": 1, "width": 1e-4, "length": 4e-4},
+            ],
         ),
         "far": Chamber(volume=1e-6, pressure=20e5),
         "bypass": VariableOrifice(lift=[-1e-3, 1e-3], area=[0.0, 2e-7]),

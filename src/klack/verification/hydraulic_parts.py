@@ -20,6 +20,7 @@ from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.conical_seats import conical_seats
 from klack.verification.gas_release import gas_release
 from klack.verification.hydraulic_edges import edges
+from klack.verification.notched_edges import notched_edges
 from klack.verification.supply_networks import OIL, supply_networks
 
 __all__ = ["checks"]
@@ -43,6 +44,7 @@ def checks() -> list[Check]:
         *_pump(),
         _pulsation(),
         *edges(),
+        *notched_edges(),
         *conical_seats(),
         *supply_networks(),
         *gas_release(),
