@@ -165,7 +165,7 @@ def test_the_double_seat_does_what_its_page_tells():
     at = 200  # 1 ms
     assert channels["groove pressure"].values[at] / 1e5 == pytest.approx(groove, abs=0.06)
     assert channels["sac pressure"].values[at] / 1e5 == pytest.approx(sac, abs=0.06)
-    assert channels["upper flow"].values[at] * 1e3 == pytest.approx(flow, abs=0.06)
+    assert channels["upper mass flow"].values[at] * 1e3 == pytest.approx(flow, abs=0.06)
     low, up = told(r"narrower one \(([\d.]+) against ([\d.]+) mm²\)")
     assert channels["lower area"].values[at] * 1e6 == pytest.approx(low, abs=6e-4)
     assert channels["upper area"].values[at] * 1e6 == pytest.approx(up, abs=6e-4)

@@ -15,7 +15,7 @@ PAGE = (HOW_TO / "metering-notches.md").read_text(encoding="utf-8")
 CHANNELS = {
     "edge opening": 1e3,
     "edge area": 1e6,
-    "edge flow": 1e3,
+    "edge mass flow": 1e3,
     "edge jet force": 1.0,
     "room pressure": 1e-5,
 }

@@ -220,7 +220,7 @@ class SpoolEdge(OpeningComponent):
         return pi * self.diameter if self.width is None else self.width
 
     def opening(self, x: float) -> float:
-        """Flow area [m^2] of edge and notches, clearance included, where it is open by ``x`` [m]."""
+        """Flow area [m^2] of edge and notches with their clearance, open by ``x`` [m]."""
         clearance = self.radial_clearance
         area = self.land_width * hypot(max(x, 0.0), clearance)
         for notch in self.notches:
