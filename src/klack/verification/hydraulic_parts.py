@@ -15,6 +15,7 @@ from klack.hydraulics.pump import Pump
 from klack.hydraulics.relief_valve import ReliefValve
 from klack.hydraulics.variable_orifice import VariableOrifice
 from klack.network.rows import Ambient
+from klack.verification.acting_areas import acting_areas
 from klack.verification.branch_step import branch_of, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.conical_seats import conical_seats
@@ -46,6 +47,7 @@ def checks() -> list[Check]:
         *edges(),
         *notched_edges(),
         *conical_seats(),
+        *acting_areas(),
         *supply_networks(),
         *gas_release(),
     ]
