@@ -20,7 +20,7 @@ from klack.simulation.network_run import simulate_network
 from klack.simulation.operating_point import operating_point
 from klack.verification.branch_step import AMBIENT, RHO, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.conical_seats import needle_pieces
+from klack.verification.conical_seats import Piece, needle_pieces
 from klack.verification.supply_networks import OIL
 
 __all__ = ["acting_areas"]
@@ -74,9 +74,13 @@ def _searched(kind: str, lift: float) -> float:
     best, r_upper = np.inf, 0.0
     for piece in above:
         for corner in ((0.01, 0.3), (0.01, 0.9), (0.5, 0.5)):
+
+            def area(uv: Vector, at: Piece = piece) -> float:
+                return mantle(at(uv[0]) + up, ends[0] + uv[1] * (ends[1] - ends[0]))
+
             found = minimize(
-                lambda uv, at=piece: mantle(at(uv[0]) + up, ends[0] + uv[1] * (ends[1] - ends[0])),
-                corner,
+                area,
+                list(corner),
                 bounds=[(0.0, 1.0)] * 2,
                 method="Nelder-Mead",
                 options={"xatol": 1e-12, "fatol": 1e-16, "maxiter": 4000, "maxfev": 8000},

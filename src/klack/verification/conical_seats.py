@@ -20,7 +20,7 @@ from klack.verification.branch_step import RHO, branch_of, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.supply_networks import OIL
 
-__all__ = ["conical_seats", "needle_pieces", "smallest_mantle"]
+__all__ = ["Piece", "conical_seats", "needle_pieces", "smallest_mantle"]
 
 Vector = NDArray[np.float64]
 Piece = Callable[[float], Vector]
