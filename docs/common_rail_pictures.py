@@ -42,7 +42,7 @@ def injected(result: NetworkResult) -> dict[int, list[float]]:
     step = time[1] - time[0]
     masses: dict[int, list[float]] = {}
     for place, number in enumerate(ORDER):
-        flow = result.channels[f"injector{number}_holes flow"].values
+        flow = result.channels[f"injector{number}_holes mass flow"].values
         starts = FIRST + (np.arange(CYCLES) + place / 4) * CYCLE
         masses[number] = [
             float(step * flow[(time > start) & (time <= start + CYCLE / 4)].sum())
@@ -70,7 +70,7 @@ def figure(result: NetworkResult) -> Figure:
     wave.set_title("wave of the first injection")
     wave.legend(loc="upper left")
     for number in ORDER:
-        flow = 1e3 * result.channels[f"injector{number}_holes flow"].values
+        flow = 1e3 * result.channels[f"injector{number}_holes mass flow"].values
         cycle = (time >= 25.0) & (time <= 50.0)
         flows.plot(
             time[cycle], flow[cycle], color=COLOURS[_COLOURS[number]], lw=1.0, label=f"{number}"

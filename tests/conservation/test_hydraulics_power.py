@@ -13,6 +13,7 @@ from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_loss import PressureLoss
 from klack.hydraulics.pulsating_flow import PulsatingFlow
 from klack.hydraulics.pump import Pump
@@ -51,6 +52,17 @@ PARTS = {
     "spool edge": SpoolEdge(
         diameter=4e-3, radial_clearance=3e-6, overlap=20e-6, direction="closing", flow_force={}
     ),
+    "notched edge": SpoolEdge(
+        diameter=4e-3,
+        radial_clearance=3e-6,
+        overlap=20e-6,
+        direction="closing",
+        flow_force={"damping_length": 0.0},
+        notches=[
+            {"shape": shape, "count": 2, "width": 40e-6, "depth": 20e-6, "length": 30e-6}
+            for shape in ("rectangular", "triangular", "round")
+        ],
+    ),
     "conical seat": ConicalSeat(
         half_angle=0.5,
         lower_diameter=1e-3,
@@ -62,18 +74,32 @@ PARTS = {
         leak_area=1e-9,
         flow_force={},
     ),
+    "conical seat that its faces follow": ConicalSeat(
+        half_angle=0.5,
+        lower_diameter=1e-3,
+        upper_diameter=2e-3,
+        edge_diameter=1.5e-3,
+        tip_half_angle=0.6,
+        chamfer_half_angle=0.55,
+        chamfer_width=30e-6,
+        leak_area=1e-9,
+        tip_side="b",
+    ),
     "pressure loss": PressureLoss(diameter=1e-3, coefficient=0.3, reverse_coefficient=2.0),
     "pipe friction": PipeFriction(length=0.3, diameter=1e-3, roughness=2e-6),
     "variable orifice": VariableOrifice(lift=[0.0, 40e-6], area=[1e-8, 1e-6]),
     "pump of pistons": Pump(displacement=1e-6, speed=20.0, pistons=7),
     "pulsation": PulsatingFlow(mean=3e-6, harmonics=[{"frequency": 1e3, "amplitude": 1e-6}]),
 }
+FACE = PressureFace(direction="opening", area=1e-6)
 HANDLES = {"a": 1, "b": 2, "needle": 0, "spool": 0, "body": 1}
 
 
 def balance(part, fluid, rng, count=300):
     """Power [W] that is lost, and its scale, for random pressures, motions and histories."""
-    rows = Rows(ambient=AMBIENT, fluid=fluid, component="part", handles=HANDLES)
+    rows = Rows(
+        ambient=AMBIENT, fluid=fluid, component="part", handles=HANDLES, partners={"b": (FACE,)}
+    )
     part.add_rows(rows)
     row = rows.branches[0]
     table = fluid_table(fluid, AMBIENT.pressure)

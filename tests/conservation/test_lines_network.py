@@ -109,7 +109,7 @@ def test_steady_flow_through_a_line_is_that_of_hagen_and_poiseuille():
 
     result = simulate_network(rows, duration=30e-3, step=100e-9, coarse=8, record=1e-5)
 
-    flow = result.channels["hole flow"].values[-1]
+    flow = result.channels["hole mass flow"].values[-1]
     p = result.channels["end pressure"].values[-1]
     mu, rho = float(oil.viscosity(5 * BAR)), float(oil.density(5 * BAR))
     expected = rho * pi * 1e-3**4 / (128.0 * mu * 0.06) * (6 * BAR - p)

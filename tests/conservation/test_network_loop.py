@@ -86,7 +86,7 @@ def test_the_sac_holds_what_flowed_in(valves, strokes):
     area = np.pi / 4 * 1.768e-3**2
     density = np.array([fluid_at(table, p, 0)[0] for p in channels["sac pressure"].values])
     mass = density * (2e-9 + area * channels["needle.bottom displacement"].values)
-    flow = channels["restriction flow"].values - channels["nozzle flow"].values
+    flow = channels["restriction mass flow"].values - channels["nozzle mass flow"].values
     moved = np.cumsum(flow[1:]) * (stroke.time[1] - stroke.time[0])
 
     assert np.ptp(mass) > 1e-3 * mass[0]

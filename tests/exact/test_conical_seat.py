@@ -11,10 +11,18 @@ from ruamel.yaml import YAML
 from klack.case.valve_reader import load_valve_case
 from klack.errors import InputError
 from klack.hydraulics.conical_seat import ConicalSeat
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient
 from klack.simulation.network_run import simulate_network
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 PAGE = (HOW_TO / "double-seat.md").read_text(encoding="utf-8")
+OIL = library_fluid("ISO VG 46").at(313.15)
 EDGE = {
     "half_angle": radians(30),
     "lower_diameter": 1e-3,
@@ -126,6 +134,57 @@ def test_geometry_that_cannot_seal_is_refused_in_words(keys, text):
     assert text in str(caught.value)
 
 
+def floating(seat, **faces):
+    seal = seat.sealing_diameter
+    inner, outer = faces.get("inner", seal), faces.get("outer", seal)
+    parts = {
+        "needle": RigidMass(mass=2e-3),
+        "spring": Spring(stiffness=4e5, preload=20.0),
+        "rail": PressureSource(pressure=60e5),
+        "sac": PressureSource(pressure=20e5),
+        "seat": seat,
+        "outside": PressureFace(direction="opening", outer_diameter=4e-3, inner_diameter=inner),
+        "inside": PressureFace(direction="opening", outer_diameter=outer),
+    }
+    joints = [
+        ["needle.body", "spring.end", "seat.needle", "outside.body", "inside.body"],
+        ["rail.fluid", "seat.a", "outside.fluid"],
+        ["sac.fluid", "seat.b", "inside.fluid"],
+    ]
+    return Network(parts, joints, Ambient(), OIL).rows()
+
+
+@pytest.mark.parametrize(
+    ("side", "faces", "text"),
+    [
+        ("b", {"outer": 1.02}, "outer_diameter"),
+        ("b", {"inner": 0.99}, "inner_diameter"),
+        ("a", {}, "at port a"),
+    ],
+)
+def test_faces_that_do_not_meet_at_the_seal_are_refused(side, faces, text):
+    seat = ConicalSeat(**EDGE, tip_side=side)
+    sizes = {name: share * seat.sealing_diameter for name, share in faces.items()}
+
+    with pytest.raises(InputError, match=r"(?s)sealing diameter.*Try: ") as caught:
+        floating(seat, **sizes)
+
+    assert text in str(caught.value)
+    floating(ConicalSeat(**EDGE), **sizes)  # without tip_side faces keep their diameters
+
+
+@pytest.mark.parametrize("keys", [{}, {"edge_radius": 30e-6}, {"tip_half_angle": 0.53}])
+def test_the_acting_area_falls_from_the_seal_to_nothing(keys):
+    seat = ConicalSeat(**EDGE | keys)
+    lifts = np.linspace(0.0, 5e-3, 5001)
+    area = np.array([seat.acting_area(x) for x in lifts])
+
+    assert area[0] == pytest.approx(pi / 4 * seat.sealing_diameter**2, rel=1e-14, abs=0.0)
+    assert np.all(np.diff(area) < 0.0)
+    assert np.max(-np.diff(area)) < 0.05 * area[0]  # no step: 4.5 % per um, almost parallel
+    assert area[-1] < 0.02 * area[0]
+
+
 def told(pattern):
     found = re.search(pattern, " ".join(PAGE.split()))
     assert found is not None, pattern
@@ -165,7 +224,7 @@ def test_the_double_seat_does_what_its_page_tells():
     at = 200  # 1 ms
     assert channels["groove pressure"].values[at] / 1e5 == pytest.approx(groove, abs=0.06)
     assert channels["sac pressure"].values[at] / 1e5 == pytest.approx(sac, abs=0.06)
-    assert channels["upper flow"].values[at] * 1e3 == pytest.approx(flow, abs=0.06)
+    assert channels["upper mass flow"].values[at] * 1e3 == pytest.approx(flow, abs=0.06)
     low, up = told(r"narrower one \(([\d.]+) against ([\d.]+) mm²\)")
     assert channels["lower area"].values[at] * 1e6 == pytest.approx(low, abs=6e-4)
     assert channels["upper area"].values[at] * 1e6 == pytest.approx(up, abs=6e-4)

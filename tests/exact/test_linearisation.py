@@ -301,7 +301,7 @@ def test_each_gas_chamber_has_states_outputs_and_modes_of_its_own() -> None:
     names = {signal.name for signal in system.outputs}
     for name in ("small", "large"):
         assert {f"{name}.{what}" for what in ("mass", "pressure", "temperature")} <= names
-        assert {f"{name}_in.flow", f"{name}_out.flow"} <= names
+        assert {f"{name}_in.mass_flow", f"{name}_out.mass_flow"} <= names
         assert found[name].participation[name] == pytest.approx(1.0, abs=1e-9)
     # isothermal, equal orifices: equal pressures, so the rates are as 1 / V
     ratio = found["small"].root.real / found["large"].root.real

@@ -214,7 +214,7 @@ def test_a_seat_opens_where_the_needle_is_in_the_middle_of_a_step():
 def test_a_centred_seat_has_the_flow_of_the_lift_alone():
     ours, plain = seat_off_axis(CENTRED), seat_off_axis(CENTRED, follows=False)
 
-    for name in ("restriction flow", "restriction area", "restriction jet force"):
+    for name in ("restriction mass flow", "restriction area", "restriction jet force"):
         np.testing.assert_allclose(values(ours, name), values(plain, name), rtol=1e-12)
 
 

@@ -138,7 +138,7 @@ def test_a_valve_that_is_held_open_stays_as_its_first_record_says():
             "coil current": 1.0,
             "push.end force": 0.5,
             "rail pressure": 20e5,
-            "valve flow": result.start.flow["valve"],
+            "valve mass flow": result.start.flow["valve"],
             "channel mass flow": result.start.flow["channel"],
         },
     )

@@ -408,6 +408,16 @@ SUPPLY = {
 
 def supply(displacement, setting, precharge, bore, overlap, wall):
     start = {"pressure": 55e5}
+    tip = ConicalSeat(
+        half_angle=0.6,
+        lower_diameter=2e-3,
+        upper_diameter=4e-3,
+        edge_diameter=bore,
+        tip_half_angle=0.8,
+        edge_radius=20e-6,
+        lift=50e-6,
+        tip_side="a",
+    )
     parts = {
         "pump": Pump(
             displacement=displacement,
@@ -438,20 +448,19 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
             overlap=overlap,
             direction="opening",
             flow_force={"velocity_coefficient": 0.98},
+            notches=[
+                {"shape": "rectangular", "count": 1, "width": 8e-5, "length": 1e-4, "depth": 1e-4},
+                {"shape": "triangular", "count": 2, "width": 1e-4, "length": 3e-4, "depth": 1e-4},
+                {"shape": "round", "count": 1, "width": 8e-5, "length": 2e-4, "depth": 1e-4},
+                {"shape": "hole", "count": 1, "width": 1e-4, "length": 4e-4},
+            ],
         ),
         "far": Chamber(volume=1e-6, pressure=20e5),
         "bypass": VariableOrifice(lift=[-1e-3, 1e-3], area=[0.0, 2e-7]),
         "switch": VariableOrifice(time=[0.0, 1e-3], area=[0.0, 5e-7]),
         "drain": Orifice(diameter=2e-3),
-        "tip": ConicalSeat(
-            half_angle=0.6,
-            lower_diameter=2e-3,
-            upper_diameter=4e-3,
-            edge_diameter=bore,
-            tip_half_angle=0.8,
-            edge_radius=20e-6,
-            lift=50e-6,
-        ),
+        "tip": tip,
+        "under": PressureFace(direction="opening", outer_diameter=tip.sealing_diameter),
         "face": PressureFace(direction="opening", outer_diameter=6e-3),
         "spool": RigidMass(mass=20e-3),
         "spring": Spring(stiffness=2e6, preload=150.0, damping=20.0),
@@ -462,9 +471,17 @@ def supply(displacement, setting, precharge, bore, overlap, wall):
         ["relief.b", "ambient"],
         ["pipe.b", "bend.fluid", "loss.a"],
         ["loss.b", "room.fluid", "edge.a", "bypass.a", "switch.a", "face.fluid"],
-        ["edge.b", "far.fluid", "bypass.b", "switch.b", "drain.a", "tip.a"],
+        ["edge.b", "far.fluid", "bypass.b", "switch.b", "drain.a", "tip.a", "under.fluid"],
         ["drain.b", "tip.b", "ambient"],
-        ["spool.body", "spring.end", "face.body", "edge.spool", "bypass.needle", "tip.needle"],
+        [
+            "spool.body",
+            "spring.end",
+            "face.body",
+            "edge.spool",
+            "bypass.needle",
+            "tip.needle",
+            "under.body",
+        ],
     ]
     return Network(parts, joints, fluid=OIL).rows()
 

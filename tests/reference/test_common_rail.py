@@ -68,7 +68,7 @@ def test_the_first_wave_is_that_of_joukowsky_and_takes_its_time(case, result):
     time, way = result.time, LINE / speed
     assert 1e3 * way == pytest.approx(told(r"The wave needs ([\d.]+) ms")[0], abs=0.005)
     own = result.channels["injector1_body pressure"].values
-    flow = result.channels["injector1_holes flow"].values
+    flow = result.channels["injector1_holes mass flow"].values
     held = (time > 1.6e-3) & (time < 2.2e-3)  # open, pressure settled
     drop = START - own[held].mean()
     assert drop == pytest.approx(
@@ -90,7 +90,7 @@ def test_each_injector_injects_once_in_each_cycle(result):
     least, most = told(r"between ([\d.]+) mg and ([\d.]+) mg: the mass")
     masses = []
     for place, number in enumerate((1, 3, 4, 2)):
-        flow = result.channels[f"injector{number}_holes flow"].values
+        flow = result.channels[f"injector{number}_holes mass flow"].values
         for turn in range(4):
             start = 1e-3 + (turn + place / 4) * cycle
             inside = (time > start) & (time <= start + cycle / 4)

@@ -54,7 +54,7 @@ def test_pressures_flows_and_the_impact_are_those_of_the_page(result):
     start, lowest = told(r"at ([\d.]+) bar, and the accumulator")[0], told(r"falls to ([\d.]+)")[0]
     assert rail[0] == pytest.approx(start, abs=0.05)
     assert rail.min() == pytest.approx(lowest, abs=0.05)
-    delivered = -result.channels["accumulator flow"].values.min() / 855.0 * 6e4
+    delivered = -result.channels["accumulator mass flow"].values.min() / 855.0 * 6e4
     assert delivered == pytest.approx(told(r"delivers up to ([\d.]+) l/min")[0], abs=0.1)
     first = result.events[0]
     time, speed = told(r"meets the stop at ([\d.]+) ms with ([\d.]+) m/s")

@@ -48,7 +48,7 @@ def test_impacts_pressures_and_flows_are_those_of_the_page(result):
     assert first["seat"].approach_speed == pytest.approx(shut_speed, abs=6e-3)
     channels = result.channels
     flow, pressure = told(r"up to ([\d.]+) g/s, and the working chamber reaches ([\d.]+) bar")
-    assert channels["throat flow"].values.max() == pytest.approx(flow * 1e-3, rel=3e-3)
+    assert channels["throat mass flow"].values.max() == pytest.approx(flow * 1e-3, rel=3e-3)
     assert channels["working pressure"].values.max() == pytest.approx(pressure * 1e5, rel=1e-3)
     warm = told(r"heats the gas: here to ([\d.]+) K")[0]
     assert channels["working temperature"].values.max() == pytest.approx(warm, abs=0.6)
@@ -59,7 +59,8 @@ def test_impacts_pressures_and_flows_are_those_of_the_page(result):
 def test_steady_flow_at_the_start_energy_and_mass(result):
     channels = result.channels
     flow = {
-        name: channels[f"{name} flow"].values for name in ("line", "throat", "guide", "exhaust")
+        name: channels[f"{name} mass flow"].values
+        for name in ("line", "throat", "guide", "exhaust")
     }
     assert flow["line"][0] == pytest.approx(flow["throat"][0] + flow["guide"][0], rel=1e-9)
     assert flow["throat"][0] == pytest.approx(flow["exhaust"][0], rel=1e-6)

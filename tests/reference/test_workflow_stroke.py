@@ -120,7 +120,7 @@ def test_pressure_stays_below_joukowsky(study: StrokeStudy):
     fluid, line = study.fluid, study.lines[0]
     assert fluid is not None
     time, pressure = wet.result.time, values(wet, "inlet pressure")
-    flow = values(wet, "nozzle flow")[np.searchsorted(time, study.switch_off)]
+    flow = values(wet, "nozzle mass flow")[np.searchsorted(time, study.switch_off)]
     rise = line.sound_speed * flow / (pi / 4 * 0.0025**2)
 
     closing = time > study.switch_off

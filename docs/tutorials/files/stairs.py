@@ -66,7 +66,9 @@ def stairs(variant, impact, count):
     channel = {name: variant.result.channels[name].values for name in variant.result.channels}
     time, speed = variant.result.time, channel["needle velocity"]
     pressure, body = channel["mouth pressure"], channel["body pressure"]
-    expected = expected_pressure(time, channel["needle.tip velocity"], channel["restriction flow"])
+    expected = expected_pressure(
+        time, channel["needle.tip velocity"], channel["restriction mass flow"]
+    )
     middle = impact.time + 0.5 * impact.contact_time
     found = []
     for k in range(count):

@@ -2,18 +2,21 @@ r"""Conical seat with two ends and a needle with an edge: the narrowest section 
 
 from collections.abc import Mapping
 from math import degrees, pi, sqrt
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner
+from klack.errors import InputError
+from klack.hydraulics.acting_area import acting_area
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.narrowest_mantle import narrowest_mantle
 from klack.hydraulics.needle_contour import NeedleContour
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.opening import OpeningComponent
 from klack.hydraulics.orifice import NOT_CHOKED
+from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.seat import gap_pass
 from klack.input.problem import CaseProblem
 from klack.network.port import ELEMENT, FLOW, Port, Role
@@ -21,10 +24,17 @@ from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Angle, Area, Length
 
-__all__ = ["ConicalSeat", "conical_seat_step", "conical_seat_under_pressure_step"]
+__all__ = [
+    "ConicalSeat",
+    "acting_seat_step",
+    "acting_seat_under_pressure_step",
+    "conical_seat_step",
+    "conical_seat_under_pressure_step",
+]
 
 _FAR = 100.0  # length of the shank over the diameter of the seat
 _PARALLEL = 1e-9  # between chamfer and seat [rad]
+_MET = 2e-3  # a diameter with four digits is that of the seat [-]
 
 
 @inner(error_model="numpy")
@@ -56,6 +66,51 @@ def conical_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -
     return 0
 
 
+@inner(error_model="numpy")
+def _acting_pass(par: Any, state: Any, inp: Any, out: Any, law: int, base: int) -> None:
+    """Pass of the seat, and what the faces with their constant area leave out."""
+    _pass(par, state, inp, out, law, base)
+    p_a, p_b, rho_a, rho_b = inp[2], inp[3], inp[4], inp[5]
+    side, edge = par[base - 3], int(par[base - 1])  # 1: the tip is at b, -1: at a
+    area = acting_area(par, base, edge, out[5], par[5])
+    more = area - par[base - 2]
+    shift = more * side * (p_b - p_a)
+    out[3] += shift
+    out[4] -= shift
+    if inp[1] > 0.0:
+        moved = inp[7] - inp[6] - inp[9] + inp[8]
+        displaced = -side * more * moved / inp[1]  # from a to b
+        out[0] += displaced * (rho_a if displaced >= 0.0 else rho_b)
+    out[10], out[11] = sqrt(4.0 * area / pi), shift
+
+
+@step_function
+def acting_seat_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`conical_seat_step` that corrects the faces by the acting area.
+
+    ``par``: 16 side of the tip, 17 acting area when closed, 18 point of the edge, 19 on the
+    contours.  ``state``: one more, the force of the shift.
+    """
+    _acting_pass(par, state, inp, out, 0, 19)
+    return 0
+
+
+@step_function
+def acting_seat_under_pressure_step(par: Any, state: Any, inp: Any, out: Any) -> int:
+    """Step of :func:`acting_seat_step` with ``par``: 16-17 the law, 18-20 what were 16-18."""
+    _acting_pass(par, state, inp, out, 16, 21)
+    return 0
+
+
+_STEPS = {
+    (False, False): conical_seat_step,
+    (False, True): conical_seat_under_pressure_step,
+    (True, False): acting_seat_step,
+    (True, True): acting_seat_under_pressure_step,
+}
+"""By whether the faces follow the acting area, and whether viscosity rises with pressure."""
+
+
 class ConicalSeat(OpeningComponent):
     r"""Restriction between a conical seat of finite length and a needle that seals with an edge.
 
@@ -72,10 +127,19 @@ class ConicalSeat(OpeningComponent):
     pressure steps from one side to the other.  Closed it is the sealing diameter, which the
     ``pressure-face`` of both sides take; it is 0 where the bore is the narrowest section.
 
-    Limits: concentric, quasi-steady, rigid; of two narrow sections only the narrower one counts.
-    The faces keep their diameters: the shift of the acting diameter is not part of the force.  The
-    contours beyond the ends of the seat must be wider than those ends.  The taper of the gap beside
-    the edge adds no viscous resistance of its own (``land_width``).
+    With ``tip_side`` the pressure faces follow: the seat adds to their force, of constant area,
+
+    .. math:: F = (S(x) - S(0))\,(p_{tip} - p_{shank}), \qquad Q = (S(x) - S(0))\,\dot x
+
+    with the acting area ``S`` of :mod:`~klack.hydraulics.acting_area`, and takes the volume ``Q``
+    that this area sweeps from the side of the tip to the other one, so that the work on the needle
+    is exactly that of the fluid (virtual work).  The channel ``acting diameter`` is then that of
+    ``S``.
+
+    Limits: concentric, quasi-steady, rigid; of two narrow sections only the narrower one counts for
+    the flow.  Without ``tip_side`` the faces keep their diameters.  The contours beyond the ends of
+    the seat must be wider than those ends.  The taper of the gap beside the edge adds no viscous
+    resistance of its own (``land_width``).
     Sources: elementary geometry (areas); Merritt 1967, ch. 3 and 5 (flow, jet).
     """
 
@@ -128,6 +192,11 @@ class ConicalSeat(OpeningComponent):
     )
     leak_area: Area = Field(default=0.0, ge=0, description="When closed; 0 to 1 um^2.")
     flow_force: FlowForce | None = Field(default=None, description="Of the jet on the needle.")
+    tip_side: Literal["a", "b"] | None = Field(
+        default=None,
+        description="Port at the tip of the needle: the pressure faces at both ports, which meet "
+        "at the sealing diameter, then follow the acting diameter; default: they keep it.",
+    )
 
     @model_validator(mode="after")
     def _edge_seals_on_the_cone(self) -> Self:
@@ -276,22 +345,65 @@ class ConicalSeat(OpeningComponent):
     def add_rows(self, rows: Rows) -> None:
         """Add one branch that pushes needle and body."""
         fluid, viscosity = ambient_viscosity(rows)
-        law = viscosity_law(rows)
+        law, follows = viscosity_law(rows), self.tip_side is not None
+        if follows:
+            self._check_faces(rows)
         rows.branch(
-            conical_seat_step if law is None else conical_seat_under_pressure_step,
+            _STEPS[follows, law is not None],
             a=rows.port("a"),
             b=rows.port("b"),
             ports=(rows.port("needle"), rows.port("body")),
             parameters=(
                 *self.parameters(viscosity, fluid.vapour_pressure),
                 *(law.numbers if law else ()),
+                *(self._acting_parameters() if follows else ()),
                 *self.contours,
             ),
-            state=(self.lift, 0.0, 0.0, 0.0, 0.0, self.sealing_diameter),
+            state=(self.lift, 0.0, 0.0, 0.0, 0.0, self.sealing_diameter, *([0.0] * follows)),
             channels=(
                 Channel("lift", "m", 0, derived=True),
                 Channel("area", "m^2", 1, derived=True),
                 Channel("jet force", "N", 2, derived=True),
                 Channel("acting diameter", "m", 5, derived=True),
+                *([Channel("shift force", "N", 6, derived=True)] * follows),
             ),
         )
+
+    def acting_area(self, lift: float) -> float:
+        """Area [m^2] on which the pressure at the tip acts, at a lift [m] of zero or more."""
+        bore = pi / 4.0 * self.lower_diameter**2
+        return float(acting_area(np.array(self.contours), 0, self.contour.edge_point, lift, bore))
+
+    def _acting_parameters(self) -> tuple[float, float, float]:
+        side = 1.0 if self.tip_side == "b" else -1.0
+        return side, self.acting_area(0.0), float(self.contour.edge_point)
+
+    def _check_faces(self, rows: Rows) -> None:
+        """Faces with another diameter would be corrected from a diameter that they do not have."""
+        seal = self.sealing_diameter
+        for port in ("a", "b"):
+            at_tip = port == self.tip_side
+            faces = [
+                part
+                for part in rows.partner(port)
+                if isinstance(part, PressureFace) and part.direction == "opening"
+            ]
+            edges = [f.outer_diameter if at_tip else f.inner_diameter for f in faces]
+            given = [edge for edge in edges if edge]
+            unknown = any(face.area is not None for face in faces)
+            met = any(abs(edge - seal) <= _MET * seal for edge in given)
+            if met or unknown or not (at_tip or given):
+                continue
+            name = "outer_diameter" if at_tip else "inner_diameter"
+            told = " and ".join(f"{1e3 * edge:.6g} mm" for edge in given)
+            raise InputError(
+                f"{rows.component}: tip_side",
+                got=f"{name} {told} of the pressure faces at port {port}"
+                if given
+                else f"no pressure-face with direction: opening at port {port}",
+                expected=f"a pressure-face with {name}: {1e3 * seal:.6g} mm, the sealing diameter, "
+                "which this seat lets follow the lift",
+                hint=f"give the face that {name}, or leave tip_side out: then faces keep theirs; "
+                "another port at the tip is tip_side: "
+                f"{'a' if self.tip_side == 'b' else 'b'}.",
+            )

@@ -24,14 +24,16 @@ from typing import Any
 
 from klack.compiling.jit import inner, njit
 
-__all__ = ["narrowest_mantle"]
+__all__ = ["FIRST", "PER_POINT", "arc_to", "narrowest_mantle", "to_line"]
 
-_FIRST, _PER_POINT = 13, 5
+FIRST, PER_POINT = 13, 5
+"""Places of the first point of the needle, and numbers of each, in what the kernels take."""
+
 _ROUNDS = 30
 
 
 @inner(error_model="numpy")
-def _to_line(
+def to_line(
     pr: float, pz: float, r0: float, z0: float, ur: float, uz: float, side: float
 ) -> tuple[float, float, float, float]:
     """Best end on a line for a point: place along it, area over pi, distance, its tangent."""
@@ -60,7 +62,7 @@ def _on_arc(
     pz = par[base + 2] - par[base + 3] * s + x
     if target == 0:
         ur, uz = par[base + 10], par[base + 11]
-        t, area, d, q = _to_line(pr, pz, par[base + 6], par[base + 7], ur, uz, 1.0)
+        t, area, d, q = to_line(pr, pz, par[base + 6], par[base + 7], ur, uz, 1.0)
         if area == inf:
             return 0.0, inf, pr, -1.0
         both = area / d if d > 0.0 else 2.0 * pr
@@ -73,7 +75,7 @@ def _on_arc(
 
 
 @inner(error_model="numpy")
-def _arc_to(par: Any, base: int, x: float, target: int) -> tuple[float, float]:
+def arc_to(par: Any, base: int, x: float, target: int) -> tuple[float, float]:
     """Smallest area over pi between arc and a part of the seat, and its radius on the arc."""
     low, high = par[base + 4], par[base + 5]
     g_low, area, radius, t = _on_arc(par, base, x, low, target)
@@ -116,9 +118,9 @@ def narrowest_mantle(par: Any, base: int, x: float) -> tuple[float, float]:
     n = int(par[base])
     area, radius = inf + 0.0 * x, 0.0 * x
     for i in range(n):
-        k = base + _FIRST + _PER_POINT * i
+        k = base + FIRST + PER_POINT * i
         pr, pz = par[k], par[k + 1] + x
-        t, found, _, _ = _to_line(
+        t, found, _, _ = to_line(
             pr, pz, par[base + 6], par[base + 7], par[base + 10], par[base + 11], 1.0
         )
         if 0.0 < t < par[base + 12] and found < area:
@@ -128,12 +130,12 @@ def narrowest_mantle(par: Any, base: int, x: float) -> tuple[float, float]:
             found = (pr + qr) * sqrt((pr - qr) * (pr - qr) + (pz - qz) * (pz - qz))
             if found < area:
                 area, radius = found, pr
-            t, found, _, _ = _to_line(qr, qz, pr, pz, par[k + 2], par[k + 3], -1.0)
+            t, found, _, _ = to_line(qr, qz, pr, pz, par[k + 2], par[k + 3], -1.0)
             if 0.0 < t < par[k + 4] and found < area:
                 area, radius = found, pr + t * par[k + 2]
     if par[base + 3] > 0.0:
         for target in range(3):
-            found, at = _arc_to(par, base, x, target)
+            found, at = arc_to(par, base, x, target)
             if found < area:
                 area, radius = found, at
     return pi * area, radius

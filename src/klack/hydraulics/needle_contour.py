@@ -80,6 +80,11 @@ class NeedleContour:
         foot = ((0.0, end[1]),) if tip_radius > 0.0 else ()
         return cls(points=(*foot, end, *middle, last), edge_start=low[0], arc=arc)
 
+    @property
+    def edge_point(self) -> int:
+        """Number of the point where the cone of the tip ends."""
+        return next(k for k, point in enumerate(self.points) if point[0] >= self.edge_start)
+
     def seal(self, angle: float) -> Point:
         """Radius and height [m] where it touches a cone of this half angle [rad]."""
         out, down = cos(angle), sin(angle)

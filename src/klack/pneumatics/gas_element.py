@@ -213,7 +213,7 @@ def _channels(rows: GasRows) -> list[Channel]:
             found.append(Channel("pressure", "Pa", at + i, derived=True, owner=source.component))
     at += len(rows.sources)
     for k, branch in enumerate(rows.branches):
-        found.append(Channel("flow", "kg/s", at + k, derived=True, owner=branch.component))
+        found.append(Channel("mass flow", "kg/s", at + k, derived=True, owner=branch.component))
     return found
 
 

@@ -50,13 +50,13 @@ class GasGap(Component):
         rows.limits.append(
             LimitRow(
                 component=rows.component,
-                quantity="flow",
+                quantity="mass flow",
                 unit="kg/s",
                 valid=(-most, most),
                 law=f"the laminar gap '{rows.component}'",
                 source="Reynolds number 1000 of a narrow gap",
                 effect=lambda value: "The flow is turbulent there, and less than computed.",
                 advice="check clearance and length; a wide gap is a gas-orifice.",
-                channel=f"{rows.component} flow",
+                channel=f"{rows.component} mass flow",
             )
         )

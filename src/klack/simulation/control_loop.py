@@ -14,6 +14,7 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest
 from klack.network.protocols import RunningController
 from klack.network.rows import ControllerRow
+from klack.simulation.flow_channels import present_name
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_recorder import Recorder
 from klack.units import KINDS, format_si, parse_quantity
@@ -163,7 +164,7 @@ class ControlLoop:
 
     def _column(self, row: ControllerRow, i: int) -> tuple[int, float]:
         key = ("components", row.component, "sensors", row.sensors[i])
-        name, unit = row.channels[i], row.units[i]
+        name, unit = present_name(row.channels[i], self._names), row.units[i]
         if name not in self._names:
             raise CaseProblem(
                 (*key, "channel"),

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from klack.hydraulics.fluid import Fluid
 from klack.memory import require_memory
 from klack.network.rows import BranchRow, Channel, ElementRow, Rows
+from klack.simulation.flow_channels import flow_label
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
@@ -78,7 +79,7 @@ class Recorder:
                 for row in rows.elements
                 for port in row.names
             ),
-            *(_Column(_column(row, "flow"), "kg/s") for row in rows.branches),
+            *(_Column(_column(row, flow_label(row)), "kg/s") for row in rows.branches),
             *(
                 _Column(f"{row.component} {kind} force", "N")
                 for row in rows.interfaces

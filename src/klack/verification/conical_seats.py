@@ -20,7 +20,7 @@ from klack.verification.branch_step import RHO, branch_of, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.supply_networks import OIL
 
-__all__ = ["conical_seats", "smallest_mantle"]
+__all__ = ["Piece", "conical_seats", "needle_pieces", "smallest_mantle"]
 
 Vector = NDArray[np.float64]
 Piece = Callable[[float], Vector]
@@ -50,7 +50,7 @@ def _straight(p: Vector, q: Vector) -> Piece:
     return lambda u: p + u * (q - p)
 
 
-def _needle(kind: str) -> list[Piece]:
+def needle_pieces(kind: str) -> list[Piece]:
     """Pieces of the contour, the corner of both cones at height 0, drawn apart."""
     tip, shank = np.array([sin(_TIP), cos(_TIP)]), np.array([sin(_SHANK), cos(_SHANK)])
     edge = np.array([_EDGE, 0.0])
@@ -75,7 +75,7 @@ def _needle(kind: str) -> list[Piece]:
 
 def smallest_mantle(kind: str, lift: float, upper: float = _UPPER) -> tuple[float, float]:
     """Area [m^2] of the smallest mantle by search, and the radius [m] where the needle seals."""
-    pieces = _needle(kind)
+    pieces = needle_pieces(kind)
     seat = _straight(np.array([_LOWER, 0.0]), np.array([upper, (upper - _LOWER) / tan(_SEAT)]))
     normal = np.array([cos(_SEAT), -sin(_SEAT)])
     sealing, level = 0.0, -np.inf

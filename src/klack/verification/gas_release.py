@@ -223,7 +223,7 @@ def _compared(
             f"{name}: energy residual [-]",
             0.0,
             result.books.relative_residual,
-            1e-12,
+            5e-13,
             "conservation of energy",
         ),
     ]
@@ -244,7 +244,7 @@ def _limits() -> list[Check]:
             "release and absorption in 1e12 s: error of the pressure, of it [-]",
             0.0,
             float(np.max(np.abs(never / frozen - 1.0))),
-            1e-12,
+            5e-14,
             "all gas free",
         ),
         _check(

@@ -15,11 +15,13 @@ from klack.hydraulics.pump import Pump
 from klack.hydraulics.relief_valve import ReliefValve
 from klack.hydraulics.variable_orifice import VariableOrifice
 from klack.network.rows import Ambient
+from klack.verification.acting_areas import acting_areas
 from klack.verification.branch_step import branch_of, branch_step
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.conical_seats import conical_seats
 from klack.verification.gas_release import gas_release
 from klack.verification.hydraulic_edges import edges
+from klack.verification.notched_edges import notched_edges
 from klack.verification.supply_networks import OIL, supply_networks
 
 __all__ = ["checks"]
@@ -43,7 +45,9 @@ def checks() -> list[Check]:
         *_pump(),
         _pulsation(),
         *edges(),
+        *notched_edges(),
         *conical_seats(),
+        *acting_areas(),
         *supply_networks(),
         *gas_release(),
     ]

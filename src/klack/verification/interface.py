@@ -613,7 +613,7 @@ def _many_impacts() -> list[Check]:
             "needle pressed on its seat, 1000 impacts: energy, largest deviation [relative]",
             expected=0.0,
             computed=_largest_deviation(pressed, press),
-            tolerance=2e-9,
+            tolerance=8e-10,
             source=source,
         ),
         compare(

@@ -276,7 +276,7 @@ def _orifice() -> list[Check]:
     result = _run(parts, connections, 350, start="rest")
     p = float(result.channels["end pressure"].values[300])
     p0 = float(result.channels["end pressure"].values[0])
-    flow = result.channels["hole flow"].values
+    flow = result.channels["hole mass flow"].values
     m = float(flow[300])
     Z = SPEED * (RHO**2 / float(HEPTANE.density(BEFORE))) / (pi / 4 * 2e-3**2)
 

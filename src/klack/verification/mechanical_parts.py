@@ -657,7 +657,7 @@ def _prescribed() -> list[Check]:
     fluid = library_fluid("n-heptane").at(293.15)
     rows = Network(wet, ends, ambient=ambient, fluid=fluid).rows()
     flown = simulate_network(rows, duration=1.6e-3, record=1e-6)
-    mass = float(np.sum(flown.channels["seat flow"].values[1:])) * float(flown.time[1])
+    mass = float(np.sum(flown.channels["seat mass flow"].values[1:])) * float(flown.time[1])
     density = float(fluid.density(6e5))
     per_lift = 0.7 * pi * 1.5e-3 * sqrt(2.0 * density * 5e5)
     return [

@@ -119,7 +119,7 @@ def _sac(valve: Network, result: NetworkResult) -> Check:
     rho = np.array([fluid_at(table, p, 0)[0] for p in _values(result, "sac pressure")])
     area = pi / 4 * 1.768e-3**2
     mass = rho * (2e-9 + area * _values(result, "needle.bottom displacement"))
-    flow = _values(result, "restriction flow") - _values(result, "nozzle flow")
+    flow = _values(result, "restriction mass flow") - _values(result, "nozzle mass flow")
     moved = float(flow[1:].sum()) * (result.time[1] - result.time[0])
     return _check(
         "fluid that the sac gained against both flows, of its mass [-]",

@@ -88,7 +88,7 @@ def _films() -> list[Check]:
             "momentum that a film of parallel faces takes in time [N s]",
             expected=taken,
             computed=float((flat.v[2] - before[2]) * MASS**0.5),
-            tolerance=2e-9,
+            tolerance=5e-12,
             source="B/2 (1/h^2 - 1/h0^2); small changes of the force follow its slopes",
         ),
         _check(

@@ -170,7 +170,7 @@ def _hammer() -> list[Check]:
     }
     result = runs[8]
     time = result.time
-    flow = result.channels["valve flow"].values
+    flow = result.channels["valve mass flow"].values
     apart = _grid(time, flow, 200)
     off = {}
     for n, run in runs.items():
@@ -210,7 +210,7 @@ def _hammer() -> list[Check]:
             * VISCOSITY
             * LENGTH
             / (pi * BORE**4)
-            * float(laminar.channels["valve flow"].values[0])
+            * float(laminar.channels["valve mass flow"].values[0])
             / DENSITY
             / BAR,
             tolerance=2e-3,

@@ -92,7 +92,9 @@ def _walls(point: OperatingPoint, rows: Rows) -> dict[Key, float]:
 
 
 def _flows(point: OperatingPoint, rows: Rows) -> dict[Key, float]:
-    gas = {row.component: point.value(f"{row.component} flow") for row in rows.gas_rows.branches}
+    gas = {
+        row.component: point.value(f"{row.component} mass flow") for row in rows.gas_rows.branches
+    }
     of_gas = {(name, "mass flow", "kg/s"): flow for name, flow in gas.items()}
     return _liquid_flows(point, rows) | of_gas
 

@@ -13,13 +13,31 @@ from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.summary import StrokeJson, stroke_measured, stroke_to_json, stroke_told
 from klack.reduction.structure import STRUCTURE_UNITS
+from klack.simulation.flow_channels import present_name, with_present_names
 
 __all__ = ["STROKE"]
 
 
 def _renewed(study: StrokeStudy) -> StrokeStudy:
-    """None for the nan with which earlier versions said that there is no such number."""
+    """None for the nan with which earlier versions said that there is no such number; names."""
+    names = {name for variant in study.variants.values() for name in variant.result.channels}
+    if any(name.endswith(" flow") for name in names):
+        study = _renamed(study)
     return replace(study, lift=_known(study.lift), switch_off=_known(study.switch_off))
+
+
+def _renamed(study: StrokeStudy) -> StrokeStudy:
+    """Mass flows under the names of today: formerly those of restrictions were called flow."""
+    variants = {
+        name: replace(
+            variant,
+            result=replace(variant.result, channels=with_present_names(variant.result.channels)),
+        )
+        for name, variant in study.variants.items()
+    }
+    known = {name for variant in variants.values() for name in variant.result.channels}
+    flows = tuple(present_name(name, known) for name in study.channels.flows)
+    return replace(study, variants=variants, channels=replace(study.channels, flows=flows))
 
 
 def _known(value: float | None) -> float | None:
