@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
 from klack.magnetics.driver import DriveProgram, Driver, DriveState, Switch, When
-from klack.magnetics.output_stage import OutputStage, StagePath
+from klack.magnetics.output_stage import Capacitor, OutputStage, StagePath
 from klack.units import Capacitance, Current, Power, Ratio, Resistance, Time, Voltage
 
 __all__ = ["BoostDriver", "Shot"]
@@ -176,14 +176,19 @@ class BoostDriver(Driver):
         return DriveProgram(
             tuple(DriveState(name, path.still, switches) for name, path, switches in states),
             stage=OutputStage(
-                capacitance=self.capacitance,
-                start=self.boost_voltage if self.start_voltage is None else self.start_voltage,
-                nominal=self.boost_voltage,
-                power=self.recharge_power,
-                current=self.recharge_current or 0.0,
-                efficiency=self.efficiency,
+                capacitor=self._capacitor(),
                 paths={name: path for name, path, _ in states},
             ),
+        )
+
+    def _capacitor(self) -> Capacitor:
+        return Capacitor(
+            capacitance=self.capacitance,
+            start=self.boost_voltage if self.start_voltage is None else self.start_voltage,
+            nominal=self.boost_voltage,
+            power=self.recharge_power,
+            current=self.recharge_current or 0.0,
+            efficiency=self.efficiency,
         )
 
     def _paths(self) -> Mapping[str, StagePath]:

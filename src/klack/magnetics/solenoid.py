@@ -12,9 +12,8 @@ from pydantic import Field, model_validator
 from klack.input.problem import CaseProblem
 from klack.input.section import Number
 from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
-from klack.magnetics.driver import driver_of
-from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.gap_range import GapRange
+from klack.magnetics.magnet_rows import magnet_rows, main_circuit
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.side_pull import ArmaturePull, ArmatureRing
 from klack.magnetics.solenoid_parts import (
@@ -25,7 +24,7 @@ from klack.magnetics.solenoid_parts import (
     PoleGap,
 )
 from klack.magnetics.tabulation import hermite_grid
-from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.magnetics.winding import REFERENCE_TEMPERATURE
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
@@ -170,16 +169,12 @@ class Solenoid(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
         circuit = self.circuit()
-        flux_rows(
+        magnet_rows(
             rows,
             circuit,
-            resistance=warm_resistance(self.resistance, self.winding_temperature),
-            driver=driver_of(rows, "terminals"),
+            {"terminals": main_circuit(self)},
             gap=self.gap,
             closing=self.closes == "upward",
-            armature=rows.port("armature"),
-            base=rows.port("base"),
-            current=self.start_current,
             gap_range=self.gap_range(),
             remanent=self.start == "remanent",
         )
