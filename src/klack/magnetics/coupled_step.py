@@ -296,10 +296,11 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             charge = mean[w] * piece
             square = mean[w] * charge
             ohmic[w] += par[row + 1] * square
-            pulse[w] += par[row + 1] * charge + through
             if par[row + 3] == 0.0:
+                pulse[w] += voltage[w] * piece
                 supply[w] += par[row + 1] * square + mean[w] * through
                 continue
+            pulse[w] += par[row + 1] * charge + through
             path = stage_path(par, row, mode[w])
             supply[w] += par[path] * charge
             switches[w] += par[path + 4] * square

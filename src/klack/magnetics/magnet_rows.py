@@ -13,6 +13,7 @@ from klack.magnetics.coupled_table import CoupledMagnet, CoupledSystem, Winding
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_step import FLUXES, flux_rows, gap_limit
 from klack.magnetics.gap_range import GapRange
+from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.network_loops import loop_names
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.rows import Channel, Rows
@@ -44,6 +45,7 @@ class CoilCircuit(Section):
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
+    insulation_class: InsulationClass = None
     start_current: Current = Field(
         default=0.0, ge=0, description="Steady current before the start: holding."
     )

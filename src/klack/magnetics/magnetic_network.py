@@ -12,6 +12,7 @@ from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.coupled_table import independent_ways
 from klack.magnetics.flux_table import circuit_numbers
 from klack.magnetics.gap_range import GapRange
+from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.magnet_rows import CoilCircuit, magnet_rows, main_circuit
 from klack.magnetics.network_elements import CoilElement, MovingGap, NetworkElement, WorkingGaps
 from klack.magnetics.network_loops import circuit_of_network
@@ -65,6 +66,7 @@ class MagneticNetwork(Component):
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
+    insulation_class: InsulationClass = None
     gap: Length = Field(gt=0, description="Working gap at the start, without residual gaps.")
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."

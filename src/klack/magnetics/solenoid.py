@@ -13,6 +13,7 @@ from klack.input.problem import CaseProblem
 from klack.input.section import Number
 from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
 from klack.magnetics.gap_range import GapRange
+from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.magnet_rows import magnet_rows, main_circuit
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.side_pull import ArmaturePull, ArmatureRing
@@ -88,6 +89,7 @@ class Solenoid(Component):
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
+    insulation_class: InsulationClass = None
     gap: Length = Field(gt=0, description="Working gap at the start, without the residual gap.")
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."
