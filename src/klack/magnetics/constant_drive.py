@@ -1,12 +1,13 @@
 """Coils of a valve that carry a constant current."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
+from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.force_map_solenoid import ForceMapSolenoid
@@ -154,7 +155,19 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
         coil = coils[name]
         part = changed.get(coil.component, coil.magnet)
         changed[coil.component] = part.model_copy(update=_starting(part, coil.port, current))
-    return network.with_components(changed)
+    return _without_capacitors(network).with_components(changed)
+
+
+def _without_capacitors(network: Network) -> Network:
+    """Network whose boost-drivers draw from nothing: constant sources take their places."""
+    shared = [name for name, part in network.components.items() if isinstance(part, BoostCapacitor)]
+    if not shared:
+        return network
+    feeds = [{str(joint) for joint in node.joints} for node in network.nodes]
+    feeds = [ports for ports in feeds if any(f"{name}.outlet" in ports for name in shared)]
+    parts = {name: part for name, part in network.components.items() if name not in shared}
+    kept = [c for c in network.connections if not any(set(c) & ports for ports in feeds)]
+    return replace(network, components=parts, connections=kept)
 
 
 def _starting(part: Component, port: str, current: float) -> dict[str, object]:

@@ -1,7 +1,7 @@
 """Windings that share a magnet or a capacitor as one row of a network."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from klack.magnetics.coupled_table import (
 )
 from klack.magnetics.flux_step import FAILURES
 from klack.magnetics.network_loops import loop_names
+from klack.magnetics.output_stage import Capacitor
 from klack.magnetics.remanent_start import remanent_state
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import Book, Channel, ElementRow, Rows
@@ -58,21 +59,20 @@ class PlacedMagnet:
 
 def coupled_rows(
     rows: Rows,
-    system: CoupledSystem,
     placed: Sequence[PlacedMagnet],
-    capacitors: Sequence[tuple[str, str]],
+    shared: Mapping[int, tuple[str, Capacitor]] | None = None,
 ) -> None:
-    """Add a system of windings to a network.
+    """Add windings that share magnets or capacitors to a network, as one row.
 
     Parameters
     ----------
     rows : Rows
-    system : CoupledSystem
     placed : sequence of PlacedMagnet
-        Its magnets, in its order.
-    capacitors : sequence of (str, str)
-        Component that each capacitor of the system is in, and its name there, perhaps empty.
+    shared : mapping of int to (str, Capacitor), optional
+        Of the windings that draw from a capacitor which is a component, by electric node: its
+        name, and its numbers.
     """
+    system, capacitors = _system(placed, shared or {})
     parameters = system.numbers()
     first = system.first_states()
 
@@ -119,6 +119,30 @@ def coupled_rows(
         for node in part.nodes:
             rows.coils[node] = (element, int(parameters[5]) + WINDING_ROW * w + 2)
             w += 1
+
+
+def _system(
+    placed: Sequence[PlacedMagnet], shared: Mapping[int, tuple[str, Capacitor]]
+) -> tuple[CoupledSystem, list[tuple[str, str]]]:
+    """System, and of each of its capacitors the component and the name in it, perhaps empty."""
+    names, capacitors = list[tuple[str, str]](), list[Capacitor]()
+    magnets = []
+    for part in placed:
+        windings = []
+        for node, winding in zip(part.nodes, part.magnet.windings, strict=True):
+            stage = winding.driver.stage
+            if stage is not None:
+                name, capacitor = (part.component, winding.name), stage.capacitor
+                if capacitor is None:
+                    component, capacitor = shared[node]
+                    name = (component, "")
+                if name not in names:
+                    names.append(name)
+                    capacitors.append(capacitor)
+                winding = replace(winding, capacitor=names.index(name))
+            windings.append(winding)
+        magnets.append(replace(part.magnet, windings=tuple(windings)))
+    return CoupledSystem(magnets=tuple(magnets), capacitors=tuple(capacitors)), names
 
 
 def _resting(part: PlacedMagnet, gap: float) -> tuple[Vector, Vector]:

@@ -1,7 +1,6 @@
 """A magnet with its windings and their drivers as a row of a network."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Protocol
 
 from pydantic import Field
@@ -9,12 +8,13 @@ from pydantic import Field
 from klack.input.section import Section
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.coupled_rows import PlacedMagnet, coupled_rows
-from klack.magnetics.coupled_table import CoupledMagnet, CoupledSystem, Winding
+from klack.magnetics.coupled_table import CoupledMagnet, Winding
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_step import FLUXES, flux_rows, gap_limit
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.network_loops import loop_names
+from klack.magnetics.shared_capacitors import shared_capacitors
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
 from klack.network.rows import Channel, Rows
 from klack.units import Current, Resistance, Temperature
@@ -61,7 +61,7 @@ def magnet_rows(
     gap_range: GapRange,
     remanent: bool,
     names_loops: bool = False,
-) -> None:
+) -> bool:
     """Add a magnet to the rows of a network: one coil by itself, or several solved together.
 
     Parameters
@@ -79,6 +79,11 @@ def magnet_rows(
         Whether hysteretic iron starts as saturation has left it.
     names_loops : bool
         Whether the flux of every loop is recorded.
+
+    Returns
+    -------
+    bool
+        Whether its element was added by itself, with one coil; else it is solved with others.
     """
     made = {
         port: Winding(
@@ -93,7 +98,11 @@ def magnet_rows(
     }
     armature, base = rows.port("armature"), rows.port("base")
     main = made["terminals"]
-    if len(made) == 1:
+    shares = any(
+        winding.driver.stage is not None and winding.driver.stage.capacitor is None
+        for winding in made.values()
+    )
+    if len(made) == 1 and not shares:
         named = enumerate(loop_names(circuit)) if names_loops else ()
         flux_rows(
             rows,
@@ -109,13 +118,8 @@ def magnet_rows(
             remanent=remanent,
             channels=tuple(Channel(f"flux of {name}", "Wb", FLUXES + k) for k, name in named),
         )
-        return
-    staged = [winding for winding in made.values() if winding.driver.stage is not None]
-    joined = [
-        replace(winding, capacitor=staged.index(winding)) if winding in staged else winding
-        for winding in made.values()
-    ]
-    magnet = CoupledMagnet(circuit=circuit, gap=gap, closing=closing, windings=tuple(joined))
+        return True
+    magnet = CoupledMagnet(circuit=circuit, gap=gap, closing=closing, windings=tuple(made.values()))
     placed = PlacedMagnet(
         component=rows.component,
         magnet=magnet,
@@ -125,10 +129,12 @@ def magnet_rows(
         remanent=remanent,
         names_loops=names_loops,
     )
-    capacitors = tuple(w.driver.stage.capacitor for w in staged if w.driver.stage is not None)
-    system = CoupledSystem(magnets=(magnet,), capacitors=capacitors)
-    coupled_rows(rows, system, [placed], [(rows.component, winding.name) for winding in staged])
+    if shares:
+        shared_capacitors(rows).magnets.append(placed)
+    else:
+        coupled_rows(rows, [placed])
     gap_limit(rows, gap_range, gap=gap, closing=closing, armature=armature, base=base)
+    return False
 
 
 def main_circuit(part: Wound) -> CoilCircuit:

@@ -15,7 +15,7 @@ power, with at most a constant current, up to its nominal voltage; both have clo
 
 Limits: switches are ideal apart from their resistance, diodes apart from forward voltage and
 resistance (no reverse recovery); no resistance in series with the capacitor, no inductance of the
-wires; the battery is ideal; each stage has a capacitor of its own.
+wires; the battery is ideal.
 """
 
 from collections.abc import Mapping, Sequence
@@ -120,17 +120,18 @@ class OutputStage:
 
     Parameters
     ----------
-    capacitor : Capacitor
+    capacitor : Capacitor or None
+        None: the one that the driver shares with others.
     paths : mapping of str to StagePath
         By state.
     """
 
-    capacitor: Capacitor
+    capacitor: Capacitor | None
     paths: Mapping[str, StagePath]
 
     def numbers(self, states: Sequence[str]) -> NDArray[np.float64]:
         """Flat stage for the compiled step, the paths in the order of the states."""
-        numbers = self.capacitor.numbers()
+        numbers = self.capacitor.numbers() if self.capacitor else [0.0] * STAGE_HEADER
         for name in states:
             path = self.paths[name]
             low, then = path.empty or (-1.0, name)

@@ -9,6 +9,7 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import Number
 from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
@@ -171,7 +172,7 @@ class Solenoid(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
         circuit = self.circuit()
-        magnet_rows(
+        alone = magnet_rows(
             rows,
             circuit,
             {"terminals": main_circuit(self)},
@@ -181,6 +182,13 @@ class Solenoid(Component):
             remanent=self.start == "remanent",
         )
         if self.off_axis_parts():
+            if not alone:
+                raise InputError(
+                    f"components.{rows.component}",
+                    got="off_axis or tilts with a driver that shares its boost capacitor",
+                    expected="forces across the axis of a magnet solved by itself",
+                    hint="give the driver a capacitance of its own.",
+                )
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))
 
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:
