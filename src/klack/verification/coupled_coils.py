@@ -10,6 +10,7 @@ SciPy, the main flux being the root of one equation by Froehlich's formula.
 """
 
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -305,7 +306,7 @@ def _saturated() -> list[Check]:
 
     y = np.zeros(5)
     corners = (0.0, 0.1e-3, 0.2e-3, 0.2e-3 + 1e-7, 0.5e-3, 0.5e-3 + 1e-7, 0.7e-3, end)
-    for a, b in zip(corners[:-1], corners[1:], strict=True):
+    for a, b in pairwise(corners):
         found = solve_ivp(rate, (a, b), y, method="DOP853", rtol=1e-11, atol=1e-15)
         y = found.y[:, -1]
     flux, currents = _main_flux(y[:2], gap(end))
@@ -364,7 +365,7 @@ def _saturated() -> list[Check]:
 
 
 def _series() -> list[Check]:
-    """Two equal halves of a coil on equal chopped drivers, against the coil at twice the voltage."""
+    """Two equal halves of a coil on equal choppers, against the coil at twice the voltage."""
 
     def magnet(parts: int) -> MagneticNetwork:
         elements: dict[str, object] = {
