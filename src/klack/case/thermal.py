@@ -1,8 +1,9 @@
 """The section ``thermal``: what a stroke warms, and what of a stroke follows temperatures."""
 
 from collections.abc import Mapping
+from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, Strict, StringConstraints
 
 from klack.input.section import Name, Section, Text
 from klack.units import Expansion, Length, Ratio, Temperature, TemperatureRise, Time
@@ -10,6 +11,10 @@ from klack.units import Expansion, Length, Ratio, Temperature, TemperatureRise, 
 __all__ = ["CaseThermal", "Growth", "GrowthLength", "HeatedMagnet", "SentHeat"]
 
 _REFERENCE = 293.15
+
+_WORD = r"[A-Za-z_][A-Za-z0-9_-]*"
+CoilName = Annotated[str, Strict(), StringConstraints(pattern=rf"^{_WORD}(\.{_WORD})?$")]
+"""Component of a coil, with the circuit where its magnet has several."""
 
 
 class SentHeat(Section):
@@ -82,9 +87,10 @@ class CaseThermal(Section):
     heat: tuple[SentHeat, ...] = Field(
         default=(), description="Losses of the stroke, and the nodes that they warm."
     )
-    windings: Mapping[Name, Name] = Field(
+    windings: Mapping[CoilName, Name] = Field(
         default_factory=dict,
-        description="coil: node of its copper, in place of its winding_temperature.",
+        description="coil: node of its copper, in place of its winding_temperature; magnet.circuit "
+        "for a further circuit of a magnetic-network.",
     )
     fluid: Name | None = Field(
         default=None, description="Node of the fluid; default the temperature of the surroundings."

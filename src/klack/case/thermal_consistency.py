@@ -50,7 +50,7 @@ def check_thermal(case: ValveSections) -> None:
         )
     for coil in thermal.windings:
         key = ("thermal", "windings", coil)
-        require_known(key, coil, _having(parts, "winding_temperature"), "coil", on_key=True)
+        require_known(key, coil, _wound(parts), "coil", on_key=True)
     for coil in thermal.magnets:
         key = ("thermal", "magnets", coil)
         with_magnets = [name for name in parts if getattr(parts[name], "magnets", ())]
@@ -74,8 +74,11 @@ def _role(part: Component) -> Role | None:
     return ports[0].role if len(ports) == 1 else None
 
 
-def _having(parts: Mapping[str, Component], key: str) -> list[str]:
-    return [name for name, part in parts.items() if key in type(part).model_fields]
+def _wound(parts: Mapping[str, Component]) -> list[str]:
+    """Every coil: that of a magnet, and those in further circuits of it."""
+    wound = [name for name in parts if "winding_temperature" in type(parts[name]).model_fields]
+    others = [f"{name}.{more}" for name in wound for more in getattr(parts[name], "circuits", {})]
+    return wound + others
 
 
 def _named_nodes(thermal: CaseThermal) -> Iterator[tuple[Key, str]]:

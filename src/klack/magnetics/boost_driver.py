@@ -5,10 +5,14 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
 from klack.magnetics.driver import DriveProgram, Driver, DriveState, Switch, When
-from klack.magnetics.output_stage import OutputStage, StagePath
+from klack.magnetics.output_stage import Capacitor, OutputStage, StagePath
+from klack.magnetics.shared_capacitors import shared_capacitors
+from klack.network.port import FED, VOLTAGE, Port
+from klack.network.rows import GROUND, Rows
 from klack.units import Capacitance, Current, Power, Ratio, Resistance, Time, Voltage
 
 __all__ = ["BoostDriver", "Shot"]
@@ -42,22 +46,32 @@ class BoostDriver(Driver):
     second shot that comes before it has recovered starts from a lower voltage and is late.
     Recuperated energy may raise it above ``boost_voltage``; then the converter rests.
 
-    Limits: those of :mod:`klack.magnetics.output_stage`; a capacitor serves this coil alone.
+    Without ``capacitance`` the driver draws from the boost-capacitor that its port ``supply`` is
+    joined to, perhaps together with others.
+
+    Limits: those of :mod:`klack.magnetics.output_stage`.
     """
 
     type: ClassVar[str] = "boost-driver"
+    ports: ClassVar[Mapping[str, Port]] = {"terminals": VOLTAGE, "supply": FED}
 
     battery: Voltage = Field(gt=0, description="Battery, for holding and for the converter.")
-    capacitance: Capacitance = Field(gt=0, description="Boost capacitor.")
-    boost_voltage: Voltage = Field(gt=0, description="Up to which the converter recharges it.")
+    capacitance: Capacitance | None = Field(
+        default=None, gt=0, description="Boost capacitor of its own; none: one joined to 'supply'."
+    )
+    boost_voltage: Voltage | None = Field(
+        default=None, gt=0, description="Up to which the converter recharges its own capacitor."
+    )
     start_voltage: Voltage | None = Field(
         default=None, ge=0, description="Of the capacitor at the start; default boost_voltage."
     )
-    recharge_power: Power = Field(ge=0, description="Into the capacitor; 0: no recharge.")
+    recharge_power: Power | None = Field(
+        default=None, ge=0, description="Into its own capacitor; 0: no recharge."
+    )
     recharge_current: Current | None = Field(
         default=None, gt=0, description="Largest current into the capacitor; default no limit."
     )
-    efficiency: Ratio = Field(default=1.0, gt=0, le=1, description="Of the converter.")
+    efficiency: Ratio = Field(default=1.0, gt=0, le=1, description="Of its own converter.")
     peak_current: Current = Field(gt=0, description="Where the boost ends.")
     peak_duration: Time | None = Field(
         default=None,
@@ -97,7 +111,8 @@ class BoostDriver(Driver):
 
     @model_validator(mode="after")
     def _levels(self) -> Self:
-        if not self.battery < self.boost_voltage:
+        self._check_capacitor()
+        if self.boost_voltage is not None and not self.battery < self.boost_voltage:
             raise CaseProblem(
                 ("boost_voltage",),
                 got=f"{self.boost_voltage:g} V",
@@ -176,14 +191,58 @@ class BoostDriver(Driver):
         return DriveProgram(
             tuple(DriveState(name, path.still, switches) for name, path, switches in states),
             stage=OutputStage(
-                capacitance=self.capacitance,
-                start=self.boost_voltage if self.start_voltage is None else self.start_voltage,
-                nominal=self.boost_voltage,
-                power=self.recharge_power,
-                current=self.recharge_current or 0.0,
-                efficiency=self.efficiency,
+                capacitor=self._capacitor(),
                 paths={name: path for name, path, _ in states},
             ),
+        )
+
+    def _check_capacitor(self) -> None:
+        """Refuse half a capacitor."""
+        needed = ("capacitance", "boost_voltage", "recharge_power")
+        more = ("start_voltage", "recharge_current")
+        given = [key for key in (*needed, *more) if getattr(self, key) is not None]
+        missing = [key for key in needed if getattr(self, key) is None]
+        if given and missing:
+            raise CaseProblem(
+                (missing[0],),
+                got=f"none, with {', '.join(given)}",
+                expected=f"all of {', '.join(needed)}, or none of its capacitor",
+                hint="add it; or join 'supply' to a boost-capacitor, which has these keys.",
+            )
+
+    def add_rows(self, rows: Rows) -> None:
+        """Draw from the capacitor at ``supply``; the coil runs the program."""
+        supply = rows.port("supply")
+        if supply == GROUND and self.capacitance is None:
+            raise InputError(
+                f"components.{rows.component}",
+                got="a boost-driver without a capacitor",
+                expected="capacitance, boost_voltage and recharge_power, or its port 'supply' "
+                "joined to a boost-capacitor",
+                hint=f"write [capacitor.outlet, {rows.component}.supply] among the connections.",
+            )
+        if supply == GROUND:
+            return
+        if self.capacitance is not None:
+            raise InputError(
+                f"components.{rows.component}",
+                got="a capacitance of its own, and the port 'supply' joined to a boost-capacitor",
+                expected="one of them",
+                hint="remove capacitance, boost_voltage, start_voltage and recharge_..., or the "
+                "connection.",
+            )
+        shared_capacitors(rows).drawing[rows.port("terminals")] = supply
+
+    def _capacitor(self) -> Capacitor | None:
+        if self.capacitance is None or self.boost_voltage is None:
+            return None
+        return Capacitor(
+            capacitance=self.capacitance,
+            start=self.boost_voltage if self.start_voltage is None else self.start_voltage,
+            nominal=self.boost_voltage,
+            power=self.recharge_power or 0.0,
+            current=self.recharge_current or 0.0,
+            efficiency=self.efficiency,
         )
 
     def _paths(self) -> Mapping[str, StagePath]:

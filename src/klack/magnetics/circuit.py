@@ -8,7 +8,10 @@ and the coil sees the linkage :math:`\psi = N_b^T C \varphi`.  ``x`` is the work
 for the whole circuit; ``C`` is :attr:`MagneticCircuit.loops`.  Loop fluxes as unknowns satisfy
 Kirchhoff's node law by construction, and make the stored energy a convex function of the unknowns.
 
-Limits: lumped flux tubes, one coil, one moving direction.  At rest iron follows its mean curve;
+Further coils, in electric circuits of their own, add their ``N_b i``: mutual induction follows
+from the fluxes that they share.
+
+Limits: lumped flux tubes, one moving direction.  At rest iron follows its mean curve;
 hysteresis acts in the time step only.
 """
 
@@ -47,6 +50,8 @@ class MagneticBranch:
         (``1/R_e`` of a shorted turn); the loss is ``S (dflux/dt)^2``.
     turns : float [-]
         ``N``: turns of the coil around this branch, signed by the direction of the branch.
+    circuit : str
+        Electric circuit that these turns belong to; empty: that of the magnet's terminals.
     remanence : float [A]
         :math:`\Theta_0`: constant magnetomotive force along the branch (remanence of the iron, a
         magnet).  It belongs to the stored energy: ``law.energy - remanence * flux``.
@@ -60,6 +65,7 @@ class MagneticBranch:
     turns: float = 0.0
     remanence: float = 0.0
     stops: IronStops | None = None
+    circuit: str = ""
 
     def __post_init__(self) -> None:
         require_nonnegative(f"MagneticBranch '{self.name}': eddy", self.eddy, "S")
@@ -132,12 +138,20 @@ class MagneticCircuit:
     @property
     def turns(self) -> NDArray[np.float64]:
         """Turns of the coil per branch, shape (n_branches,) [-]."""
-        return np.array([branch.turns for branch in self.branches], dtype=float)
+        return self._turns("")
+
+    def _turns(self, circuit: str) -> NDArray[np.float64]:
+        turns = [b.turns if b.circuit == circuit else 0.0 for b in self.branches]
+        return np.array(turns, dtype=float)
+
+    def turns_of(self, circuit: str) -> NDArray[np.float64]:
+        """Turns of an electric circuit per loop, shape (n_loops,) [-]."""
+        return np.asarray(self.loops.T @ self._turns(circuit), dtype=float)
 
     @property
     def loop_turns(self) -> NDArray[np.float64]:
         """Turns of the coil per loop, shape (n_loops,): ``linkage = loop_turns @ loop fluxes``."""
-        return np.asarray(self.loops.T @ self.turns, dtype=float)
+        return self.turns_of("")
 
     @property
     def eddy(self) -> NDArray[np.float64]:

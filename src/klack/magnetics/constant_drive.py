@@ -1,37 +1,69 @@
 """Coils of a valve that carry a constant current."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
+from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.force_map_solenoid import ForceMapSolenoid
+from klack.magnetics.magnet_rows import main_circuit
 from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.magnetics.voltage_table import VoltageTable
 from klack.magnetics.winding import warm_resistance
+from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.port import Role
 from klack.units import format_si
 
 __all__ = [
+    "Coil",
     "coils_of",
     "current_left",
     "driven",
     "hysteretic_coils",
-    "resistance_of",
     "start_currents",
 ]
 
-Coil = Solenoid | MagneticNetwork | ForceMapSolenoid
+Magnet = Solenoid | MagneticNetwork | ForceMapSolenoid
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Coil:
+    """A coil, or some in series, at a driver.
+
+    Parameters
+    ----------
+    component : str
+        Its magnet.
+    port : str
+    magnet : Solenoid, MagneticNetwork or ForceMapSolenoid
+    resistance : float [ohm]
+        At the temperature of the winding.
+    start_current : float [A]
+        With which a run begins.
+    """
+
+    component: str
+    port: str
+    magnet: Magnet
+    resistance: float
+    start_current: float
+
+    @property
+    def label(self) -> str:
+        """What its channels are called after."""
+        return self.component if self.port == "terminals" else f"{self.component} {self.port}"
 
 
 def coils_of(network: Network) -> dict[str, Coil]:
-    """Coils of a network by name.
+    """Coils of a network by name: that of the magnet, or ``magnet.port`` of a further circuit.
 
     Raises
     ------
@@ -40,8 +72,17 @@ def coils_of(network: Network) -> dict[str, Coil]:
     """
     found: dict[str, Coil] = {}
     for name, part in network.components.items():
-        if isinstance(part, Coil):
-            found[name] = part
+        if isinstance(part, Magnet):
+            circuits = {"terminals": main_circuit(part)}
+            circuits |= part.circuits if isinstance(part, MagneticNetwork) else {}
+            for port, circuit in circuits.items():
+                found[name if port == "terminals" else f"{name}.{port}"] = Coil(
+                    component=name,
+                    port=port,
+                    magnet=part,
+                    resistance=warm_resistance(circuit.resistance, circuit.winding_temperature),
+                    start_current=circuit.start_current,
+                )
         elif any(port.role is Role.COIL for port in part.port_kinds().values()):
             raise InputError(
                 f"components.{name}",
@@ -52,23 +93,20 @@ def coils_of(network: Network) -> dict[str, Coil]:
     return found
 
 
-def resistance_of(coil: Coil) -> float:
-    """Resistance [ohm] at the temperature of the winding."""
-    return warm_resistance(coil.resistance, coil.winding_temperature)
-
-
 def hysteretic_coils(network: Network) -> list[str]:
-    """Coils whose flux at a constant current depends on what was before."""
+    """Magnets whose flux at a constant current depends on what was before."""
     return [
-        name
-        for name, coil in coils_of(network).items()
-        if not isinstance(coil, ForceMapSolenoid) and coil.circuit().hysteretic
+        coil.component
+        for coil in coils_of(network).values()
+        if coil.port == "terminals"
+        and not isinstance(coil.magnet, ForceMapSolenoid)
+        and coil.magnet.circuit().hysteretic
     ]
 
 
 def start_currents(network: Network) -> dict[str, float]:
     """Steady current [A] with which a run of each coil begins."""
-    return {name: float(coil.start_current) for name, coil in coils_of(network).items()}
+    return {name: coil.start_current for name, coil in coils_of(network).items()}
 
 
 def driven(network: Network, currents: Mapping[str, float]) -> Network:
@@ -104,35 +142,61 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
                 expected="0 A or more",
                 hint="the force of a coil does not depend on the sign of its current.",
             )
-    changed = {}
+    at = {(coil.component, coil.port): name for name, coil in coils.items()}
+    changed: dict[str, Component] = {}
     for node in network.nodes:
-        here = node.having(Role.COIL)
-        names = [joint.component for joint in here]
+        names = [at[joint.component, joint.name] for joint in node.having(Role.COIL)]
         for joint in node.having(Role.VOLTAGE):
             if len(names) == 1 and names[0] in currents:
                 name = names[0]
-                voltage = resistance_of(coils[name]) * currents[name]
+                voltage = coils[name].resistance * currents[name]
                 changed[joint.component] = VoltageTable(time=(0.0,), voltage=(voltage,))
-    coiled = {
-        name: coils[name].model_copy(update={"start_current": current})
-        for name, current in currents.items()
-    }
-    return network.with_components({**changed, **coiled})
+    for name, current in currents.items():
+        coil = coils[name]
+        part = changed.get(coil.component, coil.magnet)
+        changed[coil.component] = part.model_copy(update=_starting(part, coil.port, current))
+    return _without_capacitors(network).with_components(changed)
 
 
-def current_left(coil: Coil, current: float, gap: float) -> float:
-    """Current that the steady fluxes of a coil carry at a gap [m], less the wanted one [A].
+def _without_capacitors(network: Network) -> Network:
+    """Network whose boost-drivers draw from nothing: constant sources take their places."""
+    shared = [name for name, part in network.components.items() if isinstance(part, BoostCapacitor)]
+    if not shared:
+        return network
+    feeds = [{str(joint) for joint in node.joints} for node in network.nodes]
+    feeds = [ports for ports in feeds if any(f"{name}.outlet" in ports for name in shared)]
+    parts = {name: part for name, part in network.components.items() if name not in shared}
+    kept = [c for c in network.connections if not any(set(c) & ports for ports in feeds)]
+    return replace(network, components=parts, connections=kept)
 
-    The fluxes are those of :func:`~klack.magnetics.steady_coil.steady_fluxes`; here they are put
-    into the circuit, or the map, again.
+
+def _starting(part: Component, port: str, current: float) -> dict[str, object]:
+    """What of a magnet changes for another current of one of its coils at the start."""
+    if port == "terminals":
+        return {"start_current": current}
+    circuits = dict(getattr(part, "circuits", {}))
+    circuits[port] = circuits[port].model_copy(update={"start_current": current})
+    return {"circuits": circuits}
+
+
+def current_left(magnet: Magnet, currents: Mapping[str, float], gap: float) -> float:
+    """Current that the steady fluxes of a magnet carry at a gap [m], less the wanted one [A].
+
+    ``currents`` [A] are those of its coils by port.  The fluxes are those of
+    :func:`~klack.magnetics.steady_coil.steady_fluxes`; here they are put into the circuit, or the
+    map, again.
     """
-    if isinstance(coil, ForceMapSolenoid):
-        plant: MagneticCircuit | FluxMap = coil.flux_map()
+    others = dict(currents)
+    current = others.pop("terminals")
+    if isinstance(magnet, ForceMapSolenoid):
+        plant: MagneticCircuit | FluxMap = magnet.flux_map()
     else:
-        plant = coil.circuit()
-    fluxes = steady_fluxes(plant, current=current, gap=gap)
+        plant = magnet.circuit()
+    fluxes = steady_fluxes(plant, current=current, gap=gap, others=others)
     if isinstance(plant, FluxMap):
         return float(plant.current_at(float(fluxes[0]), gap)) - current
     mmf = plant.loops.T @ plant.mmf(plant.loops @ fluxes, gap)
     left = mmf - current * plant.loop_turns
+    for port, more in others.items():
+        left -= more * plant.turns_of(port)
     return float(np.max(np.abs(left)) / np.max(np.abs(plant.loop_turns)))

@@ -362,5 +362,4 @@ def driver_of(rows: Rows, port: str = "terminals") -> DriveProgram:
             expected="one driver at the terminals of a coil",
             hint="connect the port 'terminals' of one driver (voltage-step, peak-hold, ...) to it.",
         )
-    rows.coils[rows.port(port)] = rows.component
     return drivers[0].program()

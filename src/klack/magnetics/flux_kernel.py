@@ -37,6 +37,7 @@ from klack.magnetics.stop_kernel import (
 )
 
 __all__ = [
+    "assemble",
     "circuit_current",
     "circuit_energy",
     "circuit_flux",
@@ -45,8 +46,12 @@ __all__ = [
     "circuit_loss_and_force",
     "circuit_settle",
     "circuit_step",
+    "factorise",
     "linked",
+    "settle_along",
+    "solve",
     "stack",
+    "weighted_mmf",
 ]
 
 
@@ -254,10 +259,22 @@ def circuit_gaps(
 def circuit_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any) -> float:
     """Current [A] that belongs to ``phi + change`` and the reluctances ``end`` of the tubes."""
     loops = int(par[at])
+    return weighted_mmf(par, at, hints, phi, change, end, at + _HEADER + loops + 5, _SIZE + loops)
+
+
+@inner(error_model="numpy", forceinline=True)
+def weighted_mmf(
+    par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any, weights: int, stride: int
+) -> float:
+    """Sum of the mmfs of the tubes at ``phi + change``, each by its weight.
+
+    The weights [-] stand in ``par`` from ``weights`` on, ``stride`` apart.
+    """
+    loops = int(par[at])
     p = at + _HEADER + loops
     current = 0.0
     for k in range(int(par[at + 1])):
-        weight = par[p + 5]
+        weight = par[weights + k * stride]
         if weight != 0.0:
             row = p + _SIZE
             b = par[row] * (phi[0] + change[0])
@@ -335,7 +352,7 @@ def circuit_heat(par: Any, at: int, hints: Any, phi: Any, change: Any) -> float:
 
 
 @inner(error_model="numpy")
-def _factorise(A: Any, n: int) -> bool:
+def factorise(A: Any, n: int) -> bool:
     """Replace the lower half of ``A`` by its Cholesky factor; False if it is not positive."""
     for j in range(n):
         d = A[j * n + j]
@@ -354,7 +371,7 @@ def _factorise(A: Any, n: int) -> bool:
 
 
 @inner(error_model="numpy")
-def _solve(A: Any, g: Any, n: int) -> None:
+def solve(A: Any, g: Any, n: int) -> None:
     """Replace ``g`` by the solution with the factor ``A``."""
     for i in range(n):
         v = g[i]
@@ -367,6 +384,49 @@ def _solve(A: Any, g: Any, n: int) -> None:
         for m in range(i + 1, n):
             v -= A[m * n + i] * g[m]
         g[i] = v / A[i * n + i]
+
+
+@inner(error_model="numpy", forceinline=True)
+def assemble(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    change: Any,
+    reluctance: Any,
+    per_time: float,
+    A: Any,
+    g: Any,
+) -> None:
+    """Take the mean mmfs of all tubes from ``g``, and add their slopes to the lower half of ``A``.
+
+    ``g`` has the balance of each loop, ``A`` its derivative by the changes of the loop fluxes.
+    """
+    loops, tubes = int(par[at]), int(par[at + 1])
+    for k in range(tubes):
+        p = _tube(par, at, k)
+        b0 = circuit_flux(par, at, k, phi)
+        db = circuit_flux(par, at, k, change)
+        eddy = par[p] * per_time
+        mmf = eddy * db + reluctance[k] * (b0 + 0.5 * db) - par[p + 2]
+        slope = eddy + 0.5 * reluctance[k]
+        if par[p + 4] != 0.0:
+            table, hint = at + int(par[p + 4]), int(hints[2 * k + 1])
+            iron, iron_slope = _iron_mean(par, table, hint, b0, b0 + db)
+            mmf += iron
+            slope += iron_slope
+            if par[p + 6] != 0.0:
+                first = _STOPS + int(par[p + 7])
+                iron, iron_slope = stops_mean(par, at, at + int(par[p + 6]), hints, first, b0, db)
+                mmf += iron
+                slope += iron_slope
+        row = p + _SIZE
+        for i in range(loops):
+            c = par[row + i]
+            if c != 0.0:
+                g[i] -= c * mmf
+                for j in range(i + 1):
+                    A[i * loops + j] += c * par[row + j] * slope
 
 
 @inner(error_model="numpy")
@@ -389,7 +449,7 @@ def circuit_step(
     resistance does no harm.  False if the iteration does not settle.
     """
     A, g, z = stack(phi, 36), stack(phi, 6), stack(phi, 6)
-    loops, tubes = int(par[at]), int(par[at + 1])
+    loops = int(par[at])
     turns = at + _HEADER
     most = int(par[at + 2])
     current = 0.0
@@ -399,37 +459,12 @@ def circuit_step(
             z[i] = par[turns + i]
             for j in range(i + 1):
                 A[i * loops + j] = 0.0
-        for k in range(tubes):
-            p = _tube(par, at, k)
-            b0 = circuit_flux(par, at, k, phi)
-            db = circuit_flux(par, at, k, change)
-            eddy = par[p] * per_time
-            mmf = eddy * db + reluctance[k] * (b0 + 0.5 * db) - par[p + 2]
-            slope = eddy + 0.5 * reluctance[k]
-            if par[p + 4] != 0.0:
-                table, hint = at + int(par[p + 4]), int(hints[2 * k + 1])
-                iron, iron_slope = _iron_mean(par, table, hint, b0, b0 + db)
-                mmf += iron
-                slope += iron_slope
-                if par[p + 6] != 0.0:
-                    first = _STOPS + int(par[p + 7])
-                    iron, iron_slope = stops_mean(
-                        par, at, at + int(par[p + 6]), hints, first, b0, db
-                    )
-                    mmf += iron
-                    slope += iron_slope
-            row = p + _SIZE
-            for i in range(loops):
-                c = par[row + i]
-                if c != 0.0:
-                    g[i] -= c * mmf
-                    for j in range(i + 1):
-                        A[i * loops + j] += c * par[row + j] * slope
-        if not _factorise(A, loops):
+        assemble(par, at, hints, phi, change, reluctance, per_time, A, g)
+        if not factorise(A, loops):
             return False, 0.0
-        _solve(A, g, loops)
+        solve(A, g, loops)
         if conducts:
-            _solve(A, z, loops)
+            solve(A, z, loops)
             induced = (linked(par, at, change) + linked(par, at, g)) * per_time
             current = (voltage - induced) / (resistance + linked(par, at, z) * per_time)
         largest = 0.0
@@ -458,11 +493,29 @@ def circuit_settle(
     ``move``, and of the second order in what was lacking.  Zero, and no move, where nothing is
     gained.
     """
-    A, g, along = stack(phi, 36), stack(phi, 6), stack(phi, 6)
-    loops, tubes = int(par[at]), int(par[at + 1])
     table = at + int(par[at + SETTLES])
     count = int(par[table]) + (1 if is_open else 0)
-    first = table + 1
+    return settle_along(par, at, hints, phi, end, par, table + 1, count, move)
+
+
+@inner(error_model="numpy")
+def settle_along(
+    par: Any,
+    at: int,
+    hints: Any,
+    phi: Any,
+    end: Any,
+    ways: Any,
+    first: int,
+    count: int,
+    move: Any,
+) -> float:
+    """Do what :func:`circuit_settle` does along ``count`` directions, ``ways`` from ``first`` on.
+
+    A direction is one number for each loop.
+    """
+    A, g, along = stack(phi, 36), stack(phi, 6), stack(phi, 6)
+    loops, tubes = int(par[at]), int(par[at + 1])
     for j in range(loops):
         move[j] = 0.0 * phi[j]
     if count == 0:
@@ -479,7 +532,7 @@ def circuit_settle(
             for i in range(count):
                 c = 0.0
                 for j in range(loops):
-                    c += par[first + i * loops + j] * par[p + _SIZE + j]
+                    c += ways[first + i * loops + j] * par[p + _SIZE + j]
                 along[i] = c
                 touched = touched or c != 0.0
             if not touched:
@@ -499,14 +552,14 @@ def circuit_settle(
                 g[i] -= along[i] * mmf
                 for j in range(i + 1):
                     A[i * count + j] += along[i] * along[j] * slope
-        if not _factorise(A, count):
+        if not factorise(A, count):
             break
-        _solve(A, g, count)
+        solve(A, g, count)
         largest = 0.0
         for j in range(loops):
             step = 0.0 * phi[0]
             for i in range(count):
-                step += par[first + i * loops + j] * g[i]
+                step += ways[first + i * loops + j] * g[i]
             move[j] += step
             largest = max(largest, abs(step))
         if largest <= par[at + 5]:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.compiling.constant import constant
-from klack.errors import require_positive
+from klack.errors import InputError, require_positive
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.drive_kernel import due_switch, next_time, state_block, state_voltage
 from klack.magnetics.driver import DriveProgram
@@ -57,7 +57,7 @@ from klack.magnetics.quiet_step import DIODE, FRONT, allowed_bend, quiet_step
 from klack.magnetics.remanent_start import remanent_state
 from klack.magnetics.stage_step import STAGE_BOOKS, stage_channels, stage_step
 from klack.magnetics.steady_coil import steady_fluxes
-from klack.network.rows import Book, Channel, LimitRow, Rows
+from klack.network.rows import GROUND, Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
 
 __all__ = [
@@ -69,6 +69,7 @@ __all__ = [
     "flux_numbers",
     "flux_rows",
     "flux_state",
+    "gap_limit",
     "magnet_step",
 ]
 
@@ -431,6 +432,13 @@ def flux_rows(
     InputError
         If the circuit has no leakage path without eddy currents, or too many different fluxes.
     """
+    if driver.stage is not None and driver.stage.capacitor is None:
+        raise InputError(
+            f"components.{rows.component}",
+            got="a driver that shares its boost capacitor",
+            expected="a solenoid or a magnetic-network at such a driver",
+            hint="give the driver a capacitance of its own.",
+        )
     parameters = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap, closing=closing)
 
     def at_rest(displacement: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -440,6 +448,7 @@ def flux_rows(
         return flux_state(parameters, steady_fluxes(plant, current=current, gap=x), (), current)
 
     state = at_rest(np.zeros(2))
+    rows.coils[rows.handles.get("terminals", GROUND)] = (len(rows.elements), 5)
     staged = driver.stage is not None
     books = STAGE_BOOKS if staged else BOOKS
     rows.element(
@@ -456,8 +465,28 @@ def flux_rows(
             for j in range(int(parameters[int(parameters[4])]))
         },
     )
-    known = gap_range or GapRange.of(plant)
-    advice = _MAP_ADVICE if isinstance(plant, FluxMap) else _GAP_ADVICE
+    gap_limit(
+        rows,
+        gap_range or GapRange.of(plant),
+        gap=gap,
+        closing=closing,
+        armature=armature,
+        base=base,
+        advice=_MAP_ADVICE if isinstance(plant, FluxMap) else _GAP_ADVICE,
+    )
+
+
+def gap_limit(
+    rows: Rows,
+    known: GapRange,
+    *,
+    gap: float,
+    closing: bool,
+    armature: int,
+    base: int,
+    advice: str = _GAP_ADVICE,
+) -> None:
+    """State the gaps for which a magnet is described; arguments as in :func:`flux_rows`."""
     way = -1.0 if closing else 1.0
     rows.limits.append(
         LimitRow(

@@ -33,6 +33,7 @@ __all__ = [
     "circuit_numbers",
     "current_weights",
     "free_directions",
+    "free_loops",
     "tubes_of",
 ]
 
@@ -185,12 +186,19 @@ def free_directions(circuit: MagneticCircuit) -> Vector:
 
     The last one changes the linkage of the coil, the ones before it do not.
     """
-    C, n = circuit.loops.astype(float), circuit.loop_turns
-    values, vectors = np.linalg.eigh(C.T @ (circuit.eddy[:, None] * C))
-    null = vectors[:, values <= _SAFE * values[-1]] if values[-1] > 0.0 else np.eye(n.size)
+    n, null = circuit.loop_turns, free_loops(circuit)
     along = null.T @ n
     q, _ = np.linalg.qr(np.column_stack((along, np.eye(along.size))))
     return np.asarray((null @ np.column_stack((q[:, 1:], q[:, :1]))).T)
+
+
+def free_loops(circuit: MagneticCircuit) -> Vector:
+    """Independent directions of the loop fluxes without eddy currents, shape (n_loops, k)."""
+    C = circuit.loops.astype(float)
+    values, vectors = np.linalg.eigh(C.T @ (circuit.eddy[:, None] * C))
+    if values[-1] > 0.0:
+        return np.asarray(vectors[:, values <= _SAFE * values[-1]])
+    return np.eye(C.shape[1])
 
 
 def tubes_of(circuit: MagneticCircuit) -> tuple[list[_Tube], int, float]:

@@ -11,6 +11,7 @@ from klack.input.problem import CaseProblem
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_step import flux_rows
+from klack.magnetics.insulation import InsulationClass
 from klack.magnetics.map_choice import MapFile
 from klack.magnetics.map_file import MapTable
 from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
@@ -56,6 +57,7 @@ class ForceMapSolenoid(Component):
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
+    insulation_class: InsulationClass = None
     gap: Length = Field(description="Gap at the start, as in the table.")
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."

@@ -6,19 +6,20 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.problem import CaseProblem
+from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Name
 from klack.magnetics.circuit import MagneticCircuit
-from klack.magnetics.driver import driver_of
-from klack.magnetics.flux_step import FLUXES, flux_rows
+from klack.magnetics.coupled_table import independent_ways
 from klack.magnetics.flux_table import circuit_numbers
 from klack.magnetics.gap_range import GapRange
-from klack.magnetics.network_elements import MovingGap, NetworkElement, WorkingGaps
-from klack.magnetics.network_loops import circuit_of_network, loop_names
-from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.magnetics.insulation import InsulationClass
+from klack.magnetics.magnet_rows import CoilCircuit, magnet_rows, main_circuit
+from klack.magnetics.network_elements import CoilElement, MovingGap, NetworkElement, WorkingGaps
+from klack.magnetics.network_loops import circuit_of_network
+from klack.magnetics.winding import REFERENCE_TEMPERATURE
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
-from klack.network.rows import Channel, Rows
+from klack.network.rows import Rows
 from klack.units import Current, Length, Resistance, Temperature
 
 __all__ = ["MagneticNetwork"]
@@ -38,14 +39,15 @@ class MagneticNetwork(Component):
         F = -\tfrac12\sum_b R_b'(x)\,\varphi_b^2 .
 
     The force is the slope of the co-energy at constant current, and of the energy at constant
-    fluxes.  All elements ``coil`` are in series in one circuit with its driver; windings closed
+    fluxes.  Elements ``coil`` of one electric circuit are in series with its driver, at
+    ``terminals`` or at the port of one of the ``circuits``.  The circuits, windings closed
     through a resistance (``shorted-coil``) and with a constant current (``bias-coil``) are coupled
-    to it by the fluxes they share, which is their mutual inductance.
+    by the fluxes they share, which is their mutual inductance.
 
-    A coil must drive some loop without eddy currents, its leakage; otherwise its current would
-    jump with the voltage.
+    Every circuit must drive some loop without eddy currents that no other drives alike, its
+    leakage; otherwise its current would jump with the voltage.
 
-    Limits: one circuit with a driver, one moving direction, at most 6 independent loops.
+    Limits: one moving direction, at most 6 independent loops and 8 circuits.
     Sources: Roters 1941; Woodson & Melcher 1968; loops by a spanning tree, Kirchhoff 1847.
     """
 
@@ -56,16 +58,26 @@ class MagneticNetwork(Component):
         "terminals": COIL,
     }
 
+    def port_kinds(self) -> Mapping[str, Port]:
+        """Armature, base, terminals, and one port for each further circuit."""
+        return {**self.ports, **dict.fromkeys(self.circuits, COIL)}
+
     resistance: Resistance = Field(gt=0, description="Of coils and harness, at 20 degC.")
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
+    insulation_class: InsulationClass = None
     gap: Length = Field(gt=0, description="Working gap at the start, without residual gaps.")
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."
     )
     elements: Mapping[Name, NetworkElement] = Field(
         min_length=2, description="Elements by name, each between two magnetic nodes."
+    )
+    circuits: Mapping[Name, CoilCircuit] = Field(
+        default_factory=dict,
+        description="Further electric circuits of its coils by name, which is a port, each with a "
+        "driver of its own.",
     )
     start_current: Current = Field(
         default=0.0, ge=0, description="Steady current before the start: holding."
@@ -103,13 +115,49 @@ class MagneticNetwork(Component):
                 expected=f"{low:g} to {high:g} m, in which all gaps are open",
                 hint="check gap and opens_from.",
             )
+        self._check_circuits()
         try:
             circuit_numbers(self.circuit())
+            if self.circuits:
+                independent_ways(self.circuit(), ("", *self.circuits))
         except InputError as error:
             raise CaseProblem(
                 ("elements",), got=error.got, expected=error.expected, hint=error.hint
             ) from None
         return self
+
+    def _check_circuits(self) -> None:
+        """Refuse circuits without coils, coils of no circuit, and names of other ports."""
+        wound: dict[str, list[str]] = {"": [], **{name: [] for name in self.circuits}}
+        for name, element in self.elements.items():
+            if isinstance(element, CoilElement):
+                circuit = element.circuit or ""
+                if circuit not in wound:
+                    raise CaseProblem(
+                        ("elements", name, "circuit"),
+                        got=f"'{circuit}'",
+                        expected=f"one of circuits: {one_of(self.circuits)}"
+                        if self.circuits
+                        else "no circuit, as 'circuits' has none",
+                        hint=nearest(circuit, self.circuits, "add it to circuits, or leave it out"),
+                    )
+                wound[circuit].append(name)
+        for name, coils in wound.items():
+            if not coils:
+                raise CaseProblem(
+                    ("circuits", name) if name else ("elements",),
+                    got="no coil in it" if name else "no coil at the terminals",
+                    expected="an element of kind coil"
+                    + (f" with circuit: {name}" if name else " without 'circuit'"),
+                    hint="the resistance of the network is that of the coils without 'circuit'.",
+                )
+            if name in self.ports:
+                raise CaseProblem(
+                    ("circuits", name),
+                    got=f"the name '{name}', which is another port",
+                    expected=f"a name other than {', '.join(self.ports)}",
+                    hint="name it after its purpose: holding, closing, sensing.",
+                )
 
     def circuit(self) -> MagneticCircuit:
         """Return the magnetic circuit; its ``x`` is the working gap without residual gaps."""
@@ -141,24 +189,20 @@ class MagneticNetwork(Component):
 
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
-        circuit = self.circuit()
-        flux_rows(
+        magnet_rows(
             rows,
-            circuit,
-            resistance=warm_resistance(self.resistance, self.winding_temperature),
-            driver=driver_of(rows, "terminals"),
+            self.circuit(),
+            self.windings(),
             gap=self.gap,
             closing=self.closes == "upward",
-            armature=rows.port("armature"),
-            base=rows.port("base"),
-            current=self.start_current,
             gap_range=self.gap_range(),
             remanent=self.start == "remanent",
-            channels=tuple(
-                Channel(f"flux of {name}", "Wb", FLUXES + k)
-                for k, name in enumerate(loop_names(circuit))
-            ),
+            names_loops=True,
         )
+
+    def windings(self) -> dict[str, CoilCircuit]:
+        """Electric circuits by port, that of the terminals first."""
+        return {"terminals": main_circuit(self), **self.circuits}
 
     def _moving(self) -> dict[str, MovingGap]:
         return {name: e for name, e in self.elements.items() if isinstance(e, MovingGap)}

@@ -73,8 +73,11 @@ class _Element(Section):
         eddy: float = 0.0,
         turns: float = 0.0,
         mmf: float = 0.0,
+        circuit: str = "",
     ) -> tuple[Tube, ...]:
-        branch = MagneticBranch(name=name, law=law, eddy=eddy, turns=turns, remanence=mmf)
+        branch = MagneticBranch(
+            name=name, law=law, eddy=eddy, turns=turns, remanence=mmf, circuit=circuit
+        )
         return (Tube(branch=branch, start=self.between[0], end=self.between[1], rank=rank),)
 
 
@@ -239,12 +242,17 @@ class LeakageElement(_Element):
 
 
 class CoilElement(_Element):
-    """Turns of the coil; several such elements are in series in one circuit."""
+    """Turns of a coil; several such elements of one electric circuit are in series."""
 
     kind: Literal["coil"]
     turns: Number = Field(
         description="Turns; a positive current drives flux from the first node to the second, "
         "with a negative number the other way."
+    )
+    circuit: Name | None = Field(
+        default=None,
+        description="Of the network's circuits, the one that the coil is in; default that at the "
+        "terminals.",
     )
 
     @model_validator(mode="after")
@@ -257,7 +265,8 @@ class CoilElement(_Element):
 
     def tubes(self, name: str, gaps: WorkingGaps) -> tuple[Tube, ...]:
         """One branch without reluctance."""
-        return self._tube(name, LinearReluctance(0.0), _TREE, turns=float(self.turns))
+        turns, circuit = float(self.turns), self.circuit or ""
+        return self._tube(name, LinearReluctance(0.0), _TREE, turns=turns, circuit=circuit)
 
 
 class ShortedCoil(_Element):

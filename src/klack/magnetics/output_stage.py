@@ -15,7 +15,7 @@ power, with at most a constant current, up to its nominal voltage; both have clo
 
 Limits: switches are ideal apart from their resistance, diodes apart from forward voltage and
 resistance (no reverse recovery); no resistance in series with the capacitor, no inductance of the
-wires; the battery is ideal; each stage has a capacitor of its own.
+wires; the battery is ideal.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,15 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import inner
 
-__all__ = ["STAGE_HEADER", "STAGE_ROW", "START_VOLTAGE", "OutputStage", "StagePath", "recharged"]
+__all__ = [
+    "STAGE_HEADER",
+    "STAGE_ROW",
+    "START_VOLTAGE",
+    "Capacitor",
+    "OutputStage",
+    "StagePath",
+    "recharged",
+]
 
 STAGE_HEADER = 6
 """Numbers of a stage before its paths: capacitance, nominal, power, current, efficiency, start."""
@@ -75,8 +83,8 @@ class StagePath:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OutputStage:
-    """A stage and the paths of all states of its driver.
+class Capacitor:
+    """A boost capacitor with its converter.
 
     Parameters
     ----------
@@ -91,8 +99,6 @@ class OutputStage:
         Largest one into the capacitor; 0: no limit.
     efficiency : float
         Of the converter.
-    paths : mapping of str to StagePath
-        By state.
     """
 
     capacitance: float
@@ -101,12 +107,31 @@ class OutputStage:
     power: float
     current: float
     efficiency: float
+
+    def numbers(self) -> list[float]:
+        """Flat capacitor for the compiled step."""
+        numbers = [self.capacitance, self.nominal, self.power, self.current]
+        return [*numbers, self.efficiency, self.start]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class OutputStage:
+    """A stage and the paths of all states of its driver.
+
+    Parameters
+    ----------
+    capacitor : Capacitor or None
+        None: the one that the driver shares with others.
+    paths : mapping of str to StagePath
+        By state.
+    """
+
+    capacitor: Capacitor | None
     paths: Mapping[str, StagePath]
 
     def numbers(self, states: Sequence[str]) -> NDArray[np.float64]:
         """Flat stage for the compiled step, the paths in the order of the states."""
-        numbers = [self.capacitance, self.nominal, self.power, self.current]
-        numbers += [self.efficiency, self.start]
+        numbers = self.capacitor.numbers() if self.capacitor else [0.0] * STAGE_HEADER
         for name in states:
             path = self.paths[name]
             low, then = path.empty or (-1.0, name)

@@ -10,6 +10,7 @@ Limits: iron that came back from its tip by less than twice the flux density of 
 little beside that branch.
 """
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +32,11 @@ _SETTLED = 1e-13
 
 
 def remanent_state(
-    circuit: MagneticCircuit, *, current: float, gap: float
+    circuit: MagneticCircuit,
+    *,
+    current: float,
+    gap: float,
+    others: Mapping[str, float] | None = None,
 ) -> tuple[Vector, Vector]:
     """Loop fluxes [Wb] and stops [A], in the order of the compiled step, after saturation.
 
@@ -41,6 +46,8 @@ def remanent_state(
     current : float [A]
         That remains.
     gap : float [m]
+    others : mapping of str to float [A], optional
+        Currents of further electric circuits that remain; saturated by that of the terminals.
 
     Raises
     ------
@@ -51,7 +58,7 @@ def remanent_state(
     strong = static_state(circuit, current=_STRONG / turns, gap=gap)
     signs = np.sign(strong.branch_fluxes)
     widths = np.zeros(len(circuit.branches))
-    found = static_state(circuit, current=current, gap=gap)
+    found = static_state(circuit, current=current, gap=gap, others=others)
     scale = float(np.max(np.abs(strong.branch_fluxes)))
     for turn in range(_MOST):
         branches = tuple(
@@ -60,7 +67,11 @@ def remanent_state(
         )
         before = found.branch_fluxes
         found = static_state(
-            replace(circuit, branches=branches), current=current, gap=gap, start=found.loop_fluxes
+            replace(circuit, branches=branches),
+            current=current,
+            gap=gap,
+            start=found.loop_fluxes,
+            others=others,
         )
         now = np.array(
             [

@@ -9,12 +9,13 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import Number
 from klack.magnetics.circuit import MOST_LOOPS, MagneticBranch, MagneticCircuit
-from klack.magnetics.driver import driver_of
-from klack.magnetics.flux_step import flux_rows
 from klack.magnetics.gap_range import GapRange
+from klack.magnetics.insulation import InsulationClass
+from klack.magnetics.magnet_rows import magnet_rows, main_circuit
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.side_pull import ArmaturePull, ArmatureRing
 from klack.magnetics.solenoid_parts import (
@@ -25,7 +26,7 @@ from klack.magnetics.solenoid_parts import (
     PoleGap,
 )
 from klack.magnetics.tabulation import hermite_grid
-from klack.magnetics.winding import REFERENCE_TEMPERATURE, warm_resistance
+from klack.magnetics.winding import REFERENCE_TEMPERATURE
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.network.port import COIL, ELEMENT, Port
@@ -89,6 +90,7 @@ class Solenoid(Component):
     winding_temperature: Temperature = Field(
         default=REFERENCE_TEMPERATURE, gt=0, description="Of the copper."
     )
+    insulation_class: InsulationClass = None
     gap: Length = Field(gt=0, description="Working gap at the start, without the residual gap.")
     closes: Literal["upward", "downward"] = Field(
         default="upward", description="Armature motion that closes the gap; upward opens a valve."
@@ -170,20 +172,23 @@ class Solenoid(Component):
     def add_rows(self, rows: Rows) -> None:
         """Add the coil with its driver."""
         circuit = self.circuit()
-        flux_rows(
+        alone = magnet_rows(
             rows,
             circuit,
-            resistance=warm_resistance(self.resistance, self.winding_temperature),
-            driver=driver_of(rows, "terminals"),
+            {"terminals": main_circuit(self)},
             gap=self.gap,
             closing=self.closes == "upward",
-            armature=rows.port("armature"),
-            base=rows.port("base"),
-            current=self.start_current,
             gap_range=self.gap_range(),
             remanent=self.start == "remanent",
         )
         if self.off_axis_parts():
+            if not alone:
+                raise InputError(
+                    f"components.{rows.component}",
+                    got="off_axis or tilts with a driver that shares its boost capacitor",
+                    expected="forces across the axis of a magnet solved by itself",
+                    hint="give the driver a capacitance of its own.",
+                )
             rows.side_of_element(self._side_pull(circuit.loops.shape[1]))
 
     def off_axis_parts(self) -> tuple[OffAxisPart, ...]:

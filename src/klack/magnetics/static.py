@@ -1,5 +1,6 @@
 """A magnetic circuit at rest: current and gap in, fluxes, force and energies out."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,11 +25,11 @@ class StaticState:
     gap : float [m]
     loop_fluxes, branch_fluxes : array [Wb]
     linkage : float [Wb]
-        Of the coil, ``psi``.
+        Of the coil at the terminals, ``psi``.
     force : float [N]
         Along the working gap; negative pulls it shut.
     energy, coenergy : float [J]
-        Their sum is ``psi i``.
+        Their sum is ``psi i``, summed over all circuits.
     """
 
     current: float
@@ -52,9 +53,11 @@ def static_state(
     current: float,
     gap: float,
     start: NDArray[np.float64] | None = None,
+    others: Mapping[str, float] | None = None,
 ) -> StaticState:
     """Solve the circuit for a constant current [A] at a working gap [m].
 
+    ``others`` are the currents [A] of further electric circuits, by name, none by default.
     The loop fluxes minimise the convex function ``W(phi) - psi(phi) i``; damped Newton steps find
     the minimum from any ``start`` (loop fluxes [Wb], zero by default).
 
@@ -63,17 +66,20 @@ def static_state(
     ConvergenceError
         If the minimum is not found, which needs a law that does not rise.
     """
-    C, turns = circuit.loops, circuit.loop_turns
+    C, drive = circuit.loops, current * circuit.loop_turns
+    linked = [(i, circuit.turns_of(name)) for name, i in (others or {}).items()]
+    for amperes, turns in linked:
+        drive = drive + amperes * turns
     phi = np.zeros(C.shape[1]) if start is None else np.array(start, dtype=float)
 
     def gradient(phi: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.asarray(C.T @ circuit.mmf(C @ phi, gap) - current * turns, dtype=float)
+        return np.asarray(C.T @ circuit.mmf(C @ phi, gap) - drive, dtype=float)
 
     for _ in range(_MOST_ITERATIONS):
         here = gradient(phi)
         step = -np.linalg.solve((C.T * circuit.slope(C @ phi, gap)) @ C, here)
         if np.max(np.abs(step)) <= _SETTLED * np.max(np.abs(phi)):
-            return _state(circuit, phi + step, current, gap)
+            return _state(circuit, phi + step, current, gap, linked)
         # of a convex function the slope along the step is enough, which round-off spares: it
         # starts at -downhill, and a step is too long where it has risen well above zero
         downhill, share = abs(float(here @ step)), 1.0
@@ -88,7 +94,11 @@ def static_state(
 
 
 def _state(
-    circuit: MagneticCircuit, phi: NDArray[np.float64], current: float, gap: float
+    circuit: MagneticCircuit,
+    phi: NDArray[np.float64],
+    current: float,
+    gap: float,
+    others: Sequence[tuple[float, NDArray[np.float64]]],
 ) -> StaticState:
     branch = circuit.loops @ phi
     linkage, energy = float(circuit.loop_turns @ phi), circuit.energy(branch, gap)
@@ -100,5 +110,5 @@ def _state(
         linkage=linkage,
         force=circuit.force(branch, gap),
         energy=energy,
-        coenergy=linkage * current - energy,
+        coenergy=sum((i * float(turns @ phi) for i, turns in others), linkage * current) - energy,
     )

@@ -1,5 +1,7 @@
 """Fluxes of a coil that has carried a constant current for long."""
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
@@ -15,7 +17,11 @@ _WIDEST = 2.0**20  # of the largest linkage of a map: beyond, it goes on straigh
 
 
 def steady_fluxes(
-    plant: MagneticCircuit | FluxMap, *, current: float, gap: float
+    plant: MagneticCircuit | FluxMap,
+    *,
+    current: float,
+    gap: float,
+    others: Mapping[str, float] | None = None,
 ) -> NDArray[np.float64]:
     """Loop fluxes of a circuit, or the linkage of a map [Wb], without eddy currents.
 
@@ -25,6 +31,8 @@ def steady_fluxes(
     current : float [A]
     gap : float [m]
         As the circuit or the map counts it.
+    others : mapping of str to float [A], optional
+        Currents of further electric circuits of a magnetic circuit.
 
     Raises
     ------
@@ -32,7 +40,7 @@ def steady_fluxes(
         If no flux carries this current at this gap.
     """
     if isinstance(plant, MagneticCircuit):
-        return static_state(plant, current=current, gap=gap).loop_fluxes
+        return static_state(plant, current=current, gap=gap, others=others).loop_fluxes
     high = float(plant.linkage[-1])
     while plant.current_at(high, gap) < current:
         high *= 2.0

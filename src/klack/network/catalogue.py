@@ -81,6 +81,7 @@ COMPONENTS = (
     ("two-point", "klack.magnetics.two_point.TwoPoint"),
     ("peak-hold", "klack.magnetics.peak_hold.PeakHold"),
     ("boost-driver", "klack.magnetics.boost_driver.BoostDriver"),
+    ("boost-capacitor", "klack.magnetics.boost_capacitor.BoostCapacitor"),
     ("pwm", "klack.magnetics.pwm.PulseWidth"),
     ("controlled-voltage", "klack.magnetics.controlled_voltage.ControlledVoltage"),
     # heat

@@ -49,6 +49,13 @@ def _check_dangling(components: Mapping[str, Component], nodes: Iterable[Node]) 
                 continue
             if port.role is Role.COIL:
                 raise _no_driver(("components", component), f"{component}.{name}")
+            if port.role is Role.FEEDS:
+                raise CaseProblem(
+                    ("components", component),
+                    got=f"the boost capacitor {component}.{name} without a driver",
+                    expected="boost-drivers that draw from it",
+                    hint=f"join them: [{component}.{name}, driver.supply], or remove it.",
+                )
             if port.role is Role.VOLTAGE:
                 raise _no_coil(("components", component), f"{component}.{name}")
             raise CaseProblem(
@@ -174,6 +181,9 @@ def _check_temperature(components: Mapping[str, Component], node: Node) -> None:
 
 
 def _check_drive(components: Mapping[str, Component], node: Node) -> None:
+    if node.having(Role.FEEDS) or node.having(Role.FED):
+        _check_feed(node)
+        return
     drivers = [str(joint) for joint in node.having(Role.VOLTAGE)]
     coils = [str(joint) for joint in node.having(Role.COIL)]
     key = ("connections", node.index)
@@ -186,7 +196,23 @@ def _check_drive(components: Mapping[str, Component], node: Node) -> None:
             key,
             got=f"{_and([*drivers, *coils])} in one circuit",
             expected="one driver and one coil",
-            hint="give every coil its own driver; they may have equal settings.",
+            hint="give every coil its own driver, they may have equal settings; coils of one "
+            "magnetic-network without 'circuit' are in series.",
+        )
+
+
+def _check_feed(node: Node) -> None:
+    """A boost capacitor and the drivers that draw from it."""
+    sources = [str(joint) for joint in node.having(Role.FEEDS)]
+    drivers = [str(joint) for joint in node.having(Role.FED)]
+    others = [str(joint) for joint in node.joints if str(joint) not in (*sources, *drivers)]
+    if len(sources) != 1 or not drivers or others:
+        raise CaseProblem(
+            ("connections", node.index),
+            got=f"{_and([*sources, *drivers, *others])} at one node",
+            expected="one boost-capacitor, and the port 'supply' of each boost-driver that draws "
+            "from it",
+            hint="write [capacitor.outlet, first_driver.supply, second_driver.supply].",
         )
 
 

@@ -167,6 +167,18 @@ class Network:
                 )
         return partners
 
+    def coil_labels(self) -> list[str]:
+        """Return what the channels of each coil are called after: its magnet, and its port there.
+
+        The port ``terminals`` is not named.
+        """
+        return [
+            name if port == "terminals" else f"{name} {port}"
+            for name, part in self.components.items()
+            for port, kind in part.port_kinds().items()
+            if kind.role is Role.COIL
+        ]
+
     def with_components(
         self, components: Mapping[str, Component], connections: Sequence[Sequence[str]] = ()
     ) -> Self:

@@ -7,6 +7,8 @@ __all__ = [
     "COIL",
     "COMPLIANCE",
     "ELEMENT",
+    "FED",
+    "FEEDS",
     "FLOW",
     "FLUID_DOMAINS",
     "GAS_FLOW",
@@ -33,6 +35,8 @@ class Role(Enum):
     FLOW = "carries flow"
     VOLTAGE = "drives"
     COIL = "is driven"
+    FEEDS = "feeds drivers"
+    FED = "draws from a capacitor"
     HEAT_STORE = "stores heat"
     TEMPERATURE = "prescribes temperature"
     HEAT = "carries heat"
@@ -70,6 +74,8 @@ GAS_PRESSURE = Port("pneumatic", Role.PRESSURE)
 GAS_FLOW = Port("pneumatic", Role.FLOW)
 VOLTAGE = Port("electric", Role.VOLTAGE)
 COIL = Port("electric", Role.COIL)
+FEEDS = Port("electric", Role.FEEDS)
+FED = Port("electric", Role.FED, optional=True)
 HEAT_STORE = Port("thermal", Role.HEAT_STORE, optional=True)
 TEMPERATURE = Port("thermal", Role.TEMPERATURE, optional=True)
 HEAT = Port("thermal", Role.HEAT)

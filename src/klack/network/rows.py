@@ -71,10 +71,14 @@ class Ambient:
 
 @dataclass(frozen=True, slots=True)
 class Book:
-    """One entry of the energy balance that a row keeps itself; see ``step_function``."""
+    """One entry of the energy balance that a row keeps itself; see ``step_function``.
+
+    A row that stands for several components names the ``owner`` of each entry.
+    """
 
     label: str
     kind: Literal["store", "supply", "loss"]
+    owner: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -500,7 +504,8 @@ class Rows:
     controllers: list[ControllerRow] = field(default_factory=list)
     gas_rows: GasRows = field(default_factory=GasRows)
     closing: dict[str, Callable[["Rows"], None]] = field(default_factory=dict)
-    coils: dict[int, str] = field(default_factory=dict)  # electric node -> component of its coil
+    # electric node -> element of its coil, and where in its parameters the place of the program is
+    coils: dict[int, tuple[int, int]] = field(default_factory=dict)
 
     def port(self, name: str) -> int:
         """Handle of the node that the port ``name`` of the present component is joined to.

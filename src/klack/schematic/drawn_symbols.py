@@ -125,6 +125,10 @@ _FRAMED: Mapping[str, tuple[Stroke, ...]] = {
     "two-point": (_AXES, Stroke("M-18,12 L-11,-9 l4,7 l3,-7 l4,7 l3,-7 l4,7 l3,-7 L16,12")),
     "peak-hold": (_AXES, Stroke("M-18,12 L-11,-11 l3,3 l3,-3 L0,2 l3,-3 l3,3 l3,-3 l3,3 L16,12")),
     "boost-driver": (_AXES, Stroke("M-18,12 L-11,-11 L-5,3 l3,-4 l3,4 l3,-4 l3,4 l3,-4 L16,12")),
+    "boost-capacitor": (
+        Stroke("M-18,0 H-4 M4,0 H18"),
+        Stroke("M-4,-12 V12 M4,-12 V12", "heavy"),
+    ),
     "pwm": (_AXES, Stroke("M-18,10 V-8 h5 V10 h5 V-8 h5 V10 h5 V-8 h5 V10 h5")),
 }
 

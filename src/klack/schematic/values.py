@@ -21,6 +21,7 @@ _MOST = 4
 _MAIN: Mapping[str, tuple[str, ...]] = {
     "peak-hold": ("boost_voltage", "peak_current", "supply_voltage", "hold_current", "end"),
     "boost-driver": ("capacitance", "boost_voltage", "peak_current", "hold_current"),
+    "boost-capacitor": ("capacitance", "voltage", "start_voltage", "recharge_power"),
     "solenoid": ("turns", "resistance", "gap", "residual_gap", "start_current"),
     "magnetic-network": ("resistance", "gap", "start_current"),
     "force-map-solenoid": ("resistance", "gap", "start_current"),

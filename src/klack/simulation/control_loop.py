@@ -201,10 +201,9 @@ class ControlLoop:
             nodes = network.nodes
             k = network.node_order.index(row.handle) - nodes.volumes
             return nodes.pressure, int(nodes.table0[k])
-        coil = network.rows.coils[row.handle]
-        k = next(i for i, part in enumerate(network.rows.elements) if part.component == coil)
+        k, program = network.rows.coils[row.handle]
         first = int(elements.parameter0[k])
-        drive = first + int(parameters[first + 5])
+        drive = first + int(parameters[first + program])
         block = drive + int(parameters[drive + 1])
         source = block + 3 + 4 * int(parameters[block + 2])
         return parameters, source

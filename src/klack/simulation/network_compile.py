@@ -344,7 +344,7 @@ def _step_rows(
         offsets["account0"][k] = len(accounts.kinds)
         label = " ".join(filter(None, (row.component, row.label)))
         for book in row.books:
-            place = accounts.add(f"{label} {book.label}", _KINDS[book.kind])
+            place = accounts.add(f"{book.owner or label} {book.label}", _KINDS[book.kind])
             if head and book.kind == "supply":
                 numbers["supply"][k] = place
         offsets["account0"][k + 1] = len(accounts.kinds)

@@ -19,6 +19,7 @@ from klack.magnetics.two_point import TwoPoint
 from klack.magnetics.voltage_step import VoltageStep
 from klack.magnetics.voltage_table import VoltageTable
 from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.coupled_coils import coupled_coils
 from klack.verification.single_coil import run_coil
 
 __all__ = ["checks", "injector", "linear_coil", "opening"]
@@ -54,6 +55,7 @@ def checks() -> list[Check]:
         *_energy(),
         *_long_steps(),
         *_map(),
+        *coupled_coils(),
     ]
 
 

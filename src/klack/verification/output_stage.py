@@ -19,6 +19,7 @@ from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.step_function import evaluate
 from klack.verification.check import Check, compare
 from klack.verification.drivers import injector, linear_coil
+from klack.verification.shared_capacitor import shared_capacitor
 from klack.verification.single_coil import run_coil
 
 __all__ = ["StageRun", "checks", "random_driver", "run_stage"]
@@ -42,6 +43,7 @@ def checks() -> list[Check]:
         *_second_shot(),
         *_limits(),
         *_energy(),
+        *shared_capacitor(),
     ]
 
 

@@ -20,7 +20,6 @@ from klack.case.valve_roles import ValveRoles
 from klack.errors import InputError
 from klack.input.problem import Key, one_of
 from klack.network.network import Network
-from klack.network.port import Role
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_run import simulate_network
 
@@ -148,11 +147,7 @@ def channel_names(
         For a role that the computed stroke does not have, or several times.
     """
     point = f"{roles.needle}.{roles.point}"
-    coils = [
-        name
-        for name, part in network.components.items()
-        if any(port.role is Role.COIL for port in part.port_kinds().values())
-    ]
+    coils = network.coil_labels()
     known = {"lift": [f"{point} displacement"], "velocity": [f"{point} velocity"]}
     known |= {role: [f"{coil} {role}" for coil in coils] for role in ("current", "voltage")}
     result = {}

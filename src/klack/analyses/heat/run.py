@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from klack.analyses.heat.heated_stroke import NUMBERS, HeatedStroke, heated_stroke, sent_heat
 from klack.analyses.heat.log import HEAT_LOG, HeatLog, heat_mark
 from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
-from klack.analyses.heat.warm_valve import Aspect, aspects_of
+from klack.analyses.heat.warm_valve import Aspect, aspects_of, hot_windings
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
@@ -191,7 +191,7 @@ def _soaked(strokes: _Strokes, network: HeatNetwork, soak: Sequence[float]) -> _
         heat={},
         strokes=whole,
         causes=_causes(strokes, _celsius(REFERENCE), base, states),
-        doubts=_lost(whole),
+        doubts=(*hot_windings(strokes.valve.case, dict.fromkeys(names, max(soak))), *_lost(whole)),
     )
 
 
@@ -221,7 +221,11 @@ def _warmed(strokes: _Strokes, network: HeatNetwork, thermal: CaseThermal) -> _F
         strokes=computed,
         causes=_causes(strokes, "start", start, {state: end}),
         slow=slow,
-        doubts=(*_ripple(network, thermal, points), *_lost(computed)),
+        doubts=(
+            *hot_windings(strokes.valve.case, _highest(network, points)),
+            *_ripple(network, thermal, points),
+            *_lost(computed),
+        ),
     )
 
 
@@ -246,6 +250,16 @@ def _nodes(network: HeatNetwork, temperature: Vector) -> dict[str, float]:
     """Temperature of every named node [K]."""
     found = {name: float(temperature[i]) for name, i in network.node_of.items()}
     return found | dict(zip(network.fixed_names, network.fixed.tolist(), strict=True))
+
+
+def _highest(network: HeatNetwork, points: Sequence[WarmPoint]) -> dict[str, float]:
+    """Highest temperature of every named node [K]."""
+    found: dict[str, float] = {}
+    for point in points:
+        for at in (point.temperature, point.stroke_temperature):
+            for name, T in _nodes(network, at).items():
+                found[name] = max(T, found.get(name, T))
+    return found
 
 
 def _named_columns(

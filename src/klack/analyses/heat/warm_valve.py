@@ -10,11 +10,13 @@ from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties
+from klack.input.section import Section
+from klack.magnetics.insulation import CLASS_TEMPERATURES, USUAL_CLASS
 from klack.magnetics.winding import warm_resistance
 from klack.network.component import Component
 from klack.units import format_si
 
-__all__ = ["ASPECTS", "Aspect", "WarmValve", "aspects_of", "warm_valve"]
+__all__ = ["ASPECTS", "Aspect", "WarmValve", "aspects_of", "hot_windings", "warm_valve"]
 
 Aspect = Literal["copper", "magnets", "viscosity", "density", "gaps"]
 Temperatures = Mapping[str, float]
@@ -80,8 +82,16 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
     parts: dict[str, Component] = dict(valve.case.network.components)
     values: dict[str, tuple[float, str]] = {}
     for coil, node in thermal.windings.items():
-        parts[coil] = _with(parts[coil], {"winding_temperature": at["copper"][node]}, coil)
-        cold = getattr(parts[coil], "resistance", None)
+        name, _, circuit = coil.partition(".")
+        warmer = {"winding_temperature": at["copper"][node]}
+        wound = winding_of(parts, coil)
+        if circuit:
+            others = dict(getattr(parts[name], "circuits", {}))
+            others[circuit] = _with(wound, warmer, coil)
+            parts[name] = _with(parts[name], {"circuits": others}, coil)
+        else:
+            parts[name] = _with(parts[name], warmer, coil)
+        cold = getattr(wound, "resistance", None)
         if cold is not None:
             warm = warm_resistance(float(cold), at["copper"][node])
             values[f"{coil} resistance"] = (warm, "ohm")
@@ -113,6 +123,32 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
         fluid = _with_viscosity(section.fluid.at(dense), section.fluid.at(thick))
         network = replace(network, fluid=fluid)
     return WarmValve(valve=replace(valve, case=case, network=network), values=values, doubts=doubts)
+
+
+def winding_of(parts: Mapping[str, Component], coil: str) -> Section:
+    """Return what holds resistance and temperature of a coil, ``magnet`` or ``magnet.circuit``."""
+    name, _, circuit = coil.partition(".")
+    part = parts[name]
+    return getattr(part, "circuits", {})[circuit] if circuit else part
+
+
+def hot_windings(case: ValveCase, highest: Temperatures) -> tuple[str, ...]:
+    """Doubts about copper that gets warmer [K] than its insulation bears."""
+    found = []
+    for coil, node in _thermal(case).windings.items():
+        stated = getattr(winding_of(case.network.components, coil), "insulation_class", None)
+        limit = CLASS_TEMPERATURES[stated or USUAL_CLASS]
+        if highest[node] > limit:
+            told = f"the copper of '{coil}' reaches {highest[node] - _ZERO_CELSIUS:.4g} °C, above "
+            told += f"the {limit - _ZERO_CELSIUS:.4g} °C of "
+            if stated:
+                told += f"its insulation, class {stated} of IEC 60085: less current, or a better "
+                told += "path for the heat."
+            else:
+                told += f"class {USUAL_CLASS} of IEC 60085, and states no insulation_class: give "
+                told += "that of its insulation."
+            found.append(told)
+    return tuple(found)
 
 
 def _thermal(case: ValveCase) -> CaseThermal:

@@ -30,7 +30,7 @@ from klack.case.valve_roles import find_roles
 from klack.case.variants import Variant
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
-from klack.magnetics.constant_drive import coils_of, driven, resistance_of
+from klack.magnetics.constant_drive import coils_of, driven
 from klack.magnetics.driver import Driver
 from klack.network.network import Network
 from klack.network.rows import Rows
@@ -81,7 +81,7 @@ def linear_point(found: PointFound, held: Sequence[str] = ()) -> LinearPoint:
     network, step = compiled_at(found.rows, found.point)
     drives: dict[str, tuple[str, Rows]] = {}
     for name, coil in coils_of(found.network).items():
-        more = {**found.currents, name: found.currents[name] + 1.0 / resistance_of(coil)}
+        more = {**found.currents, name: found.currents[name] + 1.0 / coil.resistance}
         with trial():
             drives[f"{name}.voltage"] = ("V", driven(found.network, more).at_start().rows())
     linear = linear_network(network, min(step, _STEP), held=held, drives=drives)

@@ -14,7 +14,7 @@ from klack.case.points import with_changes
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
-from klack.magnetics.constant_drive import Coil, coils_of, resistance_of
+from klack.magnetics.constant_drive import Coil, coils_of
 from klack.network.network import Network
 from klack.units import CURRENT, LENGTH, VOLTAGE, Kind, parse_quantity
 
@@ -61,7 +61,7 @@ class Conditions:
                     "--current" if name in self.current else "--voltage",
                     got=f"the coil '{name}'" if name else "a valve without a coil",
                     expected=f"one of: {one_of(coils)}" if coils else "no current and no voltage",
-                    hint=nearest(name, coils, "name a solenoid of the case.")
+                    hint=nearest(name, coils, "name a coil of the case.")
                     if coils
                     else "leave it out.",
                 )
@@ -76,7 +76,7 @@ class Conditions:
                 expected="one current or one voltage for each coil",
                 hint=f'write --current "{name}=3 A", or a voltage, but not both.',
             )
-        for of, factor in ((self.current, 1.0), (self.voltage, 1.0 / resistance_of(coil))):
+        for of, factor in ((self.current, 1.0), (self.voltage, 1.0 / coil.resistance)):
             for key in (name, ""):
                 if key in of:
                     return factor * of[key]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from klack.case.valve_roles import ValveRoles
-from klack.magnetics.constant_drive import coils_of, current_left, resistance_of
+from klack.magnetics.constant_drive import coils_of, current_left
 from klack.network.network import Network
 from klack.network.rows import Rows
 from klack.simulation.operating_point import OperatingPoint
@@ -127,9 +127,16 @@ def _voltage_left(
         if limit.quantity == "gap"
     }
     largest = 0.0
-    for name, coil in coils_of(network).items():
-        resistance = resistance_of(coil)
-        left = resistance * current_left(coil, currents[name], gaps[name])
-        voltage = point.value(f"{name} voltage")
-        largest = max(largest, abs(left), abs(voltage - resistance * currents[name]))
+    coils = coils_of(network)
+    for name, coil in coils.items():
+        voltage = point.value(f"{coil.label} voltage")
+        largest = max(largest, abs(voltage - coil.resistance * currents[name]))
+        if coil.port == "terminals":
+            together = {
+                other.port: currents[key]
+                for key, other in coils.items()
+                if other.component == coil.component
+            }
+            left = current_left(coil.magnet, together, gaps[coil.component])
+            largest = max(largest, coil.resistance * abs(left))
     return largest

@@ -35,7 +35,6 @@ from klack.errors import ConvergenceError, InputError
 from klack.magnetics.driver import Driver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
-from klack.network.port import Role
 from klack.network.rows import Rows
 from klack.network.travel import Travel
 from klack.progress import Progress, silent
@@ -397,11 +396,7 @@ def _channels(
     units = {
         name: data.unit for result in reversed(results) for name, data in result.channels.items()
     }
-    coils = [
-        name
-        for name, part in network.components.items()
-        if any(port.role is Role.COIL for port in part.port_kinds().values())
-    ]
+    coils = network.coil_labels()
 
     def known(names: Sequence[str]) -> tuple[str, ...]:
         return tuple(name for name in names if name in units)

@@ -1,0 +1,34 @@
+"""Thermal classes of electrical insulation: how warm the copper of a coil may get."""
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+__all__ = ["CLASS_TEMPERATURES", "USUAL_CLASS", "InsulationClass"]
+
+CLASS_TEMPERATURES: Mapping[str, float] = {
+    "Y": 363.15,
+    "A": 378.15,
+    "E": 393.15,
+    "B": 403.15,
+    "F": 428.15,
+    "H": 453.15,
+    "N": 473.15,
+    "R": 493.15,
+    "250": 523.15,
+}
+"""Highest temperature of continuous use [K]; IEC 60085:2007, table 1 (90 to 250 degC)."""
+
+USUAL_CLASS = "H"
+"""Class of the enamelled wire of most solenoids of valves: what a coil without a class may have."""
+
+InsulationClass = Annotated[
+    Literal["Y", "A", "E", "B", "F", "H", "N", "R", "250"] | None,
+    Field(
+        description="Thermal class of its insulation after IEC 60085: Y 90, A 105, E 120, B 130, "
+        "F 155, H 180, N 200, R 220 or 250 degC. klack heat doubts copper above it; without one "
+        "above 180 degC."
+    ),
+]
+"""Key of a coil."""
