@@ -25,3 +25,34 @@
     }
   });
 })();
+// The server makes parts of a page again; the focus, and what is half typed, stay where they were.
+(() => {
+  const OWN = /^c\d+$/;  // names that NiceGUI gives, other ones each time
+  let last = null;
+  const named = (e) => e.id && !OWN.test(e.id) ? `#${CSS.escape(e.id)}` : "";
+  const same = (e) => {
+    if (last.id) return e.matches(last.id);
+    return e.tagName === last.tag && (e.getAttribute("aria-label") || e.textContent.trim()) === last.words;
+  };
+  const remember = (e) => {
+    if (e.closest("[role=dialog]")) return;
+    last = { e, id: named(e), tag: e.tagName, words: e.getAttribute("aria-label") || e.textContent.trim(), given: e.value };
+  };
+  document.addEventListener("focusin", (event) => remember(event.target));
+  document.addEventListener("change", (event) => { if (last && last.e === event.target) last.given = last.e.value; });
+  document.addEventListener("pointerdown", (event) => {
+    if (!event.target.closest("a, button, input, select, textarea, summary, label, [tabindex], [role=dialog]")) last = null;
+  });
+  new MutationObserver(() => {
+    if (!last || last.e.isConnected || document.activeElement !== document.body) return;
+    const found = last.id ? document.querySelector(last.id) : [...document.getElementsByTagName(last.tag)].find(same);
+    if (!found) return;
+    const { e, given } = last, half = e.value !== given && e.value !== undefined;
+    found.focus({ preventScroll: true });
+    if (half) {
+      found.value = e.value;
+      last.given = given;  // still to be told at the end
+      if (e.selectionStart != null) found.setSelectionRange(e.selectionStart, e.selectionEnd);
+    }
+  }).observe(document.documentElement, { childList: true, subtree: true });
+})();
