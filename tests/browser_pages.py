@@ -1,4 +1,4 @@
-"""Every page that klack shows in a browser, and how to get to it: a new page joins with one line."""
+"""Every page that klack shows in a browser, and how to get there; a new one joins with one line."""
 
 import os
 import shutil
@@ -85,7 +85,7 @@ PAGES = (
     Place("sliders", f"/sliders?path={CASE}", ".k-badge.good", _open_all),
     Place("compare", f"/compare?{_BOTH}", "text=sound exposure level"),
     *(Place(f"report, {name}", _REPORT.format(name), ".main-svg") for name, *_ in _COMPUTED),
-    *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-chart svg text") for name, _ in _SHOWN),
+    *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-panel h3") for name, _ in _SHOWN),
 )
 
 

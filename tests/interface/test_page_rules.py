@@ -15,13 +15,13 @@ a, button { display: inline-block; padding: 6px 10px; color: #0b62a8 }
 
 FAULTS = {
     "sideways": '<div style="width:3000px;height:4px"></div>',
-    "outside": '<div style="width:60px;background:#eee;white-space:nowrap">much too long a text</div>',
+    "outside": '<div style="width:60px;background:#eee;white-space:nowrap">too long a text</div>',
     "overlapping": '<div style="height:24px">below</div><div style="margin-top:-24px">above</div>',
     "contrast": '<p style="color:#999">pale</p>',
     "touch": '<button style="padding:0;border:0;font-size:9px;line-height:1">tiny</button>',
 }
 MORE_CONTRAST = (
-    '<div style="background:#223"><p style="background:rgba(255,255,255,.1)">dark on dark</p></div>',
+    '<div style="background:#223"><p style="background:rgba(255,255,255,.1)">on dark</p></div>',
     '<div style="opacity:.4"><p>faint by opacity</p></div>',
     '<svg width="90" height="30"><text x="2" y="20" fill="#aaa">axis</text></svg>',
     '<label>Name<input style="color:#aaa" value="typed" size="30"></label>',

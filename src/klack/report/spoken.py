@@ -28,8 +28,8 @@ def spoken(figure: dict[str, Any]) -> str:
     Examples
     --------
     >>> line = {"type": "scatter", "name": "needle", "x": [0, 1, 2], "y": [0, 90.0, 10.0]}
-    >>> axes = {"xaxis": {"title": {"text": "time [us]"}}, "yaxis": {"title": {"text": "force [N]"}}}
-    >>> spoken({"data": [line], "layout": axes})
+    >>> across, up = {"title": {"text": "time [us]"}}, {"title": {"text": "force [N]"}}
+    >>> spoken({"data": [line], "layout": {"xaxis": across, "yaxis": up}})
     'force [N] over time [us]. needle: highest 90 at 1, lowest 0 at 0, at the end 10.'
     """
     if "axes" in figure:

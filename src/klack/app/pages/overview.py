@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, ResultCard
-from klack.app.folder import RESULT_NAME
+from klack.app.folder import RESULT_NAME, result_names
 from klack.app.jobs import Job
 from klack.app.pages.frame import (
     START_VALUE,
@@ -186,9 +186,8 @@ class _Overview:
             button("Note", partial(self._ask_note, case), of=case)
 
     async def _run(self, case: str, kind: str) -> None:
-        path = PurePosixPath(case)
-        name = path.parent.name if path.stem == "case" and path.parent.name else path.stem
-        out = f"klack-results/{name}"
+        found = await asyncio.to_thread(self._state.folder.look)
+        out = f"klack-results/{result_names({*found.cases, case})[case]}"
         await _telling(lambda: self._state.jobs.start(kind, case, out))
         self._show_jobs()
 

@@ -14,6 +14,7 @@ from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogr
 from klack.app.pages.described_chart import DescribedChart
 from klack.app.pages.frame import (
     START_VALUE,
+    asking,
     button,
     differing,
     frame,
@@ -312,8 +313,27 @@ class _Sliders:
         """Keep the text as the draft of the case, and open the editor."""
         try:
             text = await self._worker.call("text_at", dict(self._values))
+        except KlackError as error:
+            show_error(error)
+            return
+        if self._state.notes.draft(self._case) in (None, text):
+            self._edit(text)
+            return
+        with self._body, asking("Replace what is not saved?") as dialog:
+            plain(
+                "The case has changes that are not saved. These values are put into the file "
+                "as it is saved, and replace those changes.",
+                "p",
+            ).classes("k-soft")
+            with ui.element("div").classes("k-tools"):
+                button("Cancel", dialog.close)
+                button("Replace", lambda: self._edit(text), main=True)
+        dialog.open()
+
+    def _edit(self, text: str) -> None:
+        try:
             self._state.notes.set_draft(self._case, text)
-        except (KlackError, OSError) as error:
+        except OSError as error:
             show_error(error)
             return
         ui.navigate.to(f"/case?{urlencode({'path': self._case})}")

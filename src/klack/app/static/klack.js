@@ -56,3 +56,15 @@
     }
   }).observe(document.documentElement, { childList: true, subtree: true });
 })();
+// The Tab key goes round within a dialog.
+document.addEventListener("keydown", (event) => {
+  const dialogs = event.key === "Tab" ? document.querySelectorAll("[role=dialog][aria-modal=true]") : [];
+  if (!dialogs.length) return;
+  const dialog = dialogs[dialogs.length - 1];
+  const found = [...dialog.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex='0']")]
+    .filter((e) => !e.disabled && e.checkVisibility());
+  if (!found.length) return;
+  const first = found[0], last = found[found.length - 1], now = document.activeElement;
+  const to = !dialog.contains(now) ? first : event.shiftKey && !found.slice(1).includes(now) ? last : !event.shiftKey && now === last ? first : null;
+  if (to) { event.preventDefault(); to.focus(); }
+});
