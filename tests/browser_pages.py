@@ -77,6 +77,7 @@ _BOTH = "a=klack-results/impact&b=klack-results/impact"
 PAGES = (
     Place("overview", "/", "text=2 notes on this result", _open_all),
     Place("dialog, new case", "/", "text=2 notes on this result", _press("New case")),
+    Place("dialog, duplicate", "/", "text=2 notes on this result", _press(f"Duplicate {CASE}")),
     Place("dialog, note", "/", "text=2 notes on this result", _press(f"Note {CASE}")),
     Place("case, impact", f"/case?path={CASE}", "text=valid impact", _open_all),
     Place("case, stroke", "/case?path=stroke/case.yaml", "text=valid stroke"),

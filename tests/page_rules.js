@@ -79,7 +79,12 @@ window.klackRules = (() => {
 
   const sideways = () => {
     const root = document.documentElement, over = root.scrollWidth - root.clientWidth;
-    return over > 0 ? [`the page is ${over} px wider than the window of ${root.clientWidth} px`] : [];
+    const said = over > 0 ? [`the page is ${over} px wider than the window of ${root.clientWidth} px`] : [];
+    for (const e of document.querySelectorAll("body *")) {
+      if (!/auto|scroll/.test(getComputedStyle(e).overflowX) || e.scrollWidth <= e.clientWidth + 1 || !seen(e)) continue;
+      if (e.tabIndex < 0 && e.tagName !== "PRE") said.push(`${name(e)} is scrolled sideways, and the Tab key does not reach it`);
+    }
+    return said;
   };
 
   const outside = () => {

@@ -248,9 +248,9 @@ def run_cancel_and_read(walk: Walk, folder: Path) -> None:
 
 def peak_of(result: Path) -> float:
     """Peak force in a stored result, read without the application."""
-    from klack import load_result
+    from klack.analyses.catalogue import analysis_in
 
-    study = load_result(result)
+    study = analysis_in(result).load(result)
     return float(study.levels[study.reference].measures.peak_force)
 
 

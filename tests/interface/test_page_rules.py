@@ -20,6 +20,7 @@ FAULTS = {
     "contrast": '<p style="color:#999">pale</p>',
     "touch": '<button style="padding:0;border:0;font-size:9px;line-height:1">tiny</button>',
 }
+SCROLLED = '<div style="overflow:auto;width:90px"><p style="width:300px">too wide</p></div>'
 MORE_CONTRAST = (
     '<div style="background:#223"><p style="background:rgba(255,255,255,.1)">on dark</p></div>',
     '<div style="opacity:.4"><p>faint by opacity</p></div>',
@@ -51,6 +52,13 @@ def test_each_fault_is_found_by_its_rule(browser, rule):
     found = layout_findings(page)
 
     assert [said for said in found if said.startswith(f"{rule}:")], found
+    page.close()
+
+
+def test_a_part_that_is_scrolled_sideways_unreached_is_found(browser):
+    page = shown(browser, SCROLLED)
+
+    assert [said for said in layout_findings(page) if said.startswith("sideways:")]
     page.close()
 
 

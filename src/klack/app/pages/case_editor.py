@@ -46,6 +46,7 @@ class _Editor:
         self._draft = draft = state.notes.draft(case)
         self._text = saved if draft is None else draft
         self._changes = 0
+        self._given: dict[str, str] = {}
         self._open = {"case", "motion", "contact"}
 
     def build(self) -> None:
@@ -105,6 +106,7 @@ class _Editor:
             self._status.set_text(f"{valid}, {unsaved}")
             if not found.error:
                 self._form.clear()
+                self._given.clear()
                 self._show_form(found.fields)
 
     async def _keep(self, draft: str | None) -> bool:
@@ -186,7 +188,7 @@ class _Editor:
 
     async def _exchange(self, item: FormField, value: str) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
-        if value == item.written or not value.strip():
+        if value == self._given.get(item.key, item.written) or not value.strip():
             return
         try:
             text = await self._state.reader.call(
@@ -195,6 +197,7 @@ class _Editor:
         except KlackError as error:
             show_error(error)
             return
+        self._given[item.key] = value  # the form of a text that is not valid stays as it was
         self._set(text)
         await self._check()
 
