@@ -4,7 +4,10 @@ Nothing in it was computed by a solver; it only has the shape, the size and the 
 thing, so that reports and stores can be tested alone.
 """
 
+import shutil
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +30,23 @@ from klack.mesh.mesh import ElementBlock, Mesh
 from klack.reduction.transfer import TransferComparison
 
 MASS, SPEED = 2.96e-3, 0.5
+
+SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    """Chromium without a display, which draws three dimensions by software."""
+    sync_api = pytest.importorskip("playwright.sync_api")
+    program = shutil.which("chromium") or shutil.which("chromium-browser")
+    if program is None:
+        pytest.skip("no chromium here")
+    with sync_api.sync_playwright() as library:
+        started = library.chromium.launch(
+            executable_path=program, args=[*SOFTWARE_GL, "--no-sandbox"]
+        )
+        yield started
+        started.close()
 
 
 def half_sine(peak: float, duration: float, ripple: float, touch: float) -> ImpactHistory:

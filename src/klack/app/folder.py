@@ -7,15 +7,17 @@ a link, so that neither ``..`` nor a link leads out.
 import os
 import secrets
 import stat
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path, PurePosixPath
 
 from klack.errors import InputError
 from klack.held_folder import HeldFolder, synchronise
 
-__all__ = ["RESULT_NAME", "Found", "OpenFolder"]
+__all__ = ["RESULT_NAME", "Found", "OpenFolder", "result_names"]
 
 RESULT_NAME = "result.zarr"
 """Of :mod:`klack.analyses.store`, whose import takes seconds."""
@@ -181,6 +183,29 @@ class OpenFolder:
                 yield held, parts[-1]
             except OSError as error:
                 raise _refused(relative, error.strerror or str(error)) from None
+
+
+def result_names(cases: Iterable[str]) -> dict[str, str]:
+    """Name of the result of each case: no two cases of a folder write to one place.
+
+    Examples
+    --------
+    >>> result_names(["valve/case.yaml", "valve/soft.yaml", "other/soft.yaml"])
+    {'valve/case.yaml': 'valve', 'valve/soft.yaml': 'valve-soft', 'other/soft.yaml': 'other-soft'}
+    """
+    paths = {case: PurePosixPath(case) for case in cases}
+    short = {
+        case: path.parent.name if path.stem == "case" and path.parent.name else path.stem
+        for case, path in paths.items()
+    }
+    long = {case: "-".join(path.with_suffix("").parts) for case, path in paths.items()}
+    counts = Counter(short.values())
+    names = {case: short[case] if counts[short[case]] == 1 else long[case] for case in paths}
+    again = Counter(names.values())
+    return {
+        case: name if again[name] == 1 else f"{name}-{sha256(case.encode()).hexdigest()[:8]}"
+        for case, name in names.items()
+    }
 
 
 def _replace(held: HeldFolder, name: str, data: bytes) -> None:

@@ -83,6 +83,27 @@ class Notes:
         """Keep a text that is not saved yet; None once it is."""
         self._change(self._draft_name(of), of, text or "")
 
+    def exchange_draft(self, of: str, known: str | None, text: str | None) -> bool:
+        """Keep a text that is not saved yet, unless another page has kept one meanwhile.
+
+        Parameters
+        ----------
+        of : str
+        known : str or None
+            What the caller has kept, or found.
+        text : str or None
+            None once it is saved.
+
+        Returns
+        -------
+        bool
+            False where the text of another page stays.
+        """
+        if self.draft(of) not in (None, known, text):
+            return False
+        self.set_draft(of, text)
+        return True
+
     @staticmethod
     def _draft_name(of: str) -> str:
         return f"draft-{sha256(of.encode()).hexdigest()[:16]}.json"

@@ -15,6 +15,7 @@ from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
 from klack.report.interactive import figure_of
 from klack.report.page import Content
+from klack.report.spoken import spoken
 from klack.whole_file import whole_file
 
 __all__ = ["render_html", "write_report"]
@@ -36,6 +37,7 @@ def render_html(content: Content) -> str:
         lstrip_blocks=True,
     )
     environment.filters["figure"] = figure_of
+    environment.filters["spoken"] = spoken
     environment.filters["base64"] = lambda data: b64encode(data).decode()
     template = environment.get_template("template.html")
     return template.render(content=content, plotly=_plotly())

@@ -1,5 +1,6 @@
 // The page of a report: charts in the colours of the page, parts that fold, commands to copy.
 const dark = window.matchMedia("(prefers-color-scheme: dark)");
+const narrow = window.matchMedia("(max-width: 639px)");
 const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 // Labels of bars take half of a narrow screen: there they stand above their bars.
@@ -49,17 +50,19 @@ function themed(figure, paper) {
 }
 const drawn = [];
 function draw() {
+  drawn.length = 0;
   for (const plot of document.querySelectorAll(".plot")) {
     const figure = JSON.parse(plot.nextElementSibling.textContent);
+    if (figure.axes && plot.firstChild) continue;
     if (figure.axes) {
       drawParallel(plot, figure);
       continue;
     }
-    if (window.innerWidth < 640) narrowed(figure);
+    if (narrow.matches) narrowed(figure);
     themed(figure, false);
     const buttons = figure.frames ? ["toImage"] : ["toImage", "zoom2d", "pan2d", "resetScale2d"];
     Plotly.newPlot(plot, {data: figure.data, layout: figure.layout, frames: figure.frames || [],
-      config: {responsive: true, displaylogo: false, displayModeBar: window.innerWidth >= 640, modeBarButtons: [buttons]}});
+      config: {responsive: true, displaylogo: false, displayModeBar: !narrow.matches, modeBarButtons: [buttons]}});
     if (!figure.frames) drawn.push([plot, figure]);
   }
 }
@@ -70,6 +73,21 @@ function repaint(paper) {
   }
 }
 dark.addEventListener("change", () => repaint(false));
+narrow.addEventListener("change", () => { if (window.Plotly) draw(); });
+// what is wider than the window is scrolled, with the keyboard as well
+function letReach() {
+  for (const box of document.querySelectorAll(".scroll, figure.wide")) {
+    const title = box.closest(".part")?.querySelector("h2") || document.querySelector("h1");
+    const given = box.scrollWidth > box.clientWidth
+      ? {tabindex: "0", role: "group", "aria-label": `${title.textContent}, wider than the window`} : {};
+    for (const name of ["tabindex", "role", "aria-label"]) {
+      if (name in given) box.setAttribute(name, given[name]);
+      else box.removeAttribute(name);
+    }
+  }
+}
+window.addEventListener("resize", letReach);
+window.addEventListener("load", letReach);
 const parts = [...document.querySelectorAll(".part")];
 function unfold(open) { for (const part of parts) part.open = open; }
 const fold = document.getElementById("fold");

@@ -40,14 +40,14 @@ const STYLE = `
 .ks button:hover,.ks select:hover{border-color:var(--accent)}
 .ks button[aria-pressed=true]{background:var(--accent);border-color:var(--accent);color:var(--on)}
 .ks :is(button,select,input,svg):focus-visible{outline:2px solid var(--accent);outline-offset:2px}
-.ks label{display:flex;gap:6px;align-items:center;cursor:pointer}
-.ks input[type=range]{width:100%;accent-color:var(--accent)}
+.ks label{min-height:26px;display:flex;gap:6px;align-items:center;cursor:pointer}
+.ks input[type=range]{width:100%;height:26px;accent-color:var(--accent)}
 .ks input[type=checkbox]{accent-color:var(--accent);width:16px;height:16px}
 .ks select{width:100%}
 .ks-chip{width:13px;height:13px;border-radius:3px;border:1px solid var(--soft);flex:none}
 .ks-soft{color:var(--soft);font-size:12.5px;overflow-wrap:anywhere}
 .ks-faces{display:flex;flex-wrap:wrap;gap:4px}
-.ks-faces button{padding:1px 7px;font-size:12.5px;overflow-wrap:anywhere;text-align:left}
+.ks-faces button{padding:2px 8px;min-height:26px;font-size:12.5px;overflow-wrap:anywhere;text-align:left}
 .ks-faces button.ks-hot{border-color:var(--accent);background:var(--back)}
 .ks-charts{grid-column:1;border-top:1px solid var(--line);display:grid;grid-template-columns:repeat(auto-fit,minmax(min(168px,100%),1fr));background:var(--panel);max-height:46vh;overflow:auto}
 .ks-narrow .ks-charts{max-height:none}
@@ -379,6 +379,7 @@ function ringMesh(points, closed) {
 
 class Chart {
   constructor(title, curves, {logarithmic = false, xUnit, yUnit, label}) {
+    this.label = label;
     this.curves = curves; this.logarithmic = logarithmic; this.xUnit = xUnit; this.yUnit = yUnit; this.title = title;
     this.svg = svgEl('svg', {tabindex: 0, role: 'slider', 'aria-label': label, 'aria-valuemin': 0, 'aria-valuemax': 1, 'aria-valuenow': 0});
     this.line = el('i', {class: 'ks-cursor', hidden: ''});
@@ -389,10 +390,12 @@ class Chart {
   draw() {
     const {svg, curves} = this, width = Math.max(svg.clientWidth, 160), height = 176;
     this.width = width;
-    const box = this.box = {left: 46, right: width - 12, top: 24, bottom: height - 34};
     const forward = this.logarithmic ? Math.log10 : x => x;
     svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
     svg.replaceChildren();
+    const rows = this.writeTitle(width);
+    const box = this.box = {left: 46, right: width - 12, top: 10 + 14 * rows, bottom: height - 34};
+    Object.assign(this.line.style, {top: `${box.top + 6}px`, height: `${box.bottom - box.top}px`});
     let x0 = Infinity, x1 = -Infinity, y0 = Infinity, y1 = -Infinity;
     for (const c of curves) for (let i = 0; i < c.x.length; i++) {
       const y = forward(c.y[i]);
@@ -404,7 +407,6 @@ class Chart {
     this.x = v => box.left + (forward(v) - x0) / (x1 - x0) * (box.right - box.left);
     this.y = v => box.bottom - (forward(v) - y0) / (y1 - y0) * (box.bottom - box.top);
     this.back = px => { const t = x0 + (px - box.left) / (box.right - box.left) * (x1 - x0); return this.logarithmic ? 10 ** t : t; };
-    svg.append(svgEl('text', {x: 4, y: 15, class: 'ks-title'}, `${this.title} [${this.yUnit}]`));
     for (const [low, high, vertical] of [[x0, x1, true], [y0, y1, false]]) for (const tick of this.ticks(low, high, vertical ? width / 64 : 4)) {
       const value = this.logarithmic ? 10 ** tick : tick, at = vertical ? this.x(value) : this.y(value);
       svg.append(svgEl('line', vertical ? {x1: at, x2: at, y1: box.top, y2: box.bottom, class: 'ks-grid'} : {x1: box.left, x2: box.right, y1: at, y2: at, class: 'ks-grid'}));
@@ -426,10 +428,35 @@ class Chart {
       svg.append(dot);
     }
     this.moveCursor(this.cursor);
+    this.describe();
+  }
+
+  // one row, or where that is too long name and unit below each other; the number of rows
+  writeTitle(width) {
+    const whole = svgEl('text', {x: 4, y: 15, class: 'ks-title'}, `${this.title} [${this.yUnit}]`);
+    this.svg.append(whole);
+    if (whole.getComputedTextLength() <= width - 8) return 1;
+    whole.textContent = this.title;
+    for (let kept = this.title.length - 1; kept > 3 && whole.getComputedTextLength() > width - 8; kept--) whole.textContent = this.title.slice(0, kept) + '…';
+    if (whole.textContent !== this.title) whole.append(svgEl('title', {}, this.title));
+    this.svg.append(svgEl('text', {x: 4, y: 29, class: 'ks-title'}, `[${this.yUnit}]`));
+    return 2;
+  }
+
+  // what a screen reader tells of it: where the first curve is highest
+  describe() {
+    const {x, y} = this.curves[0];
+    let top = -1;
+    for (let i = 0; i < x.length; i++) if (Number.isFinite(y[i]) && !(y[i] <= y[top])) top = i;
+    const told = top < 0 ? '' : `; highest ${number(y[top])} ${this.yUnit} at ${number(x[top])} ${this.xUnit}`;
+    this.svg.setAttribute('aria-label', this.label + told);
   }
 
   moveCursor(value) {
     this.cursor = value;
+    const {x} = this.curves[0], first = x[0], last = x[x.length - 1];
+    this.svg.setAttribute('aria-valuenow', value === null ? 0 : ((value - first) / (last - first)).toFixed(3));
+    this.svg.setAttribute('aria-valuetext', value === null ? 'no cursor' : `${number(value)} ${this.xUnit}`);
     this.line.hidden = value === null;
     if (value !== null && this.x) this.line.style.transform = `translateX(${this.x(value) * this.svg.clientWidth / this.width}px)`;
   }

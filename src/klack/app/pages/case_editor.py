@@ -19,6 +19,12 @@ __all__ = ["case_editor_page"]
 _REST = 0.4  # [s] without a key until the text is checked
 
 
+_OTHERS = (
+    "Another page holds a text of this case that is not saved. Yours is kept in this page alone, "
+    "until you save it."
+)
+
+
 async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case."""
     case = given.get("path", "")
@@ -37,9 +43,10 @@ class _Editor:
 
     def __init__(self, state: State, case: str, saved: str) -> None:
         self._state, self._case, self._saved = state, case, saved
-        draft = state.notes.draft(case)
+        self._draft = draft = state.notes.draft(case)
         self._text = saved if draft is None else draft
         self._changes = 0
+        self._given: dict[str, str] = {}
         self._open = {"case", "motion", "contact"}
 
     def build(self) -> None:
@@ -82,8 +89,7 @@ class _Editor:
         """Keep the draft; say what the checker says; make the form of a valid text."""
         text, mine = self._text, self._changes
         try:
-            draft = text if text != self._saved else None
-            await asyncio.to_thread(self._state.notes.set_draft, self._case, draft)
+            is_kept = await self._keep(text if text != self._saved else None)
             found: Checked = await self._state.reader.call("check", text, self._path)
         except (KlackError, OSError) as error:
             show_error(error)
@@ -91,14 +97,25 @@ class _Editor:
         if mine != self._changes:
             return
         with self._form:
-            self._message.set_text(found.error)
+            self._message.set_text(
+                "\n".join(filter(None, (found.error, "" if is_kept else _OTHERS)))
+            )
             unsaved = "not saved" if text != self._saved else "saved"
             self._status.classes(remove="good fair out", add="out" if found.error else "good")
             valid = "not valid" if found.error else f"valid {found.kind}"
             self._status.set_text(f"{valid}, {unsaved}")
             if not found.error:
                 self._form.clear()
+                self._given.clear()
                 self._show_form(found.fields)
+
+    async def _keep(self, draft: str | None) -> bool:
+        """Keep what is not saved, unless a page elsewhere does; whether it is kept."""
+        notes, known = self._state.notes, self._draft
+        if not await asyncio.to_thread(notes.exchange_draft, self._case, known, draft):
+            return draft is None
+        self._draft = draft
+        return True
 
     @property
     def _path(self) -> str:
@@ -171,7 +188,7 @@ class _Editor:
 
     async def _exchange(self, item: FormField, value: str) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
-        if value == item.written or not value.strip():
+        if value == self._given.get(item.key, item.written) or not value.strip():
             return
         try:
             text = await self._state.reader.call(
@@ -180,6 +197,7 @@ class _Editor:
         except KlackError as error:
             show_error(error)
             return
+        self._given[item.key] = value  # the form of a text that is not valid stays as it was
         self._set(text)
         await self._check()
 

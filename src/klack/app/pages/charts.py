@@ -23,6 +23,7 @@ EMPTY: dict[str, Any] = {
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
     },
+    "config": _CONFIG,
 }
 """Of a chart whose numbers follow."""
 

@@ -7,6 +7,7 @@ from nicegui import ui
 
 from klack.app.answers import Answer
 from klack.app.pages.charts import bands_figure, curves_figure
+from klack.app.pages.described_chart import DescribedChart
 from klack.app.pages.frame import differing, frame, heading, number_text, plain
 from klack.app.state import State
 from klack.errors import KlackError
@@ -40,7 +41,9 @@ async def comparing_page(state: State, given: Mapping[str, str]) -> None:
 
 
 def _show(state: State, now: Answer, ghost: Answer, names: tuple[str, str]) -> None:
-    with ui.element("section").classes("k-section k-sheet k-scroll"):
+    scrolled = ui.element("section").classes("k-section k-sheet k-scroll").props("tabindex=0")
+    scrolled.props["aria-label"] = "main numbers of both results"
+    with scrolled:
         _show_numbers(now, ghost, names)
     unit = now.time_unit
     with ui.element("div").classes("k-grid"):
@@ -52,9 +55,7 @@ def _show(state: State, now: Answer, ghost: Answer, names: tuple[str, str]) -> N
             ("Motion", curves_figure(now.lift, ghost.lift, f"time [{unit}]", "lift [um]", names)),
             ("Third octaves of the force", bands_figure(now, ghost, names)),
         ):
-            with ui.element("section").classes("k-sheet k-chart"):
-                heading(title)
-                ui.plotly(figure).classes("k-plot").props["aria-label"] = title
+            DescribedChart(title, figure)
         with ui.element("section").classes("k-sheet k-chart"):
             heading("Hear it")
             for name, wav in ((names[1], ghost.wav), (names[0], now.wav)):

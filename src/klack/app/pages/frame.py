@@ -11,6 +11,7 @@ from klack.app.state import State
 
 __all__ = [
     "START_VALUE",
+    "asking",
     "button",
     "differing",
     "frame",
@@ -56,19 +57,25 @@ def heading(text: str, level: int = 2) -> TextElement:
     return plain(text, f"h{level}")
 
 
-def button(text: str, handler: Handler | None = None, *, main: bool = False) -> TextElement:
-    """A button, as the browser has it."""
+def button(
+    text: str, handler: Handler | None = None, *, main: bool = False, of: str = ""
+) -> TextElement:
+    """A button, as the browser has it; ``of`` names its object for those who do not see its row."""
     found = plain(text, "button").classes("k-btn" + (" k-main-btn" if main else ""))
     found.props("type=button")
+    if of:
+        found.props["aria-label"] = f"{text} {of}"
     if handler is not None:
         found.on("click", handler, args=[])
     return found
 
 
-def link(text: str, target: str, *, new: bool = False) -> TextElement:
+def link(text: str, target: str, *, new: bool = False, of: str = "") -> TextElement:
     """A link that looks like a button."""
     found = plain(text, "a").classes("k-btn")
     found.props["href"] = target
+    if of:
+        found.props["aria-label"] = f"{text} {of}"
     if new:
         found.props["target"], found.props["rel"] = "_blank", "noopener"
     return found
@@ -76,6 +83,15 @@ def link(text: str, target: str, *, new: bool = False) -> TextElement:
 
 START_VALUE = "^value"
 """Attribute of what an input holds at first; Vue would put a property back at each drawing."""
+
+
+@contextmanager
+def asking(title: str, more: str = "") -> Iterator[ui.dialog]:
+    """A dialog with its heading: it keeps the focus, Escape closes it, the focus goes back."""
+    with ui.dialog() as dialog, ui.element("div").classes(f"k-sheet k-pad k-ask {more}"):
+        dialog.props["aria-label"] = title
+        heading(title)
+        yield dialog
 
 
 def show_error(error: Exception) -> None:

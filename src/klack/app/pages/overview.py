@@ -11,10 +11,11 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, ResultCard
-from klack.app.folder import RESULT_NAME
+from klack.app.folder import RESULT_NAME, result_names
 from klack.app.jobs import Job
 from klack.app.pages.frame import (
     START_VALUE,
+    asking,
     button,
     frame,
     heading,
@@ -53,6 +54,8 @@ class _Overview:
         self._state = state
         self._chosen: list[str] = []
         self._seen: tuple[tuple[str, str], ...] = ()
+        self._ended: set[str] | None = None
+        self._progress: dict[str, Callable[[Job], None]] = {}
 
     async def build(self) -> None:
         """Make the page, then fill it while it is shown already."""
@@ -80,11 +83,16 @@ class _Overview:
         """Show the progress of runs; look again for results where one ended."""
         jobs = await asyncio.to_thread(self._state.jobs.all)
         states = tuple((job.name, job.state) for job in jobs)
-        ended = self._seen and states != self._seen
-        if states != self._seen or any(job.state == "running" for job in jobs):
+        ended = {job.name for job in jobs if job.state != "running"}
+        if states != self._seen:
             self._show_jobs(jobs)
-        self._seen = states
-        if ended:
+        else:  # in place: the focus stays on Cancel
+            for job in jobs:
+                if job.name in self._progress:
+                    self._progress[job.name](job)
+        has_new = self._ended is not None and not ended <= self._ended
+        self._seen, self._ended = states, ended
+        if has_new:
             await self._fill()
 
     # ----------------------------------------------------------------------- runs
@@ -92,6 +100,7 @@ class _Overview:
     def _show_jobs(self, jobs: list[Job] | None = None) -> None:
         found = self._state.jobs.all() if jobs is None else jobs
         self._jobs.clear()
+        self._progress.clear()
         if not found:
             return
         with self._jobs:
@@ -106,22 +115,17 @@ class _Overview:
                 plain(f"klack {job.command} {job.case}").classes("k-title")
                 began = time.strftime("%d %b %H:%M", time.localtime(job.started))
                 if job.state == "running":
-                    percent = round(100 * min(max(job.fraction, 0.0), 1.0))
-                    plain(f"{job.stage}, {percent} %, since {began}", "div").classes("k-soft")
-                    bar = ui.element("div").classes("k-bar")
-                    bar.props["role"], bar.props["aria-valuenow"] = "progressbar", percent
-                    bar.props["aria-label"] = f"{job.case}: {job.stage}"
-                    with bar:
-                        ui.element("i").style(f"width:{percent}%")
+                    self._progress[job.name] = _progress_bar(began)
+                    self._progress[job.name](job)
                 else:
                     plain(f"{_WORDS[job.state]}, {began}", "div").classes("k-soft")
                     if job.told:
                         plain(job.told, "div").classes("k-error")
             with ui.element("div").classes("k-tools"):
                 if job.state == "running":
-                    button("Cancel", partial(self._cancel, job.name))
+                    button("Cancel", partial(self._cancel, job.name), of=job.out)
                 else:
-                    button("Dismiss", partial(self._forget, job.name))
+                    button("Dismiss", partial(self._forget, job.name), of=job.out)
 
     async def _cancel(self, name: str) -> None:
         await _telling(lambda: self._state.jobs.cancel(name))
@@ -175,16 +179,15 @@ class _Overview:
             self._show_note(case)
         with ui.element("div").classes("k-tools"):
             if not checked.error:
-                button("Run", partial(self._run, case, checked.kind))
-                link("Sliders", f"/sliders?{query}")
-            link("Edit", f"/case?{query}")
-            button("Duplicate", partial(self._ask_copy, case))
-            button("Note", partial(self._ask_note, case))
+                button("Run", partial(self._run, case, checked.kind), of=case)
+                link("Sliders", f"/sliders?{query}", of=case)
+            link("Edit", f"/case?{query}", of=case)
+            button("Duplicate", partial(self._ask_copy, case), of=case)
+            button("Note", partial(self._ask_note, case), of=case)
 
     async def _run(self, case: str, kind: str) -> None:
-        path = PurePosixPath(case)
-        name = path.parent.name if path.stem == "case" and path.parent.name else path.stem
-        out = f"klack-results/{name}"
+        found = await asyncio.to_thread(self._state.folder.look)
+        out = f"klack-results/{result_names({*found.cases, case})[case]}"
         await _telling(lambda: self._state.jobs.start(kind, case, out))
         self._show_jobs()
 
@@ -233,8 +236,7 @@ class _Overview:
     ) -> None:
         """Ask for a name, and where there is a choice for what is copied."""
         values = {"source": source, "name": name}
-        with ui.dialog() as dialog, ui.element("div").classes("k-sheet k-pad k-ask"):
-            heading(title)
+        with asking(title) as dialog:
             plain(words, "p").classes("k-soft")
             if sources:
                 _choice("Copy of", sources, source, lambda value: values.update(source=value))
@@ -335,10 +337,11 @@ class _Overview:
         with ui.element("div").classes("k-tools"):
             for file, word in (("report.html", "Report"), ("report.pdf", "PDF")):
                 if self._state.folder.exists(f"{name}/{file}"):
-                    link(word, f"/report?{urlencode({'path': f'{name}/{file}'})}", new=True)
+                    target = f"/report?{urlencode({'path': f'{name}/{file}'})}"
+                    link(word, target, new=True, of=name)
             if not isinstance(card, str) and card.compares:
                 self._show_choice(name, chosen)
-            button("Note", partial(self._ask_note, name))
+            button("Note", partial(self._ask_note, name), of=name)
 
     def _show_choice(self, name: str, chosen: Callable[[], None]) -> None:
         def change(event: object) -> None:
@@ -365,8 +368,7 @@ class _Overview:
 
     def _ask_note(self, of: str) -> None:
         text = {"now": self._state.notes.note(of)}
-        with ui.dialog() as dialog, ui.element("div").classes("k-sheet k-pad k-ask k-notes"):
-            heading(f"Note on {of}")
+        with asking(f"Note on {of}", "k-notes") as dialog:
             area = plain(text["now"], "textarea").classes("k-input").props("rows=5")
             area.props["aria-label"] = f"note on {of}"
             area.on(
@@ -392,6 +394,25 @@ def _reading(name: str) -> ui.element:
         plain(name, "div").classes("k-title")
         plain("reading ...", "div").classes("k-soft")
     return row
+
+
+def _progress_bar(began: str) -> Callable[[Job], None]:
+    """Words and bar of a run; what is returned shows how far it is now."""
+    words = plain("", "div").classes("k-soft")
+    bar = ui.element("div").classes("k-bar").props("role=progressbar aria-valuemin=0")
+    bar.props["aria-valuemax"] = 100
+    with bar:
+        inner = ui.element("i")
+
+    def show(job: Job) -> None:
+        percent = round(100 * min(max(job.fraction, 0.0), 1.0))
+        words.set_text(f"{job.stage}, {percent} %, since {began}")
+        if bar.props.get("aria-valuenow") != percent:
+            bar.props["aria-valuenow"] = percent
+            inner.style(f"width:{percent}%")
+        bar.props["aria-label"] = f"{job.case}: {job.stage}"
+
+    return show
 
 
 def _title(text: str) -> None:

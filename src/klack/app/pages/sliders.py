@@ -11,8 +11,10 @@ from nicegui.elements.mixins.text_element import TextElement
 
 from klack.app.answers import Answer, Hearing, Judgement, Number, Opened, Slider
 from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogram_figure
+from klack.app.pages.described_chart import DescribedChart
 from klack.app.pages.frame import (
     START_VALUE,
+    asking,
     button,
     differing,
     frame,
@@ -154,11 +156,10 @@ class _Sliders:
         self._doubts = plain("", "p").classes("k-error")
         self._figures = ui.element("div").classes("k-figures")
         with ui.element("div").classes("k-grid"):
-            unit = opened.first.time_unit
-            self._force = _chart("Contact force", f"force over time in {unit}")
-            self._lift = _chart("Motion", f"lift over time in {unit}")
-            self._bands = _chart("Third octaves of the force", "level of the force in bands")
-            self._spectrogram = _chart("Spectrogram of the click", "level of the sound")
+            self._force = DescribedChart("Contact force", EMPTY)
+            self._lift = DescribedChart("Motion", EMPTY)
+            self._bands = DescribedChart("Third octaves of the force", EMPTY)
+            self._spectrogram = DescribedChart("Spectrogram of the click", EMPTY)
         with ui.element("section").classes("k-sheet k-pad").style("margin-top:16px"):
             heading("Hear it")
             self._sound = ui.element("div").classes("k-sound").style("margin-top:8px")
@@ -312,19 +313,30 @@ class _Sliders:
         """Keep the text as the draft of the case, and open the editor."""
         try:
             text = await self._worker.call("text_at", dict(self._values))
+        except KlackError as error:
+            show_error(error)
+            return
+        if self._state.notes.draft(self._case) in (None, text):
+            self._edit(text)
+            return
+        with self._body, asking("Replace what is not saved?") as dialog:
+            plain(
+                "The case has changes that are not saved. These values are put into the file "
+                "as it is saved, and replace those changes.",
+                "p",
+            ).classes("k-soft")
+            with ui.element("div").classes("k-tools"):
+                button("Cancel", dialog.close)
+                button("Replace", lambda: self._edit(text), main=True)
+        dialog.open()
+
+    def _edit(self, text: str) -> None:
+        try:
             self._state.notes.set_draft(self._case, text)
-        except (KlackError, OSError) as error:
+        except OSError as error:
             show_error(error)
             return
         ui.navigate.to(f"/case?{urlencode({'path': self._case})}")
-
-
-def _chart(title: str, label: str) -> ui.plotly:
-    with ui.element("section").classes("k-sheet k-chart"):
-        heading(title)
-        chart = ui.plotly(EMPTY).classes("k-plot")
-        chart.props["role"], chart.props["aria-label"] = "img", label
-    return chart
 
 
 def _player(name: str) -> tuple[ui.element, ui.element]:
@@ -332,5 +344,7 @@ def _player(name: str) -> tuple[ui.element, ui.element]:
         plain(name, "figcaption").classes("k-soft")
         player = ui.element("audio").props("controls preload=none")
         player.props["aria-label"] = f"click, {name}"
-        save = plain("Save WAV", "a").classes("k-soft").props("download=klack-click.wav")
+        save = (
+            plain("Save WAV", "a").classes("k-soft k-save-sound").props("download=klack-click.wav")
+        )
     return player, save

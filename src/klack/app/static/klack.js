@@ -25,3 +25,46 @@
     }
   });
 })();
+// The server makes parts of a page again; the focus, and what is half typed, stay where they were.
+(() => {
+  const OWN = /^c\d+$/;  // names that NiceGUI gives, other ones each time
+  let last = null;
+  const named = (e) => e.id && !OWN.test(e.id) ? `#${CSS.escape(e.id)}` : "";
+  const same = (e) => {
+    if (last.id) return e.matches(last.id);
+    return e.tagName === last.tag && (e.getAttribute("aria-label") || e.textContent.trim()) === last.words;
+  };
+  const remember = (e) => {
+    if (e.closest("[role=dialog]")) return;
+    last = { e, id: named(e), tag: e.tagName, words: e.getAttribute("aria-label") || e.textContent.trim(), given: e.value };
+  };
+  document.addEventListener("focusin", (event) => remember(event.target));
+  document.addEventListener("change", (event) => { if (last && last.e === event.target) last.given = last.e.value; });
+  document.addEventListener("pointerdown", (event) => {
+    if (!event.target.closest("a, button, input, select, textarea, summary, label, [tabindex], [role=dialog]")) last = null;
+  });
+  new MutationObserver(() => {
+    if (!last || last.e.isConnected || document.activeElement !== document.body) return;
+    const found = last.id ? document.querySelector(last.id) : [...document.getElementsByTagName(last.tag)].find(same);
+    if (!found) return;
+    const { e, given } = last, half = e.value !== given && e.value !== undefined;
+    found.focus({ preventScroll: true });
+    if (half) {
+      found.value = e.value;
+      last.given = given;  // still to be told at the end
+      if (e.selectionStart != null) found.setSelectionRange(e.selectionStart, e.selectionEnd);
+    }
+  }).observe(document.documentElement, { childList: true, subtree: true });
+})();
+// The Tab key goes round within a dialog.
+document.addEventListener("keydown", (event) => {
+  const dialogs = event.key === "Tab" ? document.querySelectorAll("[role=dialog][aria-modal=true]") : [];
+  if (!dialogs.length) return;
+  const dialog = dialogs[dialogs.length - 1];
+  const found = [...dialog.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex='0']")]
+    .filter((e) => !e.disabled && e.checkVisibility());
+  if (!found.length) return;
+  const first = found[0], last = found[found.length - 1], now = document.activeElement;
+  const to = !dialog.contains(now) ? first : event.shiftKey && !found.slice(1).includes(now) ? last : !event.shiftKey && now === last ? first : null;
+  if (to) { event.preventDefault(); to.focus(); }
+});

@@ -1,0 +1,138 @@
+"""Every page that klack shows in a browser, and how to get there; a new one joins with one line."""
+
+import os
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+__all__ = ["PAGES", "Place", "made_folder", "watched"]
+
+CASE = "valve/case.yaml"
+_COMPUTED = (
+    ("impact", "demo-valve-axisymmetric", "--level", "reduced"),
+    ("stroke", "demo-stroke", "--variant", "dry"),
+    ("heat", "warm-valve"),
+    ("linearise", "demo-stroke"),
+    ("noise", "RESULTS/impact"),
+    ("study", "STUDY"),
+)
+_SHOWN = (("impact", "RESULTS/impact"), ("stroke", "demo-stroke"))
+
+
+@dataclass(frozen=True)
+class Place:
+    """A page.
+
+    Parameters
+    ----------
+    name : str
+    address : str
+        From the server; ``file:NAME`` is a page of its own in the folder.
+    ready : str
+        Selector of what is there once the page is.
+    then : callable
+        What is done before it is looked at, for what opens on a page: a dialog.
+    """
+
+    name: str
+    address: str
+    ready: str
+    then: Callable[[Any], None] = lambda page: None
+
+    def open(self, page: Any, base: str, folder: Path) -> None:
+        """Show it."""
+        kind, _, rest = self.address.partition("file:")
+        page.goto((folder / rest).as_uri() if rest else base + kind)
+        page.wait_for_selector(self.ready)
+        self.then(page)
+
+
+def _press(name: str) -> Callable[[Any], None]:
+    def press(page: Any) -> None:
+        page.get_by_role("button", name=name, exact=True).first.click()
+        page.wait_for_selector(".q-dialog h2")
+
+    return press
+
+
+def _open_all(page: Any) -> None:
+    page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
+
+
+def _refused(page: Any) -> None:
+    page.get_by_label("case file, YAML").fill("klack: 1\nmotion: {speed: 3 kg}\n")
+    page.wait_for_selector("text=not valid, not saved")
+    page.get_by_role("button", name="Discard changes").click()
+    page.wait_for_selector("text=valid impact, saved")
+    page.get_by_label("speed", exact=True).fill("fast")
+    page.get_by_label("speed", exact=True).press("Enter")
+    page.wait_for_selector("text=not valid, not saved")
+
+
+_REPORT = "/report?path=klack-results/{}/report.html"
+_BOTH = "a=klack-results/impact&b=klack-results/impact"
+
+PAGES = (
+    Place("overview", "/", "text=2 notes on this result", _open_all),
+    Place("dialog, new case", "/", "text=2 notes on this result", _press("New case")),
+    Place("dialog, duplicate", "/", "text=2 notes on this result", _press(f"Duplicate {CASE}")),
+    Place("dialog, note", "/", "text=2 notes on this result", _press(f"Note {CASE}")),
+    Place("case, impact", f"/case?path={CASE}", "text=valid impact", _open_all),
+    Place("case, stroke", "/case?path=stroke/case.yaml", "text=valid stroke"),
+    Place("case, not valid", f"/case?path={CASE}", "text=valid impact", _refused),
+    Place("case, none", "/case?path=none.yaml", ".k-error"),
+    Place("sliders", f"/sliders?path={CASE}", ".k-badge.good", _open_all),
+    Place("compare", f"/compare?{_BOTH}", "text=sound exposure level"),
+    *(Place(f"report, {name}", _REPORT.format(name), ".main-svg") for name, *_ in _COMPUTED),
+    *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-panel h3") for name, _ in _SHOWN),
+)
+
+
+def made_folder(folder: Path) -> Path:
+    """Cases, and a result of every kind with its report, computed in this process."""
+    from klack.case.shipped import find_case
+    from klack.cli.main import main
+
+    for name, shipped in (("valve", "demo-valve-axisymmetric"), ("stroke", "demo-stroke")):
+        (folder / name).mkdir()
+        shutil.copy(find_case(shipped), folder / name / "case.yaml")
+    study = folder / "study.yaml"
+    text = find_case("demo-stroke").read_text("utf-8")
+    study.write_text(
+        text.replace("points: 64", "points: 8").replace("    - noise.sound", "    # - noise.sound")
+    )
+    results = folder / "klack-results"
+    known = {"STUDY": str(study), "RESULTS/impact": str(results / "impact")}
+    for command, source, *more in _COMPUTED:
+        out = ["--out", str(results / command), "--quiet"]
+        _run(main, [command, known.get(source, source), *more, *out])
+    for name, source in _SHOWN:
+        out = ["--out", str(folder / f"show-{name}.html"), "--quiet"]
+        _run(main, ["show", known.get(source, source), *out])
+    study.unlink()
+    return folder
+
+
+def _run(main: Callable[[list[str]], int | None], words: list[str]) -> None:
+    assert os.environ.get("OMP_NUM_THREADS") == "1"
+    code = main(words)
+    assert not code, f"klack {' '.join(words)} ended with {code}"
+
+
+def watched(page: Any, own: str) -> list[str]:
+    """What a page complains of or asks of other hosts from now on; empty on a good one."""
+    said: list[str] = []
+    page.on(
+        "console",
+        lambda told: said.append(told.text) if told.type in ("error", "warning") else None,
+    )
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("dialog", lambda dialog: said.append(f"dialog: {dialog.message}"))
+    allowed = (own, own.replace("http", "ws", 1), "data:", "blob:", "file:")
+    page.on(
+        "request",
+        lambda asked: said.append(f"asked {asked.url}") if not asked.url.startswith(allowed) else 0,
+    )
+    return said

@@ -1,0 +1,112 @@
+"""Every page in a browser: axe-core, rules of layout, the Tab key, nothing from elsewhere."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser_pages import PAGES, Place, made_folder, watched
+from page_rules import (
+    HAS_AXE,
+    SCHEMES,
+    WIDTHS,
+    axe_findings,
+    focus_findings,
+    layout_findings,
+)
+from served_app import Served
+
+pytest.importorskip("nicegui")
+pytest.importorskip("playwright.sync_api")
+pytestmark = pytest.mark.slow
+
+_LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made_folder(tmp_path_factory.mktemp("pages"))
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[Served]:
+    with Served(folder) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def context(browser: Any, server: Served) -> Iterator[Any]:
+    found = browser.new_context(viewport={"width": 1000, "height": 900})
+    page = found.new_page()
+    page.goto(server.address)  # gives the cookie
+    page.close()
+    yield found
+    found.close()
+
+
+@pytest.fixture
+def page(context: Any, server: Served) -> Iterator[Any]:
+    """A page; at its end nothing was complained of or asked of other hosts."""
+    found = context.new_page()
+    found.set_default_timeout(_LONG)
+    said = watched(found, server.base)
+    yield found
+    found.close()
+    assert said == []
+
+
+@pytest.mark.parametrize("place", PAGES, ids=lambda place: place.name)
+def test_a_page_is_sound_at_every_width_in_light_and_dark(place: Place, page, server, folder):
+    place.open(page, server.base, folder)
+    page.wait_for_timeout(300)
+    said: dict[str, list[str]] = {}
+    for scheme in SCHEMES:
+        page.emulate_media(color_scheme=scheme)
+        for width in WIDTHS:
+            page.set_viewport_size({"width": width, "height": 900})
+            page.wait_for_timeout(250)
+            found = layout_findings(page) + (axe_findings(page) if HAS_AXE else [])
+            for sentence in found:
+                said.setdefault(sentence, []).append(f"{width} px {scheme}")
+
+    page.set_viewport_size({"width": 1000, "height": 900})
+    page.wait_for_timeout(250)
+    count, unseen = focus_findings(page)
+
+    assert said == {}
+    assert unseen == []
+    assert count >= 3
+
+
+@pytest.mark.skipif(HAS_AXE, reason="axe-core is here")
+def test_axe_core_is_here():
+    pytest.skip("pages not tested with axe-core: axe-playwright-python is not installed")
+
+
+def test_motion_is_reduced_for_those_who_ask_for_it(page, server, folder):
+    page.emulate_media(reduced_motion="reduce")
+    for place in PAGES:
+        if place.name in ("overview", "report, impact", "dialog, note"):
+            place.open(page, server.base, folder)
+            moving = page.evaluate(
+                "[...document.querySelectorAll('*')].filter(e => { const s = getComputedStyle(e);"
+                "return Math.max(...[s.transitionDuration, s.animationDuration].join().split(',')"
+                ".map(parseFloat)) > 0.01; }).map(e => e.className || e.tagName)"
+            )
+            assert moving == [], place.name
+
+
+def test_charts_are_told_with_their_main_numbers(page, server, folder):
+    found = next(place for place in PAGES if place.name == "compare")
+    found.open(page, server.base, folder)
+    peak = page.locator("tbody tr").first.locator("td").nth(1).inner_text()
+    shown = page.get_by_role("img", name="Contact force")
+
+    shown.wait_for()
+    told = page.evaluate(
+        "e => e.getAttribute('aria-labelledby').split(' ')"
+        ".map(id => document.getElementById(id).textContent).join(': ')",
+        shown.element_handle(),
+    )
+    assert told.startswith("Contact force: force [N] over time [us].")
+    assert f"highest {peak}" in told
