@@ -15,6 +15,7 @@ from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from klack.errors import ConvergenceError, InputError
@@ -123,19 +124,55 @@ class ComplementaritySolver:
         return forces
 
     def _factorise(self, active: NDArray[np.bool_]) -> None:
-        index = np.flatnonzero(active)
-        columns = self.A[:, index]
-        factor = np.empty((0, 0), order="F")
-        if len(index):
-            factor, info = dpotrf(np.asfortranarray(columns[index]), lower=1, overwrite_a=1)
-            if info != 0:
-                raise ConvergenceError(
-                    f"complementarity: the compliance of {len(index)} active contact points is "
-                    f"not positive definite (pivot {info}).\n"
-                    "Try: a finer mesh on the contact surface that carries the multipliers, or "
-                    "fewer retained modes if this is a residual compliance."
-                )
+        """Factorise the active block; points stand in the order in which they became active.
+
+        What precedes the first point that left is kept: a contact that grows or shrinks costs the
+        points at its border.
+        """
+        order = self._active
+        left = np.flatnonzero(~active[order])
+        kept = order[: left[0]] if len(left) else order
+        fresh = active.copy()
+        fresh[kept] = False
+        new = np.flatnonzero(fresh)
+        index = np.concatenate([kept, new])
+        columns = np.empty((len(active), len(index)), order="F")
+        columns[:, : len(kept)] = self._columns[:, : len(kept)]
+        columns[:, len(kept) :] = self.A[:, new]
+        factor = _bordered(self._factor, columns, kept, new)
         self._set, self._active, self._factor, self._columns = active.copy(), index, factor, columns
+
+
+def _bordered(
+    known: NDArray[np.float64],
+    columns: NDArray[np.float64],
+    kept: NDArray[np.int64],
+    new: NDArray[np.int64],
+) -> NDArray[np.float64]:
+    r"""Lower Cholesky factor of kept and new points, from the leading part of a known one.
+
+    .. math:: L_{21} = A_{21} L_{11}^{-T}, \qquad L_{22} L_{22}^T = A_{22} - L_{21} L_{21}^T
+    """
+    count, size = len(kept), len(kept) + len(new)
+    factor = np.zeros((size, size), order="F")
+    factor[:count, :count] = known[:count, :count]
+    if not len(new):
+        return factor
+    corner = np.asfortranarray(columns[new, count:])
+    if count:
+        border = dtrsm(1.0, known[:count, :count], columns[kept, count:], lower=1)
+        factor[count:, :count] = border.T
+        corner = dsyrk(-1.0, border, beta=1.0, c=corner, trans=1, lower=1, overwrite_c=1)
+    corner, info = dpotrf(corner, lower=1, overwrite_a=1)
+    if info != 0:
+        raise ConvergenceError(
+            f"complementarity: the compliance of {size} active contact points is "
+            f"not positive definite (pivot {count + info}).\n"
+            "Try: a finer mesh on the contact surface that carries the multipliers, or "
+            "fewer retained modes if this is a residual compliance."
+        )
+    factor[count:, count:] = corner
+    return factor
 
 
 def solve_lcp(

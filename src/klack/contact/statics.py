@@ -14,7 +14,7 @@ with the axial weights *a* of the contact space.  For a free body the approach i
 of mass, as in a modal model with the rigid mode as one coordinate.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +37,7 @@ __all__ = [
     "StaticContact",
     "check_rim",
     "check_state",
+    "compliances_of",
     "condensed_compliance",
     "contact_compliance",
     "extended_compliance",
@@ -93,6 +94,33 @@ def contact_compliance(
     return C if faces is None else with_still_directions(C)
 
 
+def compliances_of(
+    space: ContactSpace,
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+    groups: Sequence[NDArray[np.int64]] = (),
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Condense the static compliance of each body to the contact points.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    flexibility_a, flexibility_b : Flexibility
+    groups : sequence of int arrays
+        Of points, see :func:`klack.elasticity.condensation.condensed_inverse`.
+
+    Returns
+    -------
+    C_a, C_b : array, shape (nc, nc) [m/N]
+        Symmetric; their sum is :func:`contact_compliance`.
+    """
+    _require_memory(space.G_a, space.G_b)
+    return (
+        flexibility_a.compliance_at(space.G_a, groups),
+        flexibility_b.compliance_at(space.G_b, groups),
+    )
+
+
 def condensed_compliance(
     rows_a: csr_array, rows_b: csr_array, flexibility_a: Flexibility, flexibility_b: Flexibility
 ) -> NDArray[np.float64]:
@@ -118,7 +146,7 @@ def condensed_compliance(
 
 
 def _require_memory(rows_a: csr_array, rows_b: csr_array) -> None:
-    """Refuse more rows than fit: the compliance, its symmetric part and a factor of it.
+    """Refuse more rows than fit: the compliance, those of both bodies, and a factor.
 
     And what condensing the larger body to them takes.
     """

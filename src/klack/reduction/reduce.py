@@ -43,6 +43,7 @@ def reduce_body(
     observers: Sequence[Observer] = (),
     modes_pool: Modes | None = None,
     flexibility: Flexibility | None = None,
+    port_compliance: NDArray[np.float64] | None = None,
     shifts: Sequence[float] | None = None,
     recovery_surfaces: Sequence[str] = (),
     recovery_nodes: NDArray[np.int64] | None = None,
@@ -67,6 +68,9 @@ def reduce_body(
         With :class:`ByFrequency` it must reach that frequency.
     flexibility : Flexibility, optional
         Of the same body; saves the only factorisation that statics and modes need.
+    port_compliance : array, shape (n_ports, n_ports), optional [m/N]
+        Static compliance at the ports, where it is known; saves the static solutions, unless
+        attachment modes need them.
     shifts : sequence of float [(rad/s)^2], optional
         With ``correction="attachment"``: shifted instead of residual attachment modes, one per
         port and shift, for example ``(default_shift(pool.omega),)`` or ``shift_at`` of frequencies.
@@ -85,10 +89,12 @@ def reduce_body(
     flexibility = flexibility or Flexibility(body, backend=backend, threads=threads)
     pool = modes_pool if modes_pool is not None else _compute_pool(body, modes, flexibility)
     kept = kept_modes(modes, pool, patterns)
-    deflections = flexibility.deflections(patterns)
     extra = _no_modes(body)
+    static = port_compliance
+    if static is None:
+        static = patterns.T @ flexibility.deflections(patterns)
     if correction == "attachment" and shifts is None:
-        extra = residual_attachment(body, kept, deflections)
+        extra = residual_attachment(body, kept, flexibility.deflections(patterns))
     elif correction == "attachment" and shifts is not None:
         extra = shifted_attachment(body, kept, patterns, shifts, backend=backend, threads=threads)
     elif shifts is not None:
@@ -101,7 +107,6 @@ def reduce_body(
     rigid = body.rigid_modes
     shapes = np.hstack([rigid, kept.shapes, extra.shapes])
     omega = np.concatenate([np.zeros(rigid.shape[1]), kept.omega, extra.omega])
-    static = patterns.T @ deflections
     return ReducedBody(
         name=body.name,
         mass=float(body.mass),

@@ -30,7 +30,7 @@ from klack.contact.statics import (
     ring_radius,
     size_over_half_width,
 )
-from klack.contact.surface_edges import SurfaceEdges, surface_edges
+from klack.contact.surface_edges import SurfaceEdges
 from klack.contact.touch_shape import relative_curvatures
 from klack.elasticity.body import ElasticBody
 from klack.errors import AccuracyWarning
@@ -307,18 +307,8 @@ _Side = tuple[ElasticBody, Surface, SurfaceEdges]
 
 
 def _edges(pair: BodyPair) -> tuple[_Side, _Side]:
-    return (
-        (
-            pair.upper,
-            pair.upper_surface,
-            surface_edges(pair.upper.mesh, pair.upper_surface),
-        ),
-        (
-            pair.lower,
-            pair.lower_surface,
-            surface_edges(pair.lower.mesh, pair.lower_surface),
-        ),
-    )
+    upper, lower = pair.edges
+    return (pair.upper, pair.upper_surface, upper), (pair.lower, pair.lower_surface, lower)
 
 
 def _corner(
