@@ -10,7 +10,7 @@ from klack.assembling.candidates import Candidates, CondensedSpace, grade_of, re
 from klack.case.schema import Case
 from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.mortar import ContactSpace, contact_space
-from klack.contact.statics import ReachError, StaticContact, static_contact
+from klack.contact.statics import ContactLadder, ReachError, StaticContact
 from klack.contact.worn_faces import WornFaces
 from klack.progress import Progress
 
@@ -121,10 +121,11 @@ def _ladder(
     The closing force keeps working while the bodies approach: the turning point is where the
     stored energy has reached ``energy + closing * approach``.
     """
+    ladder = ContactLadder(space, C, layer)
     refused: ReachError | None = None
     while True:
         try:
-            static = static_contact(space, C, force, layer=layer)
+            travel, pressures = ladder.states(force)
         except ReachError as error:
             # elements as wide as the contact bound the force far too high: less may do
             if not error.held > 0 or refused is not None:
@@ -132,7 +133,7 @@ def _ladder(
             refused, force = error, _HELD * error.held
             continue
         # energy stored along the ladder, by the trapezoidal rule from first touch
-        approach, load = np.append(0.0, static.approach), np.append(0.0, static.force)
+        approach, load = np.append(0.0, travel), np.append(0.0, pressures @ space.axial)
         stored = np.concatenate(
             [[0.0], np.cumsum(np.diff(approach) * (load[1:] + load[:-1]) / 2.0)]
         )
@@ -145,4 +146,4 @@ def _ladder(
     # falls up to the closing force, rises from there
     rising = load >= closing
     needed = _LOAD_MARGIN * float(np.interp(energy, surplus[rising], load[rising]))
-    return static_contact(space, C, needed, layer=layer)
+    return ladder.contact(needed)

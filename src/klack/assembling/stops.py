@@ -12,8 +12,8 @@ from math import pi, sqrt
 import numpy as np
 
 from klack.assembling.bodies import BodyPair
-from klack.assembling.damping_choice import damping_of
 from klack.assembling.candidates import Candidates
+from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops

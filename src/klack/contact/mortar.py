@@ -376,9 +376,7 @@ def _build(
     return _assemble(sides, slave, sums, inner, ring, closest, limit, floor)
 
 
-def _closest_face(
-    mesh: Mesh, surface: Surface, gaps: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _closest_face(mesh: Mesh, surface: Surface, gaps: NDArray[np.float64]) -> NDArray[np.float64]:
     """Smallest gap of the faces at each node [m]."""
     found = np.full(mesh.node_count, np.inf)
     start = 0
