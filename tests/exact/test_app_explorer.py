@@ -4,8 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
+from klack.acoustics.signal_statistics import sound_statistics
 from klack.analyses.impact.run import run_impact
+from klack.analyses.noise.body import Transfers
+from klack.analyses.noise.run import click_sound
+from klack.analyses.noise.source import impact_sources
 from klack.app.explorer import Explorer
 from klack.app.form import checked_text, exchanged_text
 from klack.app.sliders import sliders_of
@@ -32,14 +37,33 @@ def test_a_move_is_the_impact_of_the_case_with_these_values(explorer):
     assert "speed: 450 mm/s" in text
     assert "# meet the air" in text  # comments stay
 
-    study = run_impact(read_case(text, PATH), levels=("reduced",), certify=False)
+    with threadpool_limits(1):  # as the moves: sums of several threads have another order
+        study = run_impact(read_case(text, PATH), levels=("reduced",))
     measures = study.levels["reduced"].measures
     numbers = {number.key: number.value for number in answer.numbers}
 
-    # the same bodies and steps; solutions of sparse matrices differ in their last digits
-    assert numbers["peak"] == pytest.approx(measures.peak_force, rel=1e-9)
-    assert numbers["contact"] == pytest.approx(1e6 * measures.contact_time, rel=1e-9)
-    assert numbers["restitution"] == pytest.approx(measures.restitution, rel=1e-9)
+    # bit for bit: the compliance of this reach is part of that for the upper ends of the sliders
+    assert numbers["peak"] == measures.peak_force
+    assert numbers["contact"] == 1e6 * measures.contact_time
+    assert numbers["restitution"] == measures.restitution
+
+
+def test_the_sound_hardly_depends_on_earlier_moves(explorer):
+    """Far from the contact, static solutions of earlier moves are combined."""
+    for speed in (0.4, 0.44, 0.48, 0.52):
+        explorer.move({"motion.speed": speed})
+    values = {"motion.speed": 0.46}
+    moved = explorer.move(values)
+    with threadpool_limits(1):
+        case = read_case(explorer.text_at(values), PATH)
+        study = run_impact(case, levels=("reduced",), certify=False)
+        pressure = click_sound(impact_sources(study, ("reduced",), case)[0], Transfers())
+
+    assert pressure is not None
+    numbers = {number.key: number.value for number in moved.numbers}
+    level = sound_statistics(pressure).exposure_level_A
+    # the error in the norm of the energy is up to 1e-3 at the contact, far less at a distance
+    assert numbers["level"] == pytest.approx(level, abs=1e-5)
 
 
 def test_the_click_is_louder_by_the_square_of_the_speed(explorer):

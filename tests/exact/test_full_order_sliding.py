@@ -45,6 +45,7 @@ def slide(law: Friction, duration: float, body: ElasticBody | None = None, **opt
         nodes=np.zeros(1, dtype=np.int64),
         reach=0.0,
         clearance=0.0,
+        entry=np.zeros(1),
     )
     given = {"speed": 1e-9, "step": STEP, "axial_force": -PRESS, "sideways": SIDEWAYS} | options
     return simulate_full_order(

@@ -5,11 +5,12 @@ contact, the pattern of the port, the modes' share and the law are all made agai
 of ``klack stroke``, with the laws of its stops as they were built.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
@@ -36,6 +37,7 @@ from klack.analyses.stroke.run import (
 from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number, Opened, Slider
 from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
 from klack.app.sliders import sliders_of, written
+from klack.assembling.problem import contact_problem
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree, tree_of
@@ -44,7 +46,8 @@ from klack.case.points import case_at
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
-from klack.errors import InputError
+from klack.elasticity.near_loads import NearLoads
+from klack.errors import InputError, KlackError
 from klack.progress import silent
 from klack.signals import TimeSeries
 from klack.stages import collected_warnings
@@ -128,7 +131,10 @@ class Explorer:
         self._case = case = self._tree.any_case()
         found = sliders_of(case, self._tree)
         self._sliders = {slider.key: slider for slider in found}
-        self._design = _Strokes(case) if isinstance(case, ValveCase) else _Impacts(case)
+        if isinstance(case, ValveCase):
+            self._design = _Strokes(case)
+        else:
+            self._design = _Impacts(case, self._hardest(found))
         self._pinned = self._last = None
         self._pools = ThreadpoolController()  # with libraries that came since
         first = self.move({}, pin=True)
@@ -238,6 +244,18 @@ class Explorer:
         kind: Any = type(self._case)
         return case_at(kind, self._tree, self._tree, changes)
 
+    def _hardest(self, sliders: Sequence[Slider]) -> Case | None:
+        """Case with all sliders of the motion at their upper ends; None if it is refused."""
+        highest = {
+            slider.key: slider.high
+            for slider in sliders
+            if slider.place[0] == "motion" and not slider.needs_mesh
+        }
+        try:
+            return cast(Case, self._case_at(highest))
+        except InputError:
+            return None
+
     def _require_open(self) -> _Design:
         if self._design is None:
             raise InputError("sliders", got="no case", expected="an open one", hint="reload.")
@@ -252,7 +270,7 @@ class _Impacts:
 
     run, time_unit = "reduced", "us"
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: Case, hardest: Case | None) -> None:
         if not case.has_surfaces:
             raise InputError(
                 f"case {case.name}",
@@ -261,8 +279,12 @@ class _Impacts:
                 hint="run it, and compare results.",
             )
         self._bodies: ImpactBodies = impact_bodies(case, levels=(self.run,), certify=True)
+        if hardest is not None:
+            with suppress(KlackError), collected_warnings():  # moves tell what is wrong there
+                contact_problem(hardest, self._bodies.placed, silent)
         self._bodies.placed.keep_no_more()
         self._transfers = Transfers()
+        self._near = {name: NearLoads() for name in self._bodies.pools}
 
     def close(self) -> None:
         """Free the factorisations."""
@@ -296,7 +318,7 @@ class _Impacts:
 
     def _study(self, case: Case, *, certify: bool) -> ImpactStudy:
         levels = case.require_levels((self.run,))
-        return impact_of_bodies(case, self._bodies, levels=levels, certify=certify)
+        return impact_of_bodies(case, self._bodies, levels=levels, certify=certify, near=self._near)
 
 
 # --------------------------------------------------------------------------- strokes

@@ -3,9 +3,11 @@
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
 from klack.assembling.face_form import form_of_faces, layer_of_faces
@@ -22,6 +24,7 @@ from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance
+from klack.contact.surface_edges import SurfaceEdges, surface_edges, turned_away
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
 from klack.gauges.gauge import Gauge
@@ -80,6 +83,23 @@ class BodyPair:
     def shift(self) -> float:
         """Translation of the upper body along z from where it was drawn [m]."""
         return float(self.pose.shift[2])
+
+    @cached_property
+    def edges(self) -> tuple[SurfaceEdges, SurfaceEdges]:
+        """Edges of the upper and of the lower surface."""
+        return (
+            surface_edges(self.upper.mesh, self.upper_surface),
+            surface_edges(self.lower.mesh, self.lower_surface),
+        )
+
+    @cached_property
+    def sharp_edges(self) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Edges of the upper and of the lower surface that are corners towards the other one."""
+        upper, lower = self.edges
+        return (
+            upper.corners & turned_away(upper, self.lower.mesh, self.lower_surface),
+            lower.corners & turned_away(lower, self.upper.mesh, self.upper_surface),
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,8 +10,9 @@ from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.progress import Progress
 from klack.reduction.ports import Port
+from klack.reduction.reduce import kept_modes as chosen_modes
 from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection, select
+from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
 
 __all__ = [
     "PARTICIPATION_POOL",
@@ -101,8 +102,7 @@ def kept_modes(
     for body, load in zip((problem.pair.upper, problem.pair.lower), loads, strict=True):
         pool = pools[body.name]
         selection = selection_of(problem.case.reduction.choice(body.name))
-        chosen = select(selection, pool.omega, pool.shapes.T @ load[:, None])
-        kept[body.name] = Modes(pool.omega[chosen], pool.shapes[:, chosen])
+        kept[body.name] = chosen_modes(selection, pool, load[:, None])
     return kept
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from klack.assembling.bodies import BodyPair, assemble_body, find_touch, mesh_body
+from klack.assembling.candidates import Candidates
 from klack.assembling.ladder import impact_energy, static_ladder
 from klack.case.schema import Case
 from klack.closing import Closing
@@ -92,10 +93,8 @@ def build_opposite(
     )
     progress("upper stop", 0.5)
     # nothing gathers more energy than the first impact may have, whatever drives it up there
-    static = static_ladder(
-        contact,
-        flexibility,
-        moving,
+    static, _ = static_ladder(
+        Candidates(contact, flexibility, moving),
         energy=impact_energy(case, pair),
         closing=0.0,
         reach=asked.reach,

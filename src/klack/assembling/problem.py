@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from klack.assembling.bodies import BodyPair, build_bodies
+from klack.assembling.candidates import Candidates, CondensedSpace
 from klack.assembling.ladder import (
     closing_force,
     impact_energy,
@@ -49,6 +50,8 @@ class PlacedBodies(Closing):
     flexibility_upper, flexibility_lower : Flexibility
         Static solutions of both bodies; close them with :meth:`close` before a full-order run
         to give their memory back.
+    candidates : Candidates
+        Points where they can touch, with what is known of them.
     opposite : OppositeStop or None
         Upper stop.
     """
@@ -57,6 +60,7 @@ class PlacedBodies(Closing):
     pair: BodyPair
     flexibility_upper: Flexibility
     flexibility_lower: Flexibility
+    candidates: Candidates
     opposite: OppositeStop | None = None
 
     def keep_no_more(self) -> None:
@@ -84,10 +88,13 @@ class ContactProblem(PlacedBodies):
     space : ContactSpace
     static : StaticContact
         Ladder of static contact states beyond the highest force of the impact.
+    condensed : CondensedSpace
+        Compliance of each body at these points.
     """
 
     space: ContactSpace
     static: StaticContact
+    condensed: CondensedSpace
 
     @cached_property
     def rubbing(self) -> RubbingContact | None:
@@ -190,6 +197,7 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
         pair=pair,
         flexibility_upper=upper,
         flexibility_lower=lower,
+        candidates=Candidates(pair, upper, lower),
         opposite=build_opposite(case, pair, upper, progress, threads=threads),
     )
 
@@ -211,10 +219,8 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
     progress : callable
     """
     case = _with_gap(case, bodies.case.contact.gap)
-    static = static_ladder(
-        bodies.pair,
-        bodies.flexibility_upper,
-        bodies.flexibility_lower,
+    static, condensed = static_ladder(
+        bodies.candidates,
         energy=impact_energy(case, bodies.pair),
         closing=closing_force(case),
         reach=case.contact.reach,
@@ -226,9 +232,11 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
         pair=bodies.pair,
         flexibility_upper=bodies.flexibility_upper,
         flexibility_lower=bodies.flexibility_lower,
+        candidates=bodies.candidates,
         opposite=bodies.opposite,
         space=static.space,
         static=static,
+        condensed=condensed,
     )
 
 

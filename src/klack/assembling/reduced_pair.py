@@ -243,6 +243,7 @@ def _reduce_at(
     ports = (Port(PORT, load_upper), Port(PORT, -load_lower))
     bodies = (problem.pair.upper, problem.pair.lower)
     flexibilities = (problem.flexibility_upper, problem.flexibility_lower)
+    compliances = _port_compliances(problem, static, force)
     upper, lower = (
         reduce_body(
             body,
@@ -252,6 +253,7 @@ def _reduce_at(
             damping=damping_of(problem.case.bodies[body.name].damping),
             modes_pool=pools[body.name],
             flexibility=flexibility,
+            port_compliance=compliance,
             shifts=problem.case.reduction.shifts_of(body.name, correction),
             recovery_surfaces=tuple(body.mesh.surfaces) if recovery else (),
             observers=[
@@ -260,7 +262,9 @@ def _reduce_at(
                 if gauge.body == body.name
             ],
         )
-        for body, port, flexibility in zip(bodies, ports, flexibilities, strict=True)
+        for body, port, flexibility, compliance in zip(
+            bodies, ports, flexibilities, compliances, strict=True
+        )
     )
     law: ContactLaw | RubbingLaw | YieldingLaw
     law, local = _law(problem, correction, upper, lower, stiffness)
@@ -280,6 +284,21 @@ def _reduce_at(
         static=static,
         rubbing=fit,
     )
+
+
+def _port_compliances(
+    problem: ContactProblem, static: StaticContact | RubbingContact, force: float
+) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
+    """Static compliance of each body at its port [m/N]; None where the faces rub.
+
+    The port loads the contact points alone, to which the bodies are condensed already.
+    """
+    if not isinstance(static, StaticContact):
+        return None, None
+    lam = static.pattern_at(force)
+    condensed = problem.condensed
+    upper, lower = (np.array([[lam @ C @ lam]]) for C in (condensed.upper, condensed.lower))
+    return upper, lower
 
 
 def friction_doubt(case: Case, *, has_memory: bool, correction: str = "none") -> str:

@@ -12,6 +12,7 @@ from math import pi, sqrt
 import numpy as np
 
 from klack.assembling.bodies import BodyPair
+from klack.assembling.candidates import Candidates
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import selection_of
@@ -144,9 +145,8 @@ def build_stop(
     stop = case.stops[name]
     pair = _touching(name, stop, bodies)
     flexibility = [flexibilities[body.name] for body in (pair.upper, pair.lower)]
-    static = static_ladder(
-        pair,
-        *flexibility,
+    static, _ = static_ladder(
+        Candidates(pair, *flexibility),
         energy=0.5 * effective_mass(pair) * stop.speed**2,
         closing=stop.force,
         reach=stop.reach,

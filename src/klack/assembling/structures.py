@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.modes import selection_of
@@ -15,11 +16,13 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
+from klack.elasticity.near_loads import NearLoads
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
+from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.structure import Structure
 from klack.reduction.structure_building import StructurePort, build_structure
 
@@ -35,7 +38,10 @@ IMPACT_STOP = "contact"
 
 
 def impact_structures(
-    problem: ContactProblem, pools: Mapping[str, Modes], own: ReducedPair
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    own: ReducedPair,
+    near: Mapping[str, NearLoads] | None = None,
 ) -> tuple[Structure, ...]:
     """Structures of the held bodies of one impact, with the modes of the level ``reduced``.
 
@@ -46,23 +52,34 @@ def impact_structures(
     pools : mapping of body name to Modes
     own : ReducedPair
         Its ports push here.
+    near : mapping of body name to NearLoads, optional
+        Of earlier impacts of these bodies: what is left to the modes away from the contact may
+        then come from their static solutions.
     """
     case, pair = problem.case, problem.pair
     sides = (
-        (pair.upper, problem.flexibility_upper, own.ports[0], 1.0),
-        (pair.lower, problem.flexibility_lower, own.ports[1], -1.0),
+        (pair.upper, problem.flexibility_upper, own.ports[0], own.upper, 1.0),
+        (pair.lower, problem.flexibility_lower, own.ports[1], own.lower, -1.0),
     )
     held = [body.name for body, *_ in sides if body.is_fixed]
+
+    def static(flexibility: Flexibility, port: Port, reduced: ReducedBody) -> NDArray[np.float64]:
+        load = port.pattern[:, None]
+        if near is None:
+            return flexibility.deflections(load)
+        energy = float(reduced.static_compliance[0, 0])
+        return near[reduced.name].answer(port.pattern, energy, flexibility.solve)[:, None]
+
     return tuple(
         _structure(
             case,
             body,
             [StructurePort(port=port, stop=IMPACT_STOP, sign=sign)],
             pools[body.name],
-            flexibility,
+            static(flexibility, port, reduced),
             radiating_surfaces(case.noise, body, held, _contact_names(case, body.name)),
         )
-        for body, flexibility, port, sign in sides
+        for body, flexibility, port, reduced, sign in sides
         if body.is_fixed
     )
 
@@ -90,7 +107,7 @@ def valve_structures(
             bodies[name],
             [_pushed(port, name, contacts) for port in ports[name]],
             pools[name],
-            flexibilities[name],
+            flexibilities[name].deflections(_patterns(ports[name])),
             radiating_surfaces(case.noise, bodies[name], held, _stop_names(case, name)),
         )
         for name in held
@@ -139,19 +156,23 @@ def _structure(
     body: ElasticBody,
     ports: Sequence[StructurePort],
     pool: Modes,
-    flexibility: Flexibility,
+    deflections: NDArray[np.float64],
     surfaces: tuple[tuple[str, ...], tuple[str, ...]],
 ) -> Structure:
-    patterns = np.column_stack([item.port.pattern for item in ports])
+    patterns = _patterns([item.port for item in ports])
     return build_structure(
         body,
         modes=kept_modes(selection_of(case.reduction.choice(body.name)), pool, patterns),
         damping=damping_of(case.bodies[body.name].damping),
         ports=ports,
-        deflections=flexibility.deflections(patterns),
+        deflections=deflections,
         surfaces=surfaces[0],
         left_out=surfaces[1],
     )
+
+
+def _patterns(ports: Sequence[Port]) -> NDArray[np.float64]:
+    return np.column_stack([port.pattern for port in ports])
 
 
 def _pushed(port: Port, body: str, contacts: Mapping[str, StopContact]) -> StructurePort:

@@ -15,6 +15,7 @@ from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.blas import dsyrk, dtrsm
 from scipy.linalg.lapack import dpotrf, dpotrs
 
 from klack.errors import ConvergenceError, InputError
@@ -33,7 +34,8 @@ class ComplementaritySolver:
     """Solves the problem again and again for one matrix and slowly changing gaps.
 
     The Cholesky factor of the last active block is kept: in a time loop the active set changes
-    only every few steps, and a round then costs two triangular solves.
+    only every few steps, and a round then costs two triangular solves.  Points that join or leave
+    in the reverse order cost their own rows of it.
 
     Parameters
     ----------
@@ -56,7 +58,7 @@ class ComplementaritySolver:
         self._set = np.zeros(len(A), dtype=bool)
         self._active = np.empty(0, dtype=np.int64)
         self._factor = np.empty((0, 0), order="F")
-        self._columns = np.empty((len(A), 0), order="F")
+        self._columns = np.empty_like(self.A)  # of the active points, in room for all of them
 
     def solve(
         self, q: NDArray[np.float64], active: NDArray[np.bool_] | None = None
@@ -91,7 +93,7 @@ class ComplementaritySolver:
         history: deque[int] = deque(maxlen=_MEMORY)
         for rounds in range(1, self.round_limit + 1):
             forces = self._forces(q, active)
-            gap = q + self._columns @ forces
+            gap = q + self._columns[:, : len(forces)] @ forces
             bad = ~active & (gap < -gap_tolerance)
             bad[self._active[forces < -force_tolerance]] = True
             count = int(np.count_nonzero(bad))
@@ -123,19 +125,59 @@ class ComplementaritySolver:
         return forces
 
     def _factorise(self, active: NDArray[np.bool_]) -> None:
-        index = np.flatnonzero(active)
-        columns = self.A[:, index]
-        factor = np.empty((0, 0), order="F")
-        if len(index):
-            factor, info = dpotrf(np.asfortranarray(columns[index]), lower=1, overwrite_a=1)
-            if info != 0:
-                raise ConvergenceError(
-                    f"complementarity: the compliance of {len(index)} active contact points is "
-                    f"not positive definite (pivot {info}).\n"
-                    "Try: a finer mesh on the contact surface that carries the multipliers, or "
-                    "fewer retained modes if this is a residual compliance."
-                )
-        self._set, self._active, self._factor, self._columns = active.copy(), index, factor, columns
+        """Factorise the active block; points stand in the order in which they became active.
+
+        What precedes the first point that left is kept: a contact that grows or shrinks costs the
+        points at its border.
+        """
+        order, columns = self._active, self._columns
+        left = np.flatnonzero(~active[order])
+        kept = order[: left[0]] if len(left) else order
+        fresh = active.copy()
+        fresh[kept] = False
+        new = np.flatnonzero(fresh)
+        count, size = len(kept), len(kept) + len(new)
+        columns[:, count:size] = self.A[:, new]
+        known = np.asfortranarray(self._factor[:count, :count])
+        self._set = np.zeros(len(active), dtype=bool)  # of nothing, should the block be indefinite
+        self._active = order[:0]
+        self._factor = _bordered(known, columns[kept, count:size], columns[new, count:size])
+        self._active, self._set = np.concatenate([kept, new]), active.copy()
+
+
+def _bordered(
+    known: NDArray[np.float64], beside: NDArray[np.float64], corner: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    r"""Lower Cholesky factor of a block with further points; what is above its diagonal is void.
+
+    .. math:: L_{21} = A_{21} L_{11}^{-T}, \qquad L_{22} L_{22}^T = A_{22} - L_{21} L_{21}^T
+
+    Parameters
+    ----------
+    known : array, shape (k, k)
+        :math:`L_{11}`.
+    beside : array, shape (k, m)
+        :math:`A_{12}`.
+    corner : array, shape (m, m)
+        :math:`A_{22}`.
+    """
+    if not len(corner):
+        return known
+    count, size = len(known), len(known) + len(corner)
+    factor = np.empty((size, size), order="F")
+    if count:
+        border = dtrsm(1.0, known, beside, lower=1)
+        corner = dsyrk(-1.0, border, beta=1.0, c=corner, trans=1, lower=1)
+        factor[:count, :count], factor[count:, :count] = known, border.T
+    factor[count:, count:], info = dpotrf(corner, lower=1)
+    if info != 0:
+        raise ConvergenceError(
+            f"complementarity: the compliance of {size} active contact points is "
+            f"not positive definite (pivot {count + info}).\n"
+            "Try: a finer mesh on the contact surface that carries the multipliers, or "
+            "fewer retained modes if this is a residual compliance."
+        )
+    return factor
 
 
 def solve_lcp(

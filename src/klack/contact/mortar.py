@@ -112,6 +112,8 @@ class ContactSpace:
     beyond : float [m]
         No point that was left out has a smaller gap.  As long as the bodies approach by less, a
         contact at the rim is complete all the same: elements may be wider than the reach.
+    entry : array, shape (nc,) [m]
+        Reach from which on each point is a candidate.
     """
 
     G_a: csr_array
@@ -126,6 +128,7 @@ class ContactSpace:
     nodes: NDArray[np.int64]
     reach: float
     clearance: float
+    entry: NDArray[np.float64]
     beyond: float = -np.inf
 
     @property
@@ -185,7 +188,7 @@ class ContactSpace:
         )
 
 
-_ROWS = ("G_a", "G_b", "gap", "area", "points", "axial", "rim", "size", "nodes")
+_ROWS = ("G_a", "G_b", "gap", "area", "points", "axial", "rim", "size", "nodes", "entry")
 
 
 def contact_space(
@@ -234,8 +237,7 @@ def contact_space(
     if slave is None:
         slave = _finer(sides, gaps, limit)
     limit = max(limit, float(np.nanmin(gaps[slave])))  # a coarse side may be sampled farther away
-    near = np.isfinite(gaps[slave]) & (gaps[slave] <= limit)
-    return _build(sides, slave, near, limit, limit - floor, form)
+    return _build(sides, slave, gaps[slave], limit, floor, form)
 
 
 def _check_pair(
@@ -355,12 +357,14 @@ class _Sums:
 def _build(
     sides: dict[str, tuple[Mesh, Surface]],
     slave: Literal["a", "b"],
-    near: NDArray[np.bool_],
+    gaps: NDArray[np.float64],
     limit: float,
-    reach: float,
+    floor: float,
     form: FaceForm | None,
 ) -> ContactSpace:
+    """Contact points up to a gap: ``gaps`` are those of the faces of the slave side."""
     mesh, surface = sides[slave]
+    near = np.isfinite(gaps) & (gaps <= limit)
     other_mesh, other_surface = sides["b" if slave == "a" else "a"]
     inner = _part(surface, near).nodes
     ring = _faces_at(surface, inner)
@@ -368,7 +372,19 @@ def _build(
     for block in _part(surface, ring).blocks:
         for piece in _pieces(block.family):
             _integrate(sums, mesh, block, piece, other_mesh, other_surface, form)
-    return _assemble(sides, slave, sums, inner, ring, limit, reach)
+    closest = _closest_face(mesh, surface, gaps)
+    return _assemble(sides, slave, sums, inner, ring, closest, limit, floor)
+
+
+def _closest_face(mesh: Mesh, surface: Surface, gaps: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Smallest gap of the faces at each node [m]."""
+    found = np.full(mesh.node_count, np.inf)
+    start = 0
+    for block in surface.blocks:
+        part = gaps[start : start + len(block.connectivity)]
+        start += len(block.connectivity)
+        np.fmin.at(found, block.connectivity, part[:, None])
+    return found
 
 
 def _part(surface: Surface, faces: NDArray[np.bool_]) -> Surface:
@@ -713,8 +729,9 @@ def _assemble(
     sums: _Sums,
     inner: NDArray[np.int64],
     ring: NDArray[np.bool_],
+    closest: NDArray[np.float64],
     limit: float,
-    reach: float,
+    floor: float,
 ) -> ContactSpace:
     """Choose the hats and divide their sums by their areas."""
     mesh, surface = sides[slave]
@@ -747,9 +764,10 @@ def _assemble(
         size=_node_size(mesh, surface)[nodes],
         slave=slave,
         nodes=nodes,
-        reach=reach,
+        reach=limit - floor,
         clearance=_clearance(sums, nodes, axial),
         beyond=limit,
+        entry=np.maximum(gap, closest)[nodes] - floor,
     )
 
 

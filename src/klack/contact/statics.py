@@ -14,7 +14,7 @@ with the axial weights *a* of the contact space.  For a free body the approach i
 of mass, as in a modal model with the rigid mode as one coordinate.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,10 +33,12 @@ from klack.memory import require_memory
 
 __all__ = [
     "COARSE",
+    "ContactLadder",
     "ReachError",
     "StaticContact",
     "check_rim",
     "check_state",
+    "compliances_of",
     "condensed_compliance",
     "contact_compliance",
     "extended_compliance",
@@ -93,6 +95,33 @@ def contact_compliance(
     return C if faces is None else with_still_directions(C)
 
 
+def compliances_of(
+    space: ContactSpace,
+    flexibility_a: Flexibility,
+    flexibility_b: Flexibility,
+    groups: Sequence[NDArray[np.int64]] = (),
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Condense the static compliance of each body to the contact points.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    flexibility_a, flexibility_b : Flexibility
+    groups : sequence of int arrays
+        Of points, see :func:`klack.elasticity.condensation.condensed_inverse`.
+
+    Returns
+    -------
+    C_a, C_b : array, shape (nc, nc) [m/N]
+        Symmetric; their sum is :func:`contact_compliance`.
+    """
+    _require_memory(space.G_a, space.G_b)
+    return (
+        flexibility_a.compliance_at(space.G_a, groups),
+        flexibility_b.compliance_at(space.G_b, groups),
+    )
+
+
 def condensed_compliance(
     rows_a: csr_array, rows_b: csr_array, flexibility_a: Flexibility, flexibility_b: Flexibility
 ) -> NDArray[np.float64]:
@@ -118,7 +147,7 @@ def condensed_compliance(
 
 
 def _require_memory(rows_a: csr_array, rows_b: csr_array) -> None:
-    """Refuse more rows than fit: the compliance, its symmetric part and a factor of it.
+    """Refuse more rows than fit: the compliance, those of both bodies, and a factor.
 
     And what condensing the larger body to them takes.
     """
@@ -308,42 +337,59 @@ def static_contact(
     InputError
         If a contact point at the rim of the candidates carries a force.
     """
-    require_positive("static contact: max_force", max_force, "N")
-    require_positive("static contact: count", count, "states")
-    ladder = _Ladder(space, C, layer)
-    highest = _approach_for(ladder, max_force)
-    lowest = ladder.first_touch
-    approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
-    pressures = np.array([ladder.pressures(delta) for delta in approach])
-    active = pressures > 0
-    result = StaticContact(
-        space=space,
-        approach=approach,
-        force=pressures @ space.axial,
-        pressures=pressures,
-        area=active @ space.area,
-        active_count=active.sum(axis=1),
-        half_width=np.array([half_width_of(space, lam) for lam in pressures]),
-        compliance=C,
-    )
-    check_rim(result)
-    return result
+    return ContactLadder(space, C, layer).contact(max_force, count)
 
 
-class _Ladder:
-    """Pressures at one approach after the other."""
+class ContactLadder:
+    """Pressures of one contact at one approach after the other; see :func:`static_contact`.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    C : array, shape (nc, nc) [m/N]
+    layer : AsperityLayer or None
+    """
 
     def __init__(
         self, space: ContactSpace, C: NDArray[np.float64], layer: AsperityLayer | None
     ) -> None:
-        self.space, self.layer = space, layer
+        self.space, self.layer, self.compliance = space, layer, C
         # the surfaces touch a little before the first weighted gap closes
         self.start = min(space.clearance, space.touch)
         self.first_touch = space.touch - self.start
         self.solver = ComplementaritySolver(C)
         self.active: NDArray[np.bool_] | None = None
 
+    def contact(self, max_force: float, count: int = 24) -> StaticContact:
+        """Contact states up to an axial force [N], with their areas and widths."""
+        space = self.space
+        approach, pressures = self.states(max_force, count)
+        active = pressures > 0
+        return StaticContact(
+            space=space,
+            approach=approach,
+            force=pressures @ space.axial,
+            pressures=pressures,
+            area=active @ space.area,
+            active_count=active.sum(axis=1),
+            half_width=np.array([half_width_of(space, lam) for lam in pressures]),
+            compliance=self.compliance,
+        )
+
+    def states(
+        self, max_force: float, count: int = 24
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Approaches [m] and pressures [N], shape (count, nc), up to an axial force [N]."""
+        require_positive("static contact: max_force", max_force, "N")
+        require_positive("static contact: count", count, "states")
+        highest, lowest = _approach_for(self, max_force), self.first_touch
+        approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
+        pressures = np.array([self.pressures(delta) for delta in approach])
+        _require_within(self.space, approach, pressures)
+        return approach, pressures
+
     def pressures(self, approach: float) -> NDArray[np.float64]:
+        """Of the contact points [N] at an approach from first touch [m]."""
         q = self.space.gap - (self.start + approach) * self.space.axial
         if self.layer is not None:
             return press(self.layer, self.space.area, self.solver.A, q)[0]
@@ -351,10 +397,11 @@ class _Ladder:
         return lam
 
     def force(self, approach: float) -> float:
+        """Axial force [N] at an approach [m]."""
         return float(self.space.axial @ self.pressures(approach))
 
 
-def _approach_for(ladder: _Ladder, target: float) -> float:
+def _approach_for(ladder: ContactLadder, target: float) -> float:
     """Approach whose force is between ``target`` and 1.01 ``target``: doubling, then secants."""
     first = int(np.argmin(np.where(ladder.space.axial > 1e-6, ladder.space.gap, np.inf)))
     low, low_force = ladder.first_touch, 0.0
@@ -433,15 +480,21 @@ def check_rim(static: StaticContact) -> None:
     InputError
         It names the reach and the highest force without contact at the rim.
     """
-    for i, (approach, lam) in enumerate(zip(static.approach, static.pressures, strict=True)):
-        below = float(static.force[i - 1]) if i else 0.0
+    _require_within(static.space, static.approach, static.pressures)
+
+
+def _require_within(
+    space: ContactSpace, approach: NDArray[np.float64], pressures: NDArray[np.float64]
+) -> None:
+    force = pressures @ space.axial
+    for i, (travel, lam) in enumerate(zip(approach, pressures, strict=True)):
         check_state(
-            static.space,
-            approach,
+            space,
+            float(travel),
             lam,
-            below=below,
-            needed=static.max_force,
-            deepest=float(static.approach[-1]),
+            below=float(force[i - 1]) if i else 0.0,
+            needed=float(force[-1]),
+            deepest=float(approach[-1]),
         )
 
 

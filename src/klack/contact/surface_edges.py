@@ -12,17 +12,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.pairing import face_geometry
+from klack.contact.pairing import face_geometry, project_to_surface
 from klack.elasticity.shape_functions import reference_nodes
 from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
-__all__ = ["SHARP", "SurfaceEdges", "surface_edges"]
+__all__ = ["SHARP", "SurfaceEdges", "surface_edges", "turned_away"]
 
 SHARP = np.radians(10.0)
 """Angle between two normals [rad] above which an edge is a corner; a smooth surface on coarse
 quadratic faces has less."""
+
+_SHALLOW = np.sin(np.radians(0.5))
+"""Slope on both sides of a corner above which it is the corner that touches, not a face."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -195,3 +198,27 @@ def _names(mesh: Mesh, faces: list[tuple[int, ...] | None]) -> list[str | None]:
         if face in wanted
     }
     return [None if face is None else owner.get(face, "") for face in faces]
+
+
+def turned_away(edges: SurfaceEdges, mesh: Mesh, surface: Surface) -> NDArray[np.bool_]:
+    """Edges whose both faces lead away from the other surface, shape (m,)."""
+    if not len(edges.line):
+        return np.zeros(0, dtype=bool)
+    outward = -edges.along.sum(axis=1)
+    length = np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = outward / np.where(length > 0.0, length, 1.0)
+    middle = edges.line[:, 1]
+    met = project_to_surface(middle, outward, mesh, surface)
+    normal = -outward  # where nothing is met: of a surface that faces the corner
+    for number, block in enumerate(surface.blocks):
+        for k in np.flatnonzero(met.block == number):
+            normal[k] = _normal_of(mesh, block, int(met.face[k]), met.xi[k])
+    slope = np.einsum("mkd,md->mk", edges.along, normal)
+    return (slope > _SHALLOW).all(axis=1)
+
+
+def _normal_of(
+    mesh: Mesh, block: FaceBlock, face: int, xi: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    one = FaceBlock(block.family, block.connectivity[face : face + 1])
+    return face_geometry(mesh.points, one, xi[None, :]).normal[0, 0]

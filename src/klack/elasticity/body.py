@@ -68,11 +68,19 @@ class ElasticBody:
         return np.flatnonzero(moving)
 
     @cached_property
-    def nodal_mass(self) -> NDArray[np.float64]:
-        """Row sums of the scalar mass matrix, shape (n_nodes,) [kg]; they add up to the mass."""
+    def axial_momentum(self) -> NDArray[np.float64]:
+        """Momentum of all degrees of freedom at unit velocity along z, M e_z, shape (n_dof,) [kg].
+
+        z is the last component, in space and in the meridian plane.
+        """
         along = np.zeros(self.dof_count)
         along[self.dimension - 1 :: self.dimension] = 1.0
-        return (self.M @ along)[self.dimension - 1 :: self.dimension]
+        return np.asarray(self.M @ along)
+
+    @cached_property
+    def nodal_mass(self) -> NDArray[np.float64]:
+        """Row sums of the scalar mass matrix, shape (n_nodes,) [kg]; they add up to the mass."""
+        return self.axial_momentum[self.dimension - 1 :: self.dimension]
 
     @cached_property
     def mass(self) -> float:

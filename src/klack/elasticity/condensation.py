@@ -8,6 +8,8 @@ half the work of whole solves.  Loads that lie close together reach only a part 
 :math:`\hat Y` (a path through the elimination tree); the others are not kept.
 """
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -54,7 +56,11 @@ def reached_rows(factor: Halves, G: csr_array) -> NDArray[np.int64]:
 
 
 def condensed_inverse(
-    factor: Factorization, G: csr_array, *, largest: int = _LARGEST_HALF
+    factor: Factorization,
+    G: csr_array,
+    *,
+    groups: Sequence[NDArray[np.int64]] = (),
+    largest: int = _LARGEST_HALF,
 ) -> NDArray[np.float64]:
     """Condense the inverse of a factorised matrix.
 
@@ -64,6 +70,9 @@ def condensed_inverse(
         Of A, shape (n, n).
     G : csr_array, shape (m, n)
         One load per row.
+    groups : sequence of int arrays
+        Rows of G, each in one group; one group of all of them without.  What is found for two
+        groups does not depend on later ones, to the last bit: loads can be added.
     largest : int [byte]
         Memory up to which the cheaper way is taken.
 
@@ -72,17 +81,48 @@ def condensed_inverse(
     array, shape (m, m)
         Symmetric.
     """
-    if isinstance(factor, Halves) and G.shape[0]:
-        rows = reached_rows(factor, G)
-        if 8 * len(rows) * G.shape[0] <= largest:
+    if not groups:
+        return _of_groups(factor, [G], largest)
+    place = np.argsort(np.concatenate(groups), kind="stable")
+    C = _of_groups(factor, [csr_array(G[rows]) for rows in groups], largest)
+    return np.ascontiguousarray(C[np.ix_(place, place)])
+
+
+def _of_groups(
+    factor: Factorization, groups: Sequence[csr_array], largest: int
+) -> NDArray[np.float64]:
+    """Condense to loads that stand group by group."""
+    ends = np.cumsum([0, *(G.shape[0] for G in groups)])
+    own = [slice(*pair) for pair in pairwise(ends.tolist())]
+    C = np.empty((ends[-1],) * 2)
+    halves: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
+    memory = 0
+    for number, (G, here) in enumerate(zip(groups, own, strict=True)):
+        if isinstance(factor, Halves) and G.shape[0] and memory <= largest:
+            rows = reached_rows(factor, G)
+            memory += 8 * len(rows) * G.shape[0]
+        if isinstance(factor, Halves) and G.shape[0] and memory <= largest:
             half = np.empty((len(rows), G.shape[0]), order="F")
             for block in _blocks(G.shape[0]):
-                half[:, block] = factor.forward(G[block].toarray().T)[rows]
-            return half.T @ half
-    C = np.empty((G.shape[0],) * 2)
-    for block in _blocks(G.shape[0]):
-        C[:, block] = G @ factor.solve(G[block].toarray().T)
-    return (C + C.T) / 2.0
+                Y = factor.forward(G[block].toarray().T)
+                half[:, block] = Y[rows]
+                for (reached, earlier), there in zip(halves, own, strict=False):
+                    C[there, _within(here, block)] = earlier.T @ Y[reached]
+            C[here, here] = half.T @ half
+            halves.append((rows, half))
+        else:
+            for block in _blocks(G.shape[0]):
+                X = factor.solve(G[block].toarray().T)
+                for other, there in zip(groups[: number + 1], own, strict=False):
+                    C[there, _within(here, block)] = other @ X
+            C[here, here] = (C[here, here] + C[here, here].T) / 2.0
+        C[here, : here.start] = C[: here.start, here].T
+    return C
+
+
+def _within(outer: slice, inner: slice) -> slice:
+    """Part of a slice."""
+    return slice(outer.start + inner.start, min(outer.start + inner.stop, outer.stop))
 
 
 def condensation_memory(loads: int, unknowns: int) -> float:

@@ -51,6 +51,12 @@ class Modes:
         """Eigenfrequencies [Hz]."""
         return self.omega / (2.0 * np.pi)
 
+    def kept(self, numbers: NDArray[np.int64]) -> "Modes":
+        """Some of them, by ascending numbers; the lowest without gaps are not copied."""
+        if np.array_equal(numbers, np.arange(len(numbers))):
+            return Modes(self.omega[: len(numbers)], self.shapes[:, : len(numbers)])
+        return Modes(self.omega[numbers], self.shapes[:, numbers])
+
 
 def eigenmodes(
     body: VibratingBody,

@@ -15,9 +15,10 @@ A factorisation cannot be stored, but what was solved with it can.  With a cache
 factorised before is factorised again only when something is asked for that the cache does not have.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
+from itertools import product
 from typing import TypeVar
 
 import numpy as np
@@ -163,7 +164,9 @@ class Flexibility(Closing):
                 U[:, at : at + _CHUNK] = self._solve_block(F[:, at : at + _CHUNK])
         return U
 
-    def condensed(self, G: csr_array) -> NDArray[np.float64]:
+    def condensed(
+        self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
+    ) -> NDArray[np.float64]:
         r"""Static compliance seen by given loads, G F G^T: half the work of solving for them.
 
         Of a free body, with :math:`A = G R` and :math:`Z = K^+ M R` (six columns),
@@ -174,6 +177,8 @@ class Flexibility(Closing):
         ----------
         G : csr_array, shape (m, n_dof)
             One load per row.
+        groups : sequence of int arrays
+            Of rows, see :func:`klack.elasticity.condensation.condensed_inverse`.
 
         Returns
         -------
@@ -181,14 +186,28 @@ class Flexibility(Closing):
             Symmetric.
         """
         kept = csr_array(G)[:, self._kept]
-        C = condensed_inverse(self.factorization, kept)
+        C = condensed_inverse(self.factorization, kept, groups=groups)
         if self._R.shape[1]:
             MR = self._MR[self._kept]
             Z = self.factorization.solve(MR)
-            A, GZ = G @ self._R, kept @ Z
-            C += A @ (MR.T @ Z) @ A.T - A @ GZ.T - GZ @ A.T
+            A, GZ, W = G @ self._R, kept @ Z, MR.T @ Z
+            whole = np.arange(G.shape[0])
+            for i, j in product(groups or (whole,), repeat=2):
+                C[np.ix_(i, j)] += A[i] @ W @ A[j].T - A[i] @ GZ[j].T - GZ[i] @ A[j].T
             C = (C + C.T) / 2.0
         return C
+
+    def compliance_at(
+        self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
+    ) -> NDArray[np.float64]:
+        """Compliance as of :meth:`condensed`, kept in the cache: for the points of a contact."""
+        return self.remembered(
+            "compliance of the contact",
+            (G, *groups),
+            lambda: self.condensed(G, groups),
+            lambda C: Entry(arrays={"C": C}),
+            lambda entry: entry.arrays["C"],
+        )
 
     def deflections(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacements under loads as of :meth:`solve`, kept in the cache: for ports."""

@@ -28,7 +28,7 @@ from klack.reduction.recovery import Recovery, surface_faces
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ByFrequency, ModeSelection, select
 
-__all__ = ["Correction", "kept_modes", "reduce_body"]
+__all__ = ["Correction", "at_ports", "kept_modes", "reduce_body"]
 
 Correction = Literal["consistent", "attachment", "none"]
 
@@ -43,6 +43,7 @@ def reduce_body(
     observers: Sequence[Observer] = (),
     modes_pool: Modes | None = None,
     flexibility: Flexibility | None = None,
+    port_compliance: NDArray[np.float64] | None = None,
     shifts: Sequence[float] | None = None,
     recovery_surfaces: Sequence[str] = (),
     recovery_nodes: NDArray[np.int64] | None = None,
@@ -67,6 +68,9 @@ def reduce_body(
         With :class:`ByFrequency` it must reach that frequency.
     flexibility : Flexibility, optional
         Of the same body; saves the only factorisation that statics and modes need.
+    port_compliance : array, shape (n_ports, n_ports), optional [m/N]
+        Static compliance at the ports, where it is known; saves the static solutions, unless
+        attachment modes need them.
     shifts : sequence of float [(rad/s)^2], optional
         With ``correction="attachment"``: shifted instead of residual attachment modes, one per
         port and shift, for example ``(default_shift(pool.omega),)`` or ``shift_at`` of frequencies.
@@ -85,10 +89,12 @@ def reduce_body(
     flexibility = flexibility or Flexibility(body, backend=backend, threads=threads)
     pool = modes_pool if modes_pool is not None else _compute_pool(body, modes, flexibility)
     kept = kept_modes(modes, pool, patterns)
-    deflections = flexibility.deflections(patterns)
     extra = _no_modes(body)
+    static = port_compliance
+    if static is None:
+        static = patterns.T @ flexibility.deflections(patterns)
     if correction == "attachment" and shifts is None:
-        extra = residual_attachment(body, kept, deflections)
+        extra = residual_attachment(body, kept, flexibility.deflections(patterns))
     elif correction == "attachment" and shifts is not None:
         extra = shifted_attachment(body, kept, patterns, shifts, backend=backend, threads=threads)
     elif shifts is not None:
@@ -99,21 +105,20 @@ def reduce_body(
             hint="leave the shifts out, or use attachment modes.",
         )
     rigid = body.rigid_modes
-    shapes = np.hstack([rigid, kept.shapes, extra.shapes])
+    shapes = (rigid, kept.shapes, extra.shapes)
     omega = np.concatenate([np.zeros(rigid.shape[1]), kept.omega, extra.omega])
-    static = patterns.T @ deflections
     return ReducedBody(
         name=body.name,
         mass=float(body.mass),
         omega=omega,
         damping=damping.ratios(omega),
         port_names=tuple(port.name for port in ports),
-        port_shapes=shapes.T @ patterns,
+        port_shapes=np.vstack([at_ports(part, patterns) for part in shapes]),
         observer_names=tuple(observer.name for observer in observers),
         observer_shapes=_observed(body, shapes, observers),
         static_compliance=(static + static.T) / 2.0,
         rigid_count=rigid.shape[1],
-        rigid_axial=rigid.T @ (body.M @ _unit_axial_velocity(body)),
+        rigid_axial=rigid.T @ body.axial_momentum,
         dof_count=body.dof_count,
         correction=correction,
         attachment_count=len(extra.omega),
@@ -131,8 +136,13 @@ def kept_modes(selection: ModeSelection, pool: Modes, patterns: NDArray[np.float
     patterns : array, shape (n_dof, n_ports) [-]
         Load patterns of the ports.
     """
-    picked = select(selection, pool.omega, pool.shapes.T @ patterns)
-    return Modes(omega=pool.omega[picked], shapes=pool.shapes[:, picked])
+    return pool.kept(select(selection, pool.omega, at_ports(pool.shapes, patterns)))
+
+
+def at_ports(shapes: NDArray[np.float64], patterns: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Displacement of modes at ports, shape (modes, ports): most nodes have no part in any."""
+    rows = np.flatnonzero(patterns.any(axis=1))
+    return np.asarray(shapes[rows].T @ patterns[rows])
 
 
 def _compute_pool(body: ElasticBody, modes: ModeSelection, flexibility: Flexibility) -> Modes:
@@ -165,12 +175,14 @@ def _patterns(body: ElasticBody, ports: Sequence[Port]) -> NDArray[np.float64]:
 
 
 def _observed(
-    body: ElasticBody, shapes: NDArray[np.float64], observers: Sequence[Observer]
+    body: ElasticBody, shapes: Sequence[NDArray[np.float64]], observers: Sequence[Observer]
 ) -> NDArray[np.float64]:
     for observer in observers:
         _require_length(f"observer '{observer.name}'", observer.weights, body.dof_count)
-    columns = [shapes.T @ observer.weights for observer in observers]
-    return np.column_stack([np.empty((shapes.shape[1], 0)), *columns])
+    weights = np.zeros((body.dof_count, len(observers)))
+    for column, observer in enumerate(observers):
+        weights[:, column] = observer.weights
+    return np.vstack([at_ports(part, weights) for part in shapes])
 
 
 def _require_length(where: str, values: NDArray[np.float64], length: int) -> None:
@@ -183,15 +195,9 @@ def _require_length(where: str, values: NDArray[np.float64], length: int) -> Non
         )
 
 
-def _unit_axial_velocity(body: ElasticBody) -> NDArray[np.float64]:
-    field = np.zeros((body.dof_count // body.dimension, body.dimension))
-    field[:, -1] = 1.0  # z is the last component, in space and in the meridian plane
-    return field.ravel()
-
-
 def _recovery(
     body: ElasticBody,
-    shapes: NDArray[np.float64],
+    shapes: Sequence[NDArray[np.float64]],
     surfaces: Sequence[str],
     nodes: NDArray[np.int64] | None,
 ) -> Recovery | None:
@@ -205,6 +211,6 @@ def _recovery(
     return Recovery(
         nodes=wanted,
         points=body.mesh.points[wanted],
-        shapes=shapes[rows],
+        shapes=np.hstack([part[rows] for part in shapes]),
         faces=np.searchsorted(wanted, faces),
     )

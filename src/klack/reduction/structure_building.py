@@ -14,6 +14,7 @@ from klack.mesh.mesh import FaceBlock, Surface
 from klack.reduction.damping import Damping
 from klack.reduction.face_samples import face_samples
 from klack.reduction.ports import Port
+from klack.reduction.reduce import at_ports
 from klack.reduction.structure import Structure
 
 __all__ = ["StructurePort", "build_structure"]
@@ -87,7 +88,7 @@ def build_structure(
             hint="name a support in bodies." + body.name + ".fixed.",
         )
     patterns = np.column_stack([np.empty((body.dof_count, 0)), *(p.port.pattern for p in ports)])
-    shapes = modes.shapes.T @ patterns
+    shapes = at_ports(modes.shapes, patterns)
     rest = deflections - modes.shapes @ (shapes / modes.omega[:, None] ** 2)
     axial = _axial_field(body)
     static = patterns.T @ deflections
@@ -108,7 +109,7 @@ def build_structure(
         port_signs=np.array([p.sign for p in ports], dtype=float),
         port_shapes=shapes,
         static_compliance=(static + static.T) / 2.0,
-        participation=modes.shapes.T @ (body.M @ axial),
+        participation=modes.shapes.T @ body.axial_momentum,
         group_names=tuple(group.name for group in groups),
         group_area=np.array([group.area for group in groups]),
         group_gram=_stacked([g.gram[None] for g in groups], m + count + 1, m + count + 1),

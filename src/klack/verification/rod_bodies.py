@@ -58,4 +58,5 @@ def rod_contact(a: ElasticBody, b: ElasticBody | None, *, area: float, gap: floa
         nodes=np.zeros(1, dtype=np.int64),
         reach=gap,
         clearance=gap,
+        entry=np.zeros(1),
     )

@@ -9,7 +9,7 @@ it reaches the edge of a named surface (:mod:`klack.contact.surface_edges`).
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import floor, inf, isfinite, log10, nan, pi, sin, sqrt
+from math import floor, inf, isfinite, log10, nan, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,6 @@ from klack.assembling.bodies import BodyPair
 from klack.case.bodies import CaseFile
 from klack.contact.hertz import line_half_width, point_radius
 from klack.contact.mortar import ContactSpace
-from klack.contact.pairing import face_geometry, project_to_surface
 from klack.contact.statics import (
     COARSE,
     StaticContact,
@@ -30,11 +29,11 @@ from klack.contact.statics import (
     ring_radius,
     size_over_half_width,
 )
-from klack.contact.surface_edges import SurfaceEdges, surface_edges
+from klack.contact.surface_edges import SurfaceEdges
 from klack.contact.touch_shape import relative_curvatures
 from klack.elasticity.body import ElasticBody
 from klack.errors import AccuracyWarning
-from klack.mesh.mesh import FaceBlock, Mesh, Surface, solid_at
+from klack.mesh.mesh import Surface, solid_at
 from klack.stages import warnings_of
 from klack.units import format_si
 
@@ -64,9 +63,6 @@ _MARGIN = 0.3
 
 _CARRIES = 1e-6
 """Share of the largest contact force above which a point carries."""
-
-_SHALLOW = sin(0.5 * pi / 180.0)
-"""Slope on both sides of a corner above which it is the corner that touches, not a face."""
 
 _OVER_THE_END = "it reaches the edge of a named surface"
 
@@ -307,30 +303,16 @@ _Side = tuple[ElasticBody, Surface, SurfaceEdges]
 
 
 def _edges(pair: BodyPair) -> tuple[_Side, _Side]:
-    return (
-        (
-            pair.upper,
-            pair.upper_surface,
-            surface_edges(pair.upper.mesh, pair.upper_surface),
-        ),
-        (
-            pair.lower,
-            pair.lower_surface,
-            surface_edges(pair.lower.mesh, pair.lower_surface),
-        ),
-    )
+    upper, lower = pair.edges
+    return (pair.upper, pair.upper_surface, upper), (pair.lower, pair.lower_surface, lower)
 
 
 def _corner(
     pair: BodyPair, sides: tuple[_Side, _Side], space: ContactSpace, lam: NDArray[np.float64]
 ) -> str | None:
     """Text for a corner that carries more than half of the force on one row of elements."""
-    others = (
-        (pair.lower.mesh, pair.lower_surface),
-        (pair.upper.mesh, pair.upper_surface),
-    )
-    for (body, surface, edges), other in zip(sides, others, strict=True):
-        sharp = np.flatnonzero(edges.corners & _touching(edges, other))
+    for (body, surface, edges), facing in zip(sides, pair.sharp_edges, strict=True):
+        sharp = np.flatnonzero(facing)
         if not len(sharp):
             continue
         near = (edges.distance(space.points)[sharp] <= space.size).any(axis=0)
@@ -348,31 +330,6 @@ def _corner(
             "parts), with five elements along it."
         )
     return None
-
-
-def _touching(edges: SurfaceEdges, other: tuple[Mesh, Surface]) -> NDArray[np.bool_]:
-    """Edges whose both faces lead away from the other surface, shape (m,)."""
-    if not len(edges.line):
-        return np.zeros(0, dtype=bool)
-    outward = -edges.along.sum(axis=1)
-    length = np.linalg.norm(outward, axis=1, keepdims=True)
-    outward = outward / np.where(length > 0.0, length, 1.0)
-    middle = edges.line[:, 1]
-    met = project_to_surface(middle, outward, *other)
-    normal = -outward  # where nothing is met: of a surface that faces the corner
-    mesh, surface = other
-    for number, block in enumerate(surface.blocks):
-        for k in np.flatnonzero(met.block == number):
-            normal[k] = _normal_of(mesh, block, int(met.face[k]), met.xi[k])
-    slope = np.einsum("mkd,md->mk", edges.along, normal)
-    return (slope > _SHALLOW).all(axis=1)
-
-
-def _normal_of(
-    mesh: Mesh, block: FaceBlock, face: int, xi: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    one = FaceBlock(block.family, block.connectivity[face : face + 1])
-    return face_geometry(mesh.points, one, xi[None, :]).normal[0, 0]
 
 
 def _tell_ends(

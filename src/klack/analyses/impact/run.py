@@ -92,6 +92,7 @@ from klack.contact.restitution import Deviation
 from klack.contact.statics import ReachError, StaticContact, static_contact
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
+from klack.elasticity.near_loads import NearLoads
 from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, silent
@@ -219,6 +220,7 @@ def impact_of_bodies(
     *,
     levels: Sequence[str],
     certify: bool = True,
+    near: Mapping[str, NearLoads] | None = None,
     progress: Progress = silent,
 ) -> ImpactStudy:
     """Compute one impact of bodies that are there, without what is only compared with.
@@ -235,13 +237,15 @@ def impact_of_bodies(
     levels : sequence of str
         Without ``full``, which frees the factorisations first.
     certify : bool
+    near : mapping of body name to NearLoads, optional
+        Of earlier impacts: the structures then depend on these to about 1e-6, the impact does not.
     progress : callable
     """
     begin = perf_counter()
     wanted = case.require_levels(levels)
     _require_time_to_touch(case, bodies.placed.case.contact.gap)
     clock = StageClock(progress, result_cache())
-    return _study(case, bodies, wanted, certify, begin, clock, None, is_last=False)
+    return _study(case, bodies, wanted, certify, begin, clock, None, is_last=False, near=near)
 
 
 def _modes_needed(case: Case, levels: Sequence[str], certify: bool) -> int:
@@ -266,6 +270,7 @@ def _study(
     threads: int | None,
     *,
     is_last: bool,
+    near: Mapping[str, NearLoads] | None = None,
 ) -> ImpactStudy:
     """One impact of these bodies; the last one frees them, and compares its model with others."""
     pools = bodies.pools
@@ -301,7 +306,7 @@ def _study(
             "reduced": flat_for_reduced(problem, own),
             "interface": flat_for_modes(problem, kept.values()),
         }
-        structures = impact_structures(problem, pools, own)
+        structures = impact_structures(problem, pools, own, near)
         clock("radiating surfaces", 1.0)
         clock("reduced", 0.5)
         results: dict[str, LevelResult] = {}

@@ -1,0 +1,182 @@
+r"""Candidate points of a contact and their compliance, kept for impacts that reach as far.
+
+How far the candidates have to reach depends on speed and force; the compliance of the bodies at
+each of them does not.  So the reach goes up in grades, :math:`2^{k/4}` micrometres, and the
+compliance is condensed grade by grade: what was found for a far reach holds every shorter one, to
+the last bit, and an impact that reaches no further takes it from there.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil, log2
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.assembling.bodies import BodyPair
+from klack.contact.mortar import ContactSpace, contact_space
+from klack.contact.statics import compliances_of
+from klack.contact.worn_faces import WornFaces, opened_by
+from klack.elasticity.statics import Flexibility
+
+__all__ = ["Candidates", "CondensedSpace", "grade_of", "reach_of"]
+
+_STEPS = 4
+"""Grades for twice the reach: the mean of them is 9 % farther than needed."""
+
+_UNIT = 1e-6  # [m]
+
+_FIRST_POINTS = 48
+"""The first estimate of the compliance loads the points that touch first."""
+
+_FIRST_GROUP = 64
+"""Fewest points of the first group, which are solved for at once."""
+
+Array = NDArray[np.float64]
+
+
+def grade_of(reach: float) -> int:
+    """First grade that reaches as far as ``reach`` [m]."""
+    return ceil(_STEPS * log2(reach / _UNIT))
+
+
+def reach_of(grade: int) -> float:
+    """Reach of a grade [m].
+
+    Examples
+    --------
+    >>> grade_of(reach_of(9)), f"{reach_of(8):.1e}"
+    (9, '4.0e-06')
+    """
+    return float(_UNIT * 2.0 ** (grade / _STEPS))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CondensedSpace:
+    """Contact points, and the static compliance of each body there.
+
+    Parameters
+    ----------
+    space : ContactSpace
+    upper, lower : array, shape (nc, nc) [m/N]
+    """
+
+    space: ContactSpace
+    upper: Array
+    lower: Array
+
+    @property
+    def compliance(self) -> Array:
+        """Of both bodies [m/N]."""
+        return self.upper + self.lower
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Kept:
+    """Compliances of the farthest reach of one slave side so far."""
+
+    grade: int
+    nodes: NDArray[np.int64]
+    upper: Array
+    lower: Array
+
+
+class Candidates:
+    """Candidate points of two surfaces.
+
+    Parameters
+    ----------
+    pair : BodyPair
+        Only meshes, surfaces and their form matter; they need not touch.
+    upper, lower : Flexibility
+    """
+
+    def __init__(self, pair: BodyPair, upper: Flexibility, lower: Flexibility) -> None:
+        self.pair, self._upper, self._lower = pair, upper, lower
+        self._first: dict[float | None, tuple[ContactSpace, float]] = {}
+        self._spaces: dict[int, ContactSpace] = {}
+        self._farthest: dict[str, _Kept] = {}
+        self._least: int | None = None
+
+    def first(
+        self, reach: float | None, worn: WornFaces | None = None
+    ) -> tuple[ContactSpace, float]:
+        """Candidates up to a reach, or as many as are cheap, and the compliance of the nearest.
+
+        The compliance [m/N] is the axial one of both bodies under pressure on the points that
+        touch first.
+        """
+        if worn is not None:
+            space = opened_by(self.first(reach)[0], worn)
+            return space, self._first_compliance(space)
+        if reach not in self._first:
+            space = self._space(reach)
+            self._first[reach] = space, self._first_compliance(space)
+        return self._first[reach]
+
+    def within(self, reach: float, worn: WornFaces | None = None) -> CondensedSpace:
+        """Candidates with exactly this reach [m]."""
+        space = self._space(reach)
+        upper, lower = compliances_of(space, self._upper, self._lower)
+        return CondensedSpace(space=opened_by(space, worn), upper=upper, lower=lower)
+
+    def at(self, grade: int, worn: WornFaces | None = None) -> CondensedSpace:
+        """Candidates with the reach of a grade."""
+        if grade not in self._spaces:
+            self._spaces[grade] = self._space(reach_of(grade))
+        space = self._spaces[grade]
+        known = self._farthest.get(space.slave)
+        if known is None or not known.grade >= grade >= self._first_grade():
+            known = self._condensed(space, grade)
+        at = np.searchsorted(known.nodes, space.nodes)
+        rows = np.ix_(at, at)
+        return CondensedSpace(
+            space=opened_by(space, worn), upper=known.upper[rows], lower=known.lower[rows]
+        )
+
+    def _condensed(self, space: ContactSpace, grade: int) -> _Kept:
+        groups = _groups(space, self._first_grade(), grade)
+        upper, lower = compliances_of(space, self._upper, self._lower, groups)
+        found = _Kept(grade=grade, nodes=space.nodes, upper=upper, lower=lower)
+        if grade >= self._first_grade():
+            self._farthest[space.slave] = found
+        return found
+
+    def _first_grade(self) -> int:
+        """Grade from which on the points are in groups: the same for every reach."""
+        if self._least is None:
+            entry = np.sort(self.first(None)[0].entry)
+            least = float(entry[min(_FIRST_GROUP, len(entry)) - 1])
+            self._least = grade_of(max(least, 1e-6 * _UNIT))
+        return self._least
+
+    def _space(self, reach: float | None) -> ContactSpace:
+        pair = self.pair
+        return contact_space(
+            pair.upper.mesh,
+            pair.upper_surface,
+            pair.lower.mesh,
+            pair.lower_surface,
+            reach=reach,
+            form=pair.form,
+        )
+
+    def _first_compliance(self, space: ContactSpace) -> float:
+        gap = np.where(space.axial > 1e-6, space.gap, np.inf)
+        first = np.argsort(gap, kind="stable")[:_FIRST_POINTS]
+        lam = np.zeros(space.count)
+        lam[first] = space.area[first]
+        lam /= space.axial @ lam
+        compliance = 0.0
+        for G, flexibility in ((space.G_a, self._upper), (space.G_b, self._lower)):
+            load = G.T @ lam
+            compliance += float(load @ flexibility.deflections(load[:, None])[:, 0])
+        return compliance
+
+
+def _groups(space: ContactSpace, first: int, last: int) -> Sequence[NDArray[np.int64]]:
+    """Points by the grade at which they become candidates, those up to the first one together."""
+    entry = np.maximum(space.entry, 1e-6 * _UNIT)
+    grade = np.ceil(_STEPS * np.log2(entry / _UNIT)).astype(int).clip(first, max(first, last))
+    groups = [np.flatnonzero(grade == one) for one in range(first, max(first, last) + 1)]
+    return [group for group in groups if len(group)]
