@@ -12,7 +12,7 @@ from nicegui import ui
 
 from klack.app.answers import Checked, ResultCard
 from klack.app.folder import RESULT_NAME
-from klack.app.jobs import Job
+from klack.app.jobs import OF_STUDIES, Job
 from klack.app.pages.frame import (
     START_VALUE,
     button,
@@ -23,6 +23,7 @@ from klack.app.pages.frame import (
     plain,
     show_error,
 )
+from klack.app.pages.study_panel import show_study_run
 from klack.app.state import State
 from klack.errors import InputError, KlackError
 from klack.whole_file import mark_of
@@ -102,6 +103,9 @@ class _Overview:
 
     def _show_job(self, job: Job) -> None:
         with ui.element("div").classes("k-row"):
+            if job.command in OF_STUDIES and job.state != "done":
+                show_study_run(self._state, job)
+                return
             with ui.element("div"):
                 plain(f"klack {job.command} {job.case}").classes("k-title")
                 began = time.strftime("%d %b %H:%M", time.localtime(job.started))
@@ -174,10 +178,12 @@ class _Overview:
                 plain(checked.error, "div").classes("k-error")
             self._show_note(case)
         with ui.element("div").classes("k-tools"):
-            if not checked.error:
+            is_study = checked.kind == "study"
+            if not checked.error and not is_study:
                 button("Run", partial(self._run, case, checked.kind))
                 link("Sliders", f"/sliders?{query}")
-            link("Edit", f"/case?{query}")
+                link("New study", f"/new-study?{query}")
+            link("Open" if is_study else "Edit", f"/case?{query}")
             button("Duplicate", partial(self._ask_copy, case))
             button("Note", partial(self._ask_note, case))
 
@@ -336,6 +342,8 @@ class _Overview:
             for file, word in (("report.html", "Report"), ("report.pdf", "PDF")):
                 if self._state.folder.exists(f"{name}/{file}"):
                     link(word, f"/report?{urlencode({'path': f'{name}/{file}'})}", new=True)
+            if not isinstance(card, str) and card.has_points:
+                link("Points", f"/points?{urlencode({'path': name})}")
             if not isinstance(card, str) and card.compares:
                 self._show_choice(name, chosen)
             button("Note", partial(self._ask_note, name))
