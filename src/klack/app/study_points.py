@@ -222,7 +222,8 @@ def points_json(record: StudyRecord) -> bytes:
         "best": front.best,
         "feasible": front.feasible,
         "bounds": list(front.bounds),
-        "missed": [] if front.kept is None else np.flatnonzero(~front.kept[drawn]).tolist(),
+        "missed": [] if front.kept is None else _places((~front.kept & ~record.failed)[drawn]),
+        "lost": _places(failed[drawn]),
         "doubts": kinds,
         "doubt": doubt,
         "failures": _failures(record.failures, failed),
@@ -265,6 +266,11 @@ def _column(
         "today": _number(factor * scale * item.today),
         "values": [_number(value) for value in values],
     }
+
+
+def _places(which: NDArray[np.bool_]) -> list[int]:
+    """Places among the drawn points."""
+    return [int(place) for place in np.flatnonzero(which)]
 
 
 def _number(value: float) -> float | None:

@@ -27,6 +27,8 @@ _FIRST = {
     "impact": ("peak_force", "contact_time", "restitution"),
 }
 """Measures that are ticked at first, where the case has them."""
+_NEXT = (".peak_force", "noise.sound_exposure_level_weighted", ".approach_speed")
+"""Ends of the names of measures that follow."""
 _OF_THE_SOLVER = (
     "degrees_of_freedom",
     "steps",
@@ -117,9 +119,9 @@ def study_offer(text: str, path: str) -> StudyOffer:
     tree = tree_of(text, Path(path))
     case = tree.any_case()
     kind = "stroke" if "network" in tree.data else "impact"
-    names = [
-        name for name in measure_names(case) if name not in _OF_THE_SOLVER and _can(case, name)
-    ]
+    known = measure_names(case)
+    names = [name for name in known if name not in _OF_THE_SOLVER and _can(case, name)]
+    names.sort(key=lambda name: _rank(name, _FIRST[kind]))
     chosen = kind_of(case).measures(case, names)
     return StudyOffer(
         title=case.title or case.name,
@@ -136,6 +138,13 @@ def study_offer(text: str, path: str) -> StudyOffer:
         ),
         designs=_DESIGNS,
     )
+
+
+def _rank(name: str, first: tuple[str, ...]) -> int:
+    """Place of a measure in the list; those of one rank stay as the reference has them."""
+    if name in first:
+        return 0
+    return next((k for k, end in enumerate(_NEXT, 1) if name.endswith(end)), len(_NEXT) + 1)
 
 
 def _can(case: Any, name: str) -> bool:

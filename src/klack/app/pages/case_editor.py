@@ -29,8 +29,14 @@ async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
         with frame(state, "Case"):
             plain(str(error), "p").classes("k-error")
         return
-    with frame(state, "Case", case):
+    with frame(state, "Study" if _begins_a_study(text) else "Case", case):
         _Editor(state, case, text).build()
+
+
+def _begins_a_study(text: str) -> bool:
+    """Whether a text has the section of a study, and none that a case needs."""
+    heads = {line.partition(":")[0] for line in text.splitlines()}
+    return "study" in heads and not heads & {"bodies", "network"}
 
 
 class _Editor:

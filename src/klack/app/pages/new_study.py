@@ -65,8 +65,7 @@ class _NewStudy:
                 "to four.",
                 "p",
             ).classes("k-soft")
-            ordered = sorted(self._offer.measures, key=lambda item: not item.is_first)
-            self._show_list(ordered, self._show_measures)
+            self._show_list(self._offer.measures, self._show_measures)
         with ui.element("section").classes("k-section"):
             heading("Points")
             with ui.element("div").classes("k-sheet k-pad kp-axes"):
@@ -110,7 +109,7 @@ class _NewStudy:
 
         box.on("input", change, js_handler="(e) => emit(e.target.value)")
 
-    def _show_measures(self, measures: list[MeasureOffer]) -> None:
+    def _show_measures(self, measures: tuple[MeasureOffer, ...]) -> None:
         with _table("", "objective"):
             for item in measures:
                 with ui.element("tr"):

@@ -89,6 +89,8 @@
       this.front = new Set(study.front.map(point => this.place.get(point)).filter(k => k !== undefined));
       this.order = study.front.map(point => this.place.get(point)).filter(k => k !== undefined);
       this.missed = new Set(study.missed);
+      this.lost = new Set(study.lost);
+      this.reasons = new Map(study.failures.points);
       this.doubt = new Map(study.doubt);
       this.shown = study.columns.filter(column => column.varies
         && (column.role === "parameter" || column.role === "measure")).slice(0, 24);
@@ -281,6 +283,7 @@
 
     marks(k) {
       const words = [];
+      if (this.lost.has(k)) words.push("no measures");
       if (this.front.has(k)) words.push("on the front");
       if (this.study.points[k] === this.study.best) words.push("recommended");
       if (this.missed.has(k)) words.push("misses a bound");
@@ -314,10 +317,11 @@
         make("td", { text: this.text(column, column.today) }),
         make("td", { text: this.text(column, column.values[k]) }),
         make("td", { text: this.change(column, column.values[k]) })));
-      const doubt = this.doubt.get(k);
+      const doubt = this.doubt.get(k), reason = this.reasons.get(this.chosen);
       chosen.replaceChildren(
         make("h2", { text: `Point ${this.chosen}` }),
         make("p", { class: "k-soft", text: this.marks(k).join(", ") || "beaten by a point of the front, or without objectives" }),
+        ...(reason ? [make("p", { class: "k-error", text: reason })] : []),
         ...(doubt === undefined ? [] : [make("p", { class: "k-error", text: this.study.doubts[doubt] })]),
         make("div", { class: "k-scroll" }, make("table", { class: "k-table kp-compare" },
           make("thead", {}, make("tr", {}, ...["", "case", `point ${this.chosen}`, "difference"].map(text => make("th", { scope: "col", text })))),
@@ -397,7 +401,7 @@
         const words = some ? `${this.count} of ${this.study.points.length} selected` : `${plural(this.study.points.length, "point")}`;
         if (this.told.textContent !== words) this.told.textContent = words;
         clearTimeout(this.later);
-        this.later = setTimeout(() => { this.showTable(); this.showRanges(); }, 60);
+        this.later = setTimeout(() => { this.showTable(); this.showRanges(); }, 80);
         this.root.dataset.took = (performance.now() - begin).toFixed(1);
       });
     }
@@ -480,26 +484,29 @@
       pen.beginPath(); pen.rect(left - 8, top - 8, width - left - right + 16, height - top - bottom + 16); pen.clip();
       const some = this.brushes.size > 0, xs = across.numbers, ys = up.numbers, full = 2 * Math.PI;
       // batches of one style each: a path per point would take seconds for thousands
-      const batch = (test, style, alpha, shape, filled) => {
+      const batch = (test, style, alpha, size, paint) => {
+        let held = 0;
         pen.globalAlpha = alpha;
         pen.fillStyle = pen.strokeStyle = style;
+        pen.beginPath();
         for (let k = 0; k < xs.length; k++) {
           if (!test(k) || this.front.has(k)) continue;
           const px = x(xs[k]), py = y(ys[k]);
           if (!(px > -50 && px < width + 50 && py > -50 && py < height + 50)) continue;
-          shape(px, py, filled);
+          pen.moveTo(px + size, py);
+          pen.arc(px, py, size, 0, full);
+          if (++held % 64 === 0) { pen[paint](); pen.beginPath(); }
         }
+        pen[paint]();
       };
-      const dot = (px, py) => { pen.beginPath(); pen.arc(px, py, 3, 0, full); pen.fill(); };
-      const hollow = (px, py) => { pen.beginPath(); pen.arc(px, py, 2.8, 0, full); pen.stroke(); };
       const square = (px, py) => pen.strokeRect(px - 4.5, py - 4.5, 9, 9);
       const plain = k => !this.missed.has(k);
       pen.lineWidth = 1.1;
-      batch(k => plain(k) && !(some && this.selected[k]), ghost, some ? 0.3 : 0.6, dot);
-      batch(k => !plain(k) && !(some && this.selected[k]), ghost, some ? 0.3 : 0.7, hollow);
+      batch(k => plain(k) && !(some && this.selected[k]), ghost, some ? 0.3 : 0.6, 3, "fill");
+      batch(k => !plain(k) && !(some && this.selected[k]), ghost, some ? 0.3 : 0.7, 2.8, "stroke");
       if (some) {
-        batch(k => plain(k) && this.selected[k], picked, 0.85, dot);
-        batch(k => !plain(k) && this.selected[k], picked, 0.85, hollow);
+        batch(k => plain(k) && this.selected[k], picked, 0.85, 3, "fill");
+        batch(k => !plain(k) && this.selected[k], picked, 0.85, 2.8, "stroke");
       }
       pen.globalAlpha = 1;
       if (across.way && up.way) {
@@ -592,15 +599,17 @@
         const [px, py] = at(event);
         const framed = this.frame;
         from = this.frame = null;
+        this.dragged = false;
         if (framed) { this.draw(); return; }
         const k = this.nearest(px, py);
         if (k === null) { this.brushes.delete(this.x); this.brushes.delete(this.y); this.select(); this.showRanges(); }
         else this.choose(k);
       });
-      canvas.addEventListener("pointercancel", () => { from = this.frame = null; this.draw(); });
+      canvas.addEventListener("pointercancel", () => { from = this.frame = null; this.dragged = false; this.draw(); });
     }
 
     frameBrush() {
+      this.dragged = true;
       const [a, b, c, d] = this.frame;
       const xs = [this.map.atX(a), this.map.atX(c)].sort((p, q) => p - q), ys = [this.map.atY(b), this.map.atY(d)].sort((p, q) => p - q);
       this.brushes.set(this.x, xs);
@@ -613,7 +622,7 @@
 
     linesMap() {
       const room = Math.max(this.parts.parallel.clientWidth - 34, 240), axes = this.shown.length || 1;
-      const width = Math.max(room, 84 * axes + 40), height = 330, top = 62, bottom = 26, side = Math.min(60, width / (2 * axes));
+      const width = Math.max(room, 84 * axes + 40), height = 330, top = 62, bottom = 26, side = Math.min(64, width / (2 * axes));
       const x = k => axes > 1 ? side + k * (width - 2 * side) / (axes - 1) : width / 2;
       const ends = this.shown.map(column => column.high > column.low ? [column.low, column.high] : [column.low - 1, column.high + 1]);
       const y = (k, value) => height - bottom - (value - ends[k][0]) / (ends[k][1] - ends[k][0]) * (height - top - bottom);
@@ -643,11 +652,11 @@
         }
         pen.stroke();
       };
-      const dense = Math.min(Math.max(60 / Math.sqrt(count + 1), 0.18), 0.6);
+      const dense = of => Math.min(Math.max(220 / (of + 1), 0.07), 0.6);
       if (whole || !this.ground || this.ground.width !== Math.round(width * (window.devicePixelRatio || 1))) {
         this.ground = this.ground || document.createElement("canvas");
         const pen = this.paper(this.ground, width, height);
-        pen.globalAlpha = dense;
+        pen.globalAlpha = dense(count);
         pen.lineWidth = 1;
         pen.strokeStyle = colour("--ghost");
         strokes(pen, k => !this.front.has(k));
@@ -658,8 +667,11 @@
       pen.lineWidth = 1;
       if (some) {
         pen.strokeStyle = colour("--picked");
-        pen.globalAlpha = this.count > 300 ? Math.max(dense, 0.25) : 0.75;
-        strokes(pen, k => this.selected[k] && !this.front.has(k));
+        pen.globalAlpha = dense(this.count) + 0.06;
+        // while a range is dragged some of the lines do: all of them follow at its end
+        const every = this.dragged ? Math.ceil(this.count / 800) : 1;
+        let met = 0;
+        strokes(pen, k => this.selected[k] && !this.front.has(k) && met++ % every === 0);
       }
       pen.lineWidth = 1.8;
       pen.globalAlpha = 0.95;
@@ -683,7 +695,7 @@
         pen.beginPath(); pen.moveTo(x(n), top); pen.lineTo(x(n), height - bottom); pen.stroke();
         pen.textAlign = "center"; pen.textBaseline = "alphabetic";
         pen.fillStyle = ink;
-        const space = columns.length > 1 ? (x(1) - x(0)) - 8 : width - 20;
+        const space = Math.min(columns.length > 1 ? (x(1) - x(0)) - 8 : width, 2 * Math.min(x(n), width - x(n)) - 4);
         this.wrapped(pen, `${column.label}${unit(column)}`, space).forEach((text, row) => pen.fillText(text, x(n), 14 + 14 * row));
         pen.fillStyle = soft;
         const [low, high] = map.ends[n];
@@ -741,16 +753,19 @@
         if (!from) return;
         if (Math.abs(py - from[1]) > 4) from[2] = true;
         if (from[2]) {
+          this.dragged = true;
           const range = [this.axes.at(from[0], from[1]), this.axes.at(from[0], py)].sort((p, q) => p - q);
           this.brush(this.shown[from[0]].name, range);
         }
       });
       const end = () => {
+        this.dragged = false;
+        if (from && from[2]) this.draw();
         if (from && !from[2]) { this.brush(this.shown[from[0]].name, null); this.showRanges(); }
         from = null;
       };
       canvas.addEventListener("pointerup", end);
-      canvas.addEventListener("pointercancel", () => { from = null; });
+      canvas.addEventListener("pointercancel", () => { from = null; this.dragged = false; this.draw(); });
     }
   }
 
