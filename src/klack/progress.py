@@ -1,8 +1,9 @@
 """Progress reports of a long step."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
-__all__ = ["Progress", "remark", "silent"]
+__all__ = ["PointCount", "Progress", "counted", "remark", "silent"]
 
 Progress = Callable[[str, float], None]
 """Called with the name of a stage and the completed fraction, 0 to 1."""
@@ -13,6 +14,33 @@ def remark(progress: Progress, line: str) -> None:
     show = getattr(progress, "remark", None)
     if show is not None:
         show(line)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PointCount:
+    """How an evaluation of points gets on.
+
+    Parameters
+    ----------
+    done, most : int
+        Points that have their values, and all that there will be at most.
+    left : float or None [s]
+        At the rate so far; None before there is one.
+    best : str
+        The best point so far, in words; empty without one.
+    """
+
+    done: int
+    most: int
+    left: float | None = None
+    best: str = ""
+
+
+def counted(progress: Progress, count: PointCount) -> None:
+    """Show how many points are done, if the reporter has a method ``counted``."""
+    show = getattr(progress, "counted", None)
+    if show is not None:
+        show(count)
 
 
 def silent(stage: str, fraction: float) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from klack.cache.result_cache import ResultCache
 from klack.errors import AccuracyWarning, InputError, KlackError
-from klack.progress import Progress, remark
+from klack.progress import PointCount, Progress, counted, remark
 
 Found = TypeVar("Found")
 
@@ -65,6 +65,10 @@ class StageClock:
     def remark(self, line: str) -> None:
         """Pass a line of text on."""
         remark(self._progress, line)
+
+    def counted(self, count: PointCount) -> None:
+        """Pass a count of points on."""
+        counted(self._progress, count)
 
     def _book(self) -> None:
         now = perf_counter()

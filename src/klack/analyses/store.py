@@ -80,7 +80,7 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
     return folder / RESULT_NAME
 
 
-def load_record(folder: Path, form: RecordFormat) -> Any:
+def load_record(folder: Path, form: RecordFormat, *, largest: int = _LARGEST) -> Any:
     """Read what :func:`save_record` wrote.
 
     Parameters
@@ -88,6 +88,8 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
     folder : Path
         The folder given to :func:`save_record`, or the store itself.
     form : RecordFormat
+    largest : int [byte]
+        Of all arrays together; more is refused before it is read.
 
     Raises
     ------
@@ -98,7 +100,7 @@ def load_record(folder: Path, form: RecordFormat) -> Any:
     -----
     A result that another process replaces meanwhile is read again: no numbers of two results mix.
     """
-    return _steadily(folder, lambda path: _load(path, form))
+    return _steadily(folder, lambda path: _load(path, form, largest))
 
 
 def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
@@ -116,7 +118,7 @@ def _steadily(folder: Path, read: Callable[[Path], Found]) -> Found:
     raise _damaged(folder, "a result that keeps changing while it is read")
 
 
-def _load(path: Path, form: RecordFormat) -> Any:
+def _load(path: Path, form: RecordFormat, largest: int) -> Any:
     root, attributes = _open(path)
     if attributes.get("format") != form.name:
         raise InputError(
@@ -134,7 +136,7 @@ def _load(path: Path, form: RecordFormat) -> Any:
             hint="read it with the version of klack that wrote it, or run the case again.",
         )
     try:
-        _require_size(root)
+        _require_size(root, largest)
         record = _read(root, "study", form.kind)
     except InputError as error:
         raise _damaged(path, error.got) from error
@@ -310,7 +312,7 @@ def _words_checksum(values: Mapping[str, Any], order: list[str]) -> int:
 # --------------------------------------------------------------------------- reading
 
 
-def _require_size(root: zarr.Group) -> None:
+def _require_size(root: zarr.Group, largest: int) -> None:
     """Check all sizes before allocating memory: a lost or packed chunk may be large."""
     total = 0
     with warnings.catch_warnings():
@@ -319,8 +321,8 @@ def _require_size(root: zarr.Group) -> None:
     for _, node in members:
         if isinstance(node, zarr.Array):
             total += node.nbytes
-            if total > _LARGEST:
-                raise _incomplete(f"arrays of more than {_LARGEST / 1e9:.3g} GB")
+            if total > largest:
+                raise _incomplete(f"arrays of more than {largest / 1e9:.3g} GB")
 
 
 def _read(parent: zarr.Group, name: str, hint: Any) -> Any:

@@ -1,5 +1,6 @@
 """What the processes that compute tell the pages; light, for the server imports it."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,16 @@ __all__ = [
     "Checked",
     "Curve",
     "FormField",
+    "Heard",
     "Hearing",
     "Judgement",
+    "MeasureOffer",
     "Number",
     "Opened",
     "ResultCard",
     "Slider",
+    "StudyChoice",
+    "StudyOffer",
 ]
 
 Floats = NDArray[np.float64]
@@ -130,6 +135,28 @@ class Hearing:
     pattern_wav: bytes
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Heard:
+    """Click of a point of a study beside that of the case as it is.
+
+    Parameters
+    ----------
+    point : int
+    wav, base_wav : bytes
+        To one full scale, which ``scale`` has in words.
+    scale : str
+    level, base_level : float [dB(A)]
+        Sound exposure levels.
+    """
+
+    point: int
+    wav: bytes
+    base_wav: bytes
+    scale: str
+    level: float
+    base_level: float
+
+
 @dataclass(frozen=True, kw_only=True)
 class ResultCard:
     """A stored result in short.
@@ -141,6 +168,8 @@ class ResultCard:
     doubts : tuple of str
     compares : bool
         Whether two of its kind can be compared.
+    has_points : bool
+        Whether it is a study, whose points have a page.
     """
 
     command: str
@@ -150,6 +179,7 @@ class ResultCard:
     numbers: tuple[Number, ...]
     doubts: tuple[str, ...]
     compares: bool
+    has_points: bool = False
 
 
 @dataclass(frozen=True)
@@ -212,6 +242,67 @@ class Opened:
 
 
 @dataclass(frozen=True, kw_only=True)
+class MeasureOffer:
+    """A measure that a study of a case can have.
+
+    Parameters
+    ----------
+    name, unit, definition : str
+    is_first : bool
+        Whether it is ticked at first.
+    """
+
+    name: str
+    unit: str
+    definition: str
+    is_first: bool
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyOffer:
+    """What a new study of a case can be made of.
+
+    Parameters
+    ----------
+    title, kind : str
+        Of the case.
+    parameters : tuple of Slider
+        Numbers of the case.
+    measures : tuple of MeasureOffer
+    designs : mapping of str to str
+        Designs, with what they are for.
+    """
+
+    title: str
+    kind: str
+    parameters: tuple[Slider, ...]
+    measures: tuple[MeasureOffer, ...]
+    designs: Mapping[str, str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyChoice:
+    """What was chosen of a :class:`StudyOffer`.
+
+    Parameters
+    ----------
+    ranges : mapping of str to pair of str
+        Lowest and highest value, with their units, by the key of the case.
+    measures : tuple of str
+    objectives : mapping of str to str
+        ``"minimise"`` or ``"maximise"``.
+    design : str
+    points : int
+    """
+
+    ranges: Mapping[str, tuple[str, str]]
+    measures: tuple[str, ...]
+    objectives: Mapping[str, str]
+    design: str
+    points: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class FormField:
     """One key of the form.
 
@@ -259,9 +350,13 @@ class Checked:
     line : int
         That the message names; 0 for none.
     title, kind : str
-        Of a valid case; ``"impact"`` or ``"stroke"``.
+        Of a valid case; ``"impact"`` or ``"stroke"``; ``"study"`` of a study in a file of its own.
     fields : tuple of FormField
         Of a valid case.
+    has_study, has_objectives : bool
+        Whether there is a study, with something to search for.
+    case : str
+        Case that a study names.
     """
 
     error: str = ""
@@ -269,3 +364,6 @@ class Checked:
     title: str = ""
     kind: str = ""
     fields: tuple[FormField, ...] = ()
+    has_study: bool = False
+    has_objectives: bool = False
+    case: str = ""

@@ -20,7 +20,7 @@ from klack.acoustics.force_bands import force_bands
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.signal_statistics import sound_statistics
 from klack.acoustics.third_octave import ENERGY_REFERENCE
-from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
+from klack.acoustics.wav import level_statement, wav_bytes
 from klack.analyses.contact_doubts import contact_doubt
 from klack.analyses.impact.estimate_wording import FAIR, GOOD, estimate_sentence, worst_error
 from klack.analyses.impact.record import ImpactStudy
@@ -36,6 +36,7 @@ from klack.analyses.stroke.run import (
 )
 from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number, Opened, Slider
 from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
+from klack.app.listening import common_scale
 from klack.app.sliders import sliders_of, written
 from klack.assembling.problem import contact_problem
 from klack.assembling.valve import Valve, build_valve, filled_network
@@ -59,7 +60,6 @@ Values = Mapping[str, float]
 
 _SHOWN = 0.05  # [s] of the spectrogram
 _LONGEST = 5.0  # [s] of a drive pattern
-_HEADROOM = 12.0  # [dB] of the pinned click, for what a slider adds
 _REFERENCE = 20e-6  # [Pa]
 
 
@@ -205,7 +205,7 @@ class Explorer:
             number=now,
             pinned=self._pinned_loudness or now,
             spectrogram=_spectrogram(pressure),
-            pattern_wav=wav_bytes(pattern, full_scale=_common_scale(pattern, self._pinned)),
+            pattern_wav=wav_bytes(pattern, full_scale=common_scale(pattern, self._pinned)),
         )
 
     def text_at(self, values: Values) -> str:
@@ -401,17 +401,12 @@ def _sounds(now: TimeSeries | None, pinned: TimeSeries | None) -> tuple[bytes, b
     """Both clicks to one full scale: that of the pinned one with room above, or of the louder."""
     if now is None or pinned is None:
         return b"", b"", ""
-    scale = _common_scale(now, pinned)
+    scale = common_scale(now, pinned)
     return (
         wav_bytes(now, full_scale=scale),
         wav_bytes(pinned, full_scale=scale),
         level_statement(scale),
     )
-
-
-def _common_scale(now: TimeSeries, pinned: TimeSeries | None) -> float:
-    louder = full_scale_of(now, headroom=0.1)
-    return louder if pinned is None else max(full_scale_of(pinned, headroom=_HEADROOM), louder)
 
 
 def _spectrogram(pressure: TimeSeries) -> tuple[Floats, Floats, Floats]:

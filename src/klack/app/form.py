@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args, get_origin
 from pydantic.fields import FieldInfo
 
 from klack.app.answers import Checked, FormField
-from klack.case.any_case import AnyCase
+from klack.app.study_texts import is_study, study_source, study_words
 from klack.case.case_tree import CaseTree, tree_of
 from klack.case.inserting import with_values
 from klack.case.key_path import kind_at, node_at
@@ -25,13 +25,30 @@ def checked_text(text: str, path: str) -> Checked:
     """Check the text of a case as every command does, and make its form."""
     try:
         tree = tree_of(text, Path(path))
+        if is_study(tree.data):
+            return _checked_study(text, path)
         case = tree.any_case()
     except KlackError as error:
         return Checked(error=str(error), line=_line_in(str(error), path))
     return Checked(
+        has_study=case.study is not None,
+        has_objectives=case.study is not None and bool(case.study.objectives),
         title=case.title or case.name,
         kind="stroke" if "network" in tree.data else "impact",
         fields=tuple(form_of(case, tree)),
+    )
+
+
+def _checked_study(text: str, path: str) -> Checked:
+    """Check the text of a study by itself; with its case that is more than a form can wait for."""
+    file, _, tree = study_source(text, Path(path))
+    return Checked(
+        title=study_words(file.study),
+        kind="study",
+        fields=tuple(form_of(file, tree)),
+        has_study=True,
+        has_objectives=bool(file.study.objectives),
+        case=file.case or "",
     )
 
 
@@ -46,7 +63,7 @@ def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
     return with_values(tree_of(text, Path(path)), {place: _scalar(written)})
 
 
-def form_of(case: AnyCase, tree: CaseTree) -> Iterator[FormField]:
+def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
     """Fields of what the file has, then single values that it could have in the same sections."""
     written = dict(_leaves(tree.data))
     count = 0
@@ -59,11 +76,12 @@ def form_of(case: AnyCase, tree: CaseTree) -> Iterator[FormField]:
         if count > _MOST:
             return
         kind = kind_at(node, info)
+        start = 1 if place[0] == "study" and len(place) > 2 else 0
         yield FormField(
             key=".".join(map(str, place)),
             place=place,
-            section=str(place[0]) if len(place) > 1 else "case",
-            label=" ".join(map(str, place[1:] if len(place) > 1 else place)).replace("_", " "),
+            section=str(place[start]) if len(place) > 1 else "case",
+            label=" ".join(map(str, place[start + 1 :] or place[-1:])).replace("_", " "),
             written="" if place not in written else _shown(written[place]),
             kind="" if kind is None else kind.name,
             example="" if kind is None else kind.example,
@@ -88,7 +106,7 @@ def _leaves(data: Any, above: Key = ()) -> Iterator[tuple[Key, Any]]:
         yield above, data
 
 
-def _further(case: AnyCase, data: Any, above: Key = ()) -> Iterator[Key]:
+def _further(case: Section, data: Any, above: Key = ()) -> Iterator[Key]:
     """Keys with one quantity, one word or one number that the sections of the file could have."""
     if isinstance(data, Mapping):
         try:

@@ -5,7 +5,8 @@ was killed finds it again, running or ended::
 
     job.json       what was asked for: command, case, folder of the result
     process.json   number of the process and when it began
-    progress.json  stage and fraction
+    progress.json  stage and fraction; of a study also how many points are done
+    live           record of a study that runs or was stopped
     ending.json    exit code, when it ended
     cancelled      empty: it was asked to stop
     stdout, stderr what the command printed
@@ -22,6 +23,7 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
+from math import isfinite
 from pathlib import Path
 from shutil import rmtree
 from typing import Any, Literal
@@ -30,14 +32,20 @@ import psutil
 
 from klack.app.folder import OpenFolder
 from klack.errors import InputError
+from klack.progress import PointCount
 from klack.terminal.progress import PROGRESS_FILE
 from klack.whole_file import whole_file
 
-__all__ = ["COMMANDS", "Job", "Jobs", "State"]
+__all__ = ["COMMANDS", "LIVE", "OF_STUDIES", "Job", "Jobs", "State"]
 
 State = Literal["running", "done", "failed", "cancelled", "lost"]
-COMMANDS = ("impact", "stroke", "noise", "shots")
+COMMANDS = ("impact", "stroke", "noise", "shots", "study", "optimise")
 """Commands that the application starts."""
+OF_STUDIES = ("study", "optimise")
+"""Those of them that are stopped and resumed."""
+
+LIVE = "live"
+"""Of :mod:`klack.analyses.study.live_record`, whose import takes seconds."""
 
 _HOME = ".klack-app"
 _NAME = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{8}")
@@ -68,6 +76,10 @@ class Job:
         Exit code, when it has ended.
     told : str
         The last of what it printed.
+    study : str
+        File of the study, by its path from the folder; empty if it stands in the case.
+    points : PointCount or None
+        Of a study that has begun to compute.
     """
 
     name: str
@@ -80,6 +92,8 @@ class Job:
     fraction: float = 0.0
     code: int | None = None
     told: str = ""
+    study: str = ""
+    points: PointCount | None = None
 
 
 class Jobs:
@@ -95,8 +109,12 @@ class Jobs:
         self._place = folder.path / _HOME / "jobs"
         self._children: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, command: str, case: str, out: str, options: Sequence[str] = ()) -> Job:
+    def start(
+        self, command: str, case: str, out: str, options: Sequence[str] = (), study: str = ""
+    ) -> Job:
         """Start a run that outlives this server.
+
+        A study that was stopped goes on where it was: its points lie in the folder of its result.
 
         Raises
         ------
@@ -107,6 +125,8 @@ class Jobs:
         if command not in COMMANDS:
             raise _refused(command, f"one of: {', '.join(COMMANDS)}")
         path = self._folder.absolute(case)
+        if study:
+            options = [*options, "--study", str(self._folder.absolute(study))]
         running = [job for job in self.all() if job.state == "running"]
         if len(running) >= _MOST_RUNNING:
             raise _refused(f"{len(running)} runs at a time", f"at most {_MOST_RUNNING}")
@@ -115,7 +135,7 @@ class Jobs:
         name = time.strftime("%Y%m%d-%H%M%S-") + secrets.token_hex(4)
         place = self._place / name
         place.mkdir(parents=True, mode=0o700)
-        job = Job(name=name, command=command, case=case, out=out, started=time.time())
+        job = Job(name=name, command=command, case=case, out=out, started=time.time(), study=study)
         _write(place / "job.json", asdict(job))
         arguments = [command, str(path), "--out", str(self._folder.path / out), *options]
         with (place / "stdout").open("wb") as output, (place / "stderr").open("wb") as errors:
@@ -142,6 +162,16 @@ class Jobs:
             return []
         found = (self._job(name) for name in names if _NAME.fullmatch(name))
         return [job for job in found if job is not None]
+
+    def live(self, name: str) -> Path:
+        """Folder of the record of a study that runs or was stopped."""
+        return self._place / _require_name(name) / LIVE
+
+    def of_result(self, out: str) -> Job | None:
+        """The latest run that writes, or wrote, a result of a study."""
+        return next(
+            (job for job in self.all() if job.out == out and job.command in OF_STUDIES), None
+        )
 
     def cancel(self, name: str) -> None:
         """Ask a run to stop; it leaves nothing half written."""
@@ -178,6 +208,8 @@ class Jobs:
                 fraction=float(progress.get("fraction", 0.0)),
                 code=code,
                 told=_tail(place / "stderr") if code else "",
+                study=str(asked.get("study", "")),
+                points=_points(progress.get("points")),
             )
         except (KeyError, TypeError, ValueError):  # not of this version
             return None
@@ -202,6 +234,18 @@ def _state(is_running: bool, code: int | None, is_cancelled: bool) -> State:
     if code in _STOPPED:
         return "cancelled"
     return "done" if code == 0 else "failed"
+
+
+def _points(told: Any) -> PointCount | None:
+    if not isinstance(told, dict):
+        return None
+    left = told["left"]
+    return PointCount(
+        done=int(told["done"]),
+        most=int(told["most"]),
+        left=None if left is None or not isfinite(left) else float(left),
+        best=str(told["best"]),
+    )
 
 
 def _require_name(name: str) -> str:

@@ -16,9 +16,21 @@ from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import sources_of
 from klack.analyses.stroke.record import StrokeStudy
-from klack.app.answers import Answer, Checked, Curve, Number, ResultCard
+from klack.analyses.study.point_case import case_of_point
+from klack.analyses.study.record import StudyRecord
+from klack.app.answers import (
+    Answer,
+    Checked,
+    Curve,
+    Number,
+    ResultCard,
+    StudyChoice,
+    StudyOffer,
+)
 from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
 from klack.app.form import checked_text, exchanged_text
+from klack.app.study_points import StudyPoints, points_json
+from klack.app.study_texts import study_offer, study_problem, study_text
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
 from klack.signals import TimeSeries
@@ -29,7 +41,10 @@ _MOST_NUMBERS = 5
 
 
 class Reader:
-    """Checks texts, tells cases and results in short, compares two results."""
+    """Checks texts, tells cases and results in short, compares two results, reads studies."""
+
+    def __init__(self) -> None:
+        self._points = StudyPoints()
 
     def check(self, text: str, path: str) -> Checked:
         """See :func:`klack.app.form.checked_text`."""
@@ -57,7 +72,33 @@ class Reader:
             numbers=_numbers(record)[:_MOST_NUMBERS],
             doubts=tuple(getattr(record, "warnings", ())),
             compares=isinstance(record, ImpactStudy | StrokeStudy),
+            has_points=isinstance(record, StudyRecord),
         )
+
+    def points(self, folder: str) -> bytes:
+        """See :func:`klack.app.study_points.points_json`."""
+        return points_json(self._points.record(folder))
+
+    def point_case(self, folder: str, point: int, near: str, study: str) -> tuple[str, str]:
+        """Name and text of the case of a point, see :func:`case_of_point`."""
+        return case_of_point(self._points.record(folder), point, Path(near), study)
+
+    def study_of(self, folder: str) -> tuple[str, str]:
+        """Name and text of the case that a study was made of."""
+        record = self._points.record(folder)
+        return record.case, record.case_text
+
+    def study_problem(self, text: str, path: str, case_text: str, case_path: str) -> Checked:
+        """See :func:`klack.app.study_texts.study_problem`."""
+        return study_problem(text, path, case_text, case_path)
+
+    def study_offer(self, text: str, path: str) -> StudyOffer:
+        """See :func:`klack.app.study_texts.study_offer`."""
+        return study_offer(text, path)
+
+    def study_text(self, choice: StudyChoice, case_text: str, case_path: str) -> str:
+        """See :func:`klack.app.study_texts.study_text`."""
+        return study_text(choice, case_text, case_path)
 
     def compare(self, first: str, second: str) -> tuple[Answer, Answer]:
         """Two results of one kind, with their clicks to one full scale."""
@@ -91,6 +132,11 @@ def _numbers(record: Any) -> tuple[Number, ...]:
         return impact_numbers(record.levels[record.reference].measures)
     if isinstance(record, StrokeStudy):
         return stroke_numbers(record.reference, record.channels)
+    if isinstance(record, StudyRecord):
+        return (
+            Number(key="points", name="points", unit="", value=record.count),
+            Number(key="failed", name="failed", unit="", value=int(record.failed.sum())),
+        )
     return ()
 
 

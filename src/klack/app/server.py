@@ -18,8 +18,11 @@ from klack.app.folder import OpenFolder
 from klack.app.guard import LARGEST_BODY, Guard
 from klack.app.pages.case_editor import case_editor_page
 from klack.app.pages.comparing import comparing_page
+from klack.app.pages.new_study import new_study_page
 from klack.app.pages.overview import overview_page
 from klack.app.pages.sliders import sliders_page
+from klack.app.pages.study_points import study_points_page
+from klack.app.points_answer import points_answer
 from klack.app.state import State
 from klack.errors import InputError, KlackError
 
@@ -128,6 +131,8 @@ def _add_pages(state: State) -> None:
         ("/case", case_editor_page),
         ("/sliders", sliders_page),
         ("/compare", comparing_page),
+        ("/points", study_points_page),
+        ("/new-study", new_study_page),
     ):
         _add_page(state, path, page)
 
@@ -141,7 +146,12 @@ def _add_page(state: State, path: str, page: Callable[[State, dict[str, str]], A
 
 def _add_static(outer: FastAPI) -> None:
     """Style and script, read once."""
-    kinds = {"klack.css": "text/css", "klack.js": "text/javascript"}
+    kinds = {
+        "klack.css": "text/css",
+        "klack.js": "text/javascript",
+        "points.css": "text/css",
+        "points.js": "text/javascript",
+    }
     content = {name: files("klack.app").joinpath("static", name).read_bytes() for name in kinds}
 
     async def static(name: str) -> Response:
@@ -173,6 +183,12 @@ def _add_files(outer: FastAPI, state: State) -> None:
             return PlainTextResponse("this sound is not kept any more\n", 404)
         return Response(wav, media_type="audio/wav", headers={"cache-control": "no-store"})
 
+    async def points(path: str = "", known: str = "") -> Response:
+        content = await points_answer(state, path[:_LONGEST_QUERY], known)
+        headers = {"cache-control": "no-store"}
+        return Response(content, media_type="application/json", headers=headers)
+
+    outer.add_api_route("/points-data", points, response_model=None)
     outer.add_api_route("/report", report, response_model=None)
     outer.add_api_route("/sound/{name}", sound, response_model=None)
 

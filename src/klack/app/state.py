@@ -18,6 +18,7 @@ from klack.whole_file import whole_file
 __all__ = ["Notes", "Sounds", "State"]
 
 _EXPLORER, _READER = "klack.app.explorer:Explorer", "klack.app.reader:Reader"
+_LISTENER = "klack.app.listening:Listener"
 _MOST_EXPLORERS = 3
 _LONGEST_NOTE = 20_000  # characters
 
@@ -139,6 +140,8 @@ class State:
     def __init__(self, folder: OpenFolder) -> None:
         self.folder, self.jobs, self.notes = folder, Jobs(folder), Notes(folder)
         self.sounds, self.reader = Sounds(), Worker(_READER)
+        self.listener = Worker(_LISTENER)
+        self.points: dict[str, tuple[str, bytes]] = {}
         self.cards: dict[str, tuple[str, ResultCard]] = {}
         self._spare = Worker(_EXPLORER)
         self._explorers: list[Worker] = []
@@ -178,5 +181,5 @@ class State:
 
     def close(self) -> None:
         """End all processes but those of runs."""
-        for worker in (self.reader, self._spare, *self._explorers):
+        for worker in (self.reader, self.listener, self._spare, *self._explorers):
             worker.close()

@@ -251,4 +251,9 @@ class StudyFile(Section):
     """A study in a file of its own."""
 
     klack: Literal[1] = Field(description="Format version of the file: 1.")
+    case: Text | None = Field(
+        default=None,
+        description="Case file that it was made for, relative to this file: klack app runs the "
+        "study with it. A command names its case itself.",
+    )
     study: CaseStudy = Field(description="What varies and what is computed.")

@@ -7,9 +7,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
+
+from klack.progress import PointCount
 
 __all__ = ["PROGRESS_FILE", "Progress", "show_progress"]
 
@@ -50,17 +53,22 @@ def show_progress(quiet: bool = False) -> Iterator[Progress]:
 
 
 class _ToFile:
-    """Stage and fraction in a file, for a program that shows them (``klack app``)."""
+    """Stage, fraction and points in a file, for a program that shows them (``klack app``)."""
 
     def __init__(self, path: Path) -> None:
         self._path, self._stage, self._next = path, "", 0.0
+        self._points: dict[str, Any] = {}
+
+    def counted(self, count: PointCount) -> None:
+        """Points that go with the next stage or fraction."""
+        self._points = {"points": asdict(count)}
 
     def __call__(self, stage: str, fraction: float) -> None:
         now = time.monotonic()
         if stage == self._stage and now < self._next:
             return
         self._stage, self._next = stage, now + _OFTEN
-        text = json.dumps({"stage": stage, "fraction": fraction})
+        text = json.dumps({"stage": stage, "fraction": fraction} | self._points)
         new = self._path.with_suffix(".new")
         with suppress(OSError):  # the work goes on without being watched
             new.write_text(text, encoding="utf-8")

@@ -1,19 +1,23 @@
 """``klack study`` and ``klack optimise``: a case at many points of its parameter space."""
 
+import os
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
 from klack.errors import require_positive
 from klack.terminal.options import CaseArgument, Components, StudyPath, imported, require_files
+from klack.terminal.progress import PROGRESS_FILE
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterator
 
     from klack.analyses.study.record import StudyRecord
+    from klack.progress import Progress
 
 __all__ = ["optimise", "study"]
 
@@ -76,6 +80,23 @@ def optimise(
     return _run(run_optimisation, "optimum", *words, is_search=True)
 
 
+@contextmanager
+def _live(progress: "Progress") -> "Iterator[dict[str, Any]]":
+    """What shows the points so far to the program that started this process, if one did."""
+    file = os.environ.get(PROGRESS_FILE)
+    if not file:
+        yield {}
+        return
+    from klack.analyses.study.live_record import LIVE, LiveRecord
+
+    live = LiveRecord(Path(file).parent / LIVE, progress)
+    try:
+        yield {"live": live.offer}
+    except KeyboardInterrupt:
+        live.write()
+        raise
+
+
 def _run(
     run: "Callable[..., StudyRecord]",
     name: str,
@@ -107,13 +128,13 @@ def _run(
     if made is not None:
         source, name = source.made(made), "made"
     ending = Ending.of(wanted, f"{checked.name}-{name}")
-    with ending.resumable(point_log_form(checked, tree)[0]) as progress:
-        page, seen = None, {}
+    with ending.resumable(point_log_form(checked, tree)[0]) as progress, _live(progress) as seen:
+        page = None
         if is_search and ending.report:
             from klack.analyses.study.progress_page import ProgressPage
 
             page = ProgressPage(ending.folder, progress)
-            seen = {"seen": page.write}
+            seen["seen"] = page.write
         record = run(
             checked, tree, source, folder=ending.folder, where=where, progress=progress, **seen
         )

@@ -69,13 +69,15 @@ class Evaluation:
     def __init__(self, log: PointLog, workers: PointWorkers) -> None:
         self._log, self._workers = log, workers
         self.computed, self.seconds = 0, 0.0
+        self.so_far: list[PointRow | None] = []
+        """Rows of the points that are being computed, as far as they are there."""
 
     def rows(self, asked: AskedPoints, progress: Progress) -> list[PointRow]:
         """Rows of all points that are asked for, equal ones computed once."""
         begin = perf_counter()
         measures = tuple(item.name for item in asked.chosen)
         keys = [point_key(asked.tree, asked.variant, row) for row in asked.points.written]
-        rows = [self._known(key, measures) for key in keys]
+        self.so_far = rows = [self._known(key, measures) for key in keys]
         first: dict[str, int] = {}
         for place, (key, row) in enumerate(zip(keys, rows, strict=True)):
             if row is None:

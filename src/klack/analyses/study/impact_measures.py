@@ -20,7 +20,7 @@ from klack.case.schema import Case
 from klack.errors import InputError
 from klack.input.problem import one_of
 
-__all__ = ["ImpactOfPoint", "impact_measures"]
+__all__ = ["ImpactOfPoint", "impact_measure_names", "impact_measures"]
 
 _OF_THE_CLOCK = ("wall_time", "setup_time")
 """Differ from run to run."""
@@ -56,9 +56,9 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
         For a name that an impact does not have, with the nearest one; for none at all; for noise
         of bodies without surfaces, and shots of a case without them.
     """
-    known, words = [*_OF_LEVELS, *NOISE_NAMES], f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
+    known, words = impact_measure_names(case), f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
     if case.shots is not None:
-        known, words = [*known, *SHOT_NAMES], f"{words}; {SHOT_WORDS}"
+        words = f"{words}; {SHOT_WORDS}"
     chosen = choose_measures(names, lambda name: _found(case, name), known, words, "peak_force")
     for item in chosen:
         if item.is_noise and not case.has_surfaces:
@@ -69,6 +69,11 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
                 hint="noise needs bodies with meshes.",
             )
     return chosen
+
+
+def impact_measure_names(case: Case) -> tuple[str, ...]:
+    """Names of the measures of an impact, of its noise, and of the shots of a case with them."""
+    return (*_OF_LEVELS, *NOISE_NAMES, *(SHOT_NAMES if case.shots is not None else ()))
 
 
 def _found(case: Case, name: str) -> ChosenMeasure | None:

@@ -4,19 +4,26 @@ from collections.abc import Iterable
 from typing import Any
 
 from klack.analyses.study.asked_points import AskedPoints, PointKind
+from klack.analyses.study.impact_measures import impact_measure_names
 from klack.analyses.study.impacts import IMPACTS
+from klack.analyses.study.stroke_measures import stroke_measure_names
 from klack.analyses.study.strokes import STROKES
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import GivenPoints, points_of
 from klack.case.schema import Case
 
-__all__ = ["ask", "kind_of"]
+__all__ = ["ask", "kind_of", "measure_names"]
 
 
 def kind_of(case: AnyCase) -> PointKind[Any, Any]:
     """Impacts and shots of two bodies, or strokes of a whole valve."""
     return IMPACTS if isinstance(case, Case) else STROKES
+
+
+def measure_names(case: AnyCase) -> tuple[str, ...]:
+    """Names of what can be computed at the points of a case."""
+    return impact_measure_names(case) if isinstance(case, Case) else stroke_measure_names(case)
 
 
 def ask(

@@ -21,6 +21,7 @@ from klack.analyses.study.computing import sounds_of
 from klack.analyses.study.evaluation import Evaluation, asked_of
 from klack.analyses.study.goals import Goals, Side, bound_text, goals_of
 from klack.analyses.study.gradients import Gradients, require_gradients
+from klack.analyses.study.live_record import Seen
 from klack.analyses.study.log import point_log_form
 from klack.analyses.study.made_valves import MadeValves, made_valves_of
 from klack.analyses.study.pace import Pace
@@ -64,6 +65,7 @@ def run_optimisation(
     where: Where = HERE,
     progress: Progress = silent,
     seen: Callable[[StudyRecord], None] | None = None,
+    live: Seen | None = None,
 ) -> StudyRecord:
     """Search for the best points of a study, and refine those of the front.
 
@@ -84,6 +86,8 @@ def run_optimisation(
     progress : callable
     seen : callable, optional
         Takes what was found so far, now and then.
+    live : callable, optional
+        Is offered a record of what was found so far, often.
 
     Raises
     ------
@@ -138,6 +142,8 @@ def run_optimisation(
 
         if seen is not None:
             work.now_and_then = lambda: seen(record())
+        if live is not None:
+            work.always = lambda: live(record)
         for cube in search:
             search.tell(*work.told(cube, front))
         require_some(source, work.found)
@@ -201,6 +207,7 @@ class _Work:
         self._units = {item.name: item.measure.unit for item in self.asked_today.chosen}
         self.done = 0
         self.now_and_then: Callable[[], None] = lambda: None
+        self.always: Callable[[], None] = lambda: None
 
     def asked(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
@@ -249,6 +256,7 @@ class _Work:
         objectives, violations = front.add(columns)
         if self._pace.tell(self.done, self.evaluation.computed, self._best_words(front)):
             self.now_and_then()
+        self.always()
         return objectives, violations
 
     def _best_words(self, front: "_Front") -> str:

@@ -2,7 +2,7 @@
 
 from time import perf_counter
 
-from klack.progress import Progress, remark
+from klack.progress import PointCount, Progress, counted, remark
 
 __all__ = ["Pace", "duration_text"]
 
@@ -37,14 +37,16 @@ class Pace:
             The best one so far, in words.
         """
         now = perf_counter()
+        rate = computed / max(now - self._begin, 1e-9)
+        left = (self._most - done) / rate if computed else None
+        counted(self._progress, PointCount(done=done, most=self._most, left=left, best=best))
         if now - self._last < self._wait or done >= self._most:
             return False
         self._last, self._wait = now, min(2.0 * self._wait, _LONGEST)
         text = f"{done} of {self._most} points"
-        if computed:
-            rate = computed / (now - self._begin)
+        if left is not None:
             text += f", {3600.0 * rate:.3g} in an hour"
-            text += f", {duration_text((self._most - done) / rate)} left"
+            text += f", {duration_text(left)} left"
         remark(self._progress, f"{text}; {best}" if best else text)
         return True
 

@@ -10,10 +10,12 @@ from klack.case.key_path import split_path
 from klack.case.valve_reader import read_any_case
 from klack.errors import InputError
 
-__all__ = ["case_of_point"]
+__all__ = ["case_of_point", "written_of_point"]
 
 
-def case_of_point(record: StudyRecord, point: int | None, folder: Path) -> tuple[str, str]:
+def case_of_point(
+    record: StudyRecord, point: int | None, folder: Path, study: str = "a study"
+) -> tuple[str, str]:
     """Name and text of the case of a point, with all digits; comments stay.
 
     Parameters
@@ -23,6 +25,8 @@ def case_of_point(record: StudyRecord, point: int | None, folder: Path) -> tuple
         The recommended one of an optimisation by default.
     folder : Path
         Where it will lie; files that the case names are looked for there.
+    study : str
+        What it is called in the comment at the head of the text.
 
     Raises
     ------
@@ -41,15 +45,20 @@ def case_of_point(record: StudyRecord, point: int | None, folder: Path) -> tuple
     name = f"{record.case}_point_{point}.yaml"
     tree = tree_of(record.case_text, folder / name)
     values = {
-        split_path(item.name): json.dumps(_written(item, point))
-        for item in (*record.parameters, *record.linked)
-        if "." in item.name
+        split_path(name): json.dumps(value)
+        for name, value in written_of_point(record, point).items()
     }
-    made = f"Point {point} of a study by klack {record.version}, {record.created[:10]}: "
+    made = f"Point {point} of {study} by klack {record.version}, {record.created[:10]}: "
     text = with_values(tree, values, f"{made}{record.design}.\nMade from {record.case}.")
     if not record.own_components:
         read_any_case(text, folder / name)
     return name, text
+
+
+def written_of_point(record: StudyRecord, point: int) -> dict[str, str | float]:
+    """What the case file has at a point instead, by the path of the key."""
+    columns = (*record.parameters, *record.linked)
+    return {item.name: _written(item, point) for item in columns if "." in item.name}
 
 
 def _written(item: StudyColumn, point: int) -> str | float:

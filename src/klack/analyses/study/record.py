@@ -9,6 +9,7 @@ from klack.analyses.record import CaseRecord
 from klack.signals import TimeSeries
 
 __all__ = [
+    "NOT_YET",
     "MissedBound",
     "Optimum",
     "PointSound",
@@ -21,6 +22,9 @@ __all__ = [
 ]
 
 Column = NDArray[np.float64]
+
+NOT_YET = "not computed yet"
+"""Failure of a point of a study that still runs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

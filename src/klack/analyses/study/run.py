@@ -13,10 +13,12 @@ from klack.analyses.study.columns import (
 )
 from klack.analyses.study.evaluation import Evaluation, asked_of
 from klack.analyses.study.goals import bounds_of, is_by_today
+from klack.analyses.study.live_record import Seen
 from klack.analyses.study.log import point_log_form
 from klack.analyses.study.pace import Pace
+from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import StudyPoints, points_in, space_of
-from klack.analyses.study.record import StudyRecord
+from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.robustness import missed_bounds
 from klack.analyses.study.scatter import made_space
 from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
@@ -70,6 +72,7 @@ def run_study(
     folder: Path | None = None,
     where: Where = HERE,
     progress: Progress = silent,
+    live: Seen | None = None,
 ) -> StudyRecord:
     """Compute the points of a study that are not known yet.
 
@@ -85,6 +88,8 @@ def run_study(
     where : Where
         Points are computed.
     progress : callable
+    live : callable, optional
+        Is offered a record of the points so far, often.
 
     Raises
     ------
@@ -105,10 +110,25 @@ def run_study(
         evaluation = Evaluation(log, workers)
         clock("points", 0.0)
         pace = Pace(progress, len(asked.points))
+        waiting = PointRow((None,) * len(asked.chosen), NOT_YET)
+
+        def so_far() -> StudyRecord:
+            *rows, today = (row or waiting for row in evaluation.so_far)
+            return StudyRecord(
+                **case_fields(case),
+                **run_fields(begin, clock),
+                **evaluation.effort(len(asked.points)),
+                **point_fields(asked, points.space, points.values, rows, today),
+                study_text=source.text,
+                design=points.design,
+                measures=measure_columns(asked, rows, today),
+            )
 
         def told(stage: str, fraction: float) -> None:
             clock(stage, fraction)
             pace.tell(round(fraction * len(asked.points)), evaluation.computed)
+            if live is not None:
+                live(so_far)
 
         *found, today = evaluation.rows(asked, told)
     require_some(source, found)

@@ -22,7 +22,7 @@ from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.simulation.network_result import ImpactEvent
 
-__all__ = ["StrokeOfPoint", "stroke_measures"]
+__all__ = ["StrokeOfPoint", "stroke_measure_names", "stroke_measures"]
 
 _OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
 _OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
@@ -54,15 +54,20 @@ def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
     InputError
         For a name that a stroke of this case does not have, with the nearest one; for none at all.
     """
-    stops = [name for name, part in case.network.components.items() if part.type == END_STOP]
-    known = [
-        *_OF_VARIANTS,
-        *(f"{stop}.{key}" for stop in stops for key in _OF_IMPACTS),
-        *NOISE_NAMES,
-    ]
+    stops, known = _stops(case), stroke_measure_names(case)
     return choose_measures(
         names, lambda name: _found(name, stops), known, _known_words(stops), "opening_time"
     )
+
+
+def stroke_measure_names(case: ValveCase) -> tuple[str, ...]:
+    """Names of the measures of a stroke, of the first impact on each stop, and of the noise."""
+    of_impacts = (f"{stop}.{key}" for stop in _stops(case) for key in _OF_IMPACTS)
+    return (*_OF_VARIANTS, *of_impacts, *NOISE_NAMES)
+
+
+def _stops(case: ValveCase) -> list[str]:
+    return [name for name, part in case.network.components.items() if part.type == END_STOP]
 
 
 def _found(name: str, stops: list[str]) -> ChosenMeasure | None:

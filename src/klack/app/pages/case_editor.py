@@ -11,6 +11,7 @@ from nicegui import ui
 
 from klack.app.answers import Checked, FormField
 from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
+from klack.app.pages.study_panel import StudyPanel
 from klack.app.state import State
 from klack.errors import KlackError
 
@@ -34,8 +35,14 @@ async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
         with frame(state, "Case"):
             plain(str(error), "p").classes("k-error")
         return
-    with frame(state, "Case", case):
+    with frame(state, "Study" if _begins_a_study(text) else "Case", case):
         _Editor(state, case, text).build()
+
+
+def _begins_a_study(text: str) -> bool:
+    """Whether a text has the section of a study, and none that a case needs."""
+    heads = {line.partition(":")[0] for line in text.splitlines()}
+    return "study" in heads and not heads & {"bodies", "network"}
 
 
 class _Editor:
@@ -47,15 +54,22 @@ class _Editor:
         self._text = saved if draft is None else draft
         self._changes = 0
         self._given: dict[str, str] = {}
-        self._open = {"case", "motion", "contact"}
+        self._open = {"case", "motion", "contact", "parameters", "objectives"}
 
     def build(self) -> None:
         """Make the page, then check the text while it is shown already."""
+        self._panel = StudyPanel(self._state, self._case)
+        with ui.element("div") as self._above:
+            self._panel.build()
+        self._above.set_visibility(False)
         with ui.element("div").classes("k-head"):
             self._status = plain("checking ...").classes("k-badge").props("role=status")
             plain("").style("flex:1 1 auto")
             button("Discard changes", self._discard)
-            link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
+            self._of_case = ui.element("div").classes("k-tools")
+            with self._of_case:
+                link("New study", f"/new-study?{urlencode({'path': self._case})}")
+                link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
             button("Save", self._save, main=True).props("id=k-save")
         self._message = plain("", "p").classes("k-error").props("role=alert")
         with ui.element("div").classes("k-editor"):
@@ -108,6 +122,9 @@ class _Editor:
                 self._form.clear()
                 self._given.clear()
                 self._show_form(found.fields)
+                self._of_case.set_visibility(found.kind != "study")
+                self._above.set_visibility(found.has_study)
+        await self._panel.checked(text, found)
 
     async def _keep(self, draft: str | None) -> bool:
         """Keep what is not saved, unless a page elsewhere does; whether it is kept."""

@@ -110,6 +110,8 @@ def number_text(number: Number) -> str:
     """Value of a number with sensible digits; a dash where there is none."""
     if number.value is None:
         return "–"
+    if isinstance(number.value, int):
+        return str(number.value)
     digits = {"dB(A)": ".1f", "": ".4f", "us": ".2f"}.get(number.unit, ".4g")
     return f"{number.value:{digits}}"
 

@@ -12,7 +12,7 @@ from nicegui import ui
 
 from klack.app.answers import Checked, ResultCard
 from klack.app.folder import RESULT_NAME, result_names
-from klack.app.jobs import Job
+from klack.app.jobs import OF_STUDIES, Job
 from klack.app.pages.frame import (
     START_VALUE,
     asking,
@@ -24,6 +24,7 @@ from klack.app.pages.frame import (
     plain,
     show_error,
 )
+from klack.app.pages.study_panel import show_study_run
 from klack.app.state import State
 from klack.errors import InputError, KlackError
 from klack.whole_file import mark_of
@@ -111,6 +112,9 @@ class _Overview:
 
     def _show_job(self, job: Job) -> None:
         with ui.element("div").classes("k-row"):
+            if job.command in OF_STUDIES and job.state != "done":
+                show_study_run(self._state, job)
+                return
             with ui.element("div"):
                 plain(f"klack {job.command} {job.case}").classes("k-title")
                 began = time.strftime("%d %b %H:%M", time.localtime(job.started))
@@ -178,10 +182,12 @@ class _Overview:
                 plain(checked.error, "div").classes("k-error")
             self._show_note(case)
         with ui.element("div").classes("k-tools"):
-            if not checked.error:
+            is_study = checked.kind == "study"
+            if not checked.error and not is_study:
                 button("Run", partial(self._run, case, checked.kind), of=case)
                 link("Sliders", f"/sliders?{query}", of=case)
-            link("Edit", f"/case?{query}", of=case)
+                link("New study", f"/new-study?{query}", of=case)
+            link("Open" if is_study else "Edit", f"/case?{query}", of=case)
             button("Duplicate", partial(self._ask_copy, case), of=case)
             button("Note", partial(self._ask_note, case), of=case)
 
@@ -339,6 +345,8 @@ class _Overview:
                 if self._state.folder.exists(f"{name}/{file}"):
                     target = f"/report?{urlencode({'path': f'{name}/{file}'})}"
                     link(word, target, new=True, of=name)
+            if not isinstance(card, str) and card.has_points:
+                link("Points", f"/points?{urlencode({'path': name})}", of=name)
             if not isinstance(card, str) and card.compares:
                 self._show_choice(name, chosen)
             button("Note", partial(self._ask_note, name), of=name)

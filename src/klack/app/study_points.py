@@ -1,0 +1,302 @@
+"""The points of a study as a page draws them: one JSON text, of bounded size."""
+
+import json
+import os
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.store import load_record
+from klack.analyses.study.analysis import STUDY
+from klack.analyses.study.goals import Goals, bound_text, goals_of
+from klack.analyses.study.record import NOT_YET, StudyColumn, StudyRecord
+from klack.analyses.study.wording import short_labels, shown_unit
+from klack.case.case_tree import tree_of
+from klack.case.reader import parse, validated
+from klack.case.study import StudyFile
+from klack.case.study_source import StudySource
+from klack.errors import InputError, KlackError
+from klack.report.wording import printed_unit
+from klack.studies.fronts import compromise, find_front
+from klack.units import is_level
+
+__all__ = ["MOST_DRAWN", "Front", "StudyPoints", "front_of", "points_json"]
+
+MOST_DRAWN = 10_000
+"""Points that a page gets; of more, those of the front and an even choice of the others."""
+LARGEST_STORE = 400_000_000
+"""Bytes of the arrays, and of the files, of a study that is shown."""
+_LISTED, _LONGEST = 300, 1500  # failed points and kinds of doubts; characters of one
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Front:
+    """What no other point beats.
+
+    Parameters
+    ----------
+    ways : mapping of str to str
+        ``"minimise"`` or ``"maximise"``, by the objective.
+    bounds : tuple of str
+        In words.
+    points : tuple of int
+        By the first objective.
+    best : int
+        -1 without a front.
+    kept : bool array or None
+        Points that keep all bounds; None where there are none.
+    feasible : bool
+    """
+
+    ways: dict[str, str]
+    bounds: tuple[str, ...]
+    points: tuple[int, ...]
+    best: int
+    kept: NDArray[np.bool_] | None
+    feasible: bool
+
+
+class StudyPoints:
+    """The record of a study that was looked at last; it is read again once it was replaced."""
+
+    def __init__(self) -> None:
+        self._known: tuple[object, StudyRecord] | None = None
+
+    def record(self, folder: str) -> StudyRecord:
+        """Record of a folder.
+
+        Raises
+        ------
+        InputError
+            For one that is damaged, no study, or larger than is shown.
+        """
+        place = Path(folder)
+        mark = (folder, _mark(place))
+        if self._known is None or self._known[0] != mark or mark[1] is None:
+            _require_small(place)
+            found = load_record(place, STUDY.form, largest=LARGEST_STORE)
+            _require_even(found, place)
+            self._known = mark, found
+        return self._known[1]
+
+
+def _mark(place: Path) -> object:
+    try:
+        state = (place / "result.zarr" / "zarr.json").stat()
+    except OSError:
+        return None
+    return state.st_ino, state.st_mtime_ns, state.st_size
+
+
+def _require_small(place: Path) -> None:
+    total = 0
+    for folder, _, names in os.walk(place / "result.zarr"):
+        for name in names:
+            try:
+                total += os.lstat(Path(folder, name)).st_size
+            except OSError:  # replaced at this moment
+                continue
+        if total > LARGEST_STORE:
+            raise InputError(
+                f"result {place.name}",
+                got=f"files of more than {LARGEST_STORE / 1e6:.0f} MB",
+                expected="a study of up to some hundred thousand points",
+                hint="klack export --to csv writes all points, for other programs.",
+            )
+
+
+def _require_even(record: StudyRecord, place: Path) -> None:
+    """All columns have a value for every point: a store may come from anywhere."""
+    lengths = {item.values.shape for item in record.columns} | {(len(record.notes),)}
+    found = record.optimum
+    inside = found is None or (
+        found.kept.shape == (record.count,)
+        and bool(np.all((found.front >= 0) & (found.front < record.count)))
+        and -1 <= found.best < record.count
+    )
+    if lengths != {(record.count,)} or not inside:
+        raise InputError(
+            f"result {place.name}",
+            got="columns of different lengths",
+            expected="a value of every column for every point",
+            hint="run the study again.",
+        )
+
+
+def front_of(record: StudyRecord) -> Front:
+    """Front of a search, or of the points of a study that has objectives."""
+    found = record.optimum
+    if found is not None:
+        return Front(
+            ways=dict(zip(found.objectives, found.ways, strict=False)),
+            bounds=found.bounds,
+            points=tuple(map(int, found.front)),
+            best=int(found.best),
+            kept=np.asarray(found.kept, dtype=bool) if found.bounds else None,
+            feasible=bool(found.feasible),
+        )
+    try:
+        goals = _goals(record)
+    except KlackError:  # a bound by today, while today is not computed yet
+        goals = None
+    if goals is None:
+        return Front(ways={}, bounds=(), points=(), best=-1, kept=None, feasible=True)
+    columns = {item.name: item for item in record.measures}
+    of = {side: columns[side[0]].values for side in goals.sides}
+    objectives, violations = goals.objective_values(of), goals.violations(of)
+    front = find_front(objectives, violations)
+    points = front.points[np.argsort(objectives[front.points, 0], kind="stable")]
+    signs = zip(goals.objectives, goals.signs, strict=True)
+    return Front(
+        ways={name: "minimise" if sign > 0 else "maximise" for name, sign in signs},
+        bounds=tuple(
+            f"{bound.measure} {bound_text(bound, columns[bound.measure].unit)}"
+            for bound in goals.bounds
+        ),
+        points=tuple(map(int, points)),
+        best=int(points[compromise(objectives[points])]) if points.size else -1,
+        kept=np.all(violations <= 0.0, axis=1) if goals.bounds else None,
+        feasible=front.feasible,
+    )
+
+
+def _goals(record: StudyRecord) -> Goals | None:
+    """Objectives and bounds of the text of the study, if all of them were computed."""
+    path = Path("study.yaml")
+    if record.study_text:
+        data, lines = parse(record.study_text, path)
+        study = validated(StudyFile, record.study_text, path, data, lines).study
+    else:
+        tree = tree_of(record.case_text, path)
+        lines, study = (
+            tree.lines,
+            validated(
+                StudyFile,
+                tree.text,
+                path,
+                {"klack": 1, "study": tree.data.get("study")},
+                tree.lines,
+            ).study,
+        )
+    columns: dict[str, Any] = {item.name: item for item in record.measures}
+    if not study.objectives or not {*study.objectives, *study.constraints} <= columns.keys():
+        return None
+    source = StudySource(study=study, path=path, lines=lines)
+    return goals_of(source, columns, {name: item.today for name, item in columns.items()})
+
+
+def points_json(record: StudyRecord) -> bytes:
+    """Columns, front, doubts and failures of a study."""
+    front, labels = front_of(record), short_labels(record)
+    drawn = _drawn(record.count, front)
+    waiting = np.array([text == NOT_YET for text in record.failures], dtype=bool)
+    failed = record.failed & ~waiting
+    roles = (
+        *((item, "parameter") for item in record.parameters),
+        *((item, "linked") for item in record.linked),
+        *((item, "measure") for item in record.measures),
+    )
+    kinds, doubt = _doubts(record.notes, drawn)
+    data = {
+        "title": record.title or record.case,
+        "case": record.case,
+        "version": record.version,
+        "created": record.created,
+        "design": record.design,
+        "count": record.count,
+        "failed": int(failed.sum()),
+        "waiting": int(waiting.sum()),
+        "doubtful": sum(1 for note in record.notes if note),
+        "points": drawn.tolist(),
+        "columns": [
+            _column(item, role, labels.get(item.name, item.name), front, drawn)
+            for item, role in roles
+        ],
+        "front": list(front.points)[:MOST_DRAWN],
+        "best": front.best,
+        "feasible": front.feasible,
+        "bounds": list(front.bounds),
+        "missed": [] if front.kept is None else _places((~front.kept & ~record.failed)[drawn]),
+        "lost": _places(failed[drawn]),
+        "doubts": kinds,
+        "doubt": doubt,
+        "failures": _failures(record.failures, failed),
+        "warnings": [text[:_LONGEST] for text in record.warnings[:50]],
+    }
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).encode()
+
+
+def _drawn(count: int, front: Front) -> NDArray[np.int64]:
+    if count <= MOST_DRAWN:
+        return np.arange(count)
+    first = np.array(front.points[:MOST_DRAWN], dtype=np.int64)
+    others = np.setdiff1d(np.arange(count), first)
+    room = max(MOST_DRAWN - first.size, 0)
+    even = others[np.linspace(0, others.size - 1, room).astype(np.int64)] if room else others[:0]
+    return np.unique(np.concatenate([first, even]))
+
+
+def _column(
+    item: StudyColumn, role: str, label: str, front: Front, drawn: NDArray[np.int64]
+) -> dict[str, Any]:
+    unit, factor = shown_unit(item.unit)
+    known = item.values[np.isfinite(item.values)]
+    if item.words or is_level(item.unit):
+        scale = 1.0
+    else:
+        unit, scale = printed_unit(factor * known, unit)
+    values = factor * scale * item.values[drawn]
+    return {
+        "name": item.name,
+        "label": label,
+        "role": role,
+        "unit": unit,
+        "words": list(item.words),
+        "varies": item.varies,
+        "level": is_level(item.unit),
+        "time": item.unit == "s",
+        "way": front.ways.get(item.name, ""),
+        "spread": item.spread,
+        "today": _number(factor * scale * item.today),
+        "values": [_number(value) for value in values],
+    }
+
+
+def _places(which: NDArray[np.bool_]) -> list[int]:
+    """Places among the drawn points."""
+    return [int(place) for place in np.flatnonzero(which)]
+
+
+def _number(value: float) -> float | None:
+    return float(f"{value:.7g}") if isfinite(value) else None
+
+
+def _doubts(
+    notes: Sequence[str], drawn: NDArray[np.int64]
+) -> tuple[list[str], list[tuple[int, int]]]:
+    """Different texts, and which of the drawn points (by their place) has which of them."""
+    kinds: dict[str, int] = {}
+    found = []
+    for place, point in enumerate(drawn):
+        text = notes[point][:_LONGEST]
+        if text:
+            kind = kinds.setdefault(text, min(len(kinds), _LISTED))
+            found.append((place, kind))
+    texts = list(kinds)[:_LISTED]
+    return [*texts, "A doubt; klack export --to csv has its words."], found
+
+
+def _failures(failures: Sequence[str], failed: NDArray[np.bool_]) -> dict[str, Any]:
+    """How often each reason came, and the reason of the first points."""
+    places = np.flatnonzero(failed)
+    reasons = Counter(failures[place].partition("\n")[0][:_LONGEST] for place in places)
+    return {
+        "reasons": reasons.most_common(20),
+        "points": [[int(place), failures[place][:_LONGEST]] for place in places[:_LISTED]],
+    }
