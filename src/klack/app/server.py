@@ -15,10 +15,12 @@ from nicegui import ui
 
 from klack.app.access import Access, access_for
 from klack.app.folder import OpenFolder
-from klack.app.guard import LARGEST_BODY, Guard
+from klack.app.guard import LARGEST_BODY, UPLOAD, Guard
 from klack.app.pages.case_editor import case_editor_page
 from klack.app.pages.comparing import comparing_page
+from klack.app.pages.new_valve import new_valve_page
 from klack.app.pages.overview import overview_page
+from klack.app.pages.showing import showing_page
 from klack.app.pages.sliders import sliders_page
 from klack.app.state import State
 from klack.errors import InputError, KlackError
@@ -128,6 +130,8 @@ def _add_pages(state: State) -> None:
         ("/case", case_editor_page),
         ("/sliders", sliders_page),
         ("/compare", comparing_page),
+        ("/show", showing_page),
+        ("/new", new_valve_page),
     ):
         _add_page(state, path, page)
 
@@ -141,13 +145,18 @@ def _add_page(state: State, path: str, page: Callable[[State, dict[str, str]], A
 
 def _add_static(outer: FastAPI) -> None:
     """Style and script, read once."""
-    kinds = {"klack.css": "text/css", "klack.js": "text/javascript"}
-    content = {name: files("klack.app").joinpath("static", name).read_bytes() for name in kinds}
+    kinds = {"klack.css": "text/css"}
+    content = {
+        name: files("klack.app").joinpath("static", name).read_bytes()
+        for name in ("klack.css", "klack.js")
+    }
+    for name in ("scene.js", "three.min.js"):
+        content[name] = files("klack.viewer").joinpath(name).read_bytes()
 
     async def static(name: str) -> Response:
         if name not in content:
             return PlainTextResponse("no such file\n", 404)
-        return Response(content[name], media_type=kinds[name])
+        return Response(content[name], media_type=kinds.get(name, "text/javascript"))
 
     outer.add_api_route("/static/{name}", static, response_model=None)
 
@@ -173,6 +182,22 @@ def _add_files(outer: FastAPI, state: State) -> None:
             return PlainTextResponse("this sound is not kept any more\n", 404)
         return Response(wav, media_type="audio/wav", headers={"cache-control": "no-store"})
 
+    async def scene(name: str) -> Response:
+        packed = state.scenes.get(name.removesuffix(".json"))
+        if packed is None:
+            return PlainTextResponse("this scene is not kept any more\n", 404)
+        headers = {"content-encoding": "gzip", "cache-control": "no-store"}
+        return Response(packed, media_type="application/json", headers=headers)
+
+    async def upload(request: Request) -> Response:
+        try:
+            file = await state.uploads.take(request.stream())
+        except (KlackError, OSError) as error:
+            return PlainTextResponse(f"{error}\n", 415)
+        return PlainTextResponse(file)
+
+    outer.add_api_route(UPLOAD, upload, methods=["POST"], response_model=None)
+    outer.add_api_route("/scene/{name}", scene, response_model=None)
     outer.add_api_route("/report", report, response_model=None)
     outer.add_api_route("/sound/{name}", sound, response_model=None)
 

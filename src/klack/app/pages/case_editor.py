@@ -48,6 +48,7 @@ class _Editor:
             self._status = plain("checking ...").classes("k-badge").props("role=status")
             plain("").style("flex:1 1 auto")
             button("Discard changes", self._discard)
+            link("Show", f"/show?{urlencode({'path': self._case})}")
             link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
             button("Save", self._save, main=True).props("id=k-save")
         self._message = plain("", "p").classes("k-error").props("role=alert")

@@ -135,13 +135,14 @@ class _Overview:
     async def _show_cases(self, cases: tuple[str, ...], is_whole: bool) -> None:
         with ui.element("div").classes("k-head"):
             heading("Cases")
-            button("New case", self._ask_new, main=not cases)
+            link("New valve", "/new").classes("k-main-btn" if not cases else "")
+            button("New case", self._ask_new)
         if not is_whole:
             plain("There is more below this folder than is looked at.", "p").classes("k-error")
         if not cases:
             plain(
-                "No case file (YAML) below this folder yet. New case copies one that comes with "
-                "klack.",
+                "No case file (YAML) below this folder yet. New valve makes one from two STEP files or "
+                "from drawings; New case copies one that comes with klack.",
                 "p",
             ).classes("k-soft")
             return
@@ -176,6 +177,7 @@ class _Overview:
         with ui.element("div").classes("k-tools"):
             if not checked.error:
                 button("Run", partial(self._run, case, checked.kind))
+                link("Show", f"/show?{query}")
                 link("Sliders", f"/sliders?{query}")
             link("Edit", f"/case?{query}")
             button("Duplicate", partial(self._ask_copy, case))
@@ -337,6 +339,7 @@ class _Overview:
                 if self._state.folder.exists(f"{name}/{file}"):
                     link(word, f"/report?{urlencode({'path': f'{name}/{file}'})}", new=True)
             if not isinstance(card, str) and card.compares:
+                link("Show", f"/show?{urlencode({'path': name})}")
                 self._show_choice(name, chosen)
             button("Note", partial(self._ask_note, name))
 
