@@ -132,7 +132,7 @@ def _sizes_of_parts(parts: Mapping[str, Part]) -> Iterator[Finding]:
         advice = "export with the right unit: STEP files state it; tables are in mm."
         yield _error("units", f"longest sides: {words}", advice, _PARTS)
     elif min(longest.values()) < low or max(longest.values()) > high or worst > 20:
-        advice = "compare with the drawing: metres and inches look like this."
+        advice = "compare with the drawing: a wrong unit looks like this."
         yield _doubt("units", f"longest sides: {words}", advice, _PARTS)
     else:
         yield _good("units", f"longest sides: {words}")
@@ -286,11 +286,10 @@ def _placing(
     plan: ValvePlan, parts: Mapping[str, Part], meeting: _Meeting, numbers: _Numbers
 ) -> Iterator[Finding]:
     drawn = meeting.touch.clearance
-    gap = format_si(numbers["gap"], "m", 3)
-    words = (
-        f"as drawn {format_si(abs(drawn), 'm', 3)} {'apart' if drawn >= 0 else 'overlapping'}; "
-        f"the needle is moved to a gap of {gap}"
-    )
+    how = f"{format_si(abs(drawn), 'm', 3)} {'apart' if drawn >= 0 else 'overlapping'}"
+    if abs(drawn) < _CLEAR:
+        how = "touching"
+    words = f"as drawn {how}; the needle is moved to a gap of {plan.gap}"
     if drawn < -0.2 * parts["needle"].longest:
         advice = "the needle must be above the housing along z: turn one part in the CAD program."
         yield _doubt("gap", words, advice, _PARTS)
@@ -314,16 +313,16 @@ def _first_touch(meeting: _Meeting) -> Finding:
         advice = "give one face its crown if it has one; docs/how-to/flat-faces.md."
         return _doubt("first touch", "flat faces that touch all at once", advice, _FACES)
     z = meeting.touch.lower[0][-1]
-    where = f"z {1e3 * z:.4g} mm"
+    where = f"z {1e3 * z:.3g} mm"
     if isfinite(meeting.half_width):
         where += f", half width about {format_si(meeting.half_width, 'm', 2)}"
     if meeting.radius < 1e-6:
         return _good("first touch", f"a point on the axis at {where}")
     if len(meeting.touch.lower) in range(2, 40):
         words = f"{len(meeting.touch.lower)} places at a mean radius of "
-        words += f"{1e3 * meeting.radius:.4g} mm, {where}"
+        words += f"{1e3 * meeting.radius:.3g} mm, {where}"
         return _doubt("first touch", words, "a ring would go all round: look at it.", _FACES)
-    return _good("first touch", f"a ring of radius {1e3 * meeting.radius:.4g} mm at {where}")
+    return _good("first touch", f"a ring of radius {1e3 * meeting.radius:.3g} mm at {where}")
 
 
 def _overlap(plan: ValvePlan, parts: Mapping[str, Part], shift: float) -> str:
@@ -390,7 +389,7 @@ def _effort(
     seconds = least + each * nodes
     time = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
     words = (
-        f"about {nodes:.2g} nodes, elements of {format_si(sizes['needle'].contact, 'm', 2)} at the "
+        f"about {float(f'{nodes:.2g}'):.0f} nodes, elements of {format_si(sizes['needle'].contact, 'm', 2)} at the "
         f"contact; a first run takes about {time} on two cores"
     )
     if seconds > _LONG:
@@ -409,7 +408,7 @@ def _hold(
     held = ", ".join(plan.held)
     if numbers["force"] <= 0.0:
         advice = "give the force of the spring or of the pressure, if there is one."
-        words = f"nothing closes: after the impact the needle flies on; housing held at {held}"
+        words = f"nothing closes: after the impact the needle moves away; housing held at {held}"
         yield _doubt("static hold", words, advice, _MOTION)
     else:
         words = f"{plan.force} closes ({numbers['force'] / weight:.0f} times the weight of the "

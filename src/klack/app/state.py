@@ -137,8 +137,9 @@ class State:
         self.reader.start()
 
     def start_spare(self) -> None:
-        """Start the process of the next slider page ahead: its imports take seconds."""
+        """Start the processes of the next pages ahead: their imports take seconds."""
         self._spare.start()
+        self.shapes.start()
 
     def explorer(self) -> Worker:
         """A process for a slider page, to be given back.

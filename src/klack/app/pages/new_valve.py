@@ -174,7 +174,7 @@ class _Guide:
         self._next.set_visibility(self._plan.step < _LAST)
         missing = ("choose two parts that can be read", "choose both contact faces and a held face")
         stuck = self._plan.step == furthest < 2
-        self._why.set_text(f"To go on, {missing[furthest]}." if stuck else "")
+        self._why.set_text(f"To continue, {missing[furthest]}." if stuck else "")
 
     async def _show(self) -> None:
         if self._plan.step > self._furthest():
@@ -313,7 +313,7 @@ class _Guide:
         if isinstance(found, str):
             plain(found, "p").classes("k-error").props("role=alert")
             return
-        turned = found.not_turned or "a body of revolution round z"
+        turned = found.not_turned or "a body of revolution around z"
         plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
 
     def _show_models(self) -> None:
@@ -323,7 +323,7 @@ class _Guide:
         with ui.element("div").classes("k-sheet k-pad k-stack k-below"):
             if any(f is not None and f.not_turned for f in facts):
                 plain(
-                    "Computed as solids, in minutes: not both parts are turned round z.", "p"
+                    "Computed as solids, in minutes: not both parts are turned around z.", "p"
                 ).classes("k-soft")
                 return
             choice_field(
