@@ -13,6 +13,8 @@ __all__ = [
     "Answer",
     "Checked",
     "Curve",
+    "FaceFacts",
+    "Finding",
     "FormField",
     "Heard",
     "Hearing",
@@ -20,7 +22,9 @@ __all__ = [
     "MeasureOffer",
     "Number",
     "Opened",
+    "PartFacts",
     "ResultCard",
+    "Review",
     "Slider",
     "StudyChoice",
     "StudyOffer",
@@ -367,3 +371,75 @@ class Checked:
     has_study: bool = False
     has_objectives: bool = False
     case: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class FaceFacts:
+    """A face of a part, for a list.
+
+    Parameters
+    ----------
+    name, words : str
+    """
+
+    name: str
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartFacts:
+    """What a STEP file or a drawing holds.
+
+    Parameters
+    ----------
+    words : str
+        Size, volume, solids.
+    faces, solid_faces : tuple of FaceFacts
+        Of the half section, and of the solid; empty where there is none.
+    not_turned : str
+        Why there is no half section; empty where there is one.
+    """
+
+    words: str
+    faces: tuple[FaceFacts, ...]
+    solid_faces: tuple[FaceFacts, ...]
+    not_turned: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """What one check of a new valve found.
+
+    Parameters
+    ----------
+    grade : str
+        ``"good"``, ``"doubt"`` or ``"error"``.
+    what, words, advice : str
+        Name of the check, what was found, and what to do; no advice for what is good.
+    step : int
+        Of the guide, where it is changed.
+    """
+
+    grade: str
+    what: str
+    words: str
+    advice: str = ""
+    step: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Review:
+    """Checks of a new valve, and its case file.
+
+    Parameters
+    ----------
+    findings : tuple of Finding
+    text : str
+        Of the case; empty where an error stands in its way.
+    steps : tuple of str
+        Bodies whose STEP files the case names, as ``needle.step`` beside it.
+    """
+
+    findings: tuple[Finding, ...]
+    text: str = ""
+    steps: tuple[str, ...] = ()

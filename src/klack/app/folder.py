@@ -8,7 +8,7 @@ import os
 import secrets
 import stat
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
@@ -27,6 +27,7 @@ LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
 _DEEPEST, _MOST = 5, 2000  # levels, and entries that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
+_STEP_ENDINGS = (".step", ".stp")
 
 
 @dataclass(frozen=True)
@@ -41,11 +42,14 @@ class Found:
         Folders that hold a result.
     is_whole : bool
         False where there is more than was looked at.
+    steps : tuple of str
+        STEP files.
     """
 
     cases: tuple[str, ...]
     results: tuple[str, ...]
     is_whole: bool
+    steps: tuple[str, ...] = ()
 
 
 class OpenFolder:
@@ -71,6 +75,7 @@ class OpenFolder:
         """Find cases and results; links are not followed."""
         cases: list[str] = []
         results: list[str] = []
+        steps: list[str] = []
         seen = 0
         waiting = [(self.path, 0)]
         while waiting and seen < _MOST:
@@ -91,7 +96,14 @@ class OpenFolder:
                         waiting.append((Path(entry.path), depth + 1))
                 elif entry.name.endswith(_CASE_ENDINGS) and _is_case(Path(entry.path)):
                     cases.append(here)
-        return Found(tuple(sorted(cases)), tuple(sorted(results)), seen < _MOST)
+                elif entry.name.lower().endswith(_STEP_ENDINGS):
+                    steps.append(here)
+        return Found(
+            cases=tuple(sorted(cases)),
+            results=tuple(sorted(results)),
+            is_whole=seen < _MOST,
+            steps=tuple(sorted(steps)),
+        )
 
     def read(self, relative: str, *, largest: int = LARGEST_FILE) -> bytes:
         """Content of a file below the folder.
@@ -146,6 +158,29 @@ class OpenFolder:
         if self.exists(relative):
             raise _refused(relative, "a file that is there already")
         self.write(relative, text)
+
+    def make_folder(self, name: str, files: Mapping[str, bytes]) -> None:
+        """Make a new folder with files in it, all of them or nothing.
+
+        Raises
+        ------
+        InputError
+            If there is something of that name already.
+        """
+        if self.exists(name):
+            raise _refused(name, "a file or folder that is there already")
+        new = f".klack-{secrets.token_hex(8)}"
+        with self._parent(name) as (held, last):
+            held.make(new)
+            try:
+                with held.inner(new) as inner:
+                    for file, data in files.items():
+                        _replace(inner, file, data)
+                held.rename(new, last)
+            except BaseException:
+                held.remove(new)
+                raise
+            held.synchronise()
 
     def absolute(self, relative: str) -> Path:
         """Path of an entry below the folder that is there and no link.

@@ -19,7 +19,7 @@ from urllib.parse import parse_qs, parse_qsl, quote, urlencode
 
 from klack.app.access import Access
 
-__all__ = ["LARGEST_BODY", "POLICY", "Guard"]
+__all__ = ["LARGEST_BODY", "LARGEST_UPLOAD", "POLICY", "UPLOAD", "Guard"]
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -27,6 +27,8 @@ Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 LARGEST_BODY = 4 * 2**20  # [byte] of a request
+LARGEST_UPLOAD = 64 * 2**20  # [byte] of a STEP file
+UPLOAD = "/upload"
 _LONGEST_LOGIN = 4096  # [byte]
 
 POLICY = (
@@ -104,10 +106,13 @@ class Guard:
             return 403, "The request does not say from which page it comes."
         if scope["type"] == "websocket" and not self._has_session(scope):
             return 403, _NO_TOKEN
-        length = _headers(scope, b"content-length")
-        if length and not (length[0].isdecimal() and int(length[0]) <= self._largest):
-            return 413, f"More than {self._largest} bytes."
+        length, largest = _headers(scope, b"content-length"), self._largest_of(scope)
+        if length and not (length[0].isdecimal() and int(length[0]) <= largest):
+            return 413, f"More than {largest} bytes."
         return None
+
+    def _largest_of(self, scope: Scope) -> int:
+        return LARGEST_UPLOAD if scope["path"] == UPLOAD else self._largest
 
     def _has_session(self, scope: Scope) -> bool:
         found = _cookie(_headers(scope, b"cookie"), self._access.cookie)
@@ -152,13 +157,13 @@ class Guard:
             await _refuse(scope, send, 403, "That is not the password. Wait a second, try again.")
 
     async def _hand_on(self, scope: Scope, receive: Receive, send: Send) -> None:
-        came, begun = 0, False
+        came, begun, largest = 0, False, self._largest_of(scope)
 
         async def bounded() -> MutableMapping[str, Any]:
             nonlocal came
             message = await receive()
             came += len(message.get("body", b""))
-            if came > self._largest:
+            if came > largest:
                 raise _TooLarge
             return message
 
@@ -173,7 +178,7 @@ class Guard:
             await self.app(scope, bounded, guarded)
         except _TooLarge:
             if not begun:
-                await _refuse(scope, send, 413, f"More than {self._largest} bytes.")
+                await _refuse(scope, send, 413, f"More than {largest} bytes.")
 
 
 _NO_TOKEN = "Open the address that klack app printed: it holds the token of this session."

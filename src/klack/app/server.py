@@ -15,11 +15,13 @@ from nicegui import ui
 
 from klack.app.access import Access, access_for
 from klack.app.folder import OpenFolder
-from klack.app.guard import LARGEST_BODY, Guard
+from klack.app.guard import LARGEST_BODY, UPLOAD, Guard
 from klack.app.pages.case_editor import case_editor_page
 from klack.app.pages.comparing import comparing_page
 from klack.app.pages.new_study import new_study_page
+from klack.app.pages.new_valve import new_valve_page
 from klack.app.pages.overview import overview_page
+from klack.app.pages.showing import showing_page
 from klack.app.pages.sliders import sliders_page
 from klack.app.pages.study_points import study_points_page
 from klack.app.points_answer import points_answer
@@ -133,6 +135,8 @@ def _add_pages(state: State) -> None:
         ("/compare", comparing_page),
         ("/points", study_points_page),
         ("/new-study", new_study_page),
+        ("/show", showing_page),
+        ("/new", new_valve_page),
     ):
         _add_page(state, path, page)
 
@@ -153,11 +157,14 @@ def _add_static(outer: FastAPI) -> None:
         "points.js": "text/javascript",
     }
     content = {name: files("klack.app").joinpath("static", name).read_bytes() for name in kinds}
+    for name in ("scene.js", "three.min.js"):
+        content[name] = files("klack.viewer").joinpath(name).read_bytes()
+        kinds[name] = "text/javascript"
 
     async def static(name: str) -> Response:
         if name not in content:
             return PlainTextResponse("no such file\n", 404)
-        return Response(content[name], media_type=kinds[name])
+        return Response(content[name], media_type=kinds.get(name, "text/javascript"))
 
     outer.add_api_route("/static/{name}", static, response_model=None)
 
@@ -189,6 +196,22 @@ def _add_files(outer: FastAPI, state: State) -> None:
         return Response(content, media_type="application/json", headers=headers)
 
     outer.add_api_route("/points-data", points, response_model=None)
+    async def scene(name: str) -> Response:
+        packed = state.scenes.get(name.removesuffix(".json"))
+        if packed is None:
+            return PlainTextResponse("this scene is not kept any more\n", 404)
+        headers = {"content-encoding": "gzip", "cache-control": "no-store"}
+        return Response(packed, media_type="application/json", headers=headers)
+
+    async def upload(request: Request) -> Response:
+        try:
+            file = await state.uploads.take(request.stream())
+        except (KlackError, OSError) as error:
+            return PlainTextResponse(f"{error}\n", 415)
+        return PlainTextResponse(file)
+
+    outer.add_api_route(UPLOAD, upload, methods=["POST"], response_model=None)
+    outer.add_api_route("/scene/{name}", scene, response_model=None)
     outer.add_api_route("/report", report, response_model=None)
     outer.add_api_route("/sound/{name}", sound, response_model=None)
 

@@ -11,6 +11,8 @@ from typing import Any
 from klack.app.answers import ResultCard
 from klack.app.folder import OpenFolder
 from klack.app.jobs import Jobs
+from klack.app.uploads import Uploads
+from klack.app.valve_plan import Plans
 from klack.app.worker import Worker
 from klack.errors import InputError
 from klack.whole_file import whole_file
@@ -19,21 +21,27 @@ __all__ = ["Notes", "Sounds", "State"]
 
 _EXPLORER, _READER = "klack.app.explorer:Explorer", "klack.app.reader:Reader"
 _LISTENER = "klack.app.listening:Listener"
+_SHAPES = "klack.app.shapes:Shapes"
+_MOST_SCENES = 6
 _MOST_EXPLORERS = 3
 _LONGEST_NOTE = 20_000  # characters
 
 
 @dataclass
 class Sounds:
-    """The latest sounds in memory, by names that cannot be guessed.
+    """The latest sounds in memory, by names that cannot be guessed; or scenes.
 
     Parameters
     ----------
     most : int
         Kept; older ones are forgotten.
+    place, ending : str
+        Of their addresses.
     """
 
     most: int = 200
+    place: str = "/sound"
+    ending: str = ".wav"
     _kept: "OrderedDict[str, bytes]" = field(default_factory=OrderedDict)
 
     def add(self, wav: bytes) -> str:
@@ -42,7 +50,7 @@ class Sounds:
         self._kept[name] = wav
         while len(self._kept) > self.most:
             self._kept.popitem(last=False)
-        return f"/sound/{name}.wav"
+        return f"{self.place}/{name}{self.ending}"
 
     def get(self, name: str) -> bytes | None:
         """A sound, if it is still kept."""
@@ -140,6 +148,8 @@ class State:
     def __init__(self, folder: OpenFolder) -> None:
         self.folder, self.jobs, self.notes = folder, Jobs(folder), Notes(folder)
         self.sounds, self.reader = Sounds(), Worker(_READER)
+        self.scenes = Sounds(most=_MOST_SCENES, place="/scene", ending=".json")
+        self.shapes, self.plans, self.uploads = Worker(_SHAPES), Plans(folder), Uploads(folder)
         self.listener = Worker(_LISTENER)
         self.points: dict[str, tuple[str, bytes]] = {}
         self.cards: dict[str, tuple[str, ResultCard]] = {}
@@ -151,8 +161,9 @@ class State:
         self.reader.start()
 
     def start_spare(self) -> None:
-        """Start the process of the next slider page ahead: its imports take seconds."""
+        """Start the processes of the next pages ahead: their imports take seconds."""
         self._spare.start()
+        self.shapes.start()
 
     def explorer(self) -> Worker:
         """A process for a slider page, to be given back.
@@ -181,5 +192,6 @@ class State:
 
     def close(self) -> None:
         """End all processes but those of runs."""
-        for worker in (self.reader, self.listener, self._spare, *self._explorers):
+        workers = (self.reader, self.listener, self.shapes, self._spare, *self._explorers)
+        for worker in workers:
             worker.close()

@@ -1,10 +1,12 @@
 // Bodies in three dimensions: mount(element, payload, options) draws what payload.py packed.
 // One scene and one WebGL context for each mount; dispose() releases both.
 //
-// options: theme 'light' or 'dark' (default: that of the system), panel false (bodies and curves alone), autoplay false.
-// mount returns {dispose(), setTime(microseconds), showMode(index, share), on(event, call), state(), probe(body, vertex)};
-// events: 'pick' (name of a face), 'time' (microseconds), 'mode' (index). showMode counts the modes of all bodies as they
-// are listed; share is their largest displacement over the overall size.
+// options: theme 'light' or 'dark' (default: that of the system), panel false (bodies and curves alone) or
+// copy false (a pick copies nothing), autoplay false.
+// mount returns {dispose(), setTime(microseconds), showMode(index, share), on(event, call), state(), probe(body, vertex),
+// highlight(name of a face or null), setRoles({name: 'contact' or 'held'}), setTheme(theme), setCut(on), setVisible(body, on)};
+// events: 'pick' (name of a face), 'hover' (the same, or null), 'time' (microseconds), 'mode' (index). showMode counts the
+// modes of all bodies as they are listed; share is their largest displacement over the overall size.
 import * as THREE from './three.min.js';
 
 const STYLE = `
@@ -489,7 +491,7 @@ export function mount(element, payload, options = {}) {
 class SceneView {
   constructor(element, payload, options) {
     this.payload = payload; this.options = options;
-    this.listeners = {pick: [], time: [], mode: []};
+    this.listeners = {pick: [], hover: [], time: [], mode: []};
     this.undo = [];
     this.frames = 0;
     this.state = {motion: 'still', mode: null, time: 0, share: 0.08, factor: 1, playing: false, rigid: true};
@@ -518,6 +520,14 @@ class SceneView {
       showMode: (i, magnification) => this.showMode(i, magnification),
       on: (event, call) => { (this.listeners[event] ||= []).push(call); },
       probe: (body, vertex) => this.probe(body, vertex),
+      highlight: name => this.hover(this.hitOf(name)),
+      setRoles: roles => this.setRoles(roles),
+      setTheme: theme => { this.options.theme = theme; this.applyTheme(); },
+      setCut: on => this.setCut(on),
+      setVisible: (name, on) => {
+        for (const body of this.bodies) if (body.name === name) body.group.visible = on;
+        this.invalidate();
+      },
       state: () => ({...this.state, frames: this.frames, modes: this.modes.length, hasScene: Boolean(this.renderer)}),
     };
   }
@@ -528,7 +538,7 @@ class SceneView {
   }
 
   emit(event, value) {
-    for (const call of this.listeners[event]) call(value);
+    for (const call of this.listeners[event] ?? []) call(value);
   }
 
   // ---- scene
@@ -572,7 +582,7 @@ class SceneView {
     this.controls.addEventListener('change', () => this.invalidate());
     this.ray = new THREE.Raycaster();
     this.listen(this.canvas, 'pointermove', e => { this.pointer = e; this.invalidate(); });
-    this.listen(this.canvas, 'pointerleave', () => { this.pointer = null; this.hover(null); });
+    this.listen(this.canvas, 'pointerleave', () => { this.pointer = null; this.hover(null); this.tellHover(null); });
     this.listen(this.canvas, 'pointerdown', e => { this.pressed = [e.clientX, e.clientY]; });
     this.listen(this.canvas, 'click', e => {
       if (this.pressed && Math.hypot(e.clientX - this.pressed[0], e.clientY - this.pressed[1]) > 4) return;
@@ -626,7 +636,8 @@ class SceneView {
 
   setTheme() {
     const media = window.matchMedia('(prefers-color-scheme: dark)');
-    const apply = () => {
+    const apply = this.applyTheme = () => {
+      if (this.gone) return;
       const dark = this.options.theme ? this.options.theme === 'dark' : media.matches;
       this.root.classList.toggle('ks-dark', dark);
       for (const body of this.bodies) {
@@ -767,11 +778,39 @@ class SceneView {
     this.invalidate();
   }
 
+  tellHover(hit) {
+    const name = hit && hit.face >= 0 ? `${hit.body.name}.${hit.body.faces[hit.face]}` : null;
+    if (name === this.hovered) return;
+    this.hovered = name;
+    this.emit('hover', name);
+  }
+
+  hitOf(name) {
+    for (const body of this.bodies) {
+      const face = name && name.startsWith(body.name + '.') ? body.faces.indexOf(name.slice(body.name.length + 1)) : -1;
+      if (face >= 0) return {body, face};
+    }
+    return null;
+  }
+
+  // which faces touch and which are held, in place of what the payload says
+  setRoles(roles) {
+    for (const body of this.bodies) {
+      const of = body.faces.map(face => roles[`${body.name}.${face}`]);
+      body.pair = of.flatMap((role, i) => role === 'contact' ? [i] : []);
+      const {role, held} = body.surface.geometry.attributes;
+      body.face.forEach((face, v) => { role.array[v] = of[face] === 'contact' ? 1 : 0; held.array[v] = of[face] === 'held' ? 1 : 0; });
+      role.needsUpdate = held.needsUpdate = true;
+    }
+    this.invalidate();
+  }
+
   role(hit) {
     return hit.body.pair.includes(hit.face) ? ' (contact)' : '';
   }
 
   pick(name) {
+    if (this.options.copy === false) { this.emit('pick', name); return; }
     const copied = () => this.say(`Copied: ${name}`), failed = () => this.say(name);
     if (navigator.clipboard && window.isSecureContext) navigator.clipboard.writeText(name).then(copied, () => this.copyByHand(name) ? copied() : failed());
     else if (this.copyByHand(name)) copied();
@@ -808,7 +847,7 @@ class SceneView {
     const passed = Math.min((now - (this.last ?? now)) / 1e3, 0.1);
     this.last = now;
     if (this.state.playing && !document.hidden) this.advance(passed);
-    if (this.pointer && this.renderer && !this.pointer.buttons) { const e = this.pointer; this.pointer = null; this.hover(this.hitAt(e), e); }
+    if (this.pointer && this.renderer && !this.pointer.buttons) { const e = this.pointer, hit = this.hitAt(e); this.pointer = null; this.hover(hit, e); this.tellHover(hit); }
     if (this.renderer) {
       const pixel = (this.camera.top - this.camera.bottom) / this.camera.zoom / this.height;
       for (const ring of this.rings) { ring.material.uniforms.width.value = 2.2 * pixel; ring.material.uniforms.cut.value = this.cut ? 1 : 0; }
@@ -1216,6 +1255,6 @@ class SceneView {
     this.dimensionLines.geometry.dispose(); this.dimensionLines.material.dispose();
     if (this.renderer) { this.renderer.dispose(); this.renderer.forceContextLoss(); this.renderer = null; }
     this.root.remove();
-    this.listeners = {pick: [], time: [], mode: []};
+    this.listeners = {};
   }
 }

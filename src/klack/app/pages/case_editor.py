@@ -68,6 +68,7 @@ class _Editor:
             button("Discard changes", self._discard)
             self._of_case = ui.element("div").classes("k-tools")
             with self._of_case:
+                link("Show", f"/show?{urlencode({'path': self._case})}")
                 link("New study", f"/new-study?{urlencode({'path': self._case})}")
                 link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
             button("Save", self._save, main=True).props("id=k-save")

@@ -143,13 +143,14 @@ class _Overview:
     async def _show_cases(self, cases: tuple[str, ...], is_whole: bool) -> None:
         with ui.element("div").classes("k-head"):
             heading("Cases")
-            button("New case", self._ask_new, main=not cases)
+            link("New valve", "/new").classes("k-main-btn" if not cases else "")
+            button("New case", self._ask_new)
         if not is_whole:
             plain("There is more below this folder than is looked at.", "p").classes("k-error")
         if not cases:
             plain(
-                "No case file (YAML) below this folder yet. New case copies one that comes with "
-                "klack.",
+                "No case file (YAML) below this folder yet. New valve makes one from two STEP files or "
+                "from drawings; New case copies one that comes with klack.",
                 "p",
             ).classes("k-soft")
             return
@@ -185,6 +186,7 @@ class _Overview:
             is_study = checked.kind == "study"
             if not checked.error and not is_study:
                 button("Run", partial(self._run, case, checked.kind), of=case)
+                link("Show", f"/show?{query}", of=case)
                 link("Sliders", f"/sliders?{query}", of=case)
                 link("New study", f"/new-study?{query}", of=case)
             link("Open" if is_study else "Edit", f"/case?{query}", of=case)
@@ -348,6 +350,7 @@ class _Overview:
             if not isinstance(card, str) and card.has_points:
                 link("Points", f"/points?{urlencode({'path': name})}", of=name)
             if not isinstance(card, str) and card.compares:
+                link("Show", f"/show?{urlencode({'path': name})}", of=name)
                 self._show_choice(name, chosen)
             button("Note", partial(self._ask_note, name), of=name)
 

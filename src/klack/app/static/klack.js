@@ -13,6 +13,16 @@
     try { localStorage.setItem(KEY, next); } catch { /* kept for this page only */ }
     apply();
   };
+  // a STEP file to the server: its place there, or why not, in words
+  window.klackUpload = async (file, largest) => {
+    if (!file) return null;
+    if (file.size > largest) return { name: file.name, error: `${file.name}: ${Math.ceil(file.size / 2 ** 20)} MiB, more than ${largest / 2 ** 20} MiB. Try: copy it into the folder of the application.` };
+    try {
+      const answer = await fetch("/upload", { method: "POST", body: file });
+      const text = (await answer.text()).trim();
+      return answer.ok ? { name: file.name, file: text } : { name: file.name, error: `${file.name}: ${text}` };
+    } catch (error) { return { name: file.name, error: `${file.name}: ${error.message}` }; }
+  };
   const wait = setInterval(() => {
     if (document.getElementById("k-theme") && window.Quasar) { clearInterval(wait); apply(); }
   }, 30);

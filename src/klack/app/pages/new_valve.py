@@ -1,0 +1,524 @@
+"""Guide for a new valve: parts, faces, materials, motion, checks, and the case file."""
+
+import asyncio
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import PurePosixPath
+from typing import Any
+from urllib.parse import urlencode
+
+from nicegui import ui
+
+from klack.app.answers import Finding, PartFacts, Review
+from klack.app.drawing_table import EXAMPLES
+from klack.app.folder import LARGEST_FILE
+from klack.app.guard import LARGEST_UPLOAD
+from klack.app.pages.faces import FacesStep
+from klack.app.pages.fields import choice_field, text_field
+from klack.app.pages.frame import button, frame, heading, link, plain, show_error
+from klack.app.state import State
+from klack.app.valve_plan import BODIES, STEPS, ValvePlan
+from klack.errors import InputError, KlackError
+from klack.material_library import MATERIALS, MaterialEntry
+from klack.units import format_si
+
+__all__ = ["new_valve_page"]
+
+_WORDS = {"needle": "the moving body, above", "housing": "the body that it hits"}
+_GRADES = {"good": "good", "doubt": "fair", "error": "out"}
+_TITLES = {"good": "good", "doubt": "doubtful", "error": "error"}
+_LAST = len(STEPS) - 1
+
+
+async def new_valve_page(state: State, given: Mapping[str, str]) -> None:
+    """The page, where it was left."""
+    words = "From two STEP files or two drawings to a case. What is chosen here is kept."
+    with frame(state, "New valve", words):
+        guide = _Guide(state, await asyncio.to_thread(state.plans.load))
+        guide.build()
+    await asyncio.to_thread(state.shapes.start)
+
+
+class _Guide:
+    """One step at a time; the plan is kept at each change."""
+
+    def __init__(self, state: State, plan: ValvePlan) -> None:
+        self._state, self._plan = state, plan
+        self._facts: dict[str, PartFacts | str] = {}
+        self._writing = asyncio.Lock()
+
+    def build(self) -> None:
+        """Make the page, then read the parts while it is shown already."""
+        self._steps = ui.element("nav").classes("k-steps")
+        self._steps.props["aria-label"] = "Steps of the guide"
+        self._body = ui.element("div")
+        with ui.element("div").classes("k-head k-onward"):
+            self._back = button("Back", partial(self._move, -1)).props("id=k-back")
+            self._next = button("Next", partial(self._move, 1), main=True).props("id=k-next")
+            self._why = plain("", "span").classes("k-soft").props("role=status")
+            plain("").style("flex:1 1 auto")
+            button("Start over", self._start_over)
+        ui.timer(0.05, self._opened, once=True)
+
+    async def _opened(self) -> None:
+        await self._read_parts()
+        await self._show()
+
+    # ----------------------------------------------------------------------- keeping
+
+    @property
+    def plan(self) -> ValvePlan:
+        """All choices so far."""
+        return self._plan
+
+    async def keep(self, plan: ValvePlan) -> None:
+        """Change the plan; what cannot be kept is told and not changed."""
+        before, self._plan = self._plan, plan  # at once: another change may come meanwhile
+        self._show_steps()
+        async with self._writing:
+            try:
+                await asyncio.to_thread(self._state.plans.keep, self._plan)
+            except (KlackError, OSError) as error:
+                if self._plan is plan:
+                    self._plan = before
+                    self._show_steps()
+                show_error(error)
+
+    async def _move(self, by: int) -> None:
+        await self._go(self._plan.step + by)
+
+    async def _go(self, step: int) -> None:
+        step = min(max(step, 0), self._furthest())
+        await self.keep(replace(self._plan, step=step))
+        await self._show()
+
+    async def _start_over(self) -> None:
+        await asyncio.to_thread(self._state.plans.forget)
+        self._plan, self._facts = ValvePlan(), {}
+        await self._show()
+
+    # ----------------------------------------------------------------------- the parts
+
+    def source(self, body: str) -> tuple[str, str] | None:
+        """Where a body comes from, for the process that reads it; None where nothing is given."""
+        value = self._plan.of(body, "file" if self._plan.source == "step" else "table")
+        if not value.strip():
+            return None
+        if self._plan.source == "table":
+            return "table", value
+        return "step", str(self._state.folder.absolute(value))
+
+    def sources(self) -> dict[str, tuple[str, str]]:
+        """Of both bodies, which are there."""
+        found = {body: self.source(body) for body in BODIES}
+        return {body: source for body, source in found.items() if source is not None}
+
+    async def _read_parts(self) -> None:
+        self._facts = {}
+        for body in BODIES:
+            try:
+                source = self.source(body)
+                if source is not None:
+                    if source[0] == "step":
+                        self._require_small(self._plan.of(body, "file"))
+                    self._facts[body] = await self._state.shapes.call("part", body, source)
+            except (KlackError, OSError) as error:
+                self._facts[body] = str(error).replace(f"{self._state.folder.path}/", "")
+
+    def _require_small(self, file: str) -> None:
+        size = self._state.folder.absolute(file).stat().st_size
+        if size > LARGEST_FILE:
+            raise InputError(
+                file,
+                got=f"{size / 2**20:.0f} MiB",
+                expected=f"at most {LARGEST_FILE // 2**20} MiB",
+                hint="simplify the part in the CAD program.",
+            )
+
+    def facts(self, body: str) -> PartFacts | None:
+        """Of a body that could be read."""
+        found = self._facts.get(body)
+        return found if isinstance(found, PartFacts) else None
+
+    @property
+    def model(self) -> str:
+        """``"half"`` where it is chosen and both parts are turned."""
+        turned = all((f := self.facts(b)) is not None and not f.not_turned for b in BODIES)
+        return self._plan.model if turned else "solid"
+
+    def _furthest(self) -> int:
+        """Last step that can be shown."""
+        if any(self.facts(body) is None for body in BODIES):
+            return 0
+        needed = [self._plan.of(body, "contact") for body in BODIES] + list(self._plan.held[:1])
+        return _LAST if len(needed) == 3 and all(needed) else 1
+
+    # ----------------------------------------------------------------------- what is seen
+
+    def _show_steps(self) -> None:
+        furthest = self._furthest()
+        self._steps.clear()
+        with self._steps:
+            for number, name in enumerate(STEPS):
+                found = button(f"{number + 1} {name}", partial(self._go, number))
+                found.props["aria-current"] = "step" if number == self._plan.step else "false"
+                if number > furthest:
+                    found.props["disabled"] = True
+        for found, is_off in (
+            (self._back, self._plan.step == 0),
+            (self._next, self._plan.step >= min(furthest, _LAST)),
+        ):
+            found.props["disabled"] = is_off
+            found.update()
+        self._next.set_visibility(self._plan.step < _LAST)
+        missing = ("choose two parts that can be read", "choose both contact faces and a held face")
+        stuck = self._plan.step == furthest < 2
+        self._why.set_text(f"To continue, {missing[furthest]}." if stuck else "")
+
+    async def _show(self) -> None:
+        if self._plan.step > self._furthest():
+            self._plan = replace(self._plan, step=self._furthest())
+        self._show_steps()
+        shown = (
+            self._show_parts,
+            self._show_faces,
+            self._show_materials,
+            self._show_motion,
+            self._show_checks,
+            self._show_case,
+        )[self._plan.step]
+        self._body.clear()
+        with self._body:
+            heading(f"{self._plan.step + 1} {STEPS[self._plan.step]}").classes("k-sr")
+            await shown()
+
+    # ----------------------------------------------------------------------- 1 parts
+
+    async def _show_parts(self) -> None:
+        with ui.element("div").classes("k-sheet k-pad k-stack"):
+            choice_field(
+                "The two bodies come from",
+                {"step": "STEP files", "table": "drawings of their half sections"},
+                self._plan.source,
+                partial(self._change_parts, "source"),
+            )
+            plain(
+                "Axis of motion is z, in both files; the needle is above. One body in each file: "
+                "several solids of one file are glued where they touch. An assembly of both bodies "
+                "is not taken apart: export each body by itself."
+                if self._plan.source == "step"
+                else "In mm. Each row: r, z, name of the surface that leads there; for an arc also r "
+                "and z of its centre. The first row is the start, and the outline closes itself.",
+                "p",
+            ).classes("k-soft")
+        with ui.element("div").classes("k-grid k-below"):
+            steps: tuple[str, ...] = ()
+            if self._plan.source == "step":
+                steps = (await asyncio.to_thread(self._state.folder.look)).steps
+            for body in BODIES:
+                with ui.element("section").classes("k-sheet k-pad k-stack"):
+                    heading(f"{body.capitalize()}: {_WORDS[body]}", 3)
+                    if self._plan.source == "step":
+                        self._show_files(body, steps)
+                    else:
+                        self._show_table(body)
+                    self._show_facts(body)
+        self._show_models()
+
+    def _show_files(self, body: str, steps: tuple[str, ...]) -> None:
+        now, label = self._plan.of(body, "file"), self._plan.of(body, "label")
+        names = {"": "choose ..."} | {name: name for name in steps}
+        if now and now not in names:
+            names[now] = f"{label or PurePosixPath(now).name} (from this computer)"
+        choice_field(
+            f"STEP file of the {body} in the folder",
+            names,
+            now,
+            lambda value: self._change_file(body, value, ""),
+        )
+        with ui.element("label"):
+            plain(f"or from this computer, {LARGEST_UPLOAD // 2**20} MiB at most").classes("k-soft")
+            box = ui.element("input").props("type=file accept=.step,.stp,.STEP,.STP")
+            box.classes("k-input").props["aria-label"] = f"STEP file of the {body}, from here"
+            box.on(
+                "change",
+                lambda event: self._uploaded(body, event.args),
+                js_handler="async (e) => { const file = e.target.files[0]; if (file) emit(await "
+                f"window.klackUpload(file, {LARGEST_UPLOAD})); }}",
+            )
+
+    async def _uploaded(self, body: str, answer: Any) -> None:
+        if not isinstance(answer, dict):
+            return
+        if answer.get("error"):
+            self._facts[body] = str(answer["error"])[:2000]
+            await self._show()
+            return
+        await self._change_file(body, str(answer.get("file", "")), str(answer.get("name", "")))
+
+    async def _change_file(self, body: str, file: str, label: str) -> None:
+        plan = self._plan.with_body(body, "file", file).with_body(body, "label", label[:200])
+        await self._with_parts(plan)
+
+    async def _change_parts(self, what: str, value: str) -> None:
+        await self._with_parts(replace(self._plan, **{what: value}))
+
+    async def _with_parts(self, plan: ValvePlan) -> None:
+        """Read other parts; faces that they do not have are chosen no more."""
+        await self.keep(plan)
+        await self._read_parts()
+        known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
+        if all(self.facts(body) is not None for body in BODIES):
+            await self.keep(self._plan.with_faces(known))
+        await self._show()
+
+    def _faces_of(self, body: str) -> tuple[Any, ...]:
+        facts = self.facts(body)
+        if facts is None:
+            return ()
+        return facts.faces if self.model == "half" else facts.solid_faces
+
+    def _show_table(self, body: str) -> None:
+        area = plain(self._plan.of(body, "table"), "textarea").classes("k-input k-code")
+        area.props("rows=10 spellcheck=false autocomplete=off")
+        area.props["aria-label"] = f"drawing of the {body}: r, z, surface, centre r, centre z"
+        area.on(
+            "change",
+            lambda event: self._with_parts(self._plan.with_body(body, "table", str(event.args))),
+            js_handler="(e) => emit(e.target.value)",
+        )
+        with ui.element("div").classes("k-tools k-left"):
+            button(
+                "Fill in the example",
+                lambda: self._with_parts(self._plan.with_body(body, "table", EXAMPLES[body])),
+            ).props["aria-label"] = f"Fill in the example of the {body}"
+            with ui.element("label").classes("k-soft"):
+                plain("or a CSV file ")
+                box = ui.element("input").props("type=file accept=.csv,.txt,text/csv")
+                box.props["aria-label"] = f"CSV file of the {body}"
+                box.on(
+                    "change",
+                    lambda event: self._with_parts(
+                        self._plan.with_body(body, "table", str(event.args or ""))
+                    ),
+                    js_handler="async (e) => { const file = e.target.files[0]; "
+                    "if (file) emit(await file.slice(0, 200000).text()); }",
+                )
+
+    def _show_facts(self, body: str) -> None:
+        found = self._facts.get(body)
+        if found is None:
+            return
+        if isinstance(found, str):
+            plain(found, "p").classes("k-error").props("role=alert")
+            return
+        turned = found.not_turned or "a body of revolution around z"
+        plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
+
+    def _show_models(self) -> None:
+        facts = [self.facts(body) for body in BODIES]
+        if self._plan.source != "step" or None in facts:
+            return
+        with ui.element("div").classes("k-sheet k-pad k-stack k-below"):
+            if any(f is not None and f.not_turned for f in facts):
+                plain(
+                    "Computed as solids, in minutes: not both parts are turned around z.", "p"
+                ).classes("k-soft")
+                return
+            choice_field(
+                "Both parts are turned. Compute",
+                {
+                    "half": "their half sections: seconds, fine elements at the contact",
+                    "solid": "solids: minutes, coarser elements at the contact",
+                },
+                self._plan.model,
+                partial(self._change_parts, "model"),
+            )
+
+    # ----------------------------------------------------------------------- 2 faces
+
+    async def _show_faces(self) -> None:
+        faces = {body: self._faces_of(body) for body in BODIES}
+        step = FacesStep(faces, lambda: self._plan, self.keep)
+        step.build()
+
+        async def drawn() -> None:
+            try:
+                packed = await self._state.shapes.call("parts_scene", self.sources(), self.model)
+            except KlackError as error:
+                step.refuse(str(error))
+                return
+            step.draw(self._state.scenes.add(packed))
+
+        ui.timer(0.05, drawn, once=True)
+
+    # ----------------------------------------------------------------------- 3 materials
+
+    async def _show_materials(self) -> None:
+        with ui.element("div").classes("k-grid"):
+            for body in BODIES:
+                with ui.element("section").classes("k-sheet k-pad k-stack"):
+                    heading(body.capitalize(), 3)
+                    choice_field(
+                        f"Material of the {body}",
+                        {name: f"{name}: {entry.condition}" for name, entry in MATERIALS.items()},
+                        self._plan.of(body, "material"),
+                        partial(self._change_material, body),
+                    )
+                    _show_material(MATERIALS.get(self._plan.of(body, "material")))
+
+    async def _change_material(self, body: str, value: str) -> None:
+        if value in MATERIALS:
+            await self.keep(self._plan.with_body(body, "material", value))
+            await self._show()
+
+    # ----------------------------------------------------------------------- 4 motion
+
+    async def _show_motion(self) -> None:
+        fields = (
+            ("speed", "Speed at the impact", "of the needle, towards the housing; 0.02 to 5 m/s"),
+            ("force", "Closing force", "of spring, pressure and magnet at that moment; 0 N if none"),
+            ("gap", "Gap at the start", "travel to first touch; 0 um begins at the touch"),
+        )
+        with ui.element("div").classes("k-sheet k-form-open"):
+            for key, label, words in fields:
+                text_field(label, words, getattr(self._plan, key), partial(self._change, key))
+            with ui.element("label").classes("k-field"):
+                with ui.element("div"):
+                    plain("Assumed mount and plate")
+                    plain("a bracket of 1.5 mm sheet steel, so that the click can be played", "small")
+                box = ui.element("input").props("type=checkbox")
+                box.props["aria-label"] = "Assumed mount and plate"
+                if self._plan.noise:
+                    box.props["checked"] = True
+                box.on(
+                    "change",
+                    lambda event: self.keep(replace(self._plan, noise=bool(event.args))),
+                    js_handler="(e) => emit(e.target.checked)",
+                )
+
+    async def _change(self, key: str, value: str) -> None:
+        await self.keep(replace(self._plan, **{key: value.strip()[:80]}))
+
+    # ----------------------------------------------------------------------- 5 checks
+
+    async def _review(self) -> Review:
+        place = str(self._state.folder.path / "case.yaml")
+        plan = replace(self._plan, model=self.model)
+        found: Review = await self._state.shapes.call("review", plan, self.sources(), place)
+        return found
+
+    async def _show_checks(self) -> None:
+        waiting = plain("Checking ...", "p").props("role=status")
+        place = ui.element("div")
+
+        async def checked() -> None:
+            try:
+                found = await self._review()
+            except KlackError as error:
+                waiting.set_text(str(error))
+                waiting.classes("k-error")
+                return
+            counts = [sum(f.grade == grade for f in found.findings) for grade in _TITLES]
+            waiting.set_text(
+                f"{counts[0]} good, {counts[1]} doubtful, {counts[2]} "
+                f"error{'s' * (counts[2] != 1)}; estimates, nothing is solved yet"
+            )
+            with place, ui.element("div").classes("k-sheet"):
+                for finding in sorted(found.findings, key=lambda f: -list(_TITLES).index(f.grade)):
+                    self._show_finding(finding)
+
+        ui.timer(0.05, checked, once=True)
+
+    def _show_finding(self, finding: Finding) -> None:
+        with ui.element("div").classes("k-row k-finding"):
+            plain(_TITLES[finding.grade]).classes(f"k-badge {_GRADES[finding.grade]}")
+            with ui.element("div"):
+                plain(finding.what, "div").classes("k-title")
+                plain(finding.words, "div").classes("k-soft")
+                if finding.advice:
+                    plain(f"Try: {finding.advice}", "div")
+            if finding.grade != "good":
+                button(f"To {STEPS[finding.step].lower()}", partial(self._go, finding.step))
+
+    # ----------------------------------------------------------------------- 6 case
+
+    async def _show_case(self) -> None:
+        with ui.element("div").classes("k-sheet k-form-open"):
+            text_field(
+                "Name of the valve",
+                "a folder of this name is made, with case.yaml and the STEP files that it needs",
+                self._plan.name,
+                partial(self._change, "name"),
+            )
+        with ui.element("div").classes("k-head k-below"):
+            write = button("Write the case and run", partial(self._write, "run"), main=True)
+            others = [
+                button("Write, open sliders", partial(self._write, "sliders")),
+                button("Write, open editor", partial(self._write, "case")),
+            ]
+        message = plain("", "p").classes("k-error").props("role=alert")
+        text = plain("writing ...", "pre").classes("k-sheet k-pad k-yaml")
+        text.props["tabindex"] = "0"
+        self._message = message
+
+        async def written() -> None:
+            try:
+                found = await self._review()
+            except KlackError as error:
+                found = Review(findings=())
+                message.set_text(str(error))
+            errors = [f for f in found.findings if f.grade == "error"]
+            if errors:
+                message.set_text("\n".join(f"{f.what}: {f.words}" for f in errors))
+            text.set_text(found.text or "No case: see the checks.")
+            if not found.text:
+                for each in (write, *others):
+                    each.props["disabled"] = True
+                    each.update()
+
+        ui.timer(0.05, written, once=True)
+
+    async def _write(self, then: str) -> None:
+        """Make the folder with all that belongs to the case, or nothing."""
+        name = self._plan.name
+        try:
+            self._plan.require_name()
+            found = await self._review()
+            if not found.text:
+                return
+            files = {"case.yaml": found.text.encode()}
+            for body in found.steps:
+                file = self._plan.of(body, "file")
+                files[f"{body}.step"] = await asyncio.to_thread(self._state.folder.read, file)
+            await asyncio.to_thread(self._state.folder.make_folder, name, files)
+            if then == "run":
+                await asyncio.to_thread(
+                    self._state.jobs.start, "impact", f"{name}/case.yaml", f"klack-results/{name}"
+                )
+        except (KlackError, OSError) as error:
+            self._message.set_text(str(error))
+            return
+        query = urlencode({"path": f"{name}/case.yaml"})
+        ui.navigate.to("/" if then == "run" else f"/{then}?{query}")
+
+
+def _show_material(entry: MaterialEntry | None) -> None:
+    if entry is None:
+        return
+    with ui.element("div").classes("k-scroll"), ui.element("table").classes("k-table k-sources"):
+        with ui.element("thead"), ui.element("tr"):
+            for word in ("", "value", "source"):
+                plain(word, "th")
+        with ui.element("tbody"):
+            for constant in entry.constants:
+                value = constant.value
+                shown = (
+                    format_si(value, constant.unit) if isinstance(value, float) else "over temperature"
+                )
+                with ui.element("tr"):
+                    plain(constant.label, "td")
+                    plain(shown, "td")
+                    mark = "" if constant.verified else " (source not read, or an estimate)"
+                    plain(f"{constant.source}{mark}", "td")

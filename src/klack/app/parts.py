@@ -1,0 +1,234 @@
+"""A part of a new valve: from a STEP file or a drawing, as half section where it has one."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.app.answers import FaceFacts, PartFacts
+from klack.app.drawing_table import outline_of_table
+from klack.case.geometry import Outline
+from klack.errors import InputError
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import Mesh
+from klack.mesh.occ import MM, glue, revolved_solids
+from klack.mesh.profile import Profile
+from klack.mesh.quality import PoorElementError
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_step, read_step
+from klack.mesh.step_content import StepContent, StepPart, step_content
+from klack.mesh.step_profile import NotTurnedError, profiles_of_step
+
+__all__ = ["Part", "part_of_step", "part_of_table"]
+
+_FINER = (25, 50, 100)  # elements over the longest side, of a mesh for the picture alone
+_MOST_FACES = 400  # in a list
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Part:
+    """One of the two bodies.
+
+    Parameters
+    ----------
+    name : str
+    path : Path or None
+        STEP file; None for a drawing.
+    profiles : mapping of str to Profile, or None
+        Half section of each solid; None for a part that is not turned.
+    content : StepContent or None
+    not_turned : str
+    """
+
+    name: str
+    path: Path | None
+    profiles: Mapping[str, Profile] | None
+    content: StepContent | None = None
+    not_turned: str = ""
+
+    @property
+    def box(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lowest and highest corner [m]."""
+        if self.content is not None:
+            low = np.min([solid.low for solid in self.content.solids], axis=0)
+            high = np.max([solid.high for solid in self.content.solids], axis=0)
+            return low, high
+        assert self.profiles is not None
+        points = np.concatenate(
+            [c.at(np.linspace(0, 1, 33)) for p in self.profiles.values() for c in p.curves]
+        )
+        r = float(points[:, 0].max())
+        return np.array([-r, -r, points[:, 1].min()]), np.array([r, r, points[:, 1].max()])
+
+    @property
+    def longest(self) -> float:
+        """Longest side [m]."""
+        low, high = self.box
+        return float(np.max(high - low))
+
+    @property
+    def volume(self) -> float:
+        """Of all solids [m^3]."""
+        if self.content is not None:
+            return float(sum(solid.size for solid in self.content.solids))
+        assert self.profiles is not None
+        return float(sum(profile.volume for profile in self.profiles.values()))
+
+    def is_half(self, model: str) -> bool:
+        """Whether it is computed as half section."""
+        return model == "half" and self.profiles is not None
+
+    def faces(self, model: str) -> tuple[str, ...]:
+        """Names of its faces in a model."""
+        return tuple(face.name for face in self._faces(model))
+
+    def _faces(self, model: str) -> tuple[FaceFacts, ...]:
+        if self.is_half(model):
+            assert self.profiles is not None
+            return _profile_faces(self.profiles)
+        return () if self.content is None else tuple(map(_step_face, self.content.faces))
+
+    @property
+    def facts(self) -> PartFacts:
+        """For the page."""
+        low, high = self.box
+        size = " x ".join(f"{1e3 * x:.4g}" for x in high - low)
+        solids = 1 if self.content is None else len(self.content.solids)
+        count = "" if solids == 1 else f"{solids} solids that are glued, "
+        faces, solid_faces = self._faces("half"), self._faces("solid")
+        shown = faces if self.profiles is not None else solid_faces
+        if len(shown) > _MOST_FACES:
+            raise InputError(
+                self.name,
+                got=f"{len(shown)} faces",
+                expected=f"at most {_MOST_FACES}",
+                hint="suppress small fillets and threads in the CAD program, or write the case.",
+            )
+        return PartFacts(
+            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm³, {len(shown)} named faces",
+            faces=faces if self.profiles is not None else (),
+            solid_faces=solid_faces,
+            not_turned=self.not_turned,
+        )
+
+    def picture_mesh(self, model: str) -> Mesh:
+        """A coarse mesh, for a picture and for where the bodies touch."""
+        if self.is_half(model):
+            return self._half_mesh
+        return self._solid_mesh
+
+    @cached_property
+    def _half_mesh(self) -> Mesh:
+        assert self.profiles is not None
+        return mesh_meridian(self.profiles, MeshSizing(size=self.longest / 20))
+
+    @cached_property
+    def _solid_mesh(self) -> Mesh:
+        if self.path is None:
+            raise InputError(
+                self.name, got="a drawing", expected="a STEP file", hint="use the half section."
+            )
+        for count in _FINER[:-1]:
+            try:
+                return mesh_step(self.path, MeshSizing(size=self.longest / count))
+            except PoorElementError:
+                continue
+        return mesh_step(self.path, MeshSizing(size=self.longest / _FINER[-1]))
+
+    @cached_property
+    def shape(self) -> Any:
+        """As OpenCASCADE has it [mm]."""
+        if self.path is not None:
+            return read_step(self.path)
+        assert self.profiles is not None
+        return glue(revolved_solids(self.profiles))
+
+
+def part_of_step(name: str, path: Path) -> Part:
+    """Read a STEP file.
+
+    Raises
+    ------
+    InputError
+        If it is none, has no solid, or solids that overlap.
+    """
+    content = step_content(path)
+    profiles, why = None, ""
+    try:
+        profiles = _plainly_named(profiles_of_step(path))
+    except NotTurnedError as error:
+        why = error.got
+    except InputError as error:  # an outline that crosses itself, by a flaw of the file
+        why = f"a half section that cannot be used ({error.got})"
+    return Part(name=name, path=path, profiles=profiles, content=content, not_turned=why)
+
+
+def part_of_table(name: str, text: str) -> Part:
+    """Read the rows of a drawing.
+
+    Raises
+    ------
+    InputError
+        For rows that are none, and for an outline that crosses itself or does not close.
+    """
+    outline = Outline.model_validate(outline_of_table(name, text))
+    try:
+        profile = outline.profile(1.0 / MM)
+    except InputError as error:
+        raise InputError(
+            f"drawing of the {name}", got=error.got, expected=error.expected, hint=error.hint
+        ) from None
+    return Part(name=name, path=None, profiles={name: profile})
+
+
+def _plainly_named(profiles: Mapping[str, Profile]) -> dict[str, Profile]:
+    """Profiles whose solids and edges have names that a case can hold."""
+    names: dict[str, str] = {}
+
+    def plain(name: str) -> str:
+        if name not in names:
+            base = re.sub(r"[^A-Za-z0-9_-]+", "_", name)
+            base = (base if base[:1].isalpha() else f"_{base}")[:60]
+            taken, number = set(names.values()), 1
+            found = base
+            while found in taken:
+                number += 1
+                found = f"{base}_{number}"
+            names[name] = found
+        return names[name]
+
+    return {
+        plain(solid): Profile(
+            profile.start,
+            tuple(replace(e, name=plain(e.name)) if e.name else e for e in profile.edges),
+        )
+        for solid, profile in profiles.items()
+    }
+
+
+def _profile_faces(profiles: Mapping[str, Profile]) -> tuple[FaceFacts, ...]:
+    found = []
+    for name in dict.fromkeys(n for profile in profiles.values() for n in profile.names):
+        curves = [c for p in profiles.values() for c in p.curves if c.name == name]
+        points = np.concatenate([c.at(np.linspace(0, 1, 33)) for c in curves])
+        low, high = points.min(axis=0), points.max(axis=0)
+        kind = "arc, " if any(c.centre is not None for c in curves) else ""
+        words = f"{kind}r {_range(low[0], high[0])}, z {_range(low[1], high[1])}"
+        found.append(FaceFacts(name=name, words=words))
+    return tuple(found)
+
+
+def _step_face(part: StepPart) -> FaceFacts:
+    count = "" if part.count == 1 else f"{part.count} faces, "
+    z = _range(float(part.low[2]), float(part.high[2]))
+    return FaceFacts(name=part.name, words=f"{count}{part.size * 1e6:.4g} mm², z {z}")
+
+
+def _range(low: float, high: float) -> str:
+    a, b = (round(float(x) * MM, 7) + 0.0 for x in (low, high))
+    return f"{a:.4g} mm" if b - a < 1e-6 else f"{a:.4g} to {b:.4g} mm"

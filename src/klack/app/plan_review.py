@@ -1,0 +1,432 @@
+"""Checks of a new valve before anything is solved, in words, and the case that follows from it.
+
+The forces and widths here are estimates from above, for element sizes and for words.  A needle of
+mass m and length L that hits with v is stopped as a rod, F = v sqrt(m E V) / L, and the contact is
+that of Hertz under this force.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite, pi, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from klack.app.answers import Finding, Review
+from klack.app.parts import Part
+from klack.app.plan_case import BodySizes, case_text
+from klack.app.valve_plan import BODIES, ValvePlan
+from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
+from klack.case.case_tree import tree_of
+from klack.contact.hertz import line_half_width, point_radius
+from klack.errors import KlackError
+from klack.material_library import library_material
+from klack.materials import Material
+from klack.mesh.curve import Curve
+from klack.mesh.element_estimate import element_count
+from klack.mesh.occ import MM
+from klack.mesh.profile import Profile
+from klack.mesh.sizing import MeshSizing, Refinement
+from klack.units import FORCE, LENGTH, SPEED, format_si, parse_quantity
+
+__all__ = ["review"]
+
+_PARTS, _FACES, _MATERIALS, _MOTION = range(4)  # steps of the guide
+
+_USUAL_SIZE = (1e-3, 0.2)  # [m] of the longest side
+_USUAL_MASS = (1e-5, 0.5)  # [kg] of a needle
+_USUAL_SPEED = (0.02, 5.0)  # [m/s]
+_CLEAR = 1e-6  # [m] above first touch, where two bodies must not overlap
+_LEAST_OVERLAP = 1e-6  # [mm^2] or [mm^3]: below is round-off of OpenCASCADE
+_SHARP = np.radians(2.0)
+_NODES = {2: 2.1, 3: 1.5}  # of six-node triangles and ten-node tetrahedra, per element
+_GROWN = {2: 2.0, 3: 2.5}  # elements in all over those of the wanted sizes: the growth between
+_SECONDS = {2: (8.0, 1.0e-3), 3: (20.0, 1.4e-3)}
+"""Of a first run on two cores: at least, and for each node."""
+_LONG = 300.0  # [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Meeting:
+    """Where and how the two bodies meet.
+
+    Parameters
+    ----------
+    touch : Touch
+    force : float [N]
+        Estimate from above.
+    half_width : float [m]
+        By Hertz under that force; nan where the shape does not say.
+    radius : float [m]
+        Of the ring of first touch; 0 for a point, nan for a whole zone.
+    sharp : str
+        Where a sharp edge touches; empty for smooth faces.
+    duration : float [s]
+    """
+
+    touch: Touch
+    force: float
+    half_width: float
+    radius: float
+    sharp: str
+    duration: float
+
+
+def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
+    """Check a plan, and write its case.
+
+    Parameters
+    ----------
+    plan : ValvePlan
+    parts : mapping of body to Part
+    place : Path
+        Of the case file; it need not be there.
+    """
+    findings = list(_sizes_of_parts(parts))
+    missing = _missing(plan)
+    if missing:
+        return Review(findings=(*findings, *missing))
+    numbers = _numbers(plan)
+    if isinstance(numbers, tuple):
+        return Review(findings=(*findings, *numbers))
+    materials = {body: library_material(plan.of(body, "material")).material for body in BODIES}
+    findings += _masses(parts, materials)
+    try:
+        meeting = _meeting(plan, parts, materials, numbers)
+    except KlackError as error:
+        findings.append(_error("contact faces", str(error), "choose two that face.", _FACES))
+        return Review(findings=tuple(findings))
+    findings += _placing(plan, parts, meeting, numbers)
+    sizes = {body: _element_sizes(plan, parts[body], meeting) for body in BODIES}
+    findings.append(_effort(plan, parts, sizes, meeting))
+    findings += _hold(plan, parts, materials, numbers)
+    if any(finding.grade == "error" for finding in findings):
+        return Review(findings=tuple(findings))
+    profiles = {b: p.profiles if p.is_half(plan.model) else None for b, p in parts.items()}
+    present = {body: str(part.path) for body, part in parts.items()}
+    copied = {body: f"{body}.step" for body in parts}
+    try:
+        text = case_text(plan, profiles, sizes, meeting.duration, present)
+        tree_of(text, place).any_case()
+    except KlackError as error:
+        advice = "change what it names; the guide wrote the rest."
+        findings.append(_error("case file", str(error), advice, _FACES))
+        return Review(findings=tuple(findings))
+    return Review(
+        findings=tuple(findings),
+        text=case_text(plan, profiles, sizes, meeting.duration, copied),
+        steps=tuple(body for body, profile in profiles.items() if profile is None),
+    )
+
+
+# --------------------------------------------------------------------------- what is there
+
+
+def _sizes_of_parts(parts: Mapping[str, Part]) -> Iterator[Finding]:
+    longest = {body: part.longest for body, part in parts.items()}
+    words = ", ".join(f"{body} {format_si(x, 'm', 3)}" for body, x in longest.items())
+    low, high = _USUAL_SIZE
+    worst = max(longest.values()) / min(longest.values())
+    if min(longest.values()) < 0.1 * low or max(longest.values()) > 5 * high or worst > 100:
+        advice = "export with the right unit: STEP files state it; tables are in mm."
+        yield _error("units", f"longest sides: {words}", advice, _PARTS)
+    elif min(longest.values()) < low or max(longest.values()) > high or worst > 20:
+        advice = "compare with the drawing: a wrong unit looks like this."
+        yield _doubt("units", f"longest sides: {words}", advice, _PARTS)
+    else:
+        yield _good("units", f"longest sides: {words}")
+
+
+def _missing(plan: ValvePlan) -> tuple[Finding, ...]:
+    found = [
+        _error(f"contact face of the {body}", "none", "choose the face that touches.", _FACES)
+        for body in BODIES
+        if not plan.of(body, "contact")
+    ]
+    if not plan.held:
+        advice = "choose the faces by which the housing is held."
+        found.append(_error("support", "the housing is held nowhere", advice, _FACES))
+    if plan.housing_contact in plan.held:
+        found.append(_error("support", "the contact face is held", "hold another face.", _FACES))
+    return tuple(found)
+
+
+_Numbers = dict[str, float]
+
+
+def _numbers(plan: ValvePlan) -> _Numbers | tuple[Finding, ...]:
+    """Speed, force and gap in SI, or what is wrong with them."""
+    found, wrong = {}, []
+    kinds = {"speed": SPEED, "force": FORCE, "gap": LENGTH}
+    for name, kind in kinds.items():
+        try:
+            found[name] = parse_quantity(getattr(plan, name), kind, name)
+        except KlackError as error:
+            wrong.append(_error(name, str(error), f"write a {name} with its unit.", _MOTION))
+    if not wrong and not found["speed"] > 0:
+        wrong.append(_error("speed", plan.speed, "a speed above 0, towards the stop.", _MOTION))
+    if not wrong and found["gap"] < 0:
+        wrong.append(_error("gap", plan.gap, "0 or more: the bodies would penetrate.", _MOTION))
+    return tuple(wrong) or found
+
+
+def _masses(parts: Mapping[str, Part], materials: Mapping[str, Material]) -> Iterator[Finding]:
+    mass = parts["needle"].volume * materials["needle"].density
+    words = f"needle {1e3 * mass:.4g} g"
+    words += f", housing {1e3 * parts['housing'].volume * materials['housing'].density:.4g} g"
+    low, high = _USUAL_MASS
+    if low <= mass <= high:
+        yield _good("mass", words)
+    else:
+        advice = "compare with a scale or the CAD program; check the unit of the file."
+        yield _doubt("mass", words, advice, _PARTS)
+
+
+# --------------------------------------------------------------------------- how they meet
+
+
+def _meeting(
+    plan: ValvePlan,
+    parts: Mapping[str, Part],
+    materials: Mapping[str, Material],
+    numbers: _Numbers,
+) -> _Meeting:
+    needle, steel = parts["needle"], materials["needle"]
+    height = float(np.diff([corner[2] for corner in needle.box])[0])
+    mass = needle.volume * steel.density
+    force = numbers["speed"] * sqrt(mass * steel.young * needle.volume) / height
+    force += 2.0 * max(numbers["force"], 0.0)
+    period = pi * height * sqrt(mass / (steel.young * needle.volume))
+    faces = [plan.of(body, "contact") for body in BODIES]
+    profiles = [parts[body].profiles for body in BODIES]
+    sharp, radius, width = "", float("nan"), float("nan")
+    known = all(face in parts[body].faces("half") for body, face in zip(BODIES, faces, strict=True))
+    if profiles[0] is not None and profiles[1] is not None and known:
+        touch = first_touch_of_profiles(
+            profiles[0].values(), faces[0], profiles[1].values(), faces[1]
+        )
+        if touch.upper:
+            radius = touch.lower[0][0]
+            curvature, sharp = _at_touch(profiles, faces, touch)
+            modulus = 1.0 / sum(1.0 / m.plane_strain_modulus for m in materials.values())
+            width = _half_width(force, curvature, radius, modulus)
+    else:
+        meshes = [parts[body].picture_mesh(plan.model) for body in BODIES]
+        surfaces = [mesh.surface(face) for mesh, face in zip(meshes, faces, strict=True)]
+        across = min(
+            float(np.max(np.ptp(mesh.points[surface.nodes][:, :2], axis=0)))
+            for mesh, surface in zip(meshes, surfaces, strict=True)
+        )
+        touch = first_touch_of_meshes(
+            meshes[0], surfaces[0], meshes[1], surfaces[1], tolerance=5e-4 * across
+        )
+        points = np.array(touch.lower)
+        radius = float(np.mean(np.hypot(points[:, 0], points[:, 1])))
+    return _Meeting(
+        touch=touch,
+        force=force,
+        half_width=width,
+        radius=radius,
+        sharp=sharp,
+        duration=6.0 * period + numbers["gap"] / numbers["speed"],
+    )
+
+
+def _half_width(force: float, curvature: float, radius: float, modulus: float) -> float:
+    """Of a line contact on a ring, or of a point contact on the axis."""
+    if not curvature > 0.0:
+        return float("nan")
+    if radius * curvature > 1e-3:
+        return line_half_width(force / (2.0 * pi * radius), curvature, modulus)
+    return point_radius(force, curvature, modulus)
+
+
+def _at_touch(
+    profiles: list[Mapping[str, Profile] | None], faces: list[str], touch: Touch
+) -> tuple[float, str]:
+    """Relative curvature [1/m] where two half sections touch, and a sharp edge that does."""
+    total, sharp = 0.0, ""
+    for body, found, face, place in zip(
+        BODIES, profiles, faces, (touch.upper, touch.lower), strict=True
+    ):
+        assert found is not None
+        at = np.array(place[0])
+        for profile in found.values():
+            own = [curve for curve in profile.curves if curve.name == face]
+            near = [c for c in own if float(c.distance(at)) <= 1e-6 * c.length + 1e-9]
+            if not near:
+                continue
+            # material is to the left: an arc that turns anticlockwise bulges outwards
+            total += sum(np.sign(c.angle) / c.radius for c in near) / len(near)
+            if _is_corner(profile, at):
+                sharp = f"{body}.{face} at r {1e3 * at[0]:.4g} mm, z {1e3 * at[1]:.4g} mm"
+    return float(total), sharp
+
+
+def _is_corner(profile: Profile, at: np.ndarray) -> bool:
+    """Whether the outline has a convex corner there, off the axis."""
+    near = 1e-6 * max(curve.length for curve in profile.curves)
+    for before, after in zip(profile.curves[-1:] + profile.curves, profile.curves, strict=False):
+        if np.hypot(*(np.array(after.start) - at)) > near or at[0] <= near:
+            continue
+        a, b = _direction(before, 1.0), _direction(after, 0.0)
+        if np.arcsin(np.clip(a[0] * b[1] - a[1] * b[0], -1.0, 1.0)) > _SHARP:
+            return True
+    return False
+
+
+def _direction(curve: Curve, where: float) -> np.ndarray:
+    step = 1e-6 if where < 0.5 else -1e-6
+    along = (curve.at(where + step) - curve.at(where)) * np.sign(step)
+    return np.asarray(along / np.hypot(*along))
+
+
+def _placing(
+    plan: ValvePlan, parts: Mapping[str, Part], meeting: _Meeting, numbers: _Numbers
+) -> Iterator[Finding]:
+    drawn = meeting.touch.clearance
+    how = f"{format_si(abs(drawn), 'm', 3)} {'apart' if drawn >= 0 else 'overlapping'}"
+    if abs(drawn) < _CLEAR:
+        how = "touching"
+    words = f"as drawn {how}; the needle is moved to a gap of {plan.gap}"
+    if drawn < -0.2 * parts["needle"].longest:
+        advice = "the needle must be above the housing along z: turn one part in the CAD program."
+        yield _doubt("gap", words, advice, _PARTS)
+    else:
+        yield _good("gap", words)
+    overlap = _overlap(plan, parts, -drawn + numbers["gap"] + _CLEAR)
+    if overlap:
+        advice = "check the contact faces: another pair touches first; or the unit of a file."
+        yield _error("overlap", overlap, advice, _FACES)
+    else:
+        yield _good("overlap", "none: the bodies touch at the contact faces alone")
+    yield _first_touch(meeting)
+
+
+def _first_touch(meeting: _Meeting) -> Finding:
+    if meeting.sharp:
+        advice = "draw its real radius, an arc of 10 to 100 um, and choose that face."
+        words = f"on a sharp edge, {meeting.sharp}: pressure and force depend on the mesh"
+        return _doubt("first touch", words, advice, _FACES)
+    if not meeting.touch.lower:
+        advice = "give one face its crown if it has one; docs/how-to/flat-faces.md."
+        return _doubt("first touch", "flat faces that touch all at once", advice, _FACES)
+    z = meeting.touch.lower[0][-1]
+    where = f"z {1e3 * z:.3g} mm"
+    if isfinite(meeting.half_width):
+        where += f", half width about {format_si(meeting.half_width, 'm', 2)}"
+    if meeting.radius < 1e-6:
+        return _good("first touch", f"a point on the axis at {where}")
+    if len(meeting.touch.lower) in range(2, 40):
+        words = f"{len(meeting.touch.lower)} places at a mean radius of "
+        words += f"{1e3 * meeting.radius:.3g} mm, {where}"
+        return _doubt("first touch", words, "a ring would go all round: look at it.", _FACES)
+    return _good("first touch", f"a ring of radius {1e3 * meeting.radius:.3g} mm at {where}")
+
+
+def _overlap(plan: ValvePlan, parts: Mapping[str, Part], shift: float) -> str:
+    """Words for what both bodies share with the needle shifted along z; empty for nothing."""
+    from netgen.occ import gp_Vec
+
+    shape = parts["needle"].shape.Move(gp_Vec(0.0, 0.0, shift * MM))
+    try:
+        common = shape * parts["housing"].shape
+        volume = sum(solid.mass for solid in common.solids)
+    except Exception as error:  # OpenCASCADE raises plain exceptions of several types
+        return f"OpenCASCADE cannot cut the bodies with each other ({error})"
+    if not volume > _LEAST_OVERLAP:
+        return ""
+    low, high = common.bounding_box
+    return f"{volume:.3g} mm³ in common, at z {low.z:.4g} to {high.z:.4g} mm"
+
+
+# --------------------------------------------------------------------------- what it takes
+
+
+def _element_sizes(plan: ValvePlan, part: Part, meeting: _Meeting) -> BodySizes:
+    half = part.is_half(plan.model)
+    size = part.longest / (20 if half else 10)
+    width = meeting.half_width
+    if not isfinite(width):  # a zone, or a solid whose curvature is not known
+        fine = part.longest / (500 if half else 700)
+        return BodySizes(size=size, contact=_two_digits(fine), extent=_two_digits(2.5 * fine))
+    share, reach = (0.2, 2.5) if half else (0.6, 1.5)
+    return BodySizes(
+        size=_two_digits(size),
+        contact=_two_digits(min(share * width, 0.5 * size)),
+        extent=_two_digits(reach * width),
+    )
+
+
+def _two_digits(value: float) -> float:
+    return float(f"{value:.2g}")
+
+
+def _effort(
+    plan: ValvePlan, parts: Mapping[str, Part], sizes: Mapping[str, BodySizes], meeting: _Meeting
+) -> Finding:
+    nodes, dimension = 0.0, 2
+    for body, part in parts.items():
+        half = part.is_half(plan.model)
+        if half:
+            assert part.profiles is not None
+            measure = sum(profile.area for profile in part.profiles.values())
+        else:
+            dimension, measure = 3, part.volume
+        places = meeting.touch.upper if body == "needle" else meeting.touch.lower
+        own = 2 if half else 3
+        ring = [(meeting.radius, places[0][-1])] if places and meeting.radius > 0 else []
+        sizing = MeshSizing(
+            size=sizes[body].size,
+            refinements=tuple(
+                Refinement(position=at, size=sizes[body].contact, radius=sizes[body].extent)
+                for at in ring
+            ),
+        )
+        nodes += _NODES[own] * _GROWN[own] * sum(element_count(sizing, own, measure, {}).values())
+    least, each = _SECONDS[dimension]
+    seconds = least + each * nodes
+    time = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
+    words = (
+        f"about {float(f'{nodes:.2g}'):.0f} nodes, elements of {format_si(sizes['needle'].contact, 'm', 2)} at the "
+        f"contact; a first run takes about {time} on two cores"
+    )
+    if seconds > _LONG:
+        advice = "use the half section if the parts are turned; coarser elements in the case."
+        return _doubt("mesh", words, advice, _PARTS)
+    return _good("mesh", words)
+
+
+def _hold(
+    plan: ValvePlan,
+    parts: Mapping[str, Part],
+    materials: Mapping[str, Material],
+    numbers: _Numbers,
+) -> Iterator[Finding]:
+    weight = parts["needle"].volume * materials["needle"].density * 9.81
+    held = ", ".join(plan.held)
+    if numbers["force"] <= 0.0:
+        advice = "give the force of the spring or of the pressure, if there is one."
+        words = f"nothing closes: after the impact the needle moves away; housing held at {held}"
+        yield _doubt("static hold", words, advice, _MOTION)
+    else:
+        words = f"{plan.force} closes ({numbers['force'] / weight:.0f} times the weight of the "
+        yield _good("static hold", f"{words}needle, which is left out); housing held at {held}")
+    low, high = _USUAL_SPEED
+    if low <= numbers["speed"] <= high:
+        yield _good("speed", plan.speed)
+    else:
+        advice = f"needles of solenoid valves hit with {low:g} to {high:g} m/s."
+        yield _doubt("speed", plan.speed, advice, _MOTION)
+
+
+def _of_grade(grade: str) -> Callable[..., Finding]:
+    def found(what: str, words: str, advice: str = "", step: int = 0) -> Finding:
+        return Finding(grade=grade, what=what, words=words, advice=advice, step=step)
+
+    return found
+
+
+_good: Any
+_good, _doubt, _error = (_of_grade(grade) for grade in ("good", "doubt", "error"))

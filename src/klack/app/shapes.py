@@ -1,0 +1,120 @@
+"""Bodies for the pages, in a process of its own: scenes of cases, results and STEP files."""
+
+import gzip
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from klack import __version__
+from klack.app.answers import PartFacts, Review
+from klack.app.parts import Part, part_of_step, part_of_table
+from klack.app.plan_review import review
+from klack.app.valve_plan import ValvePlan
+from klack.case.case_tree import tree_of
+from klack.errors import InputError
+from klack.viewer.of_case import body_view, view_of_case
+from klack.viewer.payload import payload_of
+from klack.viewer.source import view_of_source
+from klack.viewer.view import View
+
+__all__ = ["LARGEST_SCENE", "Shapes", "packed_scene"]
+
+LARGEST_SCENE = 48_000_000
+"""Characters of a payload; a million triangles or so, which a browser draws slowly."""
+
+
+_MOST_PARTS = 8  # in memory
+
+Sources = Mapping[str, tuple[str, str]]
+"""Of each body: ``"step"`` and a path, or ``"table"`` and the rows of a drawing."""
+
+
+class Shapes:
+    """Scenes as gzipped JSON, which the browser unpacks; parts of a new valve, and their checks."""
+
+    def __init__(self) -> None:
+        self._parts: dict[tuple[object, ...], Part] = {}
+
+    def part(self, name: str, source: tuple[str, str]) -> PartFacts:
+        """What a STEP file or a drawing holds.
+
+        Raises
+        ------
+        InputError
+            For one that cannot be read.
+        """
+        return self._part(name, source).facts
+
+    def parts_scene(self, sources: Sources, model: str) -> bytes:
+        """Both parts of a new valve, as they are drawn, in coarse meshes."""
+        none = np.empty(0, dtype=np.int64)
+        parts = {name: self._part(name, source) for name, source in sources.items()}
+        bodies = tuple(
+            body_view(name, part.picture_mesh(model), none, part.facts.words)
+            for name, part in parts.items()
+        )
+        view = View(
+            name="parts",
+            title="the parts of a new valve",
+            source="",
+            description="",
+            version=__version__,
+            bodies=bodies,
+            notes=("Meshed coarsely for this picture alone.",),
+        )
+        return packed_scene(view)
+
+    def review(self, plan: ValvePlan, sources: Sources, place: str) -> Review:
+        """See :func:`klack.app.plan_review.review`."""
+        parts = {name: self._part(name, source) for name, source in sources.items()}
+        return review(plan, parts, Path(place))
+
+    def _part(self, name: str, source: tuple[str, str]) -> Part:
+        """A part, read once as long as its file stays."""
+        kind, value = source
+        key: tuple[object, ...] = (name, kind, value)
+        if kind == "step":
+            state = Path(value).stat()
+            key += (state.st_ino, state.st_size, state.st_mtime_ns)
+        found = self._parts.get(key)
+        if found is None:
+            read = part_of_step(name, Path(value)) if kind == "step" else part_of_table(name, value)
+            while len(self._parts) >= _MOST_PARTS:
+                del self._parts[next(iter(self._parts))]
+            found = self._parts[key] = read
+        return found
+
+    def case_scene(self, text: str, path: str) -> bytes:
+        """Bodies of a case; a text that is not saved yet counts as well.
+
+        Raises
+        ------
+        InputError
+            For a case that is not valid, and for shapes that cannot be meshed.
+        """
+        return packed_scene(view_of_case(tree_of(text, Path(path)).any_case()))
+
+    def result_scene(self, folder: str) -> bytes:
+        """Bodies of a stored result, with mode shapes and motion where it has them."""
+        return packed_scene(view_of_source(Path(folder)))
+
+
+def packed_scene(view: View) -> bytes:
+    """Payload of a view.
+
+    Raises
+    ------
+    InputError
+        If it is larger than a browser should get.
+    """
+    text = json.dumps(payload_of(view), separators=(",", ":"), allow_nan=False)
+    if len(text) > LARGEST_SCENE:
+        raise InputError(
+            f"bodies of {view.name}",
+            got=f"{len(text) / 1e6:.0f} MB of triangles and mode shapes",
+            expected=f"at most {LARGEST_SCENE / 1e6:.0f} MB in a page",
+            hint="coarser elements; klack show writes a page of any size.",
+        )
+    return gzip.compress(text.encode("ascii"), 4)

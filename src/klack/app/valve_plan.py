@@ -1,0 +1,203 @@
+"""What the guide for a new valve has been given so far; kept in the folder until it is a case."""
+
+import json
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from klack.app.folder import OpenFolder
+from klack.errors import InputError
+from klack.whole_file import whole_file
+
+__all__ = ["BODIES", "STEPS", "Plans", "ValvePlan"]
+
+BODIES = ("needle", "housing")
+"""The moving body, and the one that it hits."""
+
+STEPS = ("Parts", "Faces", "Materials", "Motion", "Check", "Case")
+
+_FILE = "new-valve.json"
+_LONGEST = 100_000  # characters of a table
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ValvePlan:
+    """All choices of the guide, as they were made; nothing is checked here but their kind.
+
+    Parameters
+    ----------
+    name : str
+        Of the folder that the case will have.
+    step : int
+        Where the guide stands.
+    source : str
+        ``"step"`` or ``"table"``.
+    needle_file, housing_file : str
+        STEP files by their path from the folder.
+    needle_label, housing_label : str
+        Names that uploaded files had.
+    needle_table, housing_table : str
+        Rows of a drawing, see :mod:`klack.app.drawing_table`.
+    model : str
+        ``"half"`` for the half section of turned parts, ``"solid"``.
+    needle_contact, housing_contact : str
+        Faces that meet.
+    held, radiating : tuple of str
+        Faces of the housing; all that are left radiate where none is chosen.
+    needle_material, housing_material : str
+        Of the library.
+    speed, force, gap : str
+        Quantities with their units.
+    noise : bool
+        Whether mount and plate are assumed, so that the click can be played.
+    """
+
+    name: str = "my-valve"
+    step: int = 0
+    source: str = "step"
+    needle_file: str = ""
+    housing_file: str = ""
+    needle_label: str = ""
+    housing_label: str = ""
+    needle_table: str = ""
+    housing_table: str = ""
+    model: str = "half"
+    needle_contact: str = ""
+    housing_contact: str = ""
+    held: tuple[str, ...] = ()
+    radiating: tuple[str, ...] = ()
+    needle_material: str = "X46Cr13 hardened"
+    housing_material: str = "X46Cr13 hardened"
+    speed: str = "0.3 m/s"
+    force: str = "10 N"
+    gap: str = "0 um"
+    noise: bool = True
+
+    def of(self, body: str, what: str) -> str:
+        """A choice for one body: ``file``, ``label``, ``table``, ``contact`` or ``material``."""
+        return str(getattr(self, f"{body}_{what}"))
+
+    def with_body(self, body: str, what: str, value: str) -> "ValvePlan":
+        """The same with another choice for one body."""
+        return replace(self, **{f"{body}_{what}": value})
+
+    @property
+    def roles(self) -> dict[str, str]:
+        """``"contact"``, ``"held"`` or ``"radiating"`` by the name of a face, ``needle.tip``."""
+        found = {f"housing.{face}": "radiating" for face in self.radiating}
+        found |= {f"housing.{face}": "held" for face in self.held}
+        found |= {
+            f"{body}.{self.of(body, 'contact')}": "contact"
+            for body in BODIES
+            if self.of(body, "contact")
+        }
+        return found
+
+    def with_role(self, body: str, face: str, role: str) -> "ValvePlan":
+        """The same with another role of one face; a body has one contact face.
+
+        Parameters
+        ----------
+        body, face : str
+        role : str
+            ``"contact"``, ``"held"``, ``"radiating"``, or empty for none.
+        """
+        plan = self
+        if plan.of(body, "contact") == face:
+            plan = plan.with_body(body, "contact", "")
+        if role == "contact":
+            plan = plan.with_body(body, "contact", face)
+        if body == "needle":
+            return plan
+        held = tuple(other for other in plan.held if other != face)
+        radiating = tuple(other for other in plan.radiating if other != face)
+        return replace(
+            plan,
+            held=(*held, face) if role == "held" else held,
+            radiating=(*radiating, face) if role == "radiating" else radiating,
+        )
+
+    def with_faces(self, known: Mapping[str, tuple[str, ...]]) -> "ValvePlan":
+        """The same without faces that the bodies do not have."""
+        plan = self
+        for body in BODIES:
+            if plan.of(body, "contact") not in known.get(body, ()):
+                plan = plan.with_body(body, "contact", "")
+        own = known.get("housing", ())
+        return replace(
+            plan,
+            held=tuple(face for face in plan.held if face in own),
+            radiating=tuple(face for face in plan.radiating if face in own),
+        )
+
+    def require_name(self) -> None:
+        """Refuse a name that is no plain name of a folder."""
+        if not _NAME.fullmatch(self.name):
+            raise InputError(
+                "name of the valve",
+                got=f"'{self.name[:80]}'",
+                expected="letters, digits, - and _, 61 at most",
+                hint="my-valve",
+            )
+
+
+class Plans:
+    """The plan of a folder, in ``.klack-app``; whole at every moment.
+
+    Parameters
+    ----------
+    folder : OpenFolder
+    """
+
+    def __init__(self, folder: OpenFolder) -> None:
+        self._file: Path = folder.path / ".klack-app" / _FILE
+
+    def load(self) -> ValvePlan:
+        """The plan as it was left; a new one where there is none, or one that is damaged."""
+        with suppress(OSError, ValueError):
+            found = json.loads(self._file.read_text(encoding="utf-8"))
+            if isinstance(found, dict):
+                return _plan_of(found)
+        return ValvePlan()
+
+    def keep(self, plan: ValvePlan) -> None:
+        """Keep a plan.
+
+        Raises
+        ------
+        InputError
+            For a table that is too long.
+        """
+        for body in BODIES:
+            if len(plan.of(body, "table")) > _LONGEST:
+                raise InputError(
+                    f"drawing of the {body}",
+                    got=f"{len(plan.of(body, 'table'))} characters",
+                    expected=f"at most {_LONGEST}",
+                    hint="bring such a body as STEP file or as mesh.",
+                )
+        self._file.parent.mkdir(mode=0o700, exist_ok=True)
+        with whole_file(self._file) as new:
+            new.write_text(json.dumps(asdict(plan)), encoding="utf-8")
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._file.unlink(missing_ok=True)
+
+
+def _plan_of(found: Mapping[str, Any]) -> ValvePlan:
+    """A plan of what fits; a key of another kind keeps its default."""
+    plan = ValvePlan()
+    values: dict[str, Any] = {}
+    for item in fields(plan):
+        value, usual = found.get(item.name), getattr(plan, item.name)
+        if isinstance(usual, tuple) and isinstance(value, list):
+            values[item.name] = tuple(str(one) for one in value)
+        elif type(value) is type(usual) and not isinstance(usual, tuple):
+            values[item.name] = value
+    plan = replace(plan, **values)
+    return replace(plan, step=min(max(plan.step, 0), len(STEPS) - 1))

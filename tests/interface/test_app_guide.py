@@ -1,0 +1,345 @@
+"""The guide for a new valve and the bodies in a browser: by mouse, by keyboard, with bad files."""
+
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from klack.case.reader import read_case
+from klack.case.shipped import find_case
+from klack.case.valve_reader import load_any_case
+from klack.mesh.solid import write_step_revolved
+
+sync_api = pytest.importorskip("playwright.sync_api")
+pytest.importorskip("nicegui")
+CHROMIUM = shutil.which("chromium")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here"),
+]
+
+WIDTHS = (400, 1000, 1600)
+ATTACK = "<img src=x onerror=alert(1)>.step"
+_SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+_LONG = 120_000  # [ms]: a loaded machine imports and meshes
+_NOISE = ("GPU stall", "WebGL", "413", "415", "Failed to load resource")
+"""What browsers that draw by software say of it, and of answers that refuse a file."""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("guide")
+    (place / "cad").mkdir()
+    case = load_any_case(find_case("demo-valve-axisymmetric"))
+    for name, body in case.bodies.items():
+        profiles = body.geometry.profile.profiles()
+        write_step_revolved(profiles, place / "cad" / f"{name}.step")
+    shutil.copy(place / "cad" / "needle.step", place / "cad" / ATTACK)
+    (place / "cad" / "empty.step").write_bytes(b"")
+    (place / "cad" / "words.step").write_text("this is no STEP file")
+    (place / "cad" / "lost.step").write_text("ISO-10303-21;\nHEADER;\nENDSEC;\n")
+    (place / "demo.yaml").write_text(find_case("demo-valve-axisymmetric").read_text("utf-8"))
+    return place
+
+
+class Server:
+    """``klack app`` on a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "klack", "app", str(folder), "--no-open"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        self.process.stdout.readline()
+        self.address = self.process.stdout.readline().strip()
+
+    @property
+    def base(self) -> str:
+        return self.address.partition("/?")[0]
+
+    def stop(self) -> None:
+        self.process.send_signal(signal.SIGINT)
+        self.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def server(folder: Path) -> Iterator[Server]:
+    found = Server(folder)
+    yield found
+    found.stop()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as started:
+        found = started.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", *_SOFTWARE]
+        )
+        yield found
+        found.close()
+
+
+@pytest.fixture
+def page(browser: Any, server: Server) -> Iterator[Any]:
+    """A page with the cookie; at its end nothing was complained of or asked of other hosts."""
+    context = browser.new_context(viewport={"width": 1200, "height": 950}, color_scheme="dark")
+    found = context.new_page()
+    found.set_default_timeout(_LONG)
+    complaints: list[str] = []
+
+    def complain(said: Any) -> None:
+        if said.type in ("error", "warning") and not any(word in said.text for word in _NOISE):
+            complaints.append(said.text)
+
+    found.on("console", complain)
+    found.on("pageerror", lambda error: complaints.append(str(error)))
+    found.on("dialog", lambda dialog: complaints.append(f"dialog: {dialog.message}"))
+    found.on(
+        "request",
+        lambda request: (
+            complaints.append(f"asked {request.url}")
+            if not request.url.startswith(("http://127.0.0.1:", "data:", "blob:", "ws://127.0.0.1"))
+            else None
+        ),
+    )
+    found.goto(server.address)
+    found.wait_for_selector("#k-body")
+    yield found
+    context.close()
+    assert complaints == []
+
+
+def open_guide(page: Any, server: Server) -> None:
+    """The guide, from its beginning."""
+    page.goto(f"{server.base}/new")
+    page.wait_for_selector(".k-steps button")
+    page.get_by_role("button", name="Start over").click()
+    page.get_by_label("The two bodies come from").wait_for()
+
+
+def choose_step(page: Any, body: str, file: str) -> None:
+    page.get_by_label(f"STEP file of the {body} in the folder").select_option(file)
+
+
+def read(page: Any, count: int = 2) -> None:
+    """Wait until parts were read."""
+    page.wait_for_function(f"document.querySelectorAll('.k-read').length == {count}")
+
+
+def onward(page: Any, sign: str) -> None:
+    page.locator("#k-next").click()
+    page.wait_for_selector(sign)
+
+
+def require_within(page: Any) -> None:
+    """No page is wider than its window, on a telephone or a large screen."""
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 900})
+        page.wait_for_timeout(250)
+        over = page.evaluate(
+            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
+        )
+        assert over <= 0, f"{over} px wider than {width} px"
+    page.set_viewport_size({"width": 1200, "height": 950})
+
+
+def name_under(page: Any, x: float, y: float) -> str:
+    """Move the pointer to a share of the picture; what its label names there."""
+    box = page.locator(".ks-view canvas").first.bounding_box()
+    page.mouse.move(box["x"] + x * box["width"] - 2, box["y"] + y * box["height"])
+    page.mouse.move(box["x"] + x * box["width"], box["y"] + y * box["height"])
+    page.wait_for_timeout(400)
+    tip = page.locator(".ks-tip")
+    return tip.inner_text() if tip.is_visible() else ""
+
+
+def test_from_two_step_files_by_clicking_to_a_case(page, server, folder):
+    open_guide(page, server)
+    choose_step(page, "needle", "cad/needle.step")
+    read(page, 1)
+    page.get_by_label("STEP file of the housing, from here").set_input_files(
+        {
+            "name": ATTACK,
+            "mimeType": "model/step",
+            "buffer": (folder / "cad" / "housing.step").read_bytes(),
+        }
+    )
+    read(page)
+    page.wait_for_selector("text=Both parts are turned")
+    require_within(page)
+    onward(page, ".ks-view canvas")
+    page.wait_for_timeout(800)
+    page.locator(".ks-view").first.scroll_into_view_if_needed()
+    assert page.locator("#k-next").is_disabled()
+    assert page.locator(".ks").get_attribute("class").split().count("ks-dark") == 1
+
+    page.get_by_role("checkbox", name="needle", exact=True).uncheck()
+    page.get_by_role("checkbox", name="Cut open").check()
+    for role, wanted in (("contact face", "housing.seat"), ("held face", "housing.rim")):
+        page.get_by_role("button", name=role).click()
+        found = None
+        for y in range(30, 100, 1 if wanted.endswith("seat") else 4):
+            name = name_under(page, 0.5, y / 100)
+            if name.partition(" ")[0] == wanted:
+                found = y / 100
+                break
+        if found is None:  # small on this screen: by its list, which has the same names
+            page.get_by_label(wanted, exact=True).select_option(role.partition(" ")[0])
+        else:
+            assert page.locator(".k-face.k-hot").count() == 1  # the list shows what is pointed at
+            box = page.locator(".ks-view canvas").first.bounding_box()
+            page.mouse.click(box["x"] + 0.5 * box["width"], box["y"] + found * box["height"])
+        page.wait_for_function(
+            "name => [...document.querySelectorAll('.k-face select')]"
+            ".find(e => e.ariaLabel == name).value != ''",
+            arg=wanted,
+        )
+    page.get_by_label("needle.tip", exact=True).select_option("contact")
+    page.wait_for_function("!document.getElementById('k-next').disabled")
+    require_within(page)
+
+    onward(page, "text=Young's modulus")
+    require_within(page)
+    onward(page, "text=Closing force")
+    page.get_by_label("Speed at the impact").fill("0.25 m/s")
+    page.get_by_label("Speed at the impact").press("Tab")
+    onward(page, "text=static hold")
+    assert "0 errors" in page.inner_text("#k-body")
+    require_within(page)
+    onward(page, "text=klack: 1")
+    page.get_by_label("Name of the valve").fill("../out")
+    page.get_by_label("Name of the valve").press("Tab")
+    page.get_by_role("button", name="Write, open editor").click()
+    page.wait_for_selector("text=letters, digits")
+    page.get_by_label("Name of the valve").fill("first")
+    page.get_by_label("Name of the valve").press("Tab")
+    require_within(page)
+    page.get_by_role("button", name="Write, open editor").click()
+    page.wait_for_selector("text=valid impact, saved")
+
+    text = (folder / "first" / "case.yaml").read_text("utf-8")
+    case = read_case(text, folder / "first" / "case.yaml")
+    assert (str(case.contact.moving), str(case.contact.stop)) == ("needle.tip", "housing.seat")
+    assert case.bodies["housing"].fixed[0].surface == "rim"
+    assert case.motion.speed == 0.25
+    assert sorted(p.name for p in (folder / "first").iterdir()) == ["case.yaml"]
+
+
+def test_from_drawings_by_keyboard_and_it_survives(page, server, folder):
+    open_guide(page, server)
+    page.get_by_label("The two bodies come from").focus()
+    page.keyboard.press("ArrowDown")
+    for body in ("needle", "housing"):
+        page.get_by_role("button", name=f"Fill in the example of the {body}").press("Enter")
+        page.wait_for_function(
+            "body => [...document.querySelectorAll('textarea')]"
+            ".find(e => e.ariaLabel.includes(body)).value.includes('z, surface')",
+            arg=body,
+        )
+    read(page)
+    page.locator("#k-next").press("Enter")
+    page.wait_for_selector(".ks-view canvas")
+    for name, key in (("needle.tip", "c"), ("housing.seat", "c"), ("housing.rim", "h")):
+        box = page.get_by_label(name, exact=True)
+        box.focus()
+        page.keyboard.press(key)
+        page.keyboard.press("Tab")
+    page.wait_for_function("!document.getElementById('k-next').disabled")
+    page.locator("#k-next").press("Enter")
+    page.wait_for_selector("text=Young's modulus")
+    page.wait_for_timeout(500)
+
+    page.reload()  # and another server: the step and all choices are there
+    page.wait_for_selector("text=Young's modulus")
+    other = Server(folder)
+    try:
+        page.goto(other.address)
+        page.goto(f"{other.base}/new")
+        page.wait_for_selector("text=Young's modulus")
+        page.get_by_role("button", name="2 Faces").press("Enter")
+        page.wait_for_selector(".k-face select")
+        assert page.get_by_label("housing.rim", exact=True).input_value() == "held"
+    finally:
+        page.goto(f"{server.base}/new")
+        other.stop()
+    page.get_by_role("button", name="6 Case").press("Enter")
+    page.wait_for_selector("text=klack: 1")
+    page.get_by_label("Name of the valve").fill("drawn")
+    page.get_by_label("Name of the valve").press("Tab")
+    page.get_by_role("button", name="Write, open editor").press("Enter")
+    page.wait_for_selector("text=valid impact, saved")
+    assert (folder / "drawn" / "case.yaml").is_file()
+
+
+def test_files_that_cannot_be_used_are_told_in_words(page, server, folder):
+    open_guide(page, server)
+    words = {
+        "cad/empty.step": "which starts with 'ISO-10303-21;'",
+        "cad/words.step": "which starts with 'ISO-10303-21;'",
+        "cad/lost.step": "Try:",
+        f"cad/{ATTACK}": "a body of revolution",
+    }
+    for file, expected in words.items():
+        choose_step(page, "needle", file)
+        page.wait_for_selector(f"text={expected}")
+        assert str(folder) not in page.inner_text("#k-body")  # places of the server stay there
+    upload = page.get_by_label("STEP file of the housing, from here")
+    upload.set_input_files(
+        {"name": "no.step", "mimeType": "model/step", "buffer": b"PK" + b"x" * 5_000_000}
+    )
+    page.wait_for_selector("text=no.step: uploaded file: got a file that begins with")
+    answer = page.evaluate(
+        "async () => (await fetch('/upload', {method: 'POST', body: 'x'.repeat(2 ** 26 + 1)}))"
+        ".status"
+    )
+    assert answer == 413
+    told = page.evaluate("klackUpload({name: 'a.step', size: 2 ** 27}, 2 ** 26)")
+    assert "128 MiB, more than 64 MiB" in told["error"]
+    assert list((folder / ".klack-app" / "uploads").glob("*.part")) == []
+
+
+def test_bodies_of_a_case_are_shown_and_a_hundred_pages_leave_no_context(page, server):
+    page.goto(f"{server.base}/show?path=demo.yaml")
+    page.wait_for_selector(".ks-view canvas")
+    page.wait_for_selector("text=faces in contact")
+    assert page.evaluate("window.klackScenes") == 1
+    require_within(page)
+    page.get_by_role("button", name="Colours").click()  # auto, light
+    page.wait_for_function("!document.querySelector('.ks').classList.contains('ks-dark')")
+
+    # an element that comes and goes on one page, as in the guide
+    leak = page.evaluate(
+        """async () => {
+          const { mount } = await import('/static/scene.js');
+          const address = performance.getEntriesByType('resource')
+            .map(e => e.name).find(n => n.includes('/scene/'));
+          const payload = await (await fetch(address)).json();
+          const place = document.createElement('div');
+          document.body.append(place);
+          let lost = 0;
+          for (let i = 0; i < 100; i++) {
+            const scene = mount(place, payload, { autoplay: false });
+            const canvas = place.querySelector('.ks-view canvas');
+            const context = canvas.getContext('webgl2');
+            scene.dispose();
+            lost += context.isContextLost() ? 1 : 0;
+          }
+          const empty = place.childElementCount === 0;
+          place.remove();
+          return [lost, empty, document.querySelectorAll('.ks').length];
+        }"""
+    )
+    assert leak == [100, True, 1]
+    page.get_by_role("link", name="Edit").click()
+    page.wait_for_selector("#k-yaml")
+    page.goto(f"{server.base}/show?path=../x")
+    page.wait_for_selector("text=below the folder")
+    page.goto(f"{server.base}/show?path=cad/words.step")
+    page.wait_for_selector("text=no .yaml file")
