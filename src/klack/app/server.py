@@ -164,7 +164,7 @@ def _add_static(outer: FastAPI) -> None:
     async def static(name: str) -> Response:
         if name not in content:
             return PlainTextResponse("no such file\n", 404)
-        return Response(content[name], media_type=kinds.get(name, "text/javascript"))
+        return Response(content[name], media_type=kinds[name])
 
     outer.add_api_route("/static/{name}", static, response_model=None)
 
@@ -195,7 +195,6 @@ def _add_files(outer: FastAPI, state: State) -> None:
         headers = {"cache-control": "no-store"}
         return Response(content, media_type="application/json", headers=headers)
 
-    outer.add_api_route("/points-data", points, response_model=None)
     async def scene(name: str) -> Response:
         packed = state.scenes.get(name.removesuffix(".json"))
         if packed is None:
@@ -210,6 +209,7 @@ def _add_files(outer: FastAPI, state: State) -> None:
             return PlainTextResponse(f"{error}\n", 415)
         return PlainTextResponse(file)
 
+    outer.add_api_route("/points-data", points, response_model=None)
     outer.add_api_route(UPLOAD, upload, methods=["POST"], response_model=None)
     outer.add_api_route("/scene/{name}", scene, response_model=None)
     outer.add_api_route("/report", report, response_model=None)
