@@ -52,7 +52,6 @@ _SAME_INTERVAL = 12  # iterations with it
 _MOST_OF = 0.9  # longest step within this interval
 # cavity at a junction; one that closes in this step; one that did, and cannot
 _OPEN, _CLOSED, _KEPT = 1.0, 2.0, 3.0
-_MAY_REOPEN = 40  # iterations
 _HELD = 1.0  # [kg/Pa] what holds the pressure of an open one, far more than any flow answers
 _BALANCED = 1e-9  # of the flows of a junction: what its cavity may be filled too much
 _NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
@@ -140,7 +139,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             r[0] /= trial.own[0]
         else:
             solve_mass_balance(trial.matrix, trial.own, r, nodes.volumes)
-        opens = _open_cavities(fluid, iteration)
+        opens = _open_cavities(fluid)
         worst, total = _limit_steps(fluid, iteration)
         finite = abs(total) < np.inf
         if finite and worst < _PRESSURE_LEFT and not opens:
@@ -297,17 +296,13 @@ def _add_up_ends(fluid: Any, H: float) -> None:
 
 
 @phase
-def _open_cavities(fluid: Any, iteration: int) -> bool:
-    """Hold junctions at the pressure of boiling where a Newton step leads below; whether any is.
-
-    One that closed in this step may open again while others still do either: kept open for good, it
-    would be filled with more than it has room for, and give the energy of that back as a gain.
-    """
+def _open_cavities(fluid: Any) -> bool:
+    """Hold junctions at the pressure of boiling where a Newton step leads below; whether any is."""
     nodes, trial, opens = fluid.nodes, fluid.trial, False
     for i in range(nodes.chambers, nodes.volumes):
         if trial.p[i] + trial.r[i] < nodes.boiling and not _is_held(trial.cavity[i]):
             trial.r[i] = nodes.boiling - trial.p[i]
-            if trial.cavity[i] == 0.0 or iteration < _MAY_REOPEN:
+            if trial.cavity[i] == 0.0:
                 trial.cavity[i] = _OPEN
             elif trial.p[i] <= nodes.boiling:  # not an overshoot: it leads below from there
                 trial.cavity[i] = _KEPT
@@ -406,7 +401,9 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
         theta = trial.theta[i]
         target = rho[i] + trial.slope[i] * r[i] / theta
         large = abs(r[i]) > _LARGE_STEP * p[i]
-        if iteration >= _PLAIN_NEWTON:
+        # a step that may be the last stays as the flows have it: else they would leave mass behind
+        last = abs(r[i]) < _PRESSURE_LEFT * max(theta * trial.end[i], nodes.ambient)
+        if iteration >= _PLAIN_NEWTON and not last:
             if (iteration - _PLAIN_NEWTON) % _SAME_INTERVAL == 0:
                 lower[i], upper[i] = 0.0, np.inf  # the other volumes may have moved the root
             wanted = target
