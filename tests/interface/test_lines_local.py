@@ -71,6 +71,7 @@ def test_keys_of_the_other_kind_are_refused(given, key):
         Line.model_validate(BORE | given)
 
 
+@pytest.mark.filterwarnings(TOLD)
 def test_cells_shorter_than_a_step_say_how_many_fit():
     rows = network(LOCAL | {"cells": 400})
 
@@ -104,11 +105,7 @@ def test_a_steady_flow_that_boils_in_the_line_is_refused():
     narrow = network(LOCAL | {"diameter": 0.5e-3, "friction": "none", "length": 0.02}, hole=2e-3)
 
     with pytest.raises(InputError, match=r"pipe.*start"):
-        run(replace_room(narrow))
-
-
-def replace_room(rows):
-    return rows
+        run(narrow)
 
 
 @pytest.mark.filterwarnings(TOLD)
@@ -146,21 +143,17 @@ def test_the_warning_of_fixed_properties_names_local_ones():
 
 @pytest.mark.parametrize("kind", [{}, LOCAL])
 def test_laminar_flow_beyond_its_range_is_told_with_line_number_time_and_option(kind):
-    (text,) = [x for x in told(network(kind)) if "Reynolds" in x]
+    steady = network(kind, to=300e5)
+    (text,) = [x for x in told(steady) if "Reynolds" in x]
 
-    flow = run_flow(network(kind))
-    reynolds = 4.0 * flow / (np.pi * 2e-3 * float(HEPTANE.viscosity(305e5)))
-    found = float(text.split("number of ")[1].split()[0])
-    assert found == pytest.approx(reynolds, rel=0.1)  # flow of the hole; that of the end swings
-    assert "us after the start" in text
-    assert "friction: turbulent" in text
-
-
-@pytest.mark.filterwarnings(TOLD)
-def run_flow(rows):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyWarning)
-        return float(np.max(run(rows).channels["hole flow"].values))
+        flow = float(run(steady).channels["hole flow"].values[0])
+    reynolds = 4.0 * flow / (np.pi * 2e-3 * float(HEPTANE.viscosity(300e5)))
+    found = float(text.split("number of ")[1].split()[0])
+    assert found == pytest.approx(reynolds, rel=1e-2)  # three digits; the flow starts to 1e-4
+    assert "us after the start" in text
+    assert "friction: turbulent" in text
 
 
 @pytest.mark.parametrize("kind", [{}, LOCAL])
