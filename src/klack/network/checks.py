@@ -303,7 +303,8 @@ def _check_node_rows(rows: Rows) -> None:
 
 def _check_junctions(rows: Rows) -> None:
     """Raise for a junction without a line, whose pressure nothing sets, or with a moving face."""
-    lines = {node for row in (*rows.lines, *rows.waves) for node in (row.a, row.b)}
+    lines = {node for row in rows.lines for node in (row.a, row.b)}
+    lines |= {node for row in rows.waves for node in (row.a, row.b)}
     for node, row in rows.nodes.items():
         if not row.junction:
             continue

@@ -42,7 +42,7 @@ __all__ = [
 
 def require_chambers(rows: Rows) -> None:
     """Refuse parts that hold fluid and cannot tell how much of its gas is free."""
-    wrong = [row.component for row in (*rows.lines, *rows.waves)]
+    wrong = [row.component for row in rows.lines] + [row.component for row in rows.waves]
     wrong += [row.component for row in rows.branches if row.step is fluid_store_step]
     if wrong:
         raise InputError(

@@ -401,7 +401,9 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
         theta = trial.theta[i]
         target = rho[i] + trial.slope[i] * r[i] / theta
         large = abs(r[i]) > _LARGE_STEP * p[i]
-        if iteration >= _PLAIN_NEWTON:
+        # a step that may be the last stays as the flows have it: else they would leave mass behind
+        last = abs(r[i]) < _PRESSURE_LEFT * max(theta * trial.end[i], nodes.ambient)
+        if iteration >= _PLAIN_NEWTON and not last:
             if (iteration - _PLAIN_NEWTON) % _SAME_INTERVAL == 0:
                 lower[i], upper[i] = 0.0, np.inf  # the other volumes may have moved the root
             wanted = target

@@ -499,11 +499,11 @@ def scratch_of(network: CompiledNetwork, recording: Recording) -> Scratch:
 
 def _failure(network: CompiledNetwork, status: int, report: Vector) -> ConvergenceError:
     time = float(report[2])
-    for row, code in zip(network.rows.waves, network.waves.failed, strict=True):
-        if code != 0:
-            words = row.failures.get(int(code), f"status {code} of its step function")
+    for wave, why in zip(network.rows.waves, network.waves.failed, strict=True):
+        if why != 0:
+            words = wave.failures.get(int(why), f"status {why} of its step function")
             return ConvergenceError(
-                f"{row.component}: {words}, {format_si(time, 's', 8)} after the start.\n"
+                f"{wave.component}: {words}, {format_si(time, 's', 8)} after the start.\n"
                 "Try: a smaller step; some entrained gas; a slower change of pressure."
             )
     wrong = _not_finite_part(network)

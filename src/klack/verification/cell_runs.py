@@ -91,7 +91,7 @@ def run_cells(
     power = h * total * flow
     change = held[1] - held[0]
     return CellRun(
-        time=h * (np.arange(steps) + 0.5),
+        time=np.asarray(h * (np.arange(steps) + 0.5), dtype=np.float64),
         total=total,
         flow=flow,
         losses=losses,
