@@ -153,3 +153,25 @@ def test_a_column_without_friction_gives_back_what_it_took(excess):
     # round-off of the pressure energy that is left of its change by 3 Pa
     assert abs(result.books.losses["neck flow"]) < 1e-10 * start
     assert result.books.relative_residual < 1e-9
+
+
+@pytest.mark.parametrize("direction", ["opening", "closing"])
+def test_a_source_pays_for_the_room_behind_a_face(direction):
+    """It fills what the body sweeps: (p - p_amb) A y, not only what flows away."""
+    area, pressure = 1.5e-6, 17e5
+    parts = {
+        "body": RigidMass(mass=0.07, speed=0.1),
+        "spring": Spring(stiffness=1e4, preload=0.0),
+        "rail": PressureSource(pressure=pressure),
+        "face": PressureFace(direction=direction, area=area),
+    }
+    joints = [["body.body", "spring.end", "face.body"], ["rail.fluid", "face.fluid"]]
+    rows = Network(parts, joints, fluid=FLUIDS["liquid"]).rows()
+    result = simulate_network(rows, duration=1e-3, step=5e-8, record=1e-6, start="free")
+
+    travelled = np.diff(result.channels["body.body displacement"].values[[0, -1]])[0]
+    sign = 1.0 if direction == "opening" else -1.0
+    work = sign * (pressure - 101325) * area * travelled
+    assert abs(travelled) > 1e-5
+    assert result.books.supplies["rail pressure"] == pytest.approx(work, rel=1e-9, abs=0.0)
+    assert result.books.relative_residual <= 1e-12

@@ -24,8 +24,8 @@ middle ``(x + L q) sin(be)``, and ``sqrt(x^2 + t^2 q^2)`` where ``q < x L/t^2``.
 
 Limits: the surface of the spool is plane across a notch, ``b`` small against the diameter; the
 edges are sharp; both areas are those of a quasi-steady flow, in series only as the smaller one.
-Sources: Borghi, Milani & Paoluzzi, Int. J. Fluid Power 6 (2005) no. 2 (exit and throat, the smaller
-one); areas by elementary geometry.
+Sources: elementary geometry, derived here; the subject is that of Borghi, Milani & Paoluzzi,
+Int. J. Fluid Power 6 (2005) no. 2, which was not read.
 """
 
 from math import atan, log, log1p, pi, sqrt

@@ -43,6 +43,7 @@ __all__ = [
     "Rows",
     "SideRow",
     "SliderRow",
+    "StateInput",
     "WallRow",
     "WaveRow",
 ]
@@ -117,6 +118,24 @@ class BodyRow:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class StateInput:
+    """Something that can flow into the states of an element: an input of its linear law.
+
+    Parameters
+    ----------
+    owner, quantity, unit : str
+        Whose it is, what, and its unit.
+    rates : callable
+        By index of a state, its rate for one such unit, at the given states.
+    """
+
+    owner: str
+    quantity: str
+    unit: str
+    rates: Callable[[NDArray[np.float64]], Mapping[int, float]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ElementRow:
     """Element that applies forces to ports; see :mod:`klack.network.step_function`.
 
@@ -126,7 +145,7 @@ class ElementRow:
     at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
     point, where they differ.  ``interval`` [s] is that of its exchange with something outside: no
     step is longer.  ``state_names`` are name and unit of states that no channel records, by index;
-    ``component.name`` in a row that stands for several.
+    ``component.name`` in a row that stands for several.  ``inflows`` are inputs of its linear law.
     """
 
     component: str
@@ -143,6 +162,7 @@ class ElementRow:
     at_steady: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
     state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
+    inflows: tuple[StateInput, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

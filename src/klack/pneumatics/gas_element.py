@@ -1,6 +1,7 @@
 """Rows of gas made into the one element that the solver runs, with its start and its limits."""
 
 from collections.abc import Mapping
+from functools import partial
 from math import inf
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError
 from klack.network.gas_rows import GasChamberRow, GasRows, GasSourceRow
-from klack.network.rows import Ambient, Book, Channel, ElementRow, LimitRow, Rows
+from klack.network.rows import Ambient, Book, Channel, ElementRow, LimitRow, Rows, StateInput
 from klack.network.step_function import evaluate
 from klack.pneumatics.gas import Gas
 from klack.pneumatics.gas_step import (
@@ -185,12 +186,30 @@ def close_gas(rows: Rows) -> None:
                 OF_CHAMBER * i + 1: (f"{chamber.component}.internal energy", "J")
                 for i, chamber in enumerate(found.chambers.values())
             },
+            inflows=tuple(
+                StateInput(
+                    owner=chamber.component,
+                    quantity="mass_flow",
+                    unit="kg/s",
+                    rates=partial(_inflow, i, gas.cv if chamber.heat < 0.0 else gas.cp, gas.cv),
+                )
+                for i, chamber in enumerate(found.chambers.values())
+            ),
             failures=_FAILURES,
             at_rest=net.start,
             at_steady=lambda y: net.start(y, steady=True),
         )
     )
     rows.limits += _limits(net)
+
+
+def _inflow(chamber: int, heat: float, cv: float, state: Vector) -> dict[int, float]:
+    """Rates of mass and energy for gas as warm as that in the chamber.
+
+    It carries ``c_p T``; of that ``R T`` goes into the wall where the gas stays as warm as that.
+    """
+    at = OF_CHAMBER * chamber
+    return {at: 1.0, at + 1: heat * float(state[at + 1]) / (float(state[at]) * cv)}
 
 
 def _port_name(component: str, port: str) -> str:

@@ -287,6 +287,8 @@ class _Assembly:
             self.inputs.append(Signal(self.node_names[i], "mass_flow", "kg/s"))
         for i in range(volumes, self.network.nodes.nodes):
             self.inputs.append(Signal(self.node_names[i], "pressure", "Pa"))
+        for row_e in self.rows.elements:
+            self.inputs += [Signal(x.owner, x.quantity, x.unit) for x in row_e.inflows]
         for key, (unit, _) in self.drives.items():
             owner, _, quantity = key.rpartition(".")
             self.inputs.append(Signal(owner, quantity, unit))
@@ -431,6 +433,8 @@ class _Assembly:
                 law, forms = self.linear[k], self._columns(k, ports, ends)
                 first = self.row_states[k]
                 self.rates[first : first + len(law.kept)] = law.rate @ forms
+                if isinstance(row, ElementRow):
+                    self._flow_in(row, first, law, at.state[at.state0[j] :])
                 acts = law.acts @ forms
                 owner = " ".join(filter(None, (row.component, row.label))).replace(" ", "_")
                 if branch:
@@ -450,6 +454,13 @@ class _Assembly:
                     if not any(channel.label.endswith(x) for x in ("driver state",)):
                         self._show(channel.owner or owner, channel.label, channel.unit, form)
                 k += 1
+
+    def _flow_in(self, row: ElementRow, first: int, law: LinearRow, state: Vector) -> None:
+        for inflow in row.inflows:
+            place = self.input_at[f"{inflow.owner}.{inflow.quantity}"]
+            for index, rate in inflow.rates(state).items():
+                if index in law.kept:
+                    self.rates[first + law.kept.index(index), place] += rate
 
     def _put_contacts(self) -> None:
         at = self.network.interfaces

@@ -276,6 +276,9 @@ def _kept(at: RowPoint, d: Matrix) -> tuple[int, ...]:
         matters = more
     others = P - np.diag(np.diag(P))
     driven = np.any(d[states, n:] != 0.0, axis=1) | (np.diag(P) != 2.0)
+    if isinstance(at.row, ElementRow):
+        for inflow in at.row.inflows:
+            driven[list(inflow.rates(at.state))] = True
     while True:
         more = driven | np.any((others != 0.0)[:, driven], axis=1)
         if np.array_equal(more, driven):

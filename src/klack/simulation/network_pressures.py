@@ -502,6 +502,12 @@ def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: A
             accounts.rows[branches.supply[k]] -= power
         else:
             accounts.rows[branches.loss[k]] += power
+    nodes = fluid.nodes
+    for w in range(nodes.walls):
+        i, port = nodes.wall_node[w], nodes.wall_port[w]
+        if i >= nodes.volumes:  # a source fills the room behind a wall
+            work = nodes.wall_area[w] * (trial.p[i] - nodes.ambient)
+            accounts.supply[i - nodes.volumes] += work * (S[Y1 + port] - S[SEEN + port])
 
 
 @phase

@@ -39,6 +39,7 @@ from klack.simulation.modal_step import ROW, ROW_V
 from klack.simulation.network_run import simulate_network
 from klack.simulation.operating_point import OperatingPoint, compiled_at, operating_point
 from klack.verification.check import Check, compare
+from klack.verification.gas_linearisation import gas_linearisation
 
 __all__ = ["checks"]
 
@@ -71,6 +72,7 @@ def checks() -> list[Check]:
         *_valve_on_pipe(),
         *_passive(),
         *_sine(),
+        *gas_linearisation(),
     ]
 
 

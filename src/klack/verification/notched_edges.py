@@ -25,7 +25,7 @@ AMBIENT = Ambient()
 RHO = float(OIL.density(AMBIENT.pressure))
 MU = float(OIL.viscosity(AMBIENT.pressure))
 D, C, WIDTH, DEPTH, LENGTH = 8e-3, 4e-6, 1e-3, 0.4e-3, 0.9e-3
-SOURCE = "exit and throat, the smaller one (Borghi, Milani & Paoluzzi 2005), by quadrature"
+SOURCE = "elementary geometry: exit and throat, the smaller one, by quadrature of the outline"
 
 _check = partial(compare, "hydraulic-parts")
 

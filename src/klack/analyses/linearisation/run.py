@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.linearisation.controllers import controllers_of, pid_loop, plain_name
+from klack.analyses.linearisation.gas_drives import gas_drives
 from klack.analyses.linearisation.loops import loop_margins, return_ratio
 from klack.analyses.linearisation.record import (
     Eigenvalue,
@@ -84,6 +85,9 @@ def linear_point(found: PointFound, held: Sequence[str] = ()) -> LinearPoint:
         more = {**found.currents, name: found.currents[name] + 1.0 / coil.resistance}
         with trial():
             drives[f"{name}.voltage"] = ("V", driven(found.network, more).at_start().rows())
+    for key, (unit, changed) in gas_drives(found.network).items():
+        with trial():
+            drives[key] = (unit, driven(changed, found.currents).at_start().rows())
     linear = linear_network(network, min(step, _STEP), held=held, drives=drives)
     return LinearPoint(found=found, linear=linear)
 
