@@ -182,9 +182,9 @@ def _overlapping() -> list[Check]:
 
     y = np.array([0.0, 0.0, 60.0])
     for a, b in ((0.0, begins), (begins, time)):
-        y = solve_ivp(
-            rate, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-6
-        ).y[:, -1]
+        y = solve_ivp(rate, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-6).y[
+            :, -1
+        ]
     source = "both coils, the capacitor and its converter integrated by SciPy (DOP853)"
     return [
         _check(
