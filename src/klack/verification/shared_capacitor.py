@@ -58,7 +58,7 @@ def _magnet() -> MagneticNetwork:
     )
 
 
-def _driver(start: float, end: float, peak: float = 100.0, **own: float) -> BoostDriver:
+def _driver(start: float, end: float, peak: float = 100.0) -> BoostDriver:
     return BoostDriver(
         battery=5.0,
         peak_current=peak,
@@ -66,7 +66,6 @@ def _driver(start: float, end: float, peak: float = 100.0, **own: float) -> Boos
         hold_band=1.0,
         diode_voltage=0.0,
         shots=(Shot(start=start, end=end),),
-        **own,
     )
 
 
@@ -220,12 +219,12 @@ def _overlapping() -> list[Check]:
 
 def _alike() -> list[Check]:
     """Two equal drivers at 20 uF, against one at 10 uF of its own; whole shots with switching."""
-    kwargs = {"diode_resistance": 0.02, "switch_resistance": 0.03}
-    shot = _driver(0.0, 0.4e-3, peak=8.0, **kwargs)
+    losses = {"diode_resistance": 0.02, "switch_resistance": 0.03}
+    shot = _driver(0.0, 0.4e-3, peak=8.0).model_copy(update=losses)
     bank = BoostCapacitor(capacitance=_C, voltage=_U, recharge_power=10.0)
     both = _run((shot, shot), bank, duration=0.8e-3)
     own = {"capacitance": 0.5 * _C, "boost_voltage": _U, "recharge_power": 5.0}
-    alone = _run((_driver(0.0, 0.4e-3, peak=8.0, **kwargs, **own),), None, duration=0.8e-3)
+    alone = _run((shot.model_copy(update=own),), None, duration=0.8e-3)
     apart = both.channels["m1 current"].values - alone.channels["m0 current"].values
     return [
         _check(
