@@ -1,6 +1,7 @@
 """Make the pictures of the documentation: ``python docs/pictures.py RESULT...``.
 
-Of ``klack demo`` come section.svg and force.svg, of ``klack stroke demo-stroke`` stroke.svg.
+Of ``klack demo`` come section.svg and force.svg, of ``klack stroke demo-stroke`` stroke.svg, of
+``klack stroke docs/how-to/two_coils.yaml`` two-coils.svg.
 
 Of two results of ``klack impact CASE --level interface`` comes pressure.svg; their cases are
 copies of ``demo-valve`` with titles of their own, the second with
@@ -113,7 +114,8 @@ def _write_stroke(study: StrokeStudy) -> None:
     """Picture of a stroke along its axis, or of the impacts of one in three dimensions."""
     rings = line_load_picture(study.reference)
     if rings is None:
-        (IMAGES / "stroke.svg").write_bytes(svg_chart(stroke_chart(study)))
+        name = "two-coils.svg" if len(study.channels.current) > 1 else "stroke.svg"
+        (IMAGES / name).write_bytes(svg_chart(stroke_chart(study)))
         return
     (IMAGES / "off-axis-line-load.svg").write_bytes(rings.image)
     (IMAGES / "off-axis-film.svg").write_bytes(svg_chart(film_charts(study.reference)[0]))

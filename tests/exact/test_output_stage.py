@@ -186,7 +186,7 @@ def test_a_run_in_two_parts_is_the_run_of_the_whole_time(case):
 def test_the_page_shows_the_driver_of_the_case():
     whole = YAML(typ="safe").load(HOW_TO / "boost_driver.yaml")["network"]["components"]
     text = (HOW_TO / "boost-capacitor.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```yaml-part\n(.*?)```", text, re.DOTALL)
+    block = re.findall(r"```yaml-part\n(.*?)```", text, re.DOTALL)[0]
     assert YAML(typ="safe").load(block)["driver"] == whole["driver"]
 
 

@@ -307,6 +307,42 @@ def test_a_node_that_one_stroke_warms_noticeably_is_a_doubt():
     assert any("one stroke warms 'copper' by" in text for text in run_heat(case).warnings)
 
 
+@pytest.mark.parametrize(
+    ("stated", "kelvin", "words"),
+    [
+        ("", 453.15, None),
+        ("", 573.15, "'coil' reaches 300 °C, above the 180 °C of class H of IEC 60085, and states"),
+        ("F", 428.15, None),
+        ("F", 429.15, "'coil' reaches 156 °C, above the 155 °C of its insulation, class F"),
+        ("R", 493.15, None),
+        ('"250"', 530.15, "'coil' reaches 257 °C, above the 250 °C of its insulation, class 250"),
+    ],
+)
+def test_copper_warmer_than_its_insulation_is_a_doubt(stated, kelvin, words):
+    change = [("turns: 200,", f"turns: 200, insulation_class: {stated},")] if stated else []
+    told = [
+        text for text in run_heat(read(*change), soak=(kelvin,)).warnings if "copper of" in text
+    ]
+
+    assert len(told) == (words is not None)
+    assert words is None or words in told[0]
+
+
+def test_each_coil_of_a_magnet_follows_its_own_copper():
+    path = Path(__file__).parents[2] / "docs" / "how-to" / "two_coils.yaml"
+    case = read_valve_case(path.read_text(encoding="utf-8"), path)
+    valve = build_valve(case, silent, threads=1)
+    cold = dict.fromkeys(("copper", "holding_copper", "body", "ambient"), 293.15)
+
+    warm = warm_valve(valve, {"copper": cold | {"copper": 393.15, "holding_copper": 343.15}})
+
+    assert warm.values["magnet resistance"] == (pytest.approx(0.8 * 1.393), "ohm")
+    assert warm.values["magnet.holding resistance"] == (pytest.approx(9.0 * 1.1965), "ohm")
+    magnet = warm.valve.network.components["magnet"]
+    assert magnet.winding_temperature == 393.15
+    assert magnet.circuits["holding"].winding_temperature == 343.15
+
+
 def test_a_winding_may_follow_a_fixed_temperature():
     case = read(
         (

@@ -27,7 +27,7 @@ class BoostCapacitor(Component):
     here.
 
     Limits: those of :mod:`klack.magnetics.output_stage`; at most 8 coils in all.
-    Source: Bosch, Dieselmotor-Management, on injectors with solenoids.
+    Source: charge balance of a capacitor; converter as in boost-driver.
     """
 
     type: ClassVar[str] = "boost-capacitor"

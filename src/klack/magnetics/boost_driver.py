@@ -5,14 +5,13 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
 from klack.magnetics.driver import DriveProgram, Driver, DriveState, Switch, When
 from klack.magnetics.output_stage import Capacitor, OutputStage, StagePath
 from klack.magnetics.shared_capacitors import shared_capacitors
 from klack.network.port import FED, VOLTAGE, Port
-from klack.network.rows import GROUND, Rows
+from klack.network.rows import Rows
 from klack.units import Capacitance, Current, Power, Ratio, Resistance, Time, Voltage
 
 __all__ = ["BoostDriver", "Shot"]
@@ -210,28 +209,14 @@ class BoostDriver(Driver):
                 hint="add it; or join 'supply' to a boost-capacitor, which has these keys.",
             )
 
+    def port_kinds(self) -> Mapping[str, Port]:
+        """Terminals, and ``supply`` without a capacitor of its own."""
+        return {"terminals": VOLTAGE} if self.capacitance is not None else self.ports
+
     def add_rows(self, rows: Rows) -> None:
-        """Draw from the capacitor at ``supply``; the coil runs the program."""
-        supply = rows.port("supply")
-        if supply == GROUND and self.capacitance is None:
-            raise InputError(
-                f"components.{rows.component}",
-                got="a boost-driver without a capacitor",
-                expected="capacitance, boost_voltage and recharge_power, or its port 'supply' "
-                "joined to a boost-capacitor",
-                hint=f"write [capacitor.outlet, {rows.component}.supply] among the connections.",
-            )
-        if supply == GROUND:
-            return
-        if self.capacitance is not None:
-            raise InputError(
-                f"components.{rows.component}",
-                got="a capacitance of its own, and the port 'supply' joined to a boost-capacitor",
-                expected="one of them",
-                hint="remove capacitance, boost_voltage, start_voltage and recharge_..., or the "
-                "connection.",
-            )
-        shared_capacitors(rows).drawing[rows.port("terminals")] = supply
+        """Name the capacitor at ``supply``; the coil runs the program."""
+        if self.capacitance is None:
+            shared_capacitors(rows).drawing[rows.port("terminals")] = rows.port("supply")
 
     def _capacitor(self) -> Capacitor | None:
         if self.capacitance is None or self.boost_voltage is None:

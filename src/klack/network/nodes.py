@@ -156,7 +156,12 @@ def _joint(key: tuple[str | int, ...], text: str, ports: Mapping[str, Mapping[st
             key,
             got=f"'{text}', but '{component}' has no port '{name}'",
             expected=f"one of: {one_of(full)}",
-            hint=nearest(text, full, "every component has the ports of its type only."),
+            hint=nearest(
+                text,
+                full,
+                "a component has the ports of its type, and some only with certain "
+                "keys: supply of a boost-driver without a capacitance of its own.",
+            ),
         )
     return Joint(component, name, known[name])
 

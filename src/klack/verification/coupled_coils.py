@@ -125,7 +125,7 @@ def _transformer() -> list[Check]:
     end, L = 0.6e-3, _inductance()
     step, none = VoltageTable(time=(0.0,), voltage=(12.0,)), VoltageTable(time=(0,), voltage=(0,))
     closed = _run(two_coils(), step, none, duration=end)
-    final = np.array([12.0 / _RESISTANCE[0], 0.0])
+    final = np.array([12.0 / float(_RESISTANCE[0]), 0.0])
     rate = -np.linalg.solve(L, np.diag(_RESISTANCE))
     expected = final - expm(rate * end) @ final
     opened = _run(two_coils(), step, VoltageStep(voltage=1.0, start=1.0), duration=end)
@@ -163,7 +163,7 @@ def _transformer() -> list[Check]:
         ),
         _check(
             "work of the first driver of the transformer, the second closed [J]",
-            expected=12.0 * float(_charge(rate, final, end)[0]),
+            expected=12.0 * float(_charge(np.asarray(rate), final, end)[0]),
             computed=closed.books.supplies["magnet electric"],
             tolerance=1e-7,
             source="u times the charge, integral of the matrix exponential",

@@ -58,7 +58,7 @@ def _magnet() -> MagneticNetwork:
     )
 
 
-def _driver(start: float, end: float, peak: float = 100.0, **own: float) -> BoostDriver:
+def _driver(start: float, end: float, peak: float = 100.0) -> BoostDriver:
     return BoostDriver(
         battery=5.0,
         peak_current=peak,
@@ -66,7 +66,6 @@ def _driver(start: float, end: float, peak: float = 100.0, **own: float) -> Boos
         hold_band=1.0,
         diode_voltage=0.0,
         shots=(Shot(start=start, end=end),),
-        **own,
     )
 
 
@@ -182,9 +181,9 @@ def _overlapping() -> list[Check]:
 
     y = np.array([0.0, 0.0, 60.0])
     for a, b in ((0.0, begins), (begins, time)):
-        y = solve_ivp(
-            rate, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-6
-        ).y[:, -1]
+        y = solve_ivp(rate, (a, b), y, method="DOP853", rtol=1e-12, atol=1e-14, max_step=1e-6).y[
+            :, -1
+        ]
     source = "both coils, the capacitor and its converter integrated by SciPy (DOP853)"
     return [
         _check(
@@ -220,12 +219,12 @@ def _overlapping() -> list[Check]:
 
 def _alike() -> list[Check]:
     """Two equal drivers at 20 uF, against one at 10 uF of its own; whole shots with switching."""
-    kwargs = {"diode_resistance": 0.02, "switch_resistance": 0.03}
-    shot = _driver(0.0, 0.4e-3, peak=8.0, **kwargs)
+    losses = {"diode_resistance": 0.02, "switch_resistance": 0.03}
+    shot = _driver(0.0, 0.4e-3, peak=8.0).model_copy(update=losses)
     bank = BoostCapacitor(capacitance=_C, voltage=_U, recharge_power=10.0)
     both = _run((shot, shot), bank, duration=0.8e-3)
     own = {"capacitance": 0.5 * _C, "boost_voltage": _U, "recharge_power": 5.0}
-    alone = _run((_driver(0.0, 0.4e-3, peak=8.0, **kwargs, **own),), None, duration=0.8e-3)
+    alone = _run((shot.model_copy(update=own),), None, duration=0.8e-3)
     apart = both.channels["m1 current"].values - alone.channels["m0 current"].values
     return [
         _check(

@@ -86,9 +86,9 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
         warmer = {"winding_temperature": at["copper"][node]}
         wound = winding_of(parts, coil)
         if circuit:
-            others = dict(getattr(parts[name], "circuits", {}))
-            others[circuit] = _with(wound, warmer, coil)
-            parts[name] = _with(parts[name], {"circuits": others}, coil)
+            circuits = dict(getattr(parts[name], "circuits", {}))
+            circuits[circuit] = _with(wound, warmer, coil)
+            parts[name] = _with(parts[name], {"circuits": circuits}, coil)
         else:
             parts[name] = _with(parts[name], warmer, coil)
         cold = getattr(wound, "resistance", None)
