@@ -47,6 +47,7 @@ _HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"x-frame-options", b"SAMEORIGIN"),
 )
+_CLOSE = (b"connection", b"close")
 _SAFE = ("GET", "HEAD")
 _LOGIN = "/login"
 
@@ -152,11 +153,12 @@ class Guard:
             await _refuse(scope, send, 403, "That is not the password. Wait a second, try again.")
 
     async def _hand_on(self, scope: Scope, receive: Receive, send: Send) -> None:
-        came, begun = 0, False
+        came, begun, is_read = 0, False, scope["method"] in _SAFE
 
         async def bounded() -> MutableMapping[str, Any]:
-            nonlocal came
+            nonlocal came, is_read
             message = await receive()
+            is_read = is_read or not message.get("more_body")
             came += len(message.get("body", b""))
             if came > self._largest:
                 raise _TooLarge
@@ -167,6 +169,8 @@ class Guard:
             if message["type"] == "http.response.start":
                 begun = True
                 message["headers"] = _with_headers(message.get("headers", ()))
+                if not is_read:  # the rest of the body is not waited for
+                    message["headers"].append(_CLOSE)
             await send(message)
 
         try:
@@ -253,4 +257,5 @@ async def _refuse(scope: Scope, send: Send, status: int, text: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008, "reason": text})
         return
-    await _answer(send, status, text + "\n", b"text/plain; charset=utf-8")
+    more = () if scope["method"] in _SAFE else (_CLOSE,)  # nor is a body read to its end
+    await _answer(send, status, text + "\n", b"text/plain; charset=utf-8", *more)

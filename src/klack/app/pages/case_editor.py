@@ -10,6 +10,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, FormField
+from klack.app.folder import LARGEST_CASE
 from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
 from klack.app.state import State
 from klack.errors import KlackError
@@ -70,7 +71,8 @@ class _Editor:
                 self._area.on(
                     "input",
                     self._typed,
-                    js_handler="(e) => emit(e.target.value)",
+                    js_handler=f"(e) => emit(e.target.value.length > {LARGEST_CASE} ? null : "
+                    "e.target.value)",
                     throttle=0.15,
                 )
         ui.timer(0.05, self._check, once=True)
@@ -78,8 +80,16 @@ class _Editor:
     # ----------------------------------------------------------------------- from the text
 
     async def _typed(self, event: Any) -> None:
-        self._text = str(event.args)
         self._changes += 1
+        if event.args is None:
+            self._status.set_text("too long, not kept")
+            self._status.classes(remove="good fair", add="out")
+            self._message.set_text(
+                f"The text has more than {LARGEST_CASE} characters, the most that a case file may "
+                "have. It is neither checked nor kept: make it shorter."
+            )
+            return
+        self._text = str(event.args)
         mine = self._changes
         await asyncio.sleep(_REST)
         if mine == self._changes:
