@@ -11,7 +11,7 @@ import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.responses import PlainTextResponse, Response
 from nicegui import app as pages_app
-from nicegui import core, ui
+from nicegui import ui
 
 from klack.app.access import Access, access_for
 from klack.app.folder import OpenFolder
@@ -51,7 +51,6 @@ def build(state: State, access: Access) -> Guard:
     )
     pages_app.on_startup(state.start)
     pages_app.on_shutdown(state.close)
-    core.sio.eio.max_http_buffer_size = LARGEST_BODY  # of a message: a case file, as it is typed
     ui.run_with(
         outer,
         title="klack",

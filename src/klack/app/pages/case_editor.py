@@ -10,13 +10,13 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, FormField
-from klack.app.folder import LARGEST_CASE
 from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
 from klack.app.state import State
 from klack.errors import KlackError
 
 __all__ = ["case_editor_page"]
 
+_LONGEST = 950_000  # characters: NiceGUI drops a message above 1 MB without a word
 _REST = 0.4  # [s] without a key until the text is checked
 
 
@@ -71,8 +71,8 @@ class _Editor:
                 self._area.on(
                     "input",
                     self._typed,
-                    js_handler=f"(e) => emit(e.target.value.length > {LARGEST_CASE} ? null : "
-                    "e.target.value)",
+                    js_handler=f"(e) => emit(JSON.stringify(e.target.value).length > {_LONGEST} "
+                    "? null : e.target.value)",
                     throttle=0.15,
                 )
         ui.timer(0.05, self._check, once=True)
@@ -85,8 +85,8 @@ class _Editor:
             self._status.set_text("too long, not kept")
             self._status.classes(remove="good fair", add="out")
             self._message.set_text(
-                f"The text has more than {LARGEST_CASE} characters, the most that a case file may "
-                "have. It is neither checked nor kept: make it shorter."
+                f"The text has more than {_LONGEST} characters, the most that this page takes. It "
+                "is neither checked nor kept: make it shorter, or edit the file itself."
             )
             return
         self._text = str(event.args)
