@@ -1,18 +1,24 @@
 """The pages in a browser: they answer, stay within the window, and load nothing from elsewhere."""
 
 import shutil
+import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from served_app import Served
 
 from klack.case.shipped import find_case
 
-pytest.importorskip("playwright.sync_api")
+sync_api = pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")
-pytestmark = pytest.mark.slow
+CHROMIUM = shutil.which("chromium")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here"),
+]
 
 CASE = "valve/case.yaml"
 WIDTHS = (400, 1000, 1600)
@@ -28,21 +34,42 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
+class Server:
+    """``klack app`` on a folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "klack", "app", str(folder), "--no-open"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        self.process.stdout.readline()
+        self.address = self.process.stdout.readline().strip()
+
+    @property
+    def base(self) -> str:
+        return self.address.partition("/?")[0]
+
+
 @pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[Served]:
-    with Served(folder) as found:
+def server(folder: Path) -> Iterator[Server]:
+    found = Server(folder)
+    yield found
+    found.process.send_signal(signal.SIGINT)
+    found.process.wait(20)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as started:
+        found = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         yield found
+        found.close()
 
 
 @pytest.fixture
-def other(folder: Path) -> Iterator[Served]:
-    """A second server on the folder; it ends with the test, also where that fails."""
-    with Served(folder) as found:
-        yield found
-
-
-@pytest.fixture
-def page(browser: Any, server: Served) -> Iterator[Any]:
+def page(browser: Any, server: Server) -> Iterator[Any]:
     """A page with the cookie; at its end nothing was complained of or asked of other hosts."""
     context = browser.new_context(viewport={"width": 1000, "height": 900})
     found = context.new_page()
@@ -153,6 +180,15 @@ def test_sliders_answer_by_keyboard(page, server):
     require_within(page)
 
 
+@pytest.fixture
+def other(folder: Path) -> Iterator[Server]:
+    """A second server on the folder; it ends with the test, also where that fails."""
+    found = Server(folder)
+    yield found
+    found.process.kill()
+    found.process.wait(20)
+
+
 def test_a_run_goes_on_without_the_server_and_its_results_compare(
     page, server, other, folder, browser
 ):
@@ -170,7 +206,8 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(
     row.get_by_role("button", name="Run").click()
     first.wait_for_selector("text=klack impact valve/one.yaml")
     context.close()
-    other.kill()
+    other.process.kill()
+    other.process.wait(20)
 
     page.goto(f"{server.base}/")
     page.wait_for_selector("text=done, ")
