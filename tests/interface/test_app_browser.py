@@ -180,14 +180,24 @@ def test_sliders_answer_by_keyboard(page, server):
     require_within(page)
 
 
-def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, folder, browser):
+@pytest.fixture
+def other(folder: Path) -> Iterator[Server]:
+    """A second server on the folder; it ends with the test, also where that fails."""
+    found = Server(folder)
+    yield found
+    found.process.kill()
+    found.process.wait(20)
+
+
+def test_a_run_goes_on_without_the_server_and_its_results_compare(
+    page, server, other, folder, browser
+):
     page.goto(f"{server.base}/")
     text = (folder / CASE).read_text("utf-8")
     (folder / "valve" / "one.yaml").write_text(
         text.replace("[lumped, reduced-none, reduced-attachment, reduced, full]", "[reduced]"),
         "utf-8",
     )
-    other = Server(folder)
     context = browser.new_context()
     first = context.new_page()
     first.set_default_timeout(_LONG)

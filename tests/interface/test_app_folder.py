@@ -9,7 +9,7 @@ import pytest
 
 from klack.analyses import store
 from klack.app import folder as app_folder
-from klack.app.folder import LARGEST_CASE, OpenFolder
+from klack.app.folder import LARGEST_CASE, OpenFolder, result_names
 from klack.app.state import Notes, Sounds
 from klack.errors import InputError
 
@@ -166,3 +166,25 @@ def test_sounds_are_bounded_and_have_names_that_cannot_be_guessed():
     assert sounds.get(name(first)) is None
     assert [sounds.get(name(address)) for address in others] == [b"\1", b"\2"]
     assert len(name(first)) >= 20
+
+
+def test_a_text_of_another_page_is_not_overwritten(folder):
+    notes, other = Notes(folder), Notes(folder)
+
+    assert notes.exchange_draft("a.yaml", None, "one")
+    assert not other.exchange_draft("a.yaml", None, "two")  # it has seen no draft
+    assert not other.exchange_draft("a.yaml", None, None)  # what it saved is not what waits
+    assert notes.draft("a.yaml") == "one"
+    assert notes.exchange_draft("a.yaml", "one", "one more")
+    assert other.exchange_draft("a.yaml", "one more", None)
+    assert notes.draft("a.yaml") is None
+
+
+def test_no_two_cases_write_their_results_to_one_place():
+    cases = ["x.yaml", "a/x.yaml", "a-x.yaml", "valve.yaml", "valve/case.yaml", "case.yaml"]
+
+    names = result_names(cases)
+
+    assert len(set(names.values())) == len(cases)
+    assert names["case.yaml"] == "case"
+    assert result_names(["valve/case.yaml"]) == {"valve/case.yaml": "valve"}

@@ -49,6 +49,7 @@ _HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"x-frame-options", b"SAMEORIGIN"),
 )
+_CLOSE = (b"connection", b"close")
 _SAFE = ("GET", "HEAD")
 _LOGIN = "/login"
 
@@ -157,11 +158,13 @@ class Guard:
             await _refuse(scope, send, 403, "That is not the password. Wait a second, try again.")
 
     async def _hand_on(self, scope: Scope, receive: Receive, send: Send) -> None:
-        came, begun, largest = 0, False, self._largest_of(scope)
+        came, begun, is_read = 0, False, scope["method"] in _SAFE
+        largest = self._largest_of(scope)
 
         async def bounded() -> MutableMapping[str, Any]:
-            nonlocal came
+            nonlocal came, is_read
             message = await receive()
+            is_read = is_read or not message.get("more_body")
             came += len(message.get("body", b""))
             if came > largest:
                 raise _TooLarge
@@ -172,6 +175,8 @@ class Guard:
             if message["type"] == "http.response.start":
                 begun = True
                 message["headers"] = _with_headers(message.get("headers", ()))
+                if not is_read:  # the rest of the body is not waited for
+                    message["headers"].append(_CLOSE)
             await send(message)
 
         try:
@@ -258,4 +263,5 @@ async def _refuse(scope: Scope, send: Send, status: int, text: str) -> None:
     if scope["type"] == "websocket":
         await send({"type": "websocket.close", "code": 1008, "reason": text})
         return
-    await _answer(send, status, text + "\n", b"text/plain; charset=utf-8")
+    more = () if scope["method"] in _SAFE else (_CLOSE,)  # nor is a body read to its end
+    await _answer(send, status, text + "\n", b"text/plain; charset=utf-8", *more)

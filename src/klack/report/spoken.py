@@ -63,7 +63,9 @@ def _trace(trace: dict[str, Any]) -> str:
         return f"{name}: {', '.join(words)}" if words else ""
     if kind == "heatmap":
         values = _values(value for row in trace["z"] for value in row)
-        return f"{name or 'values'}: from {values.min():.4g} to {values.max():.4g}"
+        if not np.isfinite(values).any():
+            return ""
+        return f"{name or 'values'}: from {np.nanmin(values):.4g} to {np.nanmax(values):.4g}"
     if kind not in ("scatter", "scattergl") or trace.get("mode") == "none":
         return ""
     x, y = _values(trace.get("x", ())), _values(trace.get("y", ()))
@@ -103,4 +105,4 @@ def _title(axis: dict[str, Any]) -> str:
 
 def _plain(text: str) -> str:
     """Without the marks that Plotly reads in a text."""
-    return unescape(re.sub("<[^<>]*>", " ", text)).strip()
+    return " ".join(unescape(re.sub("<[^<>]*>", " ", text)).split())

@@ -17,6 +17,7 @@ from klack.errors import KlackError
 
 __all__ = ["case_editor_page"]
 
+_LONGEST = 950_000  # characters: NiceGUI drops a message above 1 MB without a word
 _REST = 0.4  # [s] without a key until the text is checked
 
 
@@ -85,7 +86,8 @@ class _Editor:
                 self._area.on(
                     "input",
                     self._typed,
-                    js_handler="(e) => emit(e.target.value)",
+                    js_handler=f"(e) => emit(JSON.stringify(e.target.value).length > {_LONGEST} "
+                    "? null : e.target.value)",
                     throttle=0.15,
                 )
         ui.timer(0.05, self._check, once=True)
@@ -93,8 +95,16 @@ class _Editor:
     # ----------------------------------------------------------------------- from the text
 
     async def _typed(self, event: Any) -> None:
-        self._text = str(event.args)
         self._changes += 1
+        if event.args is None:
+            self._status.set_text("too long, not kept")
+            self._status.classes(remove="good fair", add="out")
+            self._message.set_text(
+                f"The text has more than {_LONGEST} characters, the most that this page takes. It "
+                "is neither checked nor kept: make it shorter, or edit the file itself."
+            )
+            return
+        self._text = str(event.args)
         mine = self._changes
         await asyncio.sleep(_REST)
         if mine == self._changes:
