@@ -1,11 +1,11 @@
 """Slider moves and page changes of ``klack app`` for hours: time of a move, and memory.
 
-``uv run --group dev --extra app python benchmarks/app_soak.py CASE --hours 8`` copies a case (a file or
-the name of a shipped one) into a folder of its own, serves it, and moves the speed slider, or the
-first one there is, in Chromium without a display; every 500 moves it changes pages ten times.
-``--moves`` and ``--pages`` bound both instead of the hours.  It prints the time from a move to the new
-force, spectrum and sound in the page, the processor time per move of computation, server and
-browser, and the memory of all three: of the page after its garbage has been collected.
+``uv run --group dev --extra app python benchmarks/app_soak.py CASE --hours 8`` copies a case (a
+file or the name of a shipped one) into a folder of its own, serves it, and moves the speed slider,
+or the first one there is, in Chromium without a display; every 500 moves it changes pages ten
+times.  ``--moves`` and ``--pages`` bound both instead of the hours.  It prints the time from a move
+to the new force, spectrum and sound in the page, the processor time per move of computation, server
+and browser, and the memory of all three: of the page after its garbage has been collected.
 """
 
 import argparse
@@ -29,9 +29,8 @@ from klack.case.shipped import find_case
 _MOVES_AT_ONCE = 500
 _PAGES_AT_ONCE = 10
 _PATIENCE = 120_000  # [ms]
-_MOVED = """([bar, share, name]) => {
+_MOVED = """([bar, share]) => {
   const took = document.getElementById('k-took');
-  window.soakBefore = took.textContent;
   bar.value = +bar.min + share * (+bar.max - +bar.min);
   const begin = performance.now();
   return new Promise((done) => {
@@ -105,14 +104,14 @@ class Soak:
         """Move the speed slider, or the first one; return the time until it is drawn [ms]."""
         bar = self.page.query_selector("input[id='s-motion.speed']")
         bar = bar or self.page.query_selector(".k-slider input")
-        return float(self.page.evaluate(_MOVED, [bar, share, ""]))
+        return float(self.page.evaluate(_MOVED, [bar, share]))
 
     def change_pages(self, count: int) -> None:
-        """Go to and fro between the pages."""
-        pages = ("/", f"/case?path={self.case}", f"/sliders?path={self.case}")
+        """Go from page to page; every third is the overview."""
+        pages = (f"/sliders?path={self.case}", f"/case?path={self.case}", "/")
         for number in range(count):
             self.page.goto(self.base + pages[number % len(pages)])
-            ready = (".k-row", "textarea", ".k-slider input")[number % len(pages)]
+            ready = (".k-slider input", "textarea", ".k-row")[number % len(pages)]
             self.page.wait_for_selector(ready)
 
     def memory(self) -> Memory:
@@ -191,7 +190,8 @@ def soak(found: Soak, *, moves: int, pages: int, until: float) -> None:
             print(
                 f"{len(times)} moves: median {statistics.median(now):.0f} ms, 95 % within "
                 f"{statistics.quantiles(now, n=20)[-1]:.0f} ms; processor time per move: "
-                f"computation {spent[0]:.0f} ms, server {spent[1]:.0f} ms, browser {spent[2]:.0f} ms"
+                f"computation {spent[0]:.0f} ms, server {spent[1]:.0f} ms, "
+                f"browser {spent[2]:.0f} ms"
             )
             print(f"  {found.memory()}")
         if changed < pages:

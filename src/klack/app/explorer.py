@@ -19,7 +19,7 @@ from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.signal_statistics import sound_statistics
-from klack.acoustics.third_octave import ENERGY_REFERENCE
+from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
 from klack.acoustics.wav import level_statement, wav_bytes
 from klack.analyses.contact_doubts import contact_doubt
 from klack.analyses.impact.estimate_wording import FAIR, GOOD, estimate_sentence, worst_error
@@ -70,6 +70,8 @@ class _Computed:
     Parameters
     ----------
     source : NoiseSource
+    bands : tuple of ThirdOctaves
+        Of the forces of its stops.
     pressure : TimeSeries or None
     force, lift : tuple of Curve
     numbers : tuple of Number
@@ -77,6 +79,7 @@ class _Computed:
     """
 
     source: NoiseSource
+    bands: tuple[ThirdOctaves, ...]
     pressure: TimeSeries | None
     force: tuple[Curve, ...]
     lift: tuple[Curve, ...]
@@ -160,7 +163,7 @@ class Explorer:
         design = self._require_open()
         with self._one_thread():
             found = self._computed(values)
-            bands = [force_bands(stop.force) for stop in found.source.stops]
+        bands = found.bands
         energy = np.sum([band.energy for band in bands], axis=0)
         levels = 10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE)
         if pin:
@@ -296,9 +299,11 @@ class _Impacts:
         level = study.levels[self.run]
         source = impact_sources(study, (self.run,), case)[0]
         history = level.history
+        bands = tuple(force_bands(stop.force) for stop in source.stops)
         return _Computed(
             source=source,
-            pressure=click_sound(source, self._transfers),
+            bands=bands,
+            pressure=click_sound(source, self._transfers, bands),
             force=(Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),),
             lift=(Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),),
             numbers=impact_numbers(level.measures),
@@ -358,9 +363,11 @@ class _Strokes:
             else (Curve.scaled("lift", *drawn(time, channel.values), 1e3, 1e6),)
         )
         failure = () if run.failure is None else (str(run.failure),)
+        bands = tuple(force_bands(stop.force) for stop in source.stops)
         return _Computed(
             source=source,
-            pressure=click_sound(source, self._transfers),
+            bands=bands,
+            pressure=click_sound(source, self._transfers, bands),
             force=tuple(
                 Curve.scaled(stop.name, *enveloped(stop.force), 1e3, 1.0) for stop in source.stops
             ),

@@ -10,7 +10,7 @@ half the work of whole solves.  Loads that lie close together reach only a part 
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,9 +50,16 @@ class Halves(Protocol):
 
 def reached_rows(factor: Halves, G: csr_array) -> NDArray[np.int64]:
     """Rows of L^-1 G^T that are not zero."""
+    return _reached(factor, [G])[0]
+
+
+def _reached(factor: Halves, groups: Sequence[csr_array]) -> list[NDArray[np.int64]]:
+    """Rows of L^-1 G^T that are not zero, of every group of loads; one substitution for all."""
     # random weights leave no entry zero by chance
-    weights = np.random.default_rng(1).uniform(1.0, 2.0, G.shape[0])
-    return np.flatnonzero(factor.forward(G.T @ weights))
+    rng = np.random.default_rng(1)
+    loads = [G.T @ rng.uniform(1.0, 2.0, G.shape[0]) for G in groups]
+    answers = factor.forward(np.column_stack(loads))
+    return [np.flatnonzero(one) for one in answers.T]
 
 
 def condensed_inverse(
@@ -97,11 +104,13 @@ def _of_groups(
     C = np.empty((ends[-1],) * 2)
     halves: list[tuple[NDArray[np.int64], NDArray[np.float64]]] = []
     memory = 0
+    is_halved = isinstance(factor, Halves) and ends[-1] > 0
+    reach = _reached(cast(Halves, factor), groups) if is_halved else []
     for number, (G, here) in enumerate(zip(groups, own, strict=True)):
-        if isinstance(factor, Halves) and G.shape[0] and memory <= largest:
-            rows = reached_rows(factor, G)
+        if isinstance(factor, Halves) and is_halved:
+            rows = reach[number]
             memory += 8 * len(rows) * G.shape[0]
-        if isinstance(factor, Halves) and G.shape[0] and memory <= largest:
+        if isinstance(factor, Halves) and is_halved and memory <= largest:
             half = np.empty((len(rows), G.shape[0]), order="F")
             for block in _blocks(G.shape[0]):
                 Y = factor.forward(G[block].toarray().T)

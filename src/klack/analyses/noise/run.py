@@ -97,7 +97,9 @@ def run_noise(
     )
 
 
-def click_sound(source: NoiseSource, transfers: Transfers) -> TimeSeries | None:
+def click_sound(
+    source: NoiseSource, transfers: Transfers, bands: Sequence[ThirdOctaves] | None = None
+) -> TimeSeries | None:
     """Sound pressure of one click: a part of :func:`noise_design`, in a fifth of its time.
 
     None if nothing radiates.
@@ -107,8 +109,11 @@ def click_sound(source: NoiseSource, transfers: Transfers) -> TimeSeries | None:
     source : NoiseSource
     transfers : Transfers
         Of its structures, as far as they are known.
+    bands : sequence of ThirdOctaves, optional
+        Of the forces of its stops, where they are known.
     """
-    bands = [force_bands(stop.force) for stop in source.stops]
+    if bands is None:
+        bands = [force_bands(stop.force) for stop in source.stops]
     around = _surroundings(source, net_share(source.net, bands), bands[0])
     return _pressure(source, around, transfers)
 
