@@ -283,7 +283,7 @@ def _doubts(
     """Different texts, and which of the drawn points (by their place) has which of them."""
     kinds: dict[str, int] = {}
     found = []
-    for place, point in enumerate(drawn):
+    for place, point in enumerate(drawn.tolist()):
         text = notes[point][:_LONGEST]
         if text:
             kind = kinds.setdefault(text, min(len(kinds), _LISTED))

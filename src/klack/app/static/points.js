@@ -524,7 +524,7 @@
         const px = x(xs[k]), py = y(ys[k]), size = 5.5;
         pen.globalAlpha = some && !this.selected[k] ? 0.35 : 1;
         pen.beginPath(); pen.moveTo(px, py - size); pen.lineTo(px + size, py); pen.lineTo(px, py + size); pen.lineTo(px - size, py); pen.closePath();
-        pen.fillStyle = some && this.selected[k] ? picked : accent; pen.fill();
+        pen.fillStyle = accent; pen.fill();
         pen.strokeStyle = sheet; pen.lineWidth = 1; pen.stroke();
       }
       pen.globalAlpha = 1;
