@@ -58,7 +58,7 @@
           const query = new URLSearchParams({ path: this.path, known: this.mark });
           const answer = await fetch(`/points-data?${query}`);
           if (answer.ok) wait = this.take(await answer.json());
-        } catch { this.tell("The server does not answer; the study itself goes on.", "fair"); }
+        } catch { this.tell("The server does not answer; the study itself continues.", "fair"); }
         await new Promise(done => setTimeout(done, wait));
       }
     }
