@@ -130,6 +130,7 @@ def test_a_brush_selects_in_all_views_and_thousands_are_paged(page, server):
     page.goto(f"{server.base}/points?path=klack-results/made")
     page.wait_for_selector("#kp-root[data-points='5000']")
     page.wait_for_selector(f"text=Made up{ATTACK}")
+    page.wait_for_selector(".kp-table")
     rows = page.locator(".kp-table tbody tr")
     assert rows.count() == 20
     page.wait_for_selector("text=20 points without measures")
