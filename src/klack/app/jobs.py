@@ -114,7 +114,7 @@ class Jobs:
     ) -> Job:
         """Start a run that outlives this server.
 
-        A study that was stopped goes on where it was: its points lie in the folder of its result.
+        A study that was stopped resumes: its points lie in the folder of its result.
 
         Raises
         ------

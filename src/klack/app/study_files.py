@@ -31,7 +31,7 @@ def case_of_study(folder: OpenFolder, study: str, named: str) -> str:
             parts.append(part)
     path = "/".join(parts)
     try:
-        folder.absolute(path)
+        folder.case_text(path)
     except KlackError:
         raise _outside(named) from None
     return path

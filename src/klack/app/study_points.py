@@ -17,7 +17,6 @@ from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.goals import Goals, bound_text, goals_of
 from klack.analyses.study.record import NOT_YET, StudyColumn, StudyRecord
 from klack.analyses.study.wording import short_labels, shown_unit
-from klack.case.case_tree import tree_of
 from klack.case.reader import parse, validated
 from klack.case.study import StudyFile
 from klack.case.study_source import StudySource
@@ -32,6 +31,8 @@ MOST_DRAWN = 10_000
 """Points that a page gets; of more, those of the front and an even choice of the others."""
 LARGEST_STORE = 400_000_000
 """Bytes of the arrays, and of the files, of a study that is shown."""
+_MOST_NUMBERS = 1_000_000
+"""Of all columns together."""
 _LISTED, _LONGEST = 300, 1500  # failed points and kinds of doubts; characters of one
 
 
@@ -169,21 +170,14 @@ def front_of(record: StudyRecord) -> Front:
 def _goals(record: StudyRecord) -> Goals | None:
     """Objectives and bounds of the text of the study, if all of them were computed."""
     path = Path("study.yaml")
-    if record.study_text:
-        data, lines = parse(record.study_text, path)
-        study = validated(StudyFile, record.study_text, path, data, lines).study
-    else:
-        tree = tree_of(record.case_text, path)
-        lines, study = (
-            tree.lines,
-            validated(
-                StudyFile,
-                tree.text,
-                path,
-                {"klack": 1, "study": tree.data.get("study")},
-                tree.lines,
-            ).study,
-        )
+    text = record.study_text or record.case_text
+    data, lines = parse(text, path)
+    given = data.get("study")
+    if not isinstance(given, dict):
+        return None
+    # a design may name a file that lies beside the study
+    plain = {name: value for name, value in given.items() if name != "design"}
+    study = validated(StudyFile, text, path, {"klack": 1, "study": plain}, lines).study
     columns: dict[str, Any] = {item.name: item for item in record.measures}
     if not study.objectives or not {*study.objectives, *study.constraints} <= columns.keys():
         return None
@@ -194,7 +188,8 @@ def _goals(record: StudyRecord) -> Goals | None:
 def points_json(record: StudyRecord) -> bytes:
     """Columns, front, doubts and failures of a study."""
     front, labels = front_of(record), short_labels(record)
-    drawn = _drawn(record.count, front)
+    most = max(min(MOST_DRAWN, _MOST_NUMBERS // max(len(record.columns), 1)), 1)
+    drawn = _drawn(record.count, front, most)
     waiting = np.array([text == NOT_YET for text in record.failures], dtype=bool)
     failed = record.failed & ~waiting
     roles = (
@@ -232,12 +227,12 @@ def points_json(record: StudyRecord) -> bytes:
     return json.dumps(data, allow_nan=False, separators=(",", ":")).encode()
 
 
-def _drawn(count: int, front: Front) -> NDArray[np.int64]:
-    if count <= MOST_DRAWN:
+def _drawn(count: int, front: Front, most: int) -> NDArray[np.int64]:
+    if count <= most:
         return np.arange(count)
-    first = np.array(front.points[:MOST_DRAWN], dtype=np.int64)
+    first = np.array(front.points[:most], dtype=np.int64)
     others = np.setdiff1d(np.arange(count), first)
-    room = max(MOST_DRAWN - first.size, 0)
+    room = most - first.size
     even = others[np.linspace(0, others.size - 1, room).astype(np.int64)] if room else others[:0]
     return np.unique(np.concatenate([first, even]))
 
@@ -283,7 +278,7 @@ def _doubts(
     """Different texts, and which of the drawn points (by their place) has which of them."""
     kinds: dict[str, int] = {}
     found = []
-    for place, point in enumerate(drawn):
+    for place, point in enumerate(drawn.tolist()):
         text = notes[point][:_LONGEST]
         if text:
             kind = kinds.setdefault(text, min(len(kinds), _LISTED))
@@ -295,8 +290,8 @@ def _doubts(
 def _failures(failures: Sequence[str], failed: NDArray[np.bool_]) -> dict[str, Any]:
     """How often each reason came, and the reason of the first points."""
     places = np.flatnonzero(failed)
-    reasons = Counter(failures[place].partition("\n")[0][:_LONGEST] for place in places)
+    reasons = Counter(failures[place].partition("\n")[0][:_LONGEST] for place in places.tolist())
     return {
         "reasons": reasons.most_common(20),
-        "points": [[int(place), failures[place][:_LONGEST]] for place in places[:_LISTED]],
+        "points": [[place, failures[place][:_LONGEST]] for place in places[:_LISTED].tolist()],
     }

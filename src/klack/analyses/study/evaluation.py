@@ -72,6 +72,11 @@ class Evaluation:
         self.so_far: list[PointRow | None] = []
         """Rows of the points that are being computed, as far as they are there."""
 
+    @property
+    def done(self) -> int:
+        """Number of rows in :attr:`so_far`."""
+        return sum(row is not None for row in self.so_far)
+
     def rows(self, asked: AskedPoints, progress: Progress) -> list[PointRow]:
         """Rows of all points that are asked for, equal ones computed once."""
         begin = perf_counter()

@@ -126,7 +126,7 @@ def run_study(
 
         def told(stage: str, fraction: float) -> None:
             clock(stage, fraction)
-            pace.tell(round(fraction * len(asked.points)), evaluation.computed)
+            pace.tell(evaluation.done, evaluation.computed)
             if live is not None:
                 live(so_far)
 

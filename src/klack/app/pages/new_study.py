@@ -26,17 +26,25 @@ _FIRST_POINTS = 64
 async def new_study_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case."""
     case = given.get("path", "")
-    try:
-        text = await asyncio.to_thread(state.folder.case_text, case)
-        path = str(state.folder.path / case)
-        offer: StudyOffer = await state.reader.call("study_offer", text, path)
-    except KlackError as error:
-        with frame(state, "New study"):
-            plain(str(error), "p").classes("k-error")
-        return
     ui.add_head_html('<link rel="stylesheet" href="/static/points.css">')
-    with frame(state, "New study", f"of {case}: {offer.title}"):
-        _NewStudy(state, case, text, offer).build()
+    with frame(state, "New study", f"of {case}"):
+        waiting = plain("Reading the case ...", "p").props("role=status")
+        body = ui.element("div")
+
+        async def fill() -> None:
+            try:
+                text = await asyncio.to_thread(state.folder.case_text, case)
+                path = str(state.folder.path / case)
+                offer: StudyOffer = await state.reader.call("study_offer", text, path)
+            except KlackError as error:
+                waiting.set_text(str(error))
+                waiting.classes("k-error")
+                return
+            waiting.set_text(offer.title)
+            with body:
+                _NewStudy(state, case, text, offer).build()
+
+        ui.timer(0.05, fill, once=True)
 
 
 class _NewStudy:

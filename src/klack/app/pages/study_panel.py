@@ -50,7 +50,7 @@ class StudyPanel:
         ui.timer(_EVERY, self._follow)
 
     async def checked(self, text: str, found: Checked) -> None:
-        """Go on from the check of the text by itself: with its case."""
+        """Check a text that is a study by itself with its case, too."""
         self._text = text
         if found.error or not found.has_study:
             self._tell("", "", found)

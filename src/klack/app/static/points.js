@@ -58,7 +58,7 @@
           const query = new URLSearchParams({ path: this.path, known: this.mark });
           const answer = await fetch(`/points-data?${query}`);
           if (answer.ok) wait = this.take(await answer.json());
-        } catch { this.tell("The server does not answer; the study itself goes on.", "fair"); }
+        } catch { this.tell("The server does not answer; the study itself continues.", "fair"); }
         await new Promise(done => setTimeout(done, wait));
       }
     }
@@ -474,11 +474,12 @@
       pen.fillStyle = ink;
       pen.textAlign = "center";
       pen.textBaseline = "bottom";
-      pen.fillText(`${across.label}${unit(across)}${across.way ? `, ${across.way}` : ""}`, (left + width - right) / 2, height - 6);
+      const title = (column, space) => this.fitted(pen, `${column.label}${unit(column)}${column.way ? `, ${column.way}` : ""}`, space);
+      pen.fillText(title(across, width - left - right), (left + width - right) / 2, height - 6);
       pen.save();
       pen.translate(12, (top + height - bottom) / 2);
       pen.rotate(-Math.PI / 2);
-      pen.fillText(`${up.label}${unit(up)}${up.way ? `, ${up.way}` : ""}`, 0, 4);
+      pen.fillText(title(up, height - top - bottom), 0, 4);
       pen.restore();
       pen.save();
       pen.beginPath(); pen.rect(left - 8, top - 8, width - left - right + 16, height - top - bottom + 16); pen.clip();
@@ -524,7 +525,7 @@
         const px = x(xs[k]), py = y(ys[k]), size = 5.5;
         pen.globalAlpha = some && !this.selected[k] ? 0.35 : 1;
         pen.beginPath(); pen.moveTo(px, py - size); pen.lineTo(px + size, py); pen.lineTo(px, py + size); pen.lineTo(px - size, py); pen.closePath();
-        pen.fillStyle = some && this.selected[k] ? picked : accent; pen.fill();
+        pen.fillStyle = accent; pen.fill();
         pen.strokeStyle = sheet; pen.lineWidth = 1; pen.stroke();
       }
       pen.globalAlpha = 1;
@@ -725,8 +726,13 @@
         if (rows.length && pen.measureText(longer).width <= space) rows[rows.length - 1] = longer;
         else rows.push(word);
       }
-      const cut = word => { let short = word; while (short.length > 2 && pen.measureText(short).width > space) short = `${short.slice(0, -2)}…`; return short; };
-      return (rows.length > 3 ? [...rows.slice(0, 2), `${rows[2]}…`] : rows).map(cut);
+      return (rows.length > 3 ? [...rows.slice(0, 2), `${rows[2]}…`] : rows).map(row => this.fitted(pen, row, space));
+    }
+
+    fitted(pen, text, space) {
+      let short = text.length > 200 ? `${text.slice(0, 200)}…` : text;
+      while (short.length > 2 && pen.measureText(short).width > space) short = `${short.slice(0, -2)}…`;
+      return short;
     }
 
     listenLines() {

@@ -67,9 +67,7 @@ def made_study(count: int, *, failed: int = 0, doubtful: int = 0, word: str = ""
             for k in range(6)
         ),
         linked=(),
-        measures=tuple(
-            column(name, unit, measures[:, k]) for k, (name, unit) in enumerate(names)
-        ),
+        measures=tuple(column(name, unit, measures[:, k]) for k, (name, unit) in enumerate(names)),
         failures=tuple(f"no contact{word}" if k < failed else "" for k in range(count)),
         notes=tuple(
             f"a doubt{word}" if failed <= k < failed + doubtful else "" for k in range(count)
