@@ -388,10 +388,9 @@ def _effort(
     least, each = _SECONDS[dimension]
     seconds = least + each * nodes
     time = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
-    words = (
-        f"about {float(f'{nodes:.2g}'):.0f} nodes, elements of {format_si(sizes['needle'].contact, 'm', 2)} at the "
-        f"contact; a first run takes about {time} on two cores"
-    )
+    finest = format_si(sizes["needle"].contact, "m", 2)
+    words = f"about {_two_digits(nodes):.0f} nodes, elements of {finest} at the contact; a first "
+    words += f"run takes about {time} on two cores"
     if seconds > _LONG:
         advice = "use the half section if the parts are turned; coarser elements in the case."
         return _doubt("mesh", words, advice, _PARTS)
