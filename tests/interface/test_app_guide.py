@@ -79,9 +79,7 @@ def server(folder: Path) -> Iterator[Server]:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     with sync_api.sync_playwright() as started:
-        found = started.chromium.launch(
-            executable_path=CHROMIUM, args=["--no-sandbox", *_SOFTWARE]
-        )
+        found = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", *_SOFTWARE])
         yield found
         found.close()
 

@@ -1,4 +1,4 @@
-"""From two STEP files or drawings to a case; truth: the drawings that went in, and hand formulas."""
+"""From STEP files or drawings to a case; truth: the drawings that went in, and hand formulas."""
 
 import asyncio
 import json
@@ -66,7 +66,12 @@ def edges_of(profile: Profile) -> set[tuple]:
         return None if point is None else tuple(round(x, 12) + 0.0 for x in point)
 
     return {
-        (plain(c.start), plain(c.end), plain(c.centre), "" if c.end[0] == c.start[0] == 0 else c.name)
+        (
+            plain(c.start),
+            plain(c.end),
+            plain(c.centre),
+            "" if c.end[0] == c.start[0] == 0 else c.name,
+        )
         for c in profile.curves
     }
 
@@ -220,9 +225,7 @@ def test_a_solid_keeps_its_step_file_beside_the_case(steps, tmp_path):
 def test_the_written_case_runs(tables, drawn, tmp_path):
     text = review(PLAN, tables, tmp_path / "case.yaml").text
 
-    study = run_impact(
-        read_case(text, tmp_path / "case.yaml"), levels=("reduced",), certify=False
-    )
+    study = run_impact(read_case(text, tmp_path / "case.yaml"), levels=("reduced",), certify=False)
 
     level = study.levels["reduced"]
     mass = 7730.0 * drawn["needle"].volume

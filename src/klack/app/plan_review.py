@@ -265,7 +265,7 @@ def _at_touch(
 
 
 def _is_corner(profile: Profile, at: np.ndarray) -> bool:
-    """Whether the outline has a convex corner there, off the axis."""
+    """Whether the outline has a convex corner there, away from r = 0."""
     near = 1e-6 * max(curve.length for curve in profile.curves)
     for before, after in zip(profile.curves[-1:] + profile.curves, profile.curves, strict=False):
         if np.hypot(*(np.array(after.start) - at)) > near or at[0] <= near:
@@ -388,10 +388,9 @@ def _effort(
     least, each = _SECONDS[dimension]
     seconds = least + each * nodes
     time = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
-    words = (
-        f"about {float(f'{nodes:.2g}'):.0f} nodes, elements of {format_si(sizes['needle'].contact, 'm', 2)} at the "
-        f"contact; a first run takes about {time} on two cores"
-    )
+    finest = format_si(sizes["needle"].contact, "m", 2)
+    words = f"about {_two_digits(nodes):.0f} nodes, elements of {finest} at the contact; a first "
+    words += f"run takes about {time} on two cores"
     if seconds > _LONG:
         advice = "use the half section if the parts are turned; coarser elements in the case."
         return _doubt("mesh", words, advice, _PARTS)

@@ -83,7 +83,8 @@ class ValvePlan:
 
     def with_body(self, body: str, what: str, value: str) -> "ValvePlan":
         """The same with another choice for one body."""
-        return replace(self, **{f"{body}_{what}": value})
+        changed: dict[str, Any] = {f"{body}_{what}": value}
+        return replace(self, **changed)
 
     @property
     def roles(self) -> dict[str, str]:

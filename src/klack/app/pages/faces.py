@@ -1,7 +1,7 @@
 """Choice of faces: by clicking in three dimensions, or in a list with the same names."""
 
 from collections.abc import Awaitable, Callable, Mapping
-from typing import Any
+from functools import partial
 
 from nicegui import ui
 
@@ -65,7 +65,7 @@ class FacesStep:
                 with ui.element("div").classes("k-head k-below"):
                     _tick("Cut open", False, self._cut)
                     for body in BODIES:
-                        _tick(body, True, lambda on, body=body: self._show_body(body, on))
+                        _tick(body, True, partial(self._show_body, body))
                     plain("Orange: contact. Green stripes: held.").classes("k-soft")
             with ui.element("div").classes("k-sheet k-faces"):
                 for body in BODIES:
@@ -164,7 +164,9 @@ class FacesStep:
         name = f"{body}.{face}"
         for other, is_on in ((self._hot, False), (name, True)):
             if other in self._rows:
-                self._rows[other].classes(add="k-hot" if is_on else "", remove="" if is_on else "k-hot")
+                self._rows[other].classes(
+                    add="k-hot" if is_on else "", remove="" if is_on else "k-hot"
+                )
         self._hot = name
 
 

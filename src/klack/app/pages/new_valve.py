@@ -16,7 +16,7 @@ from klack.app.folder import LARGEST_FILE
 from klack.app.guard import LARGEST_UPLOAD
 from klack.app.pages.faces import FacesStep
 from klack.app.pages.fields import choice_field, text_field
-from klack.app.pages.frame import button, frame, heading, link, plain, show_error
+from klack.app.pages.frame import button, frame, heading, plain, show_error
 from klack.app.state import State
 from klack.app.valve_plan import BODIES, STEPS, ValvePlan
 from klack.errors import InputError, KlackError
@@ -208,8 +208,8 @@ class _Guide:
                 "several solids of one file are glued where they touch. An assembly of both bodies "
                 "is not taken apart: export each body by itself."
                 if self._plan.source == "step"
-                else "In mm. Each row: r, z, name of the surface that leads there; for an arc also r "
-                "and z of its centre. The first row is the start, and the outline closes itself.",
+                else "In mm. Each row: r, z, name of the surface that leads there; for an arc also "
+                "r and z of its centre. The first row is the start, and the outline closes itself.",
                 "p",
             ).classes("k-soft")
         with ui.element("div").classes("k-grid k-below"):
@@ -262,7 +262,8 @@ class _Guide:
         await self._with_parts(plan)
 
     async def _change_parts(self, what: str, value: str) -> None:
-        await self._with_parts(replace(self._plan, **{what: value}))
+        changed: dict[str, Any] = {what: value}
+        await self._with_parts(replace(self._plan, **changed))
 
     async def _with_parts(self, plan: ValvePlan) -> None:
         """Read other parts; faces that they do not have are chosen no more."""
@@ -378,7 +379,11 @@ class _Guide:
     async def _show_motion(self) -> None:
         fields = (
             ("speed", "Speed at the impact", "of the needle, towards the housing; 0.02 to 5 m/s"),
-            ("force", "Closing force", "of spring, pressure and magnet at that moment; 0 N if none"),
+            (
+                "force",
+                "Closing force",
+                "of spring, pressure and magnet at that moment; 0 N if none",
+            ),
             ("gap", "Gap at the start", "travel to first touch; 0 um begins at the touch"),
         )
         with ui.element("div").classes("k-sheet k-form-open"):
@@ -387,7 +392,9 @@ class _Guide:
             with ui.element("label").classes("k-field"):
                 with ui.element("div"):
                     plain("Assumed mount and plate")
-                    plain("a bracket of 1.5 mm sheet steel, so that the click can be played", "small")
+                    plain(
+                        "a bracket of 1.5 mm sheet steel, so that the click can be played", "small"
+                    )
                 box = ui.element("input").props("type=checkbox")
                 box.props["aria-label"] = "Assumed mount and plate"
                 if self._plan.noise:
@@ -399,7 +406,8 @@ class _Guide:
                 )
 
     async def _change(self, key: str, value: str) -> None:
-        await self.keep(replace(self._plan, **{key: value.strip()[:80]}))
+        changed: dict[str, Any] = {key: value.strip()[:80]}
+        await self.keep(replace(self._plan, **changed))
 
     # ----------------------------------------------------------------------- 5 checks
 
@@ -515,7 +523,9 @@ def _show_material(entry: MaterialEntry | None) -> None:
             for constant in entry.constants:
                 value = constant.value
                 shown = (
-                    format_si(value, constant.unit) if isinstance(value, float) else "over temperature"
+                    format_si(value, constant.unit)
+                    if isinstance(value, float)
+                    else "over temperature"
                 )
                 with ui.element("tr"):
                     plain(constant.label, "td")

@@ -149,8 +149,8 @@ class _Overview:
             plain("There is more below this folder than is looked at.", "p").classes("k-error")
         if not cases:
             plain(
-                "No case file (YAML) below this folder yet. New valve makes one from two STEP files or "
-                "from drawings; New case copies one that comes with klack.",
+                "No case file (YAML) below this folder yet. New valve makes one from STEP files "
+                "or drawings; New case copies one that comes with klack.",
                 "p",
             ).classes("k-soft")
             return

@@ -11,7 +11,7 @@ Pick = Callable[[str, str], Any]
 """Called with the names of a body and of one of its faces."""
 
 
-class Scene(Element, component="scene_element.js"):
+class Scene(Element, component="scene_element.js"):  # type: ignore[call-arg]
     """Bodies that are drawn in the browser, from a payload that it fetches.
 
     The drawing context is released when the element goes: a browser has sixteen of them or so.
