@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.network.rows import Rows
@@ -13,7 +14,7 @@ from klack.simulation.network_arrays import NetworkArrays
 from klack.simulation.network_compile import CompiledNetwork, compile_network
 from klack.simulation.static_start import RestState, begin_at_rest
 from klack.simulation.step_sizes import StepSizes
-from klack.simulation.tangent_lines import delay_slopes, wave_slopes
+from klack.simulation.tangent_lines import delay_slopes, later_delays, steady_waves
 from klack.simulation.tangent_loop import lanes_of, tangent_address
 
 __all__ = [
@@ -110,28 +111,52 @@ def _slopes(
     """What changes in all numbers of a network at rest in a direction, per unit."""
     base, distance = network.arrays, direction.distance
     plus, minus = (_at_rest(rows, rest, sizes) for rows in (direction.plus, direction.minus))
-    further, before = _without_waves(plus, base), _without_waves(minus, base)
+    further, before = _in_place(plus.arrays, base), _in_place(minus.arrays, base)
     found: NetworkArrays = _difference(base, further, before, distance, direction.name)
-    delays = [end.lines.depth + end.lines.fraction for end in (plus, minus)]
     return found._replace(
-        lines=found.lines._replace(fraction=(delays[0] - delays[1]) / distance),
-        line_state=found.line_state._replace(samples=wave_slopes(base, plus, minus, distance)),
+        lines=found.lines._replace(
+            fraction=(_later(plus.arrays, base) - _later(minus.arrays, base)) / distance
+        ),
+        line_state=found.line_state._replace(
+            samples=(steady_waves(base, *plus) - steady_waves(base, *minus)) / distance
+        ),
     )
 
 
-def _at_rest(rows: Rows, rest: RestState | None, sizes: StepSizes) -> NetworkArrays:
+class _Resting(NamedTuple):
+    """Numbers of a network at rest, and the flow in its lines [m^3/s]."""
+
+    arrays: NetworkArrays
+    flow: NDArray[np.float64]
+
+
+def _at_rest(rows: Rows, rest: RestState | None, sizes: StepSizes) -> _Resting:
     network = compile_network(rows, sizes)
+    flow = dict[str, float]()
     if rest is not None:
-        begin_at_rest(network, sizes.step, rest)
-    return network.arrays
+        flow = dict(begin_at_rest(network, sizes.step, rest)[0].flow)
+    mass_flow = np.array([flow.get(line.component, 0.0) for line in rows.lines])
+    return _Resting(network.arrays, mass_flow / network.nodes.density)
 
 
-def _without_waves(numbers: NetworkArrays, base: NetworkArrays) -> NetworkArrays:
-    """The same but for the waves in lines, of which another delay keeps another number."""
-    return numbers._replace(
+def _later(numbers: NetworkArrays, base: NetworkArrays) -> NDArray[np.float64]:
+    return later_delays(base.lines, numbers.lines)
+
+
+def _in_place(numbers: NetworkArrays, base: NetworkArrays) -> NetworkArrays:
+    """The same but for what each step writes before it reads it, and for waves in lines.
+
+    Waves are kept in steps: another delay keeps another number of them.
+    """
+    found = numbers._replace(
         lines=numbers.lines._replace(fraction=base.lines.fraction),
         line_state=numbers.line_state._replace(samples=base.line_state.samples),
     )
+    for name in ("elements", "branches"):
+        given = getattr(base, name)
+        rows = getattr(found, name)._replace(inputs=given.inputs, outputs=given.outputs)
+        found = found._replace(**{name: rows})
+    return found
 
 
 def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays:
@@ -140,7 +165,7 @@ def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays
         compile_network(network.rows, replace(sizes, step=sizes.step * factor)).arrays
         for factor in (1.0, 1.0 + _LONGER, 1.0 - _LONGER)
     )
-    longer, shorter = (_without_waves(end, base) for end in ends)
+    longer, shorter = (_in_place(end, base) for end in ends)
     found = _difference(base, longer, shorter, 2.0 * _LONGER, "length of the steps")
     found = found._replace(lines=found.lines._replace(fraction=delay_slopes(base.lines)))
     for array in state_arrays(found):

@@ -255,10 +255,10 @@ def _impacts(
             ends = (others.plus.variant, others.minus.variant)
             plus, minus = (_touch_time(end, touch.stop, number) for end in ends)
             predicted, scale = space.change_together(_SHARE, slopes)
-            if plus is not None and minus is not None and predicted is not None and scale > 0.0:
+            if plus is not None and minus is not None and predicted is not None:
                 missed = abs(0.5 * (plus - minus) - predicted)
-                deviation = missed / scale
-                is_doubtful = deviation > HOLDS and missed > runs[0].sizes.step
+                deviation = missed / scale if scale > 0.0 else None
+                is_doubtful = missed > max(HOLDS * scale, runs[0].sizes.step)
         found.append(
             ImpactSlope(
                 stop=touch.stop,
