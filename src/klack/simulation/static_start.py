@@ -764,8 +764,10 @@ class _Balance:
     def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
         """Mass in each free volume [kg], its change with the pressure, and the density."""
         volume = self.volumes(state.y if self.enclosed else np.zeros_like(state.y))[self.free]
-        fluid = self._fluid(state.p[self.free])
-        return volume * fluid[:, 0], volume * fluid[:, 1], fluid[:, 0]
+        fluid = self._fluid(state.p[self.free]).T
+        # contiguous whatever their number: compiled code would be made for a view as well
+        density = np.ascontiguousarray(fluid[0])
+        return volume * density, volume * fluid[1], density
 
     def volumes(self, y: Vector) -> Vector:
         """Volume of every node [m^3] with the walls at these displacements."""

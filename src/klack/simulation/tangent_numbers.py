@@ -26,6 +26,7 @@ __all__ = [
     "mode_places",
     "numbers_at_rest",
     "set_stretch",
+    "slopes_at_rest",
     "state_arrays",
 ]
 
@@ -35,6 +36,8 @@ STRETCH = 1
 _LONGER = 1e-4  # of the step, to either side: what a longer one changes
 _BENT = 0.1  # of a small change: more than this to one side only is a jump
 _ROUND_OFF = 1e-10  # of the largest number of a bundle: a change that tells nothing
+_LEAST = {"at": 1.0, "g": 1.0, "force": 1.0, "force_before": 1.0}
+"""Of bundles that may hold nothing but round-off, forces [N] and energies [J/kg], their size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,7 +99,7 @@ def numbers_at_rest(
     InputError
         For a direction in which a number of the network jumps, or a table changes its length.
     """
-    slopes = [_slopes(network, rest, item, sizes) for item in directions]
+    slopes = [slopes_at_rest(network, rest, item, sizes) for item in directions]
     arrays = _with_functions(lifted(network.arrays, slopes), network.rows)
     by_step = zip(_floats(arrays), _floats(_slopes_by_step(network, sizes)), strict=True)
     return TangentNumbers(
@@ -105,7 +108,7 @@ def numbers_at_rest(
     )
 
 
-def _slopes(
+def slopes_at_rest(
     network: CompiledNetwork, rest: RestState | None, direction: Direction, sizes: StepSizes
 ) -> NetworkArrays:
     """What changes in all numbers of a network at rest in a direction, per unit."""
@@ -173,11 +176,13 @@ def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays
     return found
 
 
-def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) -> Any:
+def _difference(
+    base: Any, plus: Any, minus: Any, distance: float, name: str, least: float = 0.0
+) -> Any:
     if isinstance(base, tuple):
-        return type(base)(
-            *(_difference(*parts, distance, name) for parts in zip(base, plus, minus, strict=True))
-        )
+        sizes = [_LEAST.get(field, 0.0) for field in getattr(base, "_fields", [""] * len(base))]
+        parts = zip(base, plus, minus, sizes, strict=True)
+        return type(base)(*(_difference(*part[:3], distance, name, part[3]) for part in parts))
     if isinstance(base, np.ndarray):
         if base.dtype != np.float64:
             return base
@@ -187,7 +192,7 @@ def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) ->
             found, bend = plus - minus, plus + minus - 2.0 * base
         known = np.isfinite(found)
         found, bend = np.where(known, found, 0.0), np.where(known, bend, 0.0)
-        size = np.max(np.abs(base), initial=0.0, where=np.isfinite(base))
+        size = np.max(np.abs(base), initial=least, where=np.isfinite(base))
         if np.any(np.abs(bend) > _BENT * np.abs(found) + _ROUND_OFF * size):
             raise _jumps(name)
         return found / distance
@@ -197,7 +202,8 @@ def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) ->
 def _jumps(name: str) -> InputError:
     return InputError(
         name,
-        got="a parameter with which numbers of the valve jump: a table gets other points",
+        got="a parameter with which numbers of the valve jump or bend: a table gets other points, "
+        "has a corner there, or the valve another start",
         expected="one with which they change smoothly",
         hint="klack study with a few values of it computes the valve at each of them.",
     )
