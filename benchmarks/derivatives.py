@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.sensitivities.parameters import slope_space
+from klack.analyses.sensitivities.parameters import VariedKey, slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner
 from klack.case.case_tree import CaseTree, read_case_tree
 from klack.case.key_path import quantity_at
@@ -117,9 +117,7 @@ def _together(
                 ]
                 for share in _CHANGES
             ]
-            pairs = zip(_CHANGES, ends, strict=True)
-            best = [_worst(found, k, item.size, share, *pair) for share, pair in pairs]
-            yield min((Compared(key=item.name, **one) for one in best), key=lambda c: c.deviation)
+            yield _worst(found, k, item, ends)
     except KlackError as error:
         if len(keys) == 1:
             yield Compared(key=keys[0], refused=_reason(error))
@@ -129,45 +127,54 @@ def _together(
 
 
 def _worst(
-    run: TangentRun,
-    k: int,
-    size: float,
-    share: float,
-    plus: NetworkResult,
-    minus: NetworkResult,
-) -> dict[str, float | str]:
-    """The channel and the time of the largest deviation before the steps begin to stretch."""
+    run: TangentRun, k: int, item: VariedKey, ends: Sequence[Sequence[NetworkResult]]
+) -> Compared:
+    """The channel that deviates most, before the steps begin to stretch."""
     (rates, late), base = run.rates(k), run.moved(k, 0.0)
-    count = min(len(base.time), len(plus.time), len(minus.time))
+    count = min(len(end.time) for pair in ends for end in pair)
     touch = run.touches[0].time if run.touches else np.inf
-    moves = np.abs(late[:: run.looks][:count]) * size > _MOVED
+    moves = np.abs(late[:: run.looks][:count]) * item.size > _MOVED
     fixed = np.flatnonzero(~moves & (base.time[:count] < touch))
     fixed = fixed[fixed == np.arange(fixed.size)]
     largest = _largest(base)
-    found: dict[str, float | str] = {"deviation": 0.0}
+    found = [Compared(key=item.name)]
     for name, channel in rates.channels.items():
-        if name not in plus.channels:
-            continue
         at = fixed if channel.unit in _AT_START else fixed[1:]
-        if not at.size:
+        if name not in ends[0][0].channels or not at.size:
             continue
-        ends = plus.channels[name].values, minus.channels[name].values
-        by_runs = ((ends[0] - ends[1]) / (2.0 * share))[at]
-        by_tangents = (channel.values * size)[at]
-        scale = max(_rms(by_runs), _rms(by_tangents))
-        size_of = max(largest[channel.unit], _LEAST.get(channel.unit, 0.0), 1e-30)
-        scale = max(scale, max(_SHARE, _NOISE / share / _HOLDS) * size_of)
-        j = int(np.argmax(np.abs(by_runs - by_tangents)))
-        deviation = _rms(by_runs - by_tangents) / scale
-        if deviation > found["deviation"]:
-            found = {
-                "deviation": deviation,
-                "channel": name,
-                "time": float(base.time[at[j]]),
-                "by_tangents": float(by_tangents[j]),
-                "by_runs": float(by_runs[j]),
-            }
-    return found
+        size = max(largest[channel.unit], _LEAST.get(channel.unit, 0.0), 1e-30)
+        pairs = zip(_CHANGES, ends, strict=True)
+        of_shares = [
+            _deviation(
+                (channel.values * item.size)[at],
+                (plus.channels[name].values - minus.channels[name].values)[at] / (2.0 * share),
+                max(_SHARE, _NOISE / share / _HOLDS) * size,
+            )
+            for share, (plus, minus) in pairs
+        ]
+        deviation, j, by_tangents, by_runs = min(of_shares)
+        time = float(base.time[at[j]])
+        found.append(
+            Compared(
+                key=item.name,
+                deviation=deviation,
+                channel=name,
+                time=time,
+                by_tangents=by_tangents,
+                by_runs=by_runs,
+            )
+        )
+    return max(found, key=lambda one: one.deviation)
+
+
+def _deviation(
+    by_tangents: NDArray[np.float64], by_runs: NDArray[np.float64], least: float
+) -> tuple[float, int, float, float]:
+    """Relative deviation over all times, and where it is largest."""
+    missed = by_runs - by_tangents
+    j = int(np.argmax(np.abs(missed)))
+    scale = max(_rms(by_runs), _rms(by_tangents), least)
+    return _rms(missed) / scale, j, float(by_tangents[j]), float(by_runs[j])
 
 
 def _rms(values: NDArray[np.float64]) -> float:

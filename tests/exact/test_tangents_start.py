@@ -12,29 +12,31 @@ import pytest
 from klack.analyses.sensitivities.parameters import slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner
 from klack.case.case_tree import read_case_tree
-from klack.errors import InputError, KlackError
+from klack.case.key_path import _below, quantity_at
+from klack.errors import KlackError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
 from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_source import PressureSource
+from klack.input.problem import CaseProblem
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
-from klack.network.rows import Ambient
 from klack.network.network import Network
+from klack.network.rows import Ambient
 from klack.simulation.network_compile import compile_network
 from klack.simulation.static_start import begin_at_rest
 from klack.simulation.step_sizes import step_sizes
-from klack.simulation.tangent_numbers import Direction, slopes_at_rest, state_arrays
+from klack.simulation.tangent_numbers import Direction, slopes_at_rest
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 SMALL = 3e-5  # of a number: what its derivative is taken over
 CASES = (
-    *("common_rail", "double_seat", "hydraulic_supply", "relief_on_pipe", "remanent_magnet"),
-    *("held_open", "mechanical_parts", "boost_driver", "small_valve", "pneumatic_valve"),
+    *("common_rail", "hydraulic_supply", "relief_on_pipe"),
+    *("remanent_magnet", "mechanical_parts", "pneumatic_valve"),
 )
 
 
@@ -190,9 +192,6 @@ def test_what_nothing_fills_follows_the_surroundings():
 @pytest.mark.parametrize("name", CASES)
 def test_starts_of_valves_are_those_found_from_nothing(name):
     """For each number of the network; both are differences over the same change of it."""
-    from klack.case.key_path import quantity_at
-    from klack.input.problem import CaseProblem
-
     tree = read_case_tree(HOW_TO / f"{name}.yaml", [])
     case = tree.any_case()
     compared = 0
@@ -209,34 +208,36 @@ def test_starts_of_valves_are_those_found_from_nothing(name):
             network = compile_network(rows, sizes)
             rest = begin_at_rest(network, sizes.step)[1]
             found = slopes_at_rest(network, rest, way, sizes)
-        except (CaseProblem, InputError):
-            continue
-        except KlackError:
-            continue
+        except (CaseProblem, KlackError):
+            continue  # refused with its reason
         ends = [compile_network(end, sizes) for end in (way.plus, way.minus)]
         for end in ends:
             begin_at_rest(end, sizes.step)
         if any(np.any(end.lines.depth != network.lines.depth) for end in ends):
             continue  # another number of samples
-        groups = [state_arrays(end.arrays) for end in (network, *ends)]
-        for base, slope, plus, minus in zip(
-            groups[0], state_arrays(found), groups[1], groups[2], strict=True
-        ):
-            if base.dtype != np.float64 or not base.size:
-                continue
+        of_ends = map(_states, (network.arrays, found, *(end.arrays for end in ends)))
+        for base, slope, plus, minus in zip(*of_ends, strict=True):
             expected = (plus - minus) / way.distance * size
-            known = np.isfinite(expected)
-            scale = np.max(np.abs(base[np.isfinite(base)]), initial=0.0)
+            scale = np.max(np.abs(base), initial=1e-6)
             np.testing.assert_allclose(
-                slope[known] * size, expected[known], rtol=1e-5, atol=1e-7 * scale, err_msg=str(key)
+                slope * size, expected, rtol=1e-5, atol=1e-7 * scale, err_msg=str(key)
             )
         compared += 1
     assert compared > 5
 
 
-def _keys(node, key):
-    from klack.case.key_path import _below
+def _states(numbers):
+    """What a run begins with."""
+    nodes, lines, contacts = numbers.node_state, numbers.line_state, numbers.interface_state
+    return (
+        *(numbers.bodies.at, numbers.bodies.laid_out),
+        *(numbers.elements.state, numbers.branches.state),
+        *(nodes.p, nodes.mass, nodes.g, lines.samples, lines.memory),
+        *(contacts.gap, contacts.force, contacts.e, contacts.chi),
+    )
 
+
+def _keys(node, key):
     below = _below(node)[1]
     if not below:
         yield key
