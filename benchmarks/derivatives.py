@@ -22,7 +22,6 @@ from klack.case.shipped import find_case, shipped_cases
 from klack.case.valve import ValveCase
 from klack.errors import KlackError
 from klack.input.problem import CaseProblem, Key
-from klack.input.section import Section
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.simulation.tangent_run import DIRECTIONS, TangentRun, run_tangents

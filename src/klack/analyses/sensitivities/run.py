@@ -276,7 +276,8 @@ def _why(others: _Others) -> str:
     """What the strokes of the check tell of the reason."""
     same, *ends = (_in_order(end.variant) for end in (others.same, others.plus, others.minus))
     for end, words in zip(ends, ("so", "the other way"), strict=True):
-        count = next((k for k, pair in enumerate(zip(same, end)) if pair[0] != pair[1]), None)
+        pairs = enumerate(zip(same, end, strict=False))
+        count = next((k for k, (one, other) in pairs if one != other), None)
         if count is not None:
             time, stop = others.same.variant.result.events[count].time, same[count]
             return (
