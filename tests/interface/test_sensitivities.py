@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 import klack
+from klack.analyses.sensitivities.record import MeasureSlopes
 from klack.analyses.sensitivities.run import _impacts
 from klack.cli.main import main
 from klack.errors import InputError
@@ -260,3 +261,33 @@ def test_growth_of_derivatives_tells_of_chaos_without_a_check():
 
     assert [item.growth for item in found] == pytest.approx([1e-5, 1e-4, 1e-3, 1e-2])
     assert [item.is_doubtful for item in found] == [False, False, True, True]
+
+
+def test_a_measure_that_no_derivative_moves_is_doubtful_where_runs_move_it():
+    """Predicted 0, and two runs tell something else: there is no scale to divide by."""
+    told = {"name": "opening_time", "title": "", "unit": "s", "value": 1e-3, "slopes": (0.0,)}
+    found = MeasureSlopes(**told, predicted=0.0, secant=4e-7, scale=0.0, resolution=2e-8)
+
+    assert found.deviation is None
+    assert found.is_doubtful
+    assert not MeasureSlopes(
+        **told, predicted=0.0, secant=1e-9, scale=0.0, resolution=2e-8
+    ).is_doubtful
+
+
+def test_shares_of_the_lift_move_with_the_stop_that_ends_it():
+    """Truth: two strokes with another lift; at a constant force s ~ t^2, half the exponent."""
+    names = [f"opening_time_at_{share}_percent" for share in (50, 90)]
+    record = klack.sensitivities(SMALL, parameters=[GAP], measures=names, variant="dry")
+
+    for item in record.measures:
+        assert item.deviation < 2e-3
+        assert record.elasticity(item.name, GAP) == pytest.approx(0.46, abs=0.03)
+
+
+def test_a_mass_loses_the_work_that_it_was_given_whatever_it_is():
+    """``(1 - e^2) W`` with a restitution of the law: no part of it is the mass."""
+    record = klack.sensitivities(
+        SMALL, parameters=[MASS], measures=["opening.energy_loss"], variant="dry", check=False
+    )
+    assert record.elasticity("opening.energy_loss", MASS) == pytest.approx(0.0, abs=1e-3)

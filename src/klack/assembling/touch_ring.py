@@ -1,4 +1,4 @@
-"""Points of first touch of two bodies, in their order round the axis, for pictures."""
+"""Points of first touch of two bodies, in their order round their centre, for pictures."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,12 @@ from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch
 from klack.case.bodies import CaseBody
 from klack.mesh.mesh import Mesh
 
-__all__ = ["TouchingSide", "touch_ring"]
+__all__ = ["TouchingSide", "goes_round", "touch_ring"]
 
 _POINTS = 90  # of a ring
+_LEAST = 12  # points of a ring
+_INSIDE = 0.5  # of the largest distance from their centre: no point of a ring is nearer
+_WIDEST = np.pi / 3.0  # gap between two neighbours of a ring, seen from its centre
 _SAME_HEIGHT = 5e-4  # of the width of the bodies: clearances that differ by less are one touch
 
 
@@ -48,7 +51,26 @@ def touch_ring(upper: TouchingSide, lower: TouchingSide) -> tuple[NDArray[np.flo
         r, z = ring[0]
         ring = np.column_stack([r * np.cos(turn), r * np.sin(turn), np.full(_POINTS, z)])
     ring = ring.reshape(-1, 3)
-    return ring[np.argsort(np.arctan2(ring[:, 1], ring[:, 0]))], touch.clearance
+    return ring[np.argsort(_angles(ring))], touch.clearance
+
+
+def goes_round(points: NDArray[np.float64]) -> bool:
+    """Whether points of first touch lie round a hole rather than in one spot or on some pads.
+
+    Wherever its centre is; of a plane across the axis.
+    """
+    if len(points) < _LEAST:
+        return False
+    away = np.linalg.norm((points - points.mean(axis=0))[:, :2], axis=1)
+    angles = np.sort(_angles(points))
+    gaps = np.diff(angles, append=angles[0] + 2.0 * np.pi)
+    return bool(away.min() > _INSIDE * away.max() and gaps.max() < _WIDEST)
+
+
+def _angles(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Of points about their centre [rad]."""
+    away = points - points.mean(axis=0) if len(points) else points
+    return np.asarray(np.arctan2(away[:, 1], away[:, 0]))
 
 
 def _touch(upper: TouchingSide, lower: TouchingSide) -> Touch:

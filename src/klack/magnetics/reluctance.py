@@ -37,6 +37,8 @@ __all__ = ["GapReluctance", "IronReluctance", "LinearReluctance", "ReluctanceLaw
 
 Vector = NDArray[np.float64]
 
+_ROUND_OFF = 32.0 * float(np.finfo(float).eps)  # of the values of a cubic: what differences leave
+
 
 @dataclass(frozen=True, slots=True)
 class LinearReluctance:
@@ -224,11 +226,18 @@ ReluctanceLaw = LinearReluctance | GapReluctance | IronReluctance
 
 
 def _cubic_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
-    """Hermite cubics between the points: start, value, three factors; shape (n-1, 5)."""
+    """Hermite cubics between the points: start, value, three factors; shape (n-1, 5).
+
+    Factors that are nothing but round-off of the values are zero: they would change by leaps with
+    the parameters of the curve, and its derivatives be taken for those of a jump.
+    """
     h = np.diff(x)
     secant = np.diff(y) / h
     c2 = (3.0 * secant - 2.0 * dy[:-1] - dy[1:]) / h
     c3 = (dy[:-1] + dy[1:] - 2.0 * secant) / h**2
+    least = _ROUND_OFF * np.maximum(np.abs(y[:-1]), np.abs(y[1:]))
+    c2[np.abs(c2) * h**2 <= least] = 0.0
+    c3[np.abs(c3) * h**3 <= least] = 0.0
     return np.column_stack((x[:-1], y[:-1], dy[:-1], c2, c3))
 
 

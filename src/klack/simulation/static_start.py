@@ -115,6 +115,7 @@ class RestState:
     """Equilibrium of a network, from which that of one hardly different is found at once."""
 
     _state: _State
+    _first: Vector  # pressures from which the search for it began
     _held: frozenset[int]
     _stuck: frozenset[int]
     _enclosed: bool
@@ -275,8 +276,9 @@ def _settled(
             network, step, held, stuck, enclosed=enclosed, shift=shift, fixed=fixed, lifts=lifts
         )
         try:
-            state = _march(problem, None if near is None else near._state)
-            return problem, RestState(state, frozenset(held), frozenset(stuck), enclosed), closed
+            state = _march(problem, near)
+            kept = frozenset(held), frozenset(stuck), enclosed
+            return problem, RestState(state, problem.first().p, *kept), closed
         except _RunawayError as away:
             if away.volumes:
                 held.update(away.volumes)
@@ -289,20 +291,24 @@ def _settled(
                 raise _unheld(network, away.bodies) from None
 
 
-def _march(problem: "_Balance", near: _State | None) -> _State:
+def _march(problem: "_Balance", near: RestState | None) -> _State:
     """Lead the start through pseudo-time to the equilibrium, with long steps from a near one.
 
     A body that is held by nothing and on which nothing acts stays: in a long step it would drift.
     """
-    state, step = problem.first() if near is None else near.copy(), problem.step
+    begin, step = problem.first(), problem.step
+    state = begin if near is None else problem.nearby(begin, near)
     longest = _LONGEST * step
     tau = _FIRST * step if near is None else longest
+    mass = None if near is None else problem.masses(begin)  # what closed volumes hold
     beyond = 0
     while tau >= _SHORTEST * step and beyond < _MOST_BEYOND:
         open_modes = problem.unbalanced(state)
-        if open_modes is None:
+        if open_modes is None and mass is None:
             return state
-        after = problem.advance(state, min(tau, longest), open_modes)
+        if open_modes is None:  # a near state is in balance with what its own volumes hold
+            open_modes = problem.answering()
+        after = problem.advance(state, min(tau, longest), open_modes, mass)
         if after is None:
             beyond += problem.beyond is not None or bool(problem.emptied)
             tau = min(tau, longest) / _GROWTH**1.5
@@ -312,7 +318,7 @@ def _march(problem: "_Balance", near: _State | None) -> _State:
             return after
         if tau > _GROWTH**8 * longest:
             break
-        state, tau = after, tau * _GROWTH
+        state, tau, mass = after, tau * _GROWTH, None
     if problem.emptied:
         raise _RunawayError([], problem.emptied)
     raise problem.not_found(state)
@@ -372,6 +378,7 @@ class _Balance:
         stated = [rows.nodes[handle].stated for handle in network.node_order]
         self.stated = np.array(stated, dtype=bool)
         self.given = [i in held or bool(self.stated[i]) for i in range(nodes.volumes)]
+        self.at_first = np.array([rows.nodes[handle].at_start for handle in network.node_order])
         walls = set(nodes.wall_node.tolist())
         free = [i for i in range(nodes.volumes) if not self.given[i] or (enclosed and i in walls)]
         self.free = np.array(free, np.int64)
@@ -511,7 +518,15 @@ class _Balance:
         """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
         z = self.axial * self.lifts[self.of_body]
         y = np.append(self.shapes.T @ z, 0.0)
-        return _State(z, y, self.network.node_state.p.copy(), np.zeros(len(self.ends)))
+        return _State(z, y, self.at_first.copy(), np.zeros(len(self.ends)))
+
+    def nearby(self, begin: _State, near: RestState) -> _State:
+        """Equilibrium of a network that hardly differs, with what is given in this one."""
+        state = near._state.copy()
+        state.p += begin.p - near._first  # a volume that nothing fills keeps what it begins with
+        known = np.setdiff1d(np.arange(state.p.size), self.free)
+        state.p[known] = begin.p[known]
+        return state
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
         """Rigid modes that are free to creep; None if all is in equilibrium.
@@ -542,14 +557,27 @@ class _Balance:
             rest, scale = self._columns_left(state)
             if np.all(np.abs(rest) <= share * scale):
                 return None
-        answers = np.any(self.shapes @ self.by_port[: ports - 1] != 0.0, axis=1)
-        return (pushed | answers) & self.moves
+        return (pushed & self.moves) | self.answering()
 
-    def advance(self, start: _State, tau: float, open_modes: NDArray[np.bool_]) -> _State | None:
-        """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it."""
+    def answering(self) -> NDArray[np.bool_]:
+        """Rigid modes that move, and that a force answers."""
+        answers = np.any(self.shapes @ self.by_port[: self.ports] != 0.0, axis=1)
+        return np.asarray(answers & self.moves)
+
+    def advance(
+        self,
+        start: _State,
+        tau: float,
+        open_modes: NDArray[np.bool_],
+        mass: Vector | None = None,
+    ) -> _State | None:
+        """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it.
+
+        ``mass`` is what the free volumes hold at its begin, in place of what ``start`` has.
+        """
         state, before, self.beyond, self.emptied = start.copy(), np.inf, None, []
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
-        mass = self._masses(start)[0]
+        mass = self.masses(start) if mass is None else mass
         for iteration in range(_MOST_NEWTON):
             if not self.evaluate(state):
                 return None
@@ -741,11 +769,17 @@ class _Balance:
             found[:, 2] = np.asarray(fluids_at(nodes.fluid, p))[:, 2]
         return found
 
+    def masses(self, state: _State) -> Vector:
+        """Mass in each free volume [kg]."""
+        return self._masses(state)[0]
+
     def _masses(self, state: _State) -> tuple[Vector, Vector, Vector]:
         """Mass in each free volume [kg], its change with the pressure, and the density."""
         volume = self.volumes(state.y if self.enclosed else np.zeros_like(state.y))[self.free]
-        fluid = self._fluid(state.p[self.free])
-        return volume * fluid[:, 0], volume * fluid[:, 1], fluid[:, 0]
+        fluid = self._fluid(state.p[self.free]).T
+        # contiguous whatever their number: compiled code would be made for a view as well
+        density = np.ascontiguousarray(fluid[0])
+        return volume * density, volume * fluid[1], density
 
     def volumes(self, y: Vector) -> Vector:
         """Volume of every node [m^3] with the walls at these displacements."""

@@ -9,9 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.simulation.delay_line import Lines, LineState
+from klack.simulation.delay_line import Lines, LineState, start_lines
 
-__all__ = ["begin_stretch", "delay_slopes", "end_stretch", "wave_slopes", "waves_under_way"]
+__all__ = [
+    "begin_stretch",
+    "delay_slopes",
+    "end_stretch",
+    "later_delays",
+    "steady_waves",
+    "waves_under_way",
+]
 
 Vector = NDArray[np.float64]
 
@@ -28,22 +35,45 @@ def delay_slopes(lines: Lines) -> Vector:
     return found
 
 
-def wave_slopes(base: Any, plus: Any, minus: Any, distance: float) -> Vector:
-    """Change of the waves of lines at rest per unit, between two networks of other delays.
+def later_delays(base: Lines, other: Lines) -> Vector:
+    """How much longer the delays of other lines are, in steps of segments as those of the base.
+
+    As in :func:`delay_slopes` the last segment of a line takes the change of all.
+    """
+    longer = (other.depth + other.fraction) - (base.depth + base.fraction)
+    found = np.zeros(len(longer))
+    for begin, end in zip(base.first_segment[:-1], base.first_segment[1:], strict=True):
+        found[end - 1] = float(longer[begin:end].sum())
+    return found
+
+
+def steady_waves(base: Any, other: Any, flow: Vector) -> Vector:
+    """Waves of lines with a steady flow, in a memory as that of the base.
 
     Parameters
     ----------
-    base, plus, minus : NetworkArrays
-    distance : float
-        Between the last two.
+    base, other : NetworkArrays
+        With segments of equal numbers; the delays may differ.
+    flow : array [m^3/s]
+        In each line of the other network, which is at rest.
     """
-    found = np.zeros(len(base.line_state.samples))
-    for place, depth in _windows(base.lines, base.line_state.head):
-        segment, wave = place
-        first = base.lines.start[segment, wave]
-        ends = [n.line_state.samples[n.lines.start[segment, wave]] for n in (plus, minus)]
-        found[first : first + depth] = (ends[0] - ends[1]) / distance
-    return found
+    lines = other.lines._replace(
+        first_segment=base.lines.first_segment,
+        depth=base.lines.depth,
+        fraction=base.lines.fraction + later_delays(base.lines, other.lines),
+        start=base.lines.start,
+    )
+    own = other.line_state
+    state = own._replace(
+        samples=np.zeros(len(base.line_state.samples)),
+        head=own.head.copy(),
+        memory=own.memory.copy(),
+        cavity=own.cavity.copy(),
+    )
+    if len(lines.node):
+        pressure = other.nodes.density * other.node_state.g[other.nodes.end_node]
+        start_lines(lines, state, pressure, flow)
+    return state.samples
 
 
 def waves_under_way(lines: Any, state: Any) -> list[Any]:
@@ -66,10 +96,6 @@ def end_stretch(lines: Any, state: Any, lane: int) -> None:
 def _change(waves: Vector) -> Vector:
     """Change of the waves from one fine step to the next."""
     return np.asarray(np.gradient(waves)) if len(waves) > 1 else np.zeros(len(waves))
-
-
-def _windows(lines: Any, head: Any) -> list[tuple[tuple[int, int], int]]:
-    return [((s, wave), int(lines.depth[s])) for s in range(len(head)) for wave in range(2)]
 
 
 def _memory(lines: Lines, state: LineState) -> list[tuple[Any, Vector]]:

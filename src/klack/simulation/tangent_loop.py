@@ -10,8 +10,9 @@ from klack.compiling.jit import njit
 from klack.compiling.tangent_number import tangent_number, with_tangents
 from klack.network.step_function import StepFunction
 from klack.simulation.network_kernel import run_network
+from klack.simulation.network_record import record_start
 
-__all__ = ["LANES", "lanes_of", "run_with_tangents", "tangent_address"]
+__all__ = ["LANES", "lanes_of", "run_with_tangents", "start_with_tangents", "tangent_address"]
 
 LANES = 8
 """Numbers of a number with its derivatives: a vector register, or two."""
@@ -58,6 +59,12 @@ def run_with_tangents(
         with_tangents(LANES, scratch),
         with_tangents(LANES, report),
     )
+
+
+@njit
+def start_with_tangents(recording: Any, network: Any) -> None:
+    """:func:`klack.simulation.network_record.record_start` with derivatives."""
+    record_start(with_tangents(LANES, recording), with_tangents(LANES, network))
 
 
 def lanes_of(shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.network.rows import Rows
@@ -13,7 +14,7 @@ from klack.simulation.network_arrays import NetworkArrays
 from klack.simulation.network_compile import CompiledNetwork, compile_network
 from klack.simulation.static_start import RestState, begin_at_rest
 from klack.simulation.step_sizes import StepSizes
-from klack.simulation.tangent_lines import delay_slopes, wave_slopes
+from klack.simulation.tangent_lines import delay_slopes, later_delays, steady_waves
 from klack.simulation.tangent_loop import lanes_of, tangent_address
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "mode_places",
     "numbers_at_rest",
     "set_stretch",
+    "slopes_at_rest",
     "state_arrays",
 ]
 
@@ -34,6 +36,8 @@ STRETCH = 1
 _LONGER = 1e-4  # of the step, to either side: what a longer one changes
 _BENT = 0.1  # of a small change: more than this to one side only is a jump
 _ROUND_OFF = 1e-10  # of the largest number of a bundle: a change that tells nothing
+_LEAST = {"at": 1.0, "g": 1.0, "force": 1.0, "force_before": 1.0}
+"""Of bundles that may hold nothing but round-off, forces [N] and energies [J/kg], their size."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +99,7 @@ def numbers_at_rest(
     InputError
         For a direction in which a number of the network jumps, or a table changes its length.
     """
-    slopes = [_slopes(network, rest, item, sizes) for item in directions]
+    slopes = [slopes_at_rest(network, rest, item, sizes) for item in directions]
     arrays = _with_functions(lifted(network.arrays, slopes), network.rows)
     by_step = zip(_floats(arrays), _floats(_slopes_by_step(network, sizes)), strict=True)
     return TangentNumbers(
@@ -104,34 +108,58 @@ def numbers_at_rest(
     )
 
 
-def _slopes(
+def slopes_at_rest(
     network: CompiledNetwork, rest: RestState | None, direction: Direction, sizes: StepSizes
 ) -> NetworkArrays:
     """What changes in all numbers of a network at rest in a direction, per unit."""
     base, distance = network.arrays, direction.distance
     plus, minus = (_at_rest(rows, rest, sizes) for rows in (direction.plus, direction.minus))
-    further, before = _without_waves(plus, base), _without_waves(minus, base)
+    further, before = _in_place(plus.arrays, base), _in_place(minus.arrays, base)
     found: NetworkArrays = _difference(base, further, before, distance, direction.name)
-    delays = [end.lines.depth + end.lines.fraction for end in (plus, minus)]
     return found._replace(
-        lines=found.lines._replace(fraction=(delays[0] - delays[1]) / distance),
-        line_state=found.line_state._replace(samples=wave_slopes(base, plus, minus, distance)),
+        lines=found.lines._replace(
+            fraction=(_later(plus.arrays, base) - _later(minus.arrays, base)) / distance
+        ),
+        line_state=found.line_state._replace(
+            samples=(steady_waves(base, *plus) - steady_waves(base, *minus)) / distance
+        ),
     )
 
 
-def _at_rest(rows: Rows, rest: RestState | None, sizes: StepSizes) -> NetworkArrays:
+class _Resting(NamedTuple):
+    """Numbers of a network at rest, and the flow in its lines [m^3/s]."""
+
+    arrays: NetworkArrays
+    flow: NDArray[np.float64]
+
+
+def _at_rest(rows: Rows, rest: RestState | None, sizes: StepSizes) -> _Resting:
     network = compile_network(rows, sizes)
+    flow = dict[str, float]()
     if rest is not None:
-        begin_at_rest(network, sizes.step, rest)
-    return network.arrays
+        flow = dict(begin_at_rest(network, sizes.step, rest)[0].flow)
+    mass_flow = np.array([flow.get(line.component, 0.0) for line in rows.lines])
+    return _Resting(network.arrays, mass_flow / network.nodes.density)
 
 
-def _without_waves(numbers: NetworkArrays, base: NetworkArrays) -> NetworkArrays:
-    """The same but for the waves in lines, of which another delay keeps another number."""
-    return numbers._replace(
+def _later(numbers: NetworkArrays, base: NetworkArrays) -> NDArray[np.float64]:
+    return later_delays(base.lines, numbers.lines)
+
+
+def _in_place(numbers: NetworkArrays, base: NetworkArrays) -> NetworkArrays:
+    """The same but for what each step writes before it reads it, and for waves in lines.
+
+    Waves are kept in steps: another delay keeps another number of them.
+    """
+    found = numbers._replace(
         lines=numbers.lines._replace(fraction=base.lines.fraction),
         line_state=numbers.line_state._replace(samples=base.line_state.samples),
     )
+    for name in ("elements", "branches"):
+        given = getattr(base, name)
+        rows = getattr(found, name)._replace(inputs=given.inputs, outputs=given.outputs)
+        found = found._replace(**{name: rows})
+    return found
 
 
 def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays:
@@ -140,7 +168,7 @@ def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays
         compile_network(network.rows, replace(sizes, step=sizes.step * factor)).arrays
         for factor in (1.0, 1.0 + _LONGER, 1.0 - _LONGER)
     )
-    longer, shorter = (_without_waves(end, base) for end in ends)
+    longer, shorter = (_in_place(end, base) for end in ends)
     found = _difference(base, longer, shorter, 2.0 * _LONGER, "length of the steps")
     found = found._replace(lines=found.lines._replace(fraction=delay_slopes(base.lines)))
     for array in state_arrays(found):
@@ -148,11 +176,13 @@ def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays
     return found
 
 
-def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) -> Any:
+def _difference(
+    base: Any, plus: Any, minus: Any, distance: float, name: str, least: float = 0.0
+) -> Any:
     if isinstance(base, tuple):
-        return type(base)(
-            *(_difference(*parts, distance, name) for parts in zip(base, plus, minus, strict=True))
-        )
+        sizes = [_LEAST.get(field, 0.0) for field in getattr(base, "_fields", [""] * len(base))]
+        parts = zip(base, plus, minus, sizes, strict=True)
+        return type(base)(*(_difference(*part[:3], distance, name, part[3]) for part in parts))
     if isinstance(base, np.ndarray):
         if base.dtype != np.float64:
             return base
@@ -162,7 +192,7 @@ def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) ->
             found, bend = plus - minus, plus + minus - 2.0 * base
         known = np.isfinite(found)
         found, bend = np.where(known, found, 0.0), np.where(known, bend, 0.0)
-        size = np.max(np.abs(base), initial=0.0, where=np.isfinite(base))
+        size = np.max(np.abs(base), initial=least, where=np.isfinite(base))
         if np.any(np.abs(bend) > _BENT * np.abs(found) + _ROUND_OFF * size):
             raise _jumps(name)
         return found / distance
@@ -172,7 +202,8 @@ def _difference(base: Any, plus: Any, minus: Any, distance: float, name: str) ->
 def _jumps(name: str) -> InputError:
     return InputError(
         name,
-        got="a parameter with which numbers of the valve jump: a table gets other points",
+        got="a parameter with which numbers of the valve jump or bend: a table gets other points, "
+        "has a corner there, or the valve another start",
         expected="one with which they change smoothly",
         hint="klack study with a few values of it computes the valve at each of them.",
     )

@@ -34,7 +34,6 @@ from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.network_arrays import PARTS, scratch_memory
 from klack.simulation.network_compile import compile_network
 from klack.simulation.network_kernel import CLOCK
-from klack.simulation.network_record import record_start
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import (
     ChannelData,
@@ -44,12 +43,18 @@ from klack.simulation.network_result import (
     StepCounts,
 )
 from klack.simulation.network_run import grid_of, has_python_steps
-from klack.simulation.rest import longest_period
+from klack.simulation.rest import effective_mass, longest_period
 from klack.simulation.static_start import begin_at_rest
 from klack.simulation.step_sizes import StepSizes, step_sizes
 from klack.simulation.step_status import STATUS_DONE
 from klack.simulation.tangent_lines import begin_stretch, end_stretch, waves_under_way
-from klack.simulation.tangent_loop import LANES, lanes_of, run_with_tangents, tangent_address
+from klack.simulation.tangent_loop import (
+    LANES,
+    lanes_of,
+    run_with_tangents,
+    start_with_tangents,
+    tangent_address,
+)
 from klack.simulation.tangent_numbers import (
     STRETCH,
     Direction,
@@ -171,7 +176,24 @@ class TangentRun:
         moving = self._columns[2]
         speeds = {name: np.ascontiguousarray(points[:, i]) for name, i in moving.items()}
         finder.feed(time, speeds, fine)
-        return replace(self._result(time, points, at(self._means), fine), events=finder.events())
+        heavier = self._heavier(direction, amount)
+        events = tuple(
+            replace(event, energy_loss=heavier.get(event.stop, 1.0) * event.energy_loss)
+            for event in finder.events()
+        )
+        return replace(self._result(time, points, at(self._means), fine), events=events)
+
+    def _heavier(self, direction: int, amount: float) -> dict[str, float]:
+        """Mass of the relative motion at each stop over that of the run, where it changes."""
+        if amount == 0.0:
+            return {}
+        way = self.directions[direction]
+        mass, plus, minus = map(_masses, (self.rows, way.plus, way.minus))
+        return {
+            stop: 1.0 + amount * (plus[stop] - minus[stop]) / way.distance / own
+            for stop, own in mass.items()
+            if np.isfinite(own)
+        }
 
     def rates(self, direction: int) -> tuple[NetworkResult, NDArray[np.float64]]:
         """Derivatives with the parameter of a direction, at times that move along.
@@ -381,6 +403,7 @@ class _Running:
 
     def compile(self) -> None:
         """Compile the time loop, or load it, by a run of no steps."""
+        self._start()
         self._advance(0)
 
     def run(self, progress: Callable[[float], None]) -> TangentRun:
@@ -466,14 +489,12 @@ class _Running:
         laid_out[places] = kept.modes
 
     def _start(self) -> "_Part":
-        """The state before the first step; nothing is asked of its derivatives."""
+        """The state before the first step."""
         none = np.zeros((0, 5, LANES))
-        points = np.zeros((1, self.recording.points.shape[1], LANES))
-        record_start(self.recorder.recording, self.network.arrays)
-        points[0, :, 0] = self.recorder.recording.points[0]
+        start_with_tangents(self.recording, self.numbers)
         return _Part(
             time=np.zeros((1, LANES)),
-            points=points,
+            points=self.recording.points[:1].copy(),
             means=np.zeros((0, self.recording.means.shape[1], LANES)),
             fine=tuple(none for _ in self.rows.interfaces),
         )
@@ -633,6 +654,15 @@ class _Found:
     interface: int
     row: int
     time: float
+
+
+def _masses(rows: Rows) -> dict[str, float]:
+    """Mass of the relative motion of the bodies at each stop [kg]."""
+    owner = {handle: row for row in rows.bodies for handle in row.ports}
+    return {
+        row.component: effective_mass((owner.get(row.upper), owner.get(row.lower)))
+        for row in rows.interfaces
+    }
 
 
 def _quotient(a: Lanes, b: Lanes) -> Lanes:

@@ -11,7 +11,7 @@ from klack import __version__
 from klack.analyses.impact.body_picture import section_lines
 from klack.assembling.bodies import place_meshes
 from klack.assembling.held_nodes import held_nodes
-from klack.assembling.touch_ring import TouchingSide, touch_ring
+from klack.assembling.touch_ring import TouchingSide, goes_round, touch_ring
 from klack.assembling.valve import mesh_valve_bodies
 from klack.case.bodies import CaseBody, CaseFile
 from klack.case.schema import Case
@@ -25,9 +25,7 @@ from klack.schematic.picture import schematic_svg
 from klack.units import format_si
 from klack.viewer.view import BodyView, ContactView, View
 
-__all__ = ["ALL_ROUND", "body_view", "view_of_case", "view_of_mesh"]
-
-ALL_ROUND = 40  # points of 48 sectors: they go round the whole axis
+__all__ = ["body_view", "view_of_case", "view_of_mesh"]
 
 
 def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
@@ -170,6 +168,6 @@ def _contact(
         upper=names[0],
         lower=names[1],
         ring=ring,
-        closed=len(ring) > ALL_ROUND,
+        closed=goes_round(ring),
         gap=clearance if gap is None else gap,
     )

@@ -11,13 +11,14 @@ from numpy.typing import NDArray
 from klack import __version__
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.assembling.touch_ring import goes_round
 from klack.case.reader import read_case
 from klack.case.valve_reader import read_valve_case
 from klack.errors import InputError
 from klack.network.component import Component
 from klack.progress import Progress, silent
 from klack.report.thinning import thinned
-from klack.viewer.of_case import ALL_ROUND, view_of_case
+from klack.viewer.of_case import view_of_case
 from klack.viewer.view import BodyView, ContactView, Curve, MotionView, View
 
 __all__ = ["view_of_result"]
@@ -168,7 +169,7 @@ def _touching(study: ImpactStudy) -> tuple[ContactView, ...]:
             upper=upper,
             lower=lower,
             ring=ring,
-            closed=len(ring) > ALL_ROUND,
+            closed=goes_round(ring),
             gap=study.gap,
         ),
     )

@@ -353,15 +353,22 @@ function ringMesh(points, closed) {
   if (!count) return null;
   const at = i => new THREE.Vector3(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
   const up = new THREE.Vector3(0, 0, 1);
-  for (let i = 0; i < count; i++) {
-    const p = at(i), along = count > 1 ? at((i + 1) % count).sub(at((i + count - 1) % count)).normalize() : new THREE.Vector3(0, 1, 0);
+  const corners = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]];
+  // points in one spot, or on some pads, are no line: a small octahedron each
+  for (let i = 0; !closed && i < count; i++) {
+    const p = at(i);
+    for (const corner of corners) { position.push(p.x, p.y, p.z); away.push(...corner); }
+    for (const x of [0, 1]) for (const y of [2, 3]) for (const z of [4, 5]) index.push(6 * i + x, 6 * i + y, 6 * i + z);
+  }
+  for (let i = 0; closed && i < count; i++) {
+    const p = at(i), along = at((i + 1) % count).sub(at((i + count - 1) % count)).normalize();
     const out = new THREE.Vector3().crossVectors(along, up).normalize();
     for (let k = 0; k < around; k++) {
       const a = 2 * Math.PI * k / around, n = out.clone().multiplyScalar(Math.cos(a)).addScaledVector(up, Math.sin(a));
       position.push(p.x, p.y, p.z); away.push(n.x, n.y, n.z);
     }
   }
-  for (let i = 0; i < (closed ? count : count - 1); i++) for (let k = 0; k < around; k++) {
+  for (let i = 0; closed && i < count; i++) for (let k = 0; k < around; k++) {
     const a = i * around + k, b = i * around + (k + 1) % around, c = ((i + 1) % count) * around + k, d = ((i + 1) % count) * around + (k + 1) % around;
     index.push(a, b, d, a, d, c);
   }

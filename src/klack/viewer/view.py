@@ -23,10 +23,10 @@ class ContactView:
     upper, lower : str
         Surfaces, written ``needle.tip``.
     ring : array, shape (n, 3) [m]
-        Points of first touch in their order round the axis; one for a point, none where flat
+        Points of first touch in their order round their centre; one for a point, none where flat
         faces touch all at once.
     closed : bool
-        The points go round the whole axis.
+        The points are a ring; others are drawn one by one.
     gap : float [m]
         Between both as shown; nan where it is not known.
     """

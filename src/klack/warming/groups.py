@@ -2,9 +2,12 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from importlib import import_module
+from pkgutil import iter_modules
 from types import MappingProxyType
+from typing import Any
 
-__all__ = ["GROUPS", "Group"]
+__all__ = ["GROUPS", "Group", "all_steps"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,20 +46,26 @@ def _rest() -> None:
 
 
 def _components() -> None:
-    import sys
+    from klack.mechanics.force import constant_force_step
+    from klack.network.step_function import compile_step, evaluate
 
-    from klack.network.catalogue import component_classes
-    from klack.network.step_function import compile_step, is_step_function
-
-    modules = {kind.__module__ for kind in component_classes()}
-    found = {
-        step
-        for name in modules
-        for step in vars(sys.modules[name]).values()
-        if is_step_function(step)
-    }
-    for step in found:
+    for step in all_steps():
         compile_step(step)
+    evaluate(constant_force_step, [1.0], [], [0.0] * 4, 4)  # as gases find their steady flow
+
+
+def all_steps() -> set[Any]:
+    """Step functions of all files of the rooms in which components are."""
+    from klack.network.catalogue import component_classes
+    from klack.network.step_function import is_step_function
+
+    rooms = {kind.__module__.rpartition(".")[0] for kind in component_classes()}
+    files = [
+        import_module(f"{room}.{file.name}")
+        for room in sorted(rooms)
+        for file in iter_modules(import_module(room).__path__)
+    ]
+    return {step for file in files for step in vars(file).values() if is_step_function(step)}
 
 
 def _valve() -> None:

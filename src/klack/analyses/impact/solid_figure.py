@@ -20,6 +20,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
+from klack.assembling.touch_ring import goes_round
 from klack.mesh.skin import Skin
 from klack.report.depth_image import Camera, Quarter, Seen, Window, outlines, seen_of
 from klack.report.printed import STYLE, plain, svg
@@ -47,8 +48,6 @@ _BELOW = 0.1
 """Room below the bodies, of their height, for the scale and the axes."""
 _TALLEST = 1.5
 """Height over width of the windows, at most."""
-_ALL_ROUND = 12
-"""Points of first touch, at least, of a ring: fewer are those of pads."""
 _LAMP = np.array([-0.45, 0.65, -0.61])
 """Where the light comes from: right, up, away from the viewer."""
 _STEEPEST = 0.05
@@ -146,7 +145,7 @@ def _middle(skin: Skin, touching: NDArray[np.bool_]) -> Floats:
 def _reach(study: ImpactStudy, touching: list[NDArray[np.bool_]]) -> float:
     """Half the width of the enlarged window [m]."""
     touch, half_width = study.pictures[1].touch, study.contact.half_width
-    if _is_ring(touch):
+    if goes_round(touch):
         return 2.2 * float(_radii(touch).max())
     skins = [picture.skin for picture in study.pictures]
     spans = [
@@ -162,14 +161,6 @@ def _reach(study: ImpactStudy, touching: list[NDArray[np.bool_]]) -> float:
 
 def _radii(touch: Floats) -> Floats:
     return np.asarray(np.linalg.norm(touch - touch.mean(axis=0), axis=1))
-
-
-def _is_ring(touch: Floats) -> bool:
-    """Whether points of first touch lie round a hole rather than in one spot or on some pads."""
-    if len(touch) < _ALL_ROUND:
-        return False
-    radii = _radii(touch)
-    return bool(radii.min() > 0.5 * radii.max())
 
 
 # --------------------------------------------------------------------------- windows
@@ -294,7 +285,7 @@ def _draw_touch(axes: Any, touch: Floats, window: Window) -> None:
 
 
 def _touch_look(touch: Floats) -> dict[str, Any]:
-    if _is_ring(touch):
+    if goes_round(touch):
         return {"color": _RING, "linewidth": 0.9, "linestyle": _DASHES}
     return {"color": _RING, "linestyle": "", "marker": "o", "markersize": 1.8}
 
@@ -367,7 +358,7 @@ def _note(study: ImpactStudy, touching: list[NDArray[np.bool_]]) -> str:
     )
     touch = study.pictures[1].touch
     if len(touch):
-        what = "ring" if _is_ring(touch) else "points"
+        what = "ring" if goes_round(touch) else "points"
         note += f" The {what} of first touch of the centred bodies can be seen through them."
     if any(picture.held.any() for picture in study.pictures):
         note += " Striped is what is held in all directions."

@@ -96,10 +96,10 @@ class MeasureSlopes:
         """Whether other runs tell something else."""
         if self.has_strayed:
             return True
-        if self.deviation is None or self.predicted is None or self.secant is None:
+        if self.predicted is None or self.secant is None:
             return False
         resolved = abs(self.predicted - self.secant) > self.resolution
-        return resolved and self.deviation > HOLDS
+        return resolved and (self.deviation is None or self.deviation > HOLDS)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

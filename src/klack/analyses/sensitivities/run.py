@@ -115,7 +115,7 @@ def run_sensitivities(
             *notes,
             *runner.notes,
             *not_checked,
-            *_doubts(found, impacts),
+            *_doubts(found, impacts, others),
         ),
     )
 
@@ -255,10 +255,10 @@ def _impacts(
             ends = (others.plus.variant, others.minus.variant)
             plus, minus = (_touch_time(end, touch.stop, number) for end in ends)
             predicted, scale = space.change_together(_SHARE, slopes)
-            if plus is not None and minus is not None and predicted is not None and scale > 0.0:
+            if plus is not None and minus is not None and predicted is not None:
                 missed = abs(0.5 * (plus - minus) - predicted)
-                deviation = missed / scale
-                is_doubtful = deviation > HOLDS and missed > runs[0].sizes.step
+                deviation = missed / scale if scale > 0.0 else None
+                is_doubtful = missed > max(HOLDS * scale, runs[0].sizes.step)
         found.append(
             ImpactSlope(
                 stop=touch.stop,
@@ -272,6 +272,31 @@ def _impacts(
     return tuple(found)
 
 
+def _why(others: _Others) -> str:
+    """What the strokes of the check tell of the reason."""
+    same, *ends = (_in_order(end.variant) for end in (others.same, others.plus, others.minus))
+    for end, words in zip(ends, ("so", "the other way"), strict=True):
+        pairs = enumerate(zip(same, end, strict=False))
+        count = next((k for k, (one, other) in pairs if one != other), None)
+        if count is not None:
+            time, stop = others.same.variant.result.events[count].time, same[count]
+            return (
+                f" Changed {words}, impact {count + 1} of all, on '{stop}' at "
+                f"{format_si(time, 's', 4)}, is on '{end[count]}': the impacts have another order."
+            )
+        if len(end) != len(same):
+            return f" Changed {words}, there are {len(end)} impacts in place of {len(same)}."
+    return (
+        " The impacts have the same order: either the measure bends or jumps within that change, "
+        "as the flow about no pressure drop and a peak between two bounces do, or the motion is "
+        "chaotic; smaller changes in a study tell which."
+    )
+
+
+def _in_order(variant: StrokeVariant) -> list[str]:
+    return [event.stop for event in variant.result.events]
+
+
 def _touch_time(variant: StrokeVariant, stop: str, number: int) -> float | None:
     """Time of an impact on a stop of another run."""
     fastest = max((event.approach_speed for event in variant.impacts(stop)), default=0.0)
@@ -279,14 +304,19 @@ def _touch_time(variant: StrokeVariant, stop: str, number: int) -> float | None:
     return events[number - 1].time if number <= len(events) else None
 
 
-def _doubts(measures: Sequence[MeasureSlopes], impacts: Sequence[ImpactSlope]) -> tuple[str, ...]:
-    """Derivatives that do not predict what another run does."""
+def _doubts(
+    measures: Sequence[MeasureSlopes],
+    impacts: Sequence[ImpactSlope],
+    others: _Others | None = None,
+) -> tuple[str, ...]:
+    """Derivatives that do not predict what another run does, and why."""
     found = []
     wrong = [item.name for item in measures if item.is_doubtful]
     if wrong:
         found.append(
             f"The derivatives of {one_of(wrong)} do not predict runs with all parameters changed "
             f"by {_SHARE:.0%}: they tell nothing about changes of this size."
+            + ("" if others is None else _why(others))
         )
     strayed = [item.name for item in measures if item.has_strayed]
     if strayed:

@@ -187,10 +187,11 @@ class SlopeRunner:
 
     def _ahead(self, run: TangentRun, direction: int) -> Callable[[float], StrokeOfPoint]:
         """The stroke where the parameter of a direction has changed by an amount."""
-        rows = variant_network(self.valve, self.name).rows()
+        name = run.directions[direction].name if run.directions else ""
 
         def moved(amount: float) -> VariantRun:
             result = run.moved(direction, amount)
+            rows = self.rows({name: amount})  # stops may end another lift
             variant = variant_of(self.valve, self.roles, self.name, rows, result)
             return VariantRun(variant=variant, rows=rows, failure=None)
 
