@@ -7,16 +7,13 @@ import pytest
 
 from klack.case.shipped import find_case
 
-pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")
-from app_browser import CHROMIUM, LONG, Server, browser, page, require_within, server
+from app_browser import LONG, page, require_within, server
+from served_app import Served
 
-__all__ = ["browser", "page", "server"]  # fixtures
+__all__ = ["page", "server"]  # fixtures
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here"),
-]
+pytestmark = pytest.mark.slow
 
 CASE = "valve/case.yaml"
 
@@ -103,34 +100,23 @@ def test_sliders_answer_by_keyboard(page, server):
     require_within(page)
 
 
-@pytest.fixture
-def other(folder: Path) -> Iterator[Server]:
-    """A second server on the folder; it ends with the test, also where that fails."""
-    found = Server(folder)
-    yield found
-    found.process.kill()
-    found.process.wait(20)
-
-
-def test_a_run_goes_on_without_the_server_and_its_results_compare(
-    page, server, other, folder, browser
-):
+def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, folder, browser):
     page.goto(f"{server.base}/")
     text = (folder / CASE).read_text("utf-8")
     (folder / "valve" / "one.yaml").write_text(
         text.replace("[lumped, reduced-none, reduced-attachment, reduced, full]", "[reduced]"),
         "utf-8",
     )
-    context = browser.new_context()
-    first = context.new_page()
-    first.set_default_timeout(LONG)
-    first.goto(other.address)
-    row = first.locator(".k-row", has_text="valve/one.yaml").last
-    row.get_by_role("button", name="Run").click()
-    first.wait_for_selector("text=klack impact valve/one.yaml")
-    context.close()
-    other.process.kill()
-    other.process.wait(20)
+    with Served(folder) as other:
+        context = browser.new_context()
+        first = context.new_page()
+        first.set_default_timeout(LONG)
+        first.goto(other.address)
+        row = first.locator(".k-row", has_text="valve/one.yaml").last
+        row.get_by_role("button", name="Run").click()
+        first.wait_for_selector("text=klack impact valve/one.yaml")
+        context.close()
+        other.kill()
 
     page.goto(f"{server.base}/")
     page.wait_for_selector("text=done, ")

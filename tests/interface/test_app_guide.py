@@ -1,9 +1,6 @@
 """The guide for a new valve and the bodies in a browser: by mouse, by keyboard, with bad files."""
 
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,18 +12,17 @@ from klack.case.shipped import find_case
 from klack.case.valve_reader import load_any_case
 from klack.mesh.solid import write_step_revolved
 
-sync_api = pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")
-CHROMIUM = shutil.which("chromium")
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here"),
-]
+from app_browser import LONG, require_within, server
+from browser_pages import watched
+from served_app import Served
 
-WIDTHS = (400, 1000, 1600)
+__all__ = ["server"]  # fixture
+
+pytestmark = pytest.mark.slow
+
+WINDOW = {"width": 1200, "height": 950}
 ATTACK = "<img src=x onerror=alert(1)>.step"
-_SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-_LONG = 120_000  # [ms]: a loaded machine imports and meshes
 _NOISE = ("GPU stall", "WebGL", "413", "415", "Failed to load resource")
 """What browsers that draw by software say of it, and of answers that refuse a file."""
 
@@ -47,74 +43,21 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place
 
 
-class Server:
-    """``klack app`` on a folder."""
-
-    def __init__(self, folder: Path) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "klack", "app", str(folder), "--no-open"],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert self.process.stdout is not None
-        self.process.stdout.readline()
-        self.address = self.process.stdout.readline().strip()
-
-    @property
-    def base(self) -> str:
-        return self.address.partition("/?")[0]
-
-    def stop(self) -> None:
-        self.process.send_signal(signal.SIGINT)
-        self.process.wait(20)
-
-
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[Server]:
-    found = Server(folder)
-    yield found
-    found.stop()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as started:
-        found = started.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox", *_SOFTWARE])
-        yield found
-        found.close()
-
-
 @pytest.fixture
-def page(browser: Any, server: Server) -> Iterator[Any]:
-    """A page with the cookie; at its end nothing was complained of or asked of other hosts."""
-    context = browser.new_context(viewport={"width": 1200, "height": 950}, color_scheme="dark")
+def page(browser: Any, server: Served) -> Iterator[Any]:
+    """A dark page with the cookie; at its end nothing was complained of."""
+    context = browser.new_context(viewport=WINDOW, color_scheme="dark")
     found = context.new_page()
-    found.set_default_timeout(_LONG)
-    complaints: list[str] = []
-
-    def complain(said: Any) -> None:
-        if said.type in ("error", "warning") and not any(word in said.text for word in _NOISE):
-            complaints.append(said.text)
-
-    found.on("console", complain)
-    found.on("pageerror", lambda error: complaints.append(str(error)))
-    found.on("dialog", lambda dialog: complaints.append(f"dialog: {dialog.message}"))
-    found.on(
-        "request",
-        lambda request: (
-            complaints.append(f"asked {request.url}")
-            if not request.url.startswith(("http://127.0.0.1:", "data:", "blob:", "ws://127.0.0.1"))
-            else None
-        ),
-    )
+    found.set_default_timeout(LONG)
+    said = watched(found, server.base)
     found.goto(server.address)
     found.wait_for_selector("#k-body")
     yield found
     context.close()
-    assert complaints == []
+    assert [words for words in said if not any(noise in words for noise in _NOISE)] == []
 
 
-def open_guide(page: Any, server: Server) -> None:
+def open_guide(page: Any, server: Served) -> None:
     """The guide, from its beginning."""
     page.goto(f"{server.base}/new")
     page.wait_for_selector(".k-steps button")
@@ -134,18 +77,6 @@ def read(page: Any, count: int = 2) -> None:
 def onward(page: Any, sign: str) -> None:
     page.locator("#k-next").click()
     page.wait_for_selector(sign)
-
-
-def require_within(page: Any) -> None:
-    """No page is wider than its window, on a telephone or a large screen."""
-    for width in WIDTHS:
-        page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(250)
-        over = page.evaluate(
-            "document.documentElement.scrollWidth - document.documentElement.clientWidth"
-        )
-        assert over <= 0, f"{over} px wider than {width} px"
-    page.set_viewport_size({"width": 1200, "height": 950})
 
 
 def name_under(page: Any, x: float, y: float) -> str:
@@ -230,7 +161,7 @@ def test_from_two_step_files_by_clicking_to_a_case(page, server, folder):
     assert sorted(p.name for p in (folder / "first").iterdir()) == ["case.yaml"]
 
 
-def test_from_drawings_by_keyboard_and_it_survives(page, server, folder):
+def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser):
     open_guide(page, server)
     page.get_by_label("The two bodies come from").focus()
     page.keyboard.press("ArrowDown")
@@ -256,17 +187,19 @@ def test_from_drawings_by_keyboard_and_it_survives(page, server, folder):
 
     page.reload()  # and another server: the step and all choices are there
     page.wait_for_selector("text=Young's modulus")
-    other = Server(folder)
-    try:
-        page.goto(other.address)
-        page.goto(f"{other.base}/new")
-        page.wait_for_selector("text=Young's modulus")
-        page.get_by_role("button", name="2 Faces").press("Enter")
-        page.wait_for_selector(".k-face select")
-        assert page.get_by_label("housing.rim", exact=True).input_value() == "held"
-    finally:
-        page.goto(f"{server.base}/new")
-        other.stop()
+    with Served(folder) as other:
+        context = browser.new_context()
+        second = context.new_page()
+        second.set_default_timeout(LONG)
+        second.goto(other.address)
+        second.wait_for_selector("#k-body")
+        second.goto(f"{other.base}/new")
+        second.wait_for_selector("text=Young's modulus")
+        second.get_by_role("button", name="2 Faces").press("Enter")
+        second.wait_for_selector(".k-face select")
+        assert second.get_by_label("housing.rim", exact=True).input_value() == "held"
+        context.close()
+    page.goto(f"{server.base}/new")
     page.get_by_role("button", name="6 Case").press("Enter")
     page.wait_for_selector("text=klack: 1")
     page.get_by_label("Name of the valve").fill("drawn")

@@ -11,7 +11,8 @@ from made_study import made_study
 pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")
 
-from app_browser import CHROMIUM, LONG, Server, browser, page, require_within, server
+from app_browser import LONG, page, require_within, server
+from served_app import Served
 
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.run import run_study
@@ -21,12 +22,9 @@ from klack.case.case_tree import read_case_tree
 from klack.case.shipped import find_case
 from klack.case.study_source import study_of
 
-__all__ = ["browser", "page", "server"]  # fixtures
+__all__ = ["page", "server"]  # fixtures
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no chromium here"),
-]
+pytestmark = pytest.mark.slow
 
 ATTACK = "</script><img src=x onerror=alert(1)>${alert(2)}"
 LISTENED = """klack: 1
@@ -90,19 +88,18 @@ def test_a_study_is_made_started_stopped_and_resumed_without_its_server(
     written = (folder / "small_study.yaml").read_text("utf-8")
     assert "network.components.spring.preload: {from: 10.8 N, to: 14 N}  # today 12 N" in written
 
-    other = Server(folder)
-    context = browser.new_context()
-    first = context.new_page()
-    first.set_default_timeout(LONG)
-    first.goto(other.address)
-    first.wait_for_selector("#k-body")
-    first.goto(f"{other.base}/case?path=small_study.yaml")
-    first.get_by_role("button", name="Start the study").click()
-    first.get_by_role("link", name="Points").click()
-    first.wait_for_selector("#kp-root[data-points='8000']")
-    context.close()
-    other.process.kill()
-    other.process.wait(20)
+    with Served(folder) as other:
+        context = browser.new_context()
+        first = context.new_page()
+        first.set_default_timeout(LONG)
+        first.goto(other.address)
+        first.wait_for_selector("#k-body")
+        first.goto(f"{other.base}/case?path=small_study.yaml")
+        first.get_by_role("button", name="Start the study").click()
+        first.get_by_role("link", name="Points").click()
+        first.wait_for_selector("#kp-root[data-points='8000']")
+        context.close()
+        other.kill()
 
     page.goto(f"{server.base}/points?path=klack-results/small_study")
     page.wait_for_selector("text=study runs, ")
