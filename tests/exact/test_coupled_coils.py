@@ -17,6 +17,7 @@ from klack.control.sensor import Sensor
 from klack.errors import InputError
 from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.boost_driver import BoostDriver, Shot
+from klack.magnetics.constant_drive import driven
 from klack.magnetics.controlled_voltage import ControlledVoltage
 from klack.magnetics.coupled_step import coupled_step
 from klack.magnetics.flux_step import magnet_step
@@ -262,6 +263,16 @@ def test_coils_of_one_magnet_may_share_a_capacitor():
     assert run.books.relative_residual < 1e-11
     assert set(run.books.supplies) >= {"magnet battery", "magnet other battery", "bank recharge"}
     assert np.min(run.channels["bank capacitor voltage"].values) > 0.0
+
+
+def test_constant_currents_need_no_capacitor():
+    network = at_bank(SHARING, BANK, FEED)
+
+    still = driven(network, {"magnet": 2.0, "magnet.other": 0.0})
+
+    assert "bank" not in still.components
+    run = simulate_network(still.rows(), duration=20e-6, step=1e-6, record=1e-5)
+    assert run.channels["magnet current"].values[-1] == pytest.approx(2.0, rel=1e-12)
 
 
 @pytest.fixture(scope="module")

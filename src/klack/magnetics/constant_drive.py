@@ -155,18 +155,17 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
         coil = coils[name]
         part = changed.get(coil.component, coil.magnet)
         changed[coil.component] = part.model_copy(update=_starting(part, coil.port, current))
-    return _without_capacitors(network).with_components(changed)
+    return _with_sources(network, changed)
 
 
-def _without_capacitors(network: Network) -> Network:
-    """Network whose boost-drivers draw from nothing: constant sources take their places."""
+def _with_sources(network: Network, changed: Mapping[str, Component]) -> Network:
+    """Network with constant sources in place of drivers: no capacitor feeds them any more."""
     shared = [name for name, part in network.components.items() if isinstance(part, BoostCapacitor)]
     if not shared:
-        return network
-    feeds = [{str(joint) for joint in node.joints} for node in network.nodes]
-    feeds = [ports for ports in feeds if any(f"{name}.outlet" in ports for name in shared)]
-    parts = {name: part for name, part in network.components.items() if name not in shared}
-    kept = [c for c in network.connections if not any(set(c) & ports for ports in feeds)]
+        return network.with_components(changed)
+    parts = {name: p for name, p in {**network.components, **changed}.items() if name not in shared}
+    outlets = {f"{name}.outlet" for name in shared}
+    kept = [line for line in network.connections if not outlets & set(line)]
     return replace(network, components=parts, connections=kept)
 
 

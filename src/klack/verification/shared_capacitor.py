@@ -154,7 +154,7 @@ def _in_sequence() -> list[Check]:
             "recharge of a shared capacitor, from 10 V, after 1.5 ms [V]",
             expected=float(charged),
             computed=_last(late, "bank capacitor voltage"),
-            tolerance=1e-12,
+            tolerance=5e-13,
             source="constant current, then constant power: U^2 = U_0^2 + 2 P t/C",
         ),
         _check(
