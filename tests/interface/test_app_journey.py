@@ -258,9 +258,9 @@ def peak_of(result: Path) -> float:
 
 def speed_in(text: str) -> float:
     """Speed in the text of a case [m/s]."""
-    found = re.search(r"^ *speed: *[\"']?([\d.eE+-]+) m/s", text, re.MULTILINE)
+    found = re.search(r"\bspeed: *[\"']?([\d.eE+-]+) (m?m)/s", text)
     assert found, text[-600:]
-    return float(found[1])
+    return float(found[1]) * {"m": 1.0, "mm": 1e-3}[found[2]]
 
 
 def move_pin_hear(walk: Walk, folder: Path) -> None:
