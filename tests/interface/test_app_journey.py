@@ -423,6 +423,7 @@ def look_around(walk: Walk) -> None:
     walk.finds(walk.page.evaluate("location.hash") == "#k-body", "it goes to the content")
 
 
+@pytest.mark.timeout(1500)  # [s]: two runs and two slider pages, on a loaded machine
 def test_a_day_of_work_loses_nothing(browser, serve, tmp_path):
     folder = tmp_path / "day"
     folder.mkdir()
