@@ -1,4 +1,4 @@
-"""A chart in words: what somebody hears who does not see it, with its main numbers.
+"""A chart in words, with its main numbers, for those who do not see it.
 
 Made from the plain data that plotly.js draws, so that reports and the pages of ``klack app`` share
 it.  Every named curve is told with its ends and with where it is highest and lowest.
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 __all__ = ["spoken"]
 
-_MOST = 8  # curves, or bars, that somebody would listen to
+_MOST = 8  # curves, or bars, that one would listen to
 
 
 def spoken(figure: dict[str, Any]) -> str:

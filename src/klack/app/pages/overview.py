@@ -75,6 +75,8 @@ class _Overview:
         with self._cases:
             self._cases.clear()
             await self._show_cases(found.cases, found.is_whole)
+        if self._results.is_deleted:
+            return
         with self._results:
             self._results.clear()
             await self._show_results(found.results)
@@ -158,6 +160,8 @@ class _Overview:
             rows = [(case, _reading(case)) for case in cases]
         for case, row in rows:
             checked = await self._checked(case)
+            if row.is_deleted:  # the list is made anew meanwhile, or the page is left
+                return
             row.clear()
             with row:
                 self._show_case(case, checked)
@@ -302,6 +306,8 @@ class _Overview:
 
         for name, row in rows:
             card = await self._card(name)
+            if row.is_deleted:
+                return
             row.clear()
             with row:
                 self._show_result(name, card, chosen)
