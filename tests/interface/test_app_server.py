@@ -59,7 +59,17 @@ def test_it_listens_on_this_machine_alone_with_a_token(address):
     assert httpx.get(address.partition("?")[0]).status_code == 403
 
 
-@pytest.mark.parametrize("path", ["/", "/case?path=x", "/sliders?path=x", "/compare?a=x&b=y"])
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/",
+        "/case?path=x",
+        "/sliders?path=x",
+        "/compare?a=x&b=y",
+        "/points?path=x",
+        "/new-study?path=x",
+    ],
+)
 def test_pages_name_no_other_host_in_what_they_load(client, path):
     page = client.get(path)
 
@@ -72,11 +82,19 @@ def test_pages_name_no_other_host_in_what_they_load(client, path):
 def test_scripts_in_names_and_addresses_stay_text(client):
     name = f"{ATTACK.replace('/', '')}.yaml"
     for path in (ATTACK, name):
-        for page in ("/case", "/sliders", "/compare"):
+        for page in ("/case", "/sliders", "/compare", "/points", "/new-study"):
             answer = client.get(page, params={"path": path, "a": path, "b": path})
             assert answer.status_code == 200
             assert "<script>alert" not in answer.text
             assert "`${alert" not in answer.text
+
+
+def test_the_numbers_of_a_study_are_no_page(client):
+    answer = client.get("/points-data", params={"path": ATTACK})
+
+    assert answer.headers["content-type"] == "application/json"
+    assert answer.headers["x-content-type-options"] == "nosniff"
+    assert "no study" in answer.json()["error"]
 
 
 def test_reports_run_apart_from_the_application(client):
