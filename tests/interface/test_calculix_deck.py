@@ -10,11 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.assembling.bodies import build_bodies
 from klack.case import find_case, load_case
 from klack.case.guide import CaseGuide
 from klack.contact.pairing import axial_distance, face_geometry, project_to_surface
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
+from klack.exchange import calculix_case
 from klack.exchange.calculix_case import calculix_impact, calculix_settings
 from klack.exchange.calculix_deck import (
     CalculixImpact,
@@ -238,6 +240,18 @@ def test_axisymmetric_cases_are_refused_before_any_mesh():
         calculix_impact(load_case(find_case("demo-valve-axisymmetric")), nothing)
 
 
+@pytest.fixture(scope="module")
+def witness():
+    """Bodies of the witness case, which neither its guide nor its friction changes."""
+    return build_bodies(load_case(find_case("witness")), silent)
+
+
+@pytest.fixture
+def built(witness, monkeypatch):
+    monkeypatch.setattr(calculix_case, "build_bodies", lambda case, progress: witness)
+
+
+@pytest.mark.usefixtures("built")
 def test_a_guide_is_left_out_with_a_note():
     case = load_case(find_case("witness"))
     guide = CaseGuide(surface="shaft", heights=("1 mm", "2 mm"), clearance="5 um")
@@ -245,6 +259,7 @@ def test_a_guide_is_left_out_with_a_note():
         calculix_impact(case.model_copy(update={"guide": guide}), silent)
 
 
+@pytest.mark.usefixtures("built")
 @pytest.mark.parametrize(
     ("contact", "words"),
     [
