@@ -17,6 +17,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
 from klack.network.rows import Ambient
+from klack.simulation.linear_network import linear_network
 from klack.simulation.network_compile import compile_network
 from klack.simulation.network_run import simulate_network
 from klack.simulation.step_sizes import step_sizes
@@ -99,6 +100,14 @@ def test_gas_that_takes_time_is_refused():
 def test_derivatives_are_refused():
     with pytest.raises(InputError, match=r"components.pipe.properties"):
         run_tangents(network(LOCAL), (), duration=1e-5)
+
+
+def test_a_linear_state_space_is_refused():
+    rows = network(LOCAL)
+    compiled = compile_network(rows, step_sizes(rows, "normal", step=40e-9))
+
+    with pytest.raises(InputError, match=r"components.pipe.properties.*properties: fixed"):
+        linear_network(compiled, 1e-9)
 
 
 def test_a_steady_flow_that_boils_in_the_line_is_refused():
