@@ -83,12 +83,12 @@ class _Editor:
                 self._area = plain(self._text, "textarea")
                 self._area.props("id=k-yaml spellcheck=false autocomplete=off")
                 self._area.props["aria-label"] = "case file, YAML"
+                # not throttled: what was typed last comes before the click on Save or Discard
                 self._area.on(
                     "input",
                     self._typed,
                     js_handler=f"(e) => emit(JSON.stringify(e.target.value).length > {_LONGEST} "
                     "? null : e.target.value)",
-                    throttle=0.15,
                 )
         ui.timer(0.05, self._check, once=True)
 
