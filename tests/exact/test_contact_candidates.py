@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from klack.assembling.candidates import Candidates, grade_of, reach_of
 from klack.assembling.problem import place_bodies
@@ -55,35 +56,51 @@ def test_points_enter_at_their_reach(placed):
         assert np.array_equal(near.nodes, far.nodes[far.entry <= reach_of(grade)])
 
 
+class Dense:
+    """A factorised full matrix."""
+
+    dtype = np.dtype(float)
+
+    def __init__(self, size: int, seed: int) -> None:
+        A = np.random.default_rng(seed).normal(size=(size, size))
+        self.A = A @ A.T + size * np.eye(size)
+        self.L = np.linalg.cholesky(self.A)
+
+    def solve(self, B):
+        return np.linalg.solve(self.A, B)
+
+    def forward(self, B):
+        return np.linalg.solve(self.L, B)
+
+    def backward(self, Y):
+        return np.linalg.solve(self.L.T, Y)
+
+
 def test_groups_are_condensed_apart_and_together():
-    rng = np.random.default_rng(3)
-    A = rng.normal(size=(30, 30))
-    A = A @ A.T + 30.0 * np.eye(30)
-
-    class Dense:
-        dtype = np.dtype(float)
-
-        def __init__(self) -> None:
-            self.L = np.linalg.cholesky(A)
-
-        def solve(self, B):
-            return np.linalg.solve(A, B)
-
-        def forward(self, B):
-            return np.linalg.solve(self.L, B)
-
-        def backward(self, Y):
-            return np.linalg.solve(self.L.T, Y)
-
-    from scipy.sparse import csr_array
-
+    factor, rng = Dense(30, seed=3), np.random.default_rng(4)
     G = csr_array(rng.normal(size=(9, 30)))
     groups = [np.array([4, 1, 7]), np.array([0, 8]), np.array([2, 3, 5, 6])]
-    expected = G @ np.linalg.solve(A, G.T.toarray())
+    expected = G @ np.linalg.solve(factor.A, G.T.toarray())
 
     for largest in (2**29, 8 * 30 * 4, 0):  # forward halves, some of them, whole solutions
-        C = condensed_inverse(Dense(), G, groups=groups, largest=largest)
+        C = condensed_inverse(factor, G, groups=groups, largest=largest)
         np.testing.assert_allclose(C, expected, rtol=1e-11, atol=1e-14)
+
+
+@pytest.mark.parametrize("largest", [2**29, 0], ids=["halves", "whole solutions"])
+def test_later_groups_change_no_bit_of_the_first(largest):
+    factor, rng = Dense(1200, seed=8), np.random.default_rng(9)
+    factor.L[::2, 1::2] = factor.L[1::2, ::2] = 0.0  # loads on even rows never reach odd ones
+    factor.A = factor.L @ factor.L.T
+    loads = rng.normal(size=(143, 1200))
+    loads[:102, 1::2] = 0.0
+    G = csr_array(loads)
+    groups = [np.arange(61), np.arange(61, 102), np.arange(102, 143)]
+
+    whole = condensed_inverse(factor, G, groups=groups, largest=largest)
+    fewer = condensed_inverse(factor, G[:102], groups=groups[:2], largest=largest)
+
+    assert np.array_equal(whole[:102, :102], fewer)
 
 
 def test_a_factor_follows_points_that_join_and_leave():
