@@ -157,7 +157,7 @@ def test_laminar_flow_beyond_its_range_is_told_with_line_number_time_and_option(
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AccuracyWarning)
-        flow = float(run(steady).channels["hole flow"].values[0])
+        flow = float(run(steady).channels["hole mass flow"].values[0])
     reynolds = 4.0 * flow / (np.pi * 2e-3 * float(HEPTANE.viscosity(300e5)))
     found = float(text.split("number of ")[1].split()[0])
     assert found == pytest.approx(reynolds, rel=1e-2)  # three digits; the flow starts to 1e-4

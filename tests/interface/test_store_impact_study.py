@@ -109,8 +109,8 @@ def test_a_result_exchanged_while_it_is_read_is_read_again(
     IMPACT.save(impact_study, tmp_path)
     usual, times = record_store._load, []
 
-    def exchanged(path: Path, form: record_store.RecordFormat) -> object:
-        record = usual(path, form)
+    def exchanged(path: Path, form: record_store.RecordFormat, largest: int) -> object:
+        record = usual(path, form, largest)
         if not times:
             IMPACT.save(lonely_study, tmp_path)
         times.append(path)
