@@ -86,7 +86,7 @@ def _guided(number: int) -> Callable[[Any], None]:
 
     def lead(page: Any) -> None:
         page.get_by_role("button", name="Start over").click()
-        page.get_by_label("The two bodies come from").select_option("drawing")
+        page.get_by_label("The two bodies come from").select_option("table")
         for body in ("needle", "housing"):
             page.get_by_role("button", name=f"Fill in the example of the {body}").click()
         page.wait_for_function("document.querySelectorAll('.k-read').length == 2")
