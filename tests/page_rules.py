@@ -56,6 +56,18 @@ def layout_findings(page: Any) -> list[str]:
     ]
 
 
+_FROM_THE_TOP = """() => {
+  document.activeElement?.blur();
+  if (!document.querySelector(".q-dialog")) {  // what was pressed last would be the start
+    document.body.tabIndex = -1;
+    document.body.focus();
+    document.body.removeAttribute("tabindex");
+  }
+  window.scrollTo(0, 0);
+  window.klackKeys = null;
+}"""
+
+
 def focus_findings(page: Any, most: int = 200) -> tuple[int, list[str]]:
     """Go through a page with the Tab key.
 
@@ -65,7 +77,7 @@ def focus_findings(page: Any, most: int = 200) -> tuple[int, list[str]]:
         Places that had the focus; those that did not show it, or were hidden.
     """
     _bring(page)
-    page.evaluate("document.activeElement?.blur(); window.scrollTo(0, 0); window.klackKeys = null")
+    page.evaluate(_FROM_THE_TOP)
     seen: set[int] = set()
     said: list[str] = []
     for _ in range(most):

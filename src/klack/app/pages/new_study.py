@@ -83,7 +83,7 @@ class _NewStudy:
         self._problem = plain("", "p").classes("k-error").props("role=alert")
 
     def _show_list(self, items: Any, show: Any) -> None:
-        with ui.element("div").classes("k-sheet k-scroll"):
+        with ui.element("div").classes("k-sheet k-scroll").props("tabindex=0"):
             show(items[:_AT_FIRST])
             if len(items) > _AT_FIRST:
                 with ui.element("details"):
@@ -143,12 +143,12 @@ class _NewStudy:
         box.on("change", change, js_handler="(e) => emit(e.target.value)")
 
     def _tick(self, name: str, label: str, among: set[str], title: str) -> None:
-        with ui.element("label") as found:
+        with ui.element("label").classes("k-tick") as found:
             found.props["title"] = title
             box = ui.element("input").props("type=checkbox")
             if name in among:
                 box.props["checked"] = True
-            plain(f" {label}")
+            plain(label)
 
         def change(event: Any) -> None:
             (among.add if event.args else among.discard)(name)

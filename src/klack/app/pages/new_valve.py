@@ -297,7 +297,7 @@ class _Guide:
             with ui.element("label").classes("k-soft"):
                 plain("or a CSV file ")
                 box = ui.element("input").props("type=file accept=.csv,.txt,text/csv")
-                box.props["aria-label"] = f"CSV file of the {body}"
+                box.classes("k-input").props["aria-label"] = f"CSV file of the {body}"
                 box.on(
                     "change",
                     lambda event: self._with_parts(

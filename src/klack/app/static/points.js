@@ -191,11 +191,11 @@
           make("button", { type: "button", class: "k-btn", text: "Clear the selection",
             onclick: () => { this.brushes.clear(); this.page = 0; this.select(); this.showRanges(); } })),
         make("p", { class: "k-soft", text: "Drag along an axis, or across the chart above: only the points that pass there stay in all views. A click on an axis removes its range." }),
-        make("div", { class: "k-scroll" }, this.lines),
+        make("div", { class: "k-scroll", tabindex: "0" }, this.lines),
         make("details", { ontoggle: () => this.showRanges() }, make("summary", { text: "Ranges as numbers" }), this.ranges));
       this.listenLines();
 
-      this.rows = make("div", { class: "k-scroll" });
+      this.rows = make("div", { class: "k-scroll", tabindex: "0" });
       this.pages = make("div", { class: "kp-tools" });
       const only = make("input", { type: "checkbox", onchange: event => { this.frontOnly = event.target.checked; this.page = 0; this.showTable(); } });
       table.append(
@@ -323,7 +323,7 @@
         make("p", { class: "k-soft", text: this.marks(k).join(", ") || "beaten by a point of the front, or without objectives" }),
         ...(reason ? [make("p", { class: "k-error", text: reason })] : []),
         ...(doubt === undefined ? [] : [make("p", { class: "k-error", text: this.study.doubts[doubt] })]),
-        make("div", { class: "k-scroll" }, make("table", { class: "k-table kp-compare" },
+        make("div", { class: "k-scroll", tabindex: "0" }, make("table", { class: "k-table kp-compare" },
           make("thead", {}, make("tr", {}, ...["", "case", `point ${this.chosen}`, "difference"].map(text => make("th", { scope: "col", text })))),
           make("tbody", {}, ...rows))));
     }
