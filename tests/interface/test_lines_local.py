@@ -163,6 +163,16 @@ def test_laminar_flow_beyond_its_range_is_told_with_line_number_time_and_option(
     assert found == pytest.approx(reynolds, rel=1e-2)  # three digits; the flow starts to 1e-4
     assert "us after the start" in text
     assert "friction: turbulent" in text
+    more = float(text.split("about ")[1].split()[0])
+    assert more == pytest.approx(0.3164 / 64.0 * reynolds**0.75, rel=0.05)  # two digits
+    if kind:
+        return  # viscosity differs along the line: no number
+    told_drop = 1e5 * float(text.split("pressure drop, ")[1].split()[0])
+    flow_law = 128.0 * float(HEPTANE.viscosity(300e5)) * BORE["length"] / (np.pi * 2e-3**4)
+    poiseuille = flow_law * flow / float(HEPTANE.density(300e5))
+    assert told_drop == pytest.approx(
+        poiseuille, rel=0.1
+    )  # two digits, properties at a stated pressure
 
 
 @pytest.mark.parametrize("kind", [{}, LOCAL])

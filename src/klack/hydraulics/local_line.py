@@ -23,7 +23,7 @@ from klack.hydraulics.line_cells import (
 )
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.network_fluid import network_fluid
-from klack.hydraulics.pipe_friction import LAMINAR, PipeFriction, laminar_doubt
+from klack.hydraulics.pipe_friction import PipeFriction, laminar_doubts
 from klack.network.protocols import NetworkFluid
 from klack.network.rows import Rows, WaveRow
 from klack.network.step_function import first
@@ -129,8 +129,8 @@ class LocalLine:
                 "from the cells; a shock loses the rest.\n"
                 f"Try: components.{component}.cells: {2 * self.cells}, and compare."
             )
-        if self.friction in ("steady", "kagawa") and reynolds > LAMINAR:
-            yield laminar_doubt(component, reynolds, time)
+        if self.friction in ("steady", "kagawa"):
+            yield from laminar_doubts(component, reynolds, time, None)
 
 
 @njit(error_model="numpy")

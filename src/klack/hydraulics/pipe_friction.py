@@ -1,6 +1,6 @@
 r"""Friction of a pipe, laminar and turbulent, without inertia and compliance."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import log, pi, sqrt
 from typing import Any, ClassVar, Self
 
@@ -18,7 +18,7 @@ from klack.units import Length, format_si
 __all__ = [
     "LAMINAR",
     "PipeFriction",
-    "laminar_doubt",
+    "laminar_doubts",
     "pipe_friction_step",
     "reynolds_of",
     "root_of",
@@ -26,6 +26,8 @@ __all__ = [
 
 LAMINAR = 2300.0
 """Reynolds number at which laminar flow ends."""
+
+_TOLD = 1e3  # [Pa]: 1 % of the atmosphere
 
 _TURBULENT = 4000.0  # turbulent flow is developed
 _LAST = sqrt(64.0 * LAMINAR)  # Re sqrt(f) where laminar flow ends
@@ -74,13 +76,23 @@ def reynolds_of(x: float, rough: float, first: float) -> tuple[float, float]:
     return LAMINAR + slope * (x - _LAST), slope
 
 
-def laminar_doubt(component: str, reynolds: float, time: float) -> str:
-    """Sentence on laminar friction beyond its range."""
-    return (
+def laminar_doubts(
+    component: str, reynolds: float, time: float, drop: float | None
+) -> Iterator[str]:
+    r"""Sentence on laminar friction beyond its range, where it matters: by 0.01 bar or more.
+
+    In a smooth pipe the turbulent pressure drop is :math:`0.3164\,Re^{3/4}/64` times the laminar
+    one, ``drop`` [Pa] or None where it is not known (Blasius, Mitt. Forschungsarb. 131 (1913)).
+    """
+    times = 0.3164 * reynolds**0.75 / 64.0
+    if reynolds <= LAMINAR or (drop is not None and (times - 1.0) * drop < _TOLD):
+        return
+    shown = "" if drop is None else f", {1e-5 * drop:.2g} bar as computed,"
+    yield (
         f"'{component}': the flow in this line, whose friction is laminar, reaches a Reynolds "
         f"number of {reynolds:.3g} {format_si(time, 's', 4)} after the start; steady laminar flow "
         f"ends at {LAMINAR:g}. In the first milliseconds of a change it stays laminar above that, "
-        "later the pressure drop is higher than computed.\n"
+        f"later the pressure drop{shown} is about {times:.2g} times that of laminar friction.\n"
         f"Try: components.{component}.friction: turbulent."
     )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from klack.hydraulics.pipe_friction import LAMINAR, laminar_doubt
+from klack.hydraulics.pipe_friction import LAMINAR, laminar_doubts
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.wave_rows import wave_store
 
@@ -14,9 +14,9 @@ def line_doubts(network: CompiledNetwork, begin: float) -> Iterator[str]:
     rows, lines, state = network.rows, network.lines, network.line_state
     for k, row in enumerate(rows.lines):
         reynolds = LAMINAR * float(state.fastest[k]) / row.laminar_flow
-        if reynolds > LAMINAR:
-            time = begin + lines.step * float(state.moment[k, 0])
-            yield laminar_doubt(row.component, reynolds, time)
+        time = begin + lines.step * float(state.moment[k, 0])
+        drop = row.resistance * float(state.fastest[k])
+        yield from laminar_doubts(row.component, reynolds, time, drop)
     for k, wave in enumerate(rows.waves):
         _, _, reynolds, time = wave_store(network.waves, rows.waves, k)
         yield from wave.doubts(network.accounts.waves[k], float(reynolds), float(time))
