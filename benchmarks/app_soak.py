@@ -33,15 +33,16 @@ _MOVED = """([bar, share]) => {
   const took = document.getElementById('k-took');
   bar.value = +bar.min + share * (+bar.max - +bar.min);
   const begin = performance.now();
-  return new Promise((done) => {
+  return new Promise((done, fail) => {
+    setTimeout(() => fail(new Error('no answer to a move')), 60000);
     new MutationObserver((_, seen) => {
       seen.disconnect();
       requestAnimationFrame(() => setTimeout(() => done(performance.now() - begin)));
-    }).observe(took, {childList: true, characterData: true, subtree: true});
+    }).observe(took, {childList: true, characterData: true, subtree: true, attributes: true});
     bar.dispatchEvent(new Event('input'));
   });
 }"""
-"""A move, and the wait for the picture after the words that tell its time."""
+"""A move, and the wait for the picture after the number of its answer."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from solid_valve import solid_valve
 from threadpoolctl import threadpool_limits
 
 from klack.assembling.bodies import assemble_body, build_bodies
+from klack.assembling.candidates import Candidates
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder
 from klack.assembling.modes import mode_pool
 from klack.case.schema import Case
@@ -99,9 +100,8 @@ def _measure(case: Case) -> _Costs:
     clock.stop("assembly")
     factors = [Flexibility(body, threads=1) for body in bodies]
     clock.stop("factorisation")
-    static = static_ladder(
-        pair,
-        *factors,
+    static, _ = static_ladder(
+        Candidates(pair, *factors),
         energy=impact_energy(case, pair),
         closing=closing_force(case),
         reach=case.contact.reach,

@@ -370,13 +370,13 @@ class WaveRow:
     Its step function writes its state in place; with ``B`` [J/kg] the pressure energy per mass of
     the node at an end, and flows [kg/s] into the part:
 
-    =============  ==================================  =========================================
-    first input    inputs behind it                    outputs
-    =============  ==================================  =========================================
-    ``WAVE_BEGIN`` ``H``                               ``B, flow, dflow/dB`` of what leaves a, b
-    ``WAVE_END``   ``H``, ``B, flow`` found at a, b    losses [J]: friction, waves, outflow
-    ``WAVE_STORE`` none                                energy [J], mass [kg], Reynolds number, time
-    =============  ==================================  =========================================
+    ==============  ==================================  ============================================
+    first input     inputs behind it                    outputs
+    ==============  ==================================  ============================================
+    ``WAVE_BEGIN``  ``H``                               ``B, flow, dflow/dB`` of what leaves a, b
+    ``WAVE_END``    ``H``, ``B, flow`` found at a, b    losses [J]: friction, waves, outflow
+    ``WAVE_STORE``  none                                energy [J], mass [kg], Reynolds number, time
+    ==============  ==================================  ============================================
 
     Parameters
     ----------

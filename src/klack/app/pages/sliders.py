@@ -181,7 +181,7 @@ class _Sliders:
     async def _follow(self) -> None:
         """Answer the latest position; what takes longer once the sliders rest."""
         client = self._body.client
-        judged = False
+        judged, answers = False, 0
         while not client._deleted:
             try:
                 await asyncio.wait_for(self._moved.wait(), _REST)
@@ -201,6 +201,8 @@ class _Sliders:
             with self._body:
                 self._badge.classes(remove="good fair").set_text("estimate follows")
                 self._draw(answer)
+                answers += 1
+                self._took.props["data-answers"] = str(answers)  # the words may stay the same
                 self._took.set_text(
                     f"computed in {1e3 * answer.seconds:.0f} ms, drawn after "
                     f"{1e3 * (perf_counter() - begin):.0f} ms"
