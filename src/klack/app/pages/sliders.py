@@ -207,6 +207,7 @@ class _Sliders:
                     f"computed in {1e3 * answer.seconds:.0f} ms, drawn after "
                     f"{1e3 * (perf_counter() - begin):.0f} ms"
                 )
+                self._took.update()
 
     async def _judge(self) -> None:
         """Two requests, so that a move waits for one of them at most."""
