@@ -81,16 +81,18 @@ _STEPS = (
 )
 
 
+_AT_THE_START = """() => document.querySelector(".k-choice select")?.value == "step"
+  && !document.querySelector(".k-read")"""
+
+
 def _guided(number: int) -> Callable[[Any], None]:
     """The guide for a new valve, from drawings to one of its steps."""
 
     def lead(page: Any) -> None:
         page.wait_for_function("window.socket?.connected")  # what is pressed before is lost
-        page.get_by_role("button", name="Start over").click()
-        page.wait_for_function(
-            "document.querySelector('.k-choice select')?.value == 'step'"
-            " && !document.querySelector('.k-read')"
-        )
+        if not page.evaluate(_AT_THE_START):
+            page.get_by_role("button", name="Start over").click()
+            page.wait_for_function(_AT_THE_START)
         page.get_by_label("The two bodies come from").select_option("table")
         for body in ("needle", "housing"):
             page.get_by_role("button", name=f"Fill in the example of the {body}").click()
