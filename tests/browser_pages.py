@@ -71,49 +71,6 @@ def _refused(page: Any) -> None:
     page.wait_for_selector("text=not valid, not saved")
 
 
-_STEPS = (
-    ("Parts", ".k-read"),
-    ("Faces", ".ks-view canvas"),
-    ("Materials", "text=Young's modulus"),
-    ("Motion", "text=Closing force"),
-    ("Check", "text=static hold"),
-    ("Case", "text=klack: 1"),
-)
-
-
-_AT_THE_START = """() => document.querySelector(".k-choice select")?.value == "step"
-  && !document.querySelector(".k-read")"""
-
-
-def _guided(number: int) -> Callable[[Any], None]:
-    """The guide for a new valve, from drawings to one of its steps."""
-
-    def lead(page: Any) -> None:
-        page.wait_for_function("window.socket?.connected")  # what is pressed before is lost
-        if not page.evaluate(_AT_THE_START):
-            page.get_by_role("button", name="Start over").click()
-            page.wait_for_function(_AT_THE_START)
-        page.get_by_label("The two bodies come from").select_option("table")
-        for body in ("needle", "housing"):
-            page.get_by_role("button", name=f"Fill in the example of the {body}").click()
-        page.wait_for_function("document.querySelectorAll('.k-read').length == 2")
-        if number > 1:
-            page.locator("#k-next").click()
-            for name, role in (
-                ("needle.tip", "contact"),
-                ("housing.seat", "contact"),
-                ("housing.rim", "held"),
-            ):
-                page.get_by_label(name, exact=True).select_option(role)
-            page.wait_for_function("!document.getElementById('k-next').disabled")
-        for _ in range(number - 2):
-            page.locator("#k-next").click()
-            page.wait_for_timeout(300)
-        page.wait_for_selector(_STEPS[number - 1][1])
-
-    return lead
-
-
 _REPORT = "/report?path=klack-results/{}/report.html"
 _BOTH = "a=klack-results/impact&b=klack-results/impact"
 
@@ -130,12 +87,9 @@ PAGES = (
     Place("compare", f"/compare?{_BOTH}", "text=sound exposure level"),
     Place("new study", f"/new-study?path={CASE}", "text=Write the study"),
     Place("points", "/points?path=klack-results/study", "#kp-root[data-points]"),
-    Place("bodies of a case", f"/show?path={CASE}", ".ks-view canvas"),
+    Place("bodies of a case", "/show?path=stroke/case.yaml", ".ks-view canvas"),
     Place("bodies of a result", "/show?path=klack-results/impact", ".ks-view canvas"),
-    *(
-        Place(f"new valve, {name}", "/new", ".k-steps button", _guided(number))
-        for number, (name, _) in enumerate(_STEPS, 1)
-    ),
+    Place("new valve", "/new", ".k-steps button"),
     *(Place(f"report, {name}", _REPORT.format(name), ".main-svg") for name, *_ in _COMPUTED),
     *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-panel h3") for name, _ in _SHOWN),
 )
