@@ -27,6 +27,7 @@ from klack.magnetics.coupled_table import (
     WINDING_ROW,
 )
 from klack.magnetics.drive_kernel import state_block, state_voltage
+from klack.magnetics.event_bracket import LOCATED, between, narrowed
 from klack.magnetics.flux_kernel import (
     assemble,
     circuit_gaps,
@@ -37,7 +38,7 @@ from klack.magnetics.flux_kernel import (
     stack,
     weighted_mmf,
 )
-from klack.magnetics.flux_pieces import KEPT, LOCATED
+from klack.magnetics.flux_pieces import KEPT
 from klack.magnetics.flux_table import MOST_TUBES, STOPS
 from klack.magnetics.output_stage import STAGE_HEADER, STAGE_ROW, recharged
 from klack.network.step_function import shift
@@ -311,8 +312,7 @@ def coupled_locate(
     side = 0
     size = length
     for _ in range(100):
-        guess = (low * f_high - high * f_low) / (f_high - f_low)
-        guess = min(max(guess, low + 1e-3 * LOCATED * length), high)
+        guess = between(low, high, f_low, f_high, length)
         for j in range(6 * int(par[0])):
             change[j] *= guess / size
         size = guess
@@ -335,16 +335,7 @@ def coupled_locate(
         f = value - target - rise * (size / length)
         if abs(f) <= accepted or high - low <= LOCATED * length:
             return size
-        if f * f_high > 0.0:
-            high, f_high = size, f
-            if side == 1:
-                f_low *= 0.5
-            side = 1
-        else:
-            low, f_low = size, f
-            if side == -1:
-                f_high *= 0.5
-            side = -1
+        low, high, f_low, f_high, side = narrowed(low, high, f_low, f_high, side, size, f)
     return -1.0
 
 

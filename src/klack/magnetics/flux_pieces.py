@@ -9,6 +9,7 @@ from typing import Any
 
 from klack.compiling.jit import inner
 from klack.magnetics.drive_kernel import crossed_switch, switch_current
+from klack.magnetics.event_bracket import LOCATED, between, narrowed
 from klack.magnetics.flux_kernel import (
     circuit_current,
     circuit_gaps,
@@ -25,7 +26,6 @@ __all__ = [
     "FIRST_PIECE",
     "KEPT",
     "LEAST_PIECE",
-    "LOCATED",
     "MOST_EVENTS",
     "NO_SWITCH",
     "SPOTS",
@@ -38,9 +38,6 @@ __all__ = [
     "piece_settle",
     "piece_to_current",
 ]
-
-LOCATED = 1e-12
-"""Instants within a step are found to this share of the current, and of the piece."""
 
 NO_SWITCH, DIODE_BLOCKS = -1, -2
 """What ends a piece beside the switches of a state."""
@@ -131,8 +128,7 @@ def piece_to_current(
     side = 0
     size = length
     for _ in range(100):
-        guess = (low * f_high - high * f_low) / (f_high - f_low)
-        guess = min(max(guess, low + 1e-3 * LOCATED * length), high)
+        guess = between(low, high, f_low, f_high, length)
         for j in range(loops):
             change[j] *= guess / size
         size = guess
@@ -145,16 +141,7 @@ def piece_to_current(
         f = piece_current(par, at, hints, phi, change, end) - target - rise * (size / length)
         if abs(f) <= accepted or high - low <= LOCATED * length:
             return size, mean
-        if f * f_high > 0.0:
-            high, f_high = size, f
-            if side == 1:
-                f_low *= 0.5
-            side = 1
-        else:
-            low, f_low = size, f
-            if side == -1:
-                f_high *= 0.5
-            side = -1
+        low, high, f_low, f_high, side = narrowed(low, high, f_low, f_high, side, size, f)
     return -1.0, 0.0
 
 

@@ -19,6 +19,7 @@ from typing import Any
 from klack.compiling.constant import constant
 from klack.compiling.jit import inner
 from klack.magnetics.drive_kernel import due_switch, next_time, state_block
+from klack.magnetics.event_bracket import LOCATED, between, narrowed
 from klack.magnetics.flux_kernel import (
     circuit_energy,
     circuit_flux,
@@ -33,7 +34,6 @@ from klack.magnetics.flux_pieces import (
     FIRST_PIECE,
     KEPT,
     LEAST_PIECE,
-    LOCATED,
     MOST_EVENTS,
     NO_SWITCH,
     SPOTS,
@@ -160,8 +160,7 @@ def _to_event(
     side = 0
     size = length
     for _ in range(100):
-        guess = (low * f_high - high * f_low) / (f_high - f_low)
-        guess = min(max(guess, low + 1e-3 * LOCATED * length), high)
+        guess = between(low, high, f_low, f_high, length)
         for j in range(loops):
             change[j] *= guess / size
         size = guess
@@ -179,16 +178,7 @@ def _to_event(
         f = value - target
         if abs(f) <= accepted or high - low <= LOCATED * length:
             return size, mean
-        if f * f_high > 0.0:
-            high, f_high = size, f
-            if side == 1:
-                f_low *= 0.5
-            side = 1
-        else:
-            low, f_low = size, f
-            if side == -1:
-                f_high *= 0.5
-            side = -1
+        low, high, f_low, f_high, side = narrowed(low, high, f_low, f_high, side, size, f)
     return -1.0, 0.0
 
 
