@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 from browser_pages import watched
+from page_rules import WIDTHS
 from served_app import Served
 
 __all__ = ["LONG", "page", "require_within", "server"]
 
 LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
-WIDTHS = (400, 1000, 1600)
 
 
 @pytest.fixture(scope="module")

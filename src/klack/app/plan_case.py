@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from klack.app.valve_plan import BODIES, ValvePlan
-from klack.mesh.profile import Arc, Profile
+from klack.mesh.profile import Arc, Line, Profile
 
 __all__ = ["BodySizes", "case_text"]
 
@@ -136,12 +136,12 @@ def _body(
             yield f"      - surface: {json.dumps(face, ensure_ascii=False)}"
 
 
-def _edge(edge: object) -> str:
-    name = f", name: {edge.name}" if getattr(edge, "name", "") else ""  # type: ignore[attr-defined]
+def _edge(edge: Line | Arc) -> str:
+    name = f", name: {edge.name}" if edge.name else ""
     if isinstance(edge, Arc):
         sense = "" if edge.clockwise is None else f", clockwise: {str(edge.clockwise).lower()}"
         return f"{{arc: {_point(edge.end)}, centre: {_point(edge.centre)}{sense}{name}}}"
-    return f"{{line: {_point(edge.end)}{name}}}"  # type: ignore[attr-defined]
+    return f"{{line: {_point(edge.end)}{name}}}"
 
 
 def _point(point: tuple[float, float]) -> str:

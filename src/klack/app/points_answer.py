@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from klack.app.folder import RESULT_NAME
-from klack.app.jobs import LIVE, Job
+from klack.app.jobs import Job
 from klack.app.state import State
 from klack.errors import InputError, KlackError
 
 __all__ = ["PointsSource", "points_answer", "points_source"]
 
 _KEPT = 4  # studies whose text is kept
-_JOBS = ".klack-app/jobs"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +50,7 @@ def points_source(state: State, out: str) -> PointsSource:
     job = state.jobs.of_result(out)
     places = [out]
     if job is not None:
-        live = f"{_JOBS}/{job.name}/{LIVE}"
+        live = state.jobs.live(job.name).relative_to(state.folder.path).as_posix()
         places = [out, live] if job.state == "done" else [live, out]
         if job.state == "running":
             places = [live]
