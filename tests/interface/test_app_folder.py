@@ -1,5 +1,6 @@
 """Files of the browser application: only below the folder, whole, bounded."""
 
+import asyncio
 import os
 import subprocess
 import sys
@@ -10,7 +11,7 @@ import pytest
 from klack.analyses import store
 from klack.app import folder as app_folder
 from klack.app.folder import LARGEST_CASE, OpenFolder, result_names
-from klack.app.state import Notes, Sounds
+from klack.app.state import Notes, Sounds, State
 from klack.errors import InputError
 
 TEXT = "klack: 1\ntitle: <script>alert(1)</script>\n"
@@ -188,3 +189,22 @@ def test_no_two_cases_write_their_results_to_one_place():
     assert len(set(names.values())) == len(cases)
     assert names["case.yaml"] == "case"
     assert result_names(["valve/case.yaml"]) == {"valve/case.yaml": "valve"}
+
+
+def test_a_page_that_was_left_makes_room_for_another(folder):
+    state = State(folder)
+    open_pages = [state.explorer() for _ in range(3)]
+
+    with pytest.raises(InputError, match="3 open slider pages"):
+        state.explorer()
+    state.mark_left(open_pages[0], is_left=True)
+    state.mark_left(open_pages[1], is_left=True)
+    state.mark_left(open_pages[0], is_left=False)  # it has come back
+    found = state.explorer()
+
+    assert found not in open_pages
+    with pytest.raises(InputError, match="reload the page"):
+        asyncio.run(open_pages[1].call("move", {}))
+    with pytest.raises(InputError, match="3 open slider pages"):
+        state.explorer()
+    state.close()

@@ -110,3 +110,13 @@ def test_charts_are_told_with_their_main_numbers(page, server, folder):
     )
     assert told.startswith("Contact force: force [N] over time [us].")
     assert f"highest {peak}" in told
+
+
+def test_a_slider_page_that_is_reloaded_again_and_again_answers(page, server, folder):
+    found = next(place for place in PAGES if place.name == "sliders")
+    found.open(page, server.base, folder)
+
+    for _ in range(6):  # each left page may come back for some seconds, and holds its bodies
+        page.reload(wait_until="commit")
+
+    page.wait_for_selector(".k-slider input")

@@ -154,7 +154,7 @@ class State:
         self.points: dict[str, tuple[str, bytes]] = {}
         self.cards: dict[str, tuple[str, ResultCard]] = {}
         self._spare = Worker(_EXPLORER)
-        self._explorers: list[Worker] = []
+        self._explorers: dict[Worker, bool] = {}  # and whether its page was left
 
     def start(self) -> None:
         """Start the reading process ahead."""
@@ -168,26 +168,36 @@ class State:
     def explorer(self) -> Worker:
         """A process for a slider page, to be given back.
 
+        At the limit, that of a page that was left ends for it: a browser that reloads leaves one
+        page after another, and each may come back for some seconds.
+
         Raises
         ------
         InputError
-            If too many pages have one.
+            If too many pages are open.
         """
         if len(self._explorers) >= _MOST_EXPLORERS:
-            raise InputError(
-                "sliders",
-                got=f"{len(self._explorers)} open slider pages",
-                expected=f"at most {_MOST_EXPLORERS}, each holds its bodies in memory",
-                hint="close one of them.",
-            )
+            left = next((one for one, is_left in self._explorers.items() if is_left), None)
+            if left is None:
+                raise InputError(
+                    "sliders",
+                    got=f"{len(self._explorers)} open slider pages",
+                    expected=f"at most {_MOST_EXPLORERS}, each holds its bodies in memory",
+                    hint="close one of them.",
+                )
+            self.give_back(left)
         found, self._spare = self._spare, Worker(_EXPLORER)
-        self._explorers.append(found)
+        self._explorers[found] = False
         return found
+
+    def mark_left(self, explorer: Worker, *, is_left: bool) -> None:
+        """Note that the browser has left the page of a process, or has come back to it."""
+        if explorer in self._explorers:
+            self._explorers[explorer] = is_left
 
     def give_back(self, explorer: Worker) -> None:
         """End the process of a page that was closed."""
-        if explorer in self._explorers:
-            self._explorers.remove(explorer)
+        if self._explorers.pop(explorer, None) is not None:
             explorer.close()
 
     def close(self) -> None:

@@ -34,6 +34,7 @@ class Worker:
         self._kind = kind
         self._process: subprocess.Popen[bytes] | None = None
         self._thread = ThreadPoolExecutor(1)
+        self._is_closed = False
 
     def start(self) -> None:
         """Start the process ahead of the first request."""
@@ -52,13 +53,16 @@ class Worker:
         Raises
         ------
         KlackError
-            Of the method, or where the process died.
+            Of the method, or where the process died or was ended.
         """
+        if self._is_closed:
+            raise _closed()
         loop = asyncio.get_running_loop()
         return await loop.run_in_executor(self._thread, self._exchange, method, arguments)
 
     def close(self) -> None:
         """End the process, also in the middle of a request."""
+        self._is_closed = True
         process, self._process = self._process, None
         if process is not None:
             process.kill()
@@ -66,6 +70,8 @@ class Worker:
         self._thread.shutdown(wait=False, cancel_futures=True)
 
     def _exchange(self, method: str, arguments: tuple[Any, ...]) -> Any:
+        if self._is_closed:  # since it was asked
+            raise _closed()
         self.start()
         process = self._process
         assert process is not None
@@ -88,6 +94,15 @@ def _dead(code: int | None) -> InputError:
         got=f"an end of its process ({code})",
         expected="an answer",
         hint="try again; with a smaller model if the memory of this machine is exhausted.",
+    )
+
+
+def _closed() -> InputError:
+    return InputError(
+        "computation",
+        got="a page that was left, and whose process ended for another one",
+        expected="a page with a process",
+        hint="reload the page.",
     )
 
 

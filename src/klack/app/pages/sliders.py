@@ -47,6 +47,8 @@ async def sliders_page(state: State, given: Mapping[str, str]) -> None:
             plain(str(error), "p").classes("k-error")
         return
     client = ui.context.client
+    client.on_connect(lambda: state.mark_left(worker, is_left=False))
+    client.on_disconnect(lambda: state.mark_left(worker, is_left=True))
     client.on_delete(lambda: state.give_back(worker))
     with frame(state, "Sliders", case):
         await _Sliders(state, worker, case).build(text)
