@@ -634,7 +634,7 @@ def _read_stores(network: CompiledNetwork) -> None:
                     network.accounts.rows[account] = rows.outputs[first + j]
 
 
-_IMPACTS = "impacts.unfinished"
+_IMPACTS = "impacts.under_way"
 _SLIDERS = "sliders."
 _LAST = "record.last"
 _RECORDS = "moving.impact_"
