@@ -11,7 +11,7 @@ import pytest
 
 import klack
 from klack.analyses.sensitivities.record import MeasureSlopes
-from klack.analyses.sensitivities.run import _impacts
+from klack.analyses.sensitivities.run import _doubts, _impacts
 from klack.cli.main import main
 from klack.errors import InputError
 
@@ -291,3 +291,49 @@ def test_a_mass_loses_the_work_that_it_was_given_whatever_it_is():
         SMALL, parameters=[MASS], measures=["opening.energy_loss"], variant="dry", check=False
     )
     assert record.elasticity("opening.energy_loss", MASS) == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "secant", "told"),
+    [
+        (-1.4478e-3, -2.2145e-3, "is_unconfirmed"),  # 53 %, within a thousandth of the value
+        (-1.4478e-3, -1.46e-3, None),
+        (-1.4e-2, -1.6e-2, "is_rough"),
+        (-1.4e-2, -2.2e-2, "is_doubtful"),
+    ],
+)
+def test_what_two_strokes_do_not_confirm_is_told(predicted, secant, told):
+    """Truth: deviations of 53, 1, 14 and 57 % of a speed that a run resolves to a thousandth."""
+    found = MeasureSlopes(
+        name="stop.approach_speed",
+        title="",
+        unit="m/s",
+        value=0.9887,
+        slopes=(1.0,),
+        predicted=predicted,
+        secant=secant,
+        scale=abs(predicted),
+        resolution=0.9887e-3,
+    )
+    for kind in ("is_unconfirmed", "is_rough", "is_doubtful"):
+        assert getattr(found, kind) == (kind == told), kind
+    texts = " ".join(_doubts([found], []))
+    assert ("stop.approach_speed" in texts) == (told is not None)
+
+
+def test_derivatives_that_leave_the_motion_are_told():
+    """Four needles at rest on their seats, answered one macro step late: cause and remedy."""
+    case = klack.load_case(SMALL.with_name("four_injectors.yaml"))
+    found = klack.sensitivities(
+        case.with_value("run.duration", "1.4 ms"),
+        parameters=["parameters.p_rail"],
+        measures=["opening_time"],
+        check=False,
+    )
+    (told,) = [text for text in found.warnings if "without bound" in text]
+    assert "run.coarse: 16" in told
+    settled = case.with_value("run.duration", "1.4 ms").with_value("run.coarse", 16)
+    again = klack.sensitivities(
+        settled, parameters=["parameters.p_rail"], measures=["opening_time"], check=False
+    )
+    assert not [text for text in again.warnings if "without bound" in text]
