@@ -7,13 +7,16 @@ import json
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 import klack
 from klack.analyses.sensitivities.record import MeasureSlopes
-from klack.analyses.sensitivities.run import _impacts
+from klack.analyses.sensitivities.run import _doubts, _impacts
 from klack.cli.main import main
 from klack.errors import InputError
+from klack.simulation.tangent_loop import LANES
+from klack.simulation.tangent_run import TangentRun
 
 pytestmark = pytest.mark.slow  # the loop with derivatives compiles for a minute
 
@@ -291,3 +294,67 @@ def test_a_mass_loses_the_work_that_it_was_given_whatever_it_is():
         SMALL, parameters=[MASS], measures=["opening.energy_loss"], variant="dry", check=False
     )
     assert record.elasticity("opening.energy_loss", MASS) == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "secant", "told"),
+    [
+        (-1.4478e-3, -2.2145e-3, "is_unconfirmed"),  # 53 %, within a thousandth of the value
+        (-1.4478e-3, -1.46e-3, None),
+        (-1.4e-2, -1.6e-2, "is_rough"),
+        (-1.4e-2, -2.2e-2, "is_doubtful"),
+    ],
+)
+def test_what_two_strokes_do_not_confirm_is_told(predicted, secant, told):
+    """Truth: deviations of 53, 1, 14 and 57 % of a speed that a run resolves to a thousandth."""
+    found = MeasureSlopes(
+        name="stop.approach_speed",
+        title="",
+        unit="m/s",
+        value=0.9887,
+        slopes=(1.0,),
+        predicted=predicted,
+        secant=secant,
+        scale=abs(predicted),
+        resolution=0.9887e-3,
+    )
+    for kind in ("is_unconfirmed", "is_rough", "is_doubtful"):
+        assert getattr(found, kind) == (kind == told), kind
+    texts = " ".join(_doubts([found], []))
+    assert ("stop.approach_speed" in texts) == (told is not None)
+
+
+def test_needles_at_rest_keep_derivatives_bounded():
+    """Truth: two strokes, also of the bounces after the other three needles came to rest.
+
+    One pass of a macro step leaves derivatives of contacts at rest where the guess had them; they
+    grew without bound from 1.3338 ms on.
+    """
+    found = klack.sensitivities(
+        SMALL.with_name("four_injectors.yaml"),
+        parameters=["parameters.p_rail"],
+        measures=["injector4_seat.approach_speed", "injector4_seat.2.time"],
+    )
+    assert not [text for text in found.warnings if "without bound" in text]
+    assert len(found.impacts) == 40
+    assert not [item for item in found.impacts if item.is_doubtful]
+    speed, time = found.measures
+    assert abs(time.predicted - time.secant) < 20e-9  # a step of the strokes
+    assert abs(time.secant) > 200e-9
+    assert speed.deviation < 0.25
+
+
+def test_derivatives_that_leave_the_motion_are_told():
+    """Displacements of 0.1 mm that a parameter moves by 0.05 m, 0.05 m and 1 m."""
+    points = np.zeros((3, 2, LANES))
+    points[:, 0, 0], points[:, 0, 2] = 1e-4, (0.05, 0.05, 1.0)
+    points[:, 1, 2] = 1e9  # a pressure
+    time = np.zeros((3, LANES))
+    time[:, 0] = 0.0, 1e-3, 2e-3
+    columns = [SimpleNamespace(name="tip displacement"), SimpleNamespace(name="room pressure")]
+    run = SimpleNamespace(_columns=(None, columns, None), _points=points, _time=time)
+
+    assert TangentRun.without_bound(run, 0, 1.0) == 2e-3
+    assert TangentRun.without_bound(run, 0, 0.01) is None
+    points[1, 0, 2] = np.nan
+    assert TangentRun.without_bound(run, 0, 0.01) == 1e-3

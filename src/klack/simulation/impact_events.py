@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from klack.compiling.jit import inner, njit
 from klack.network.rows import GROUND, BodyRow, Rows
 from klack.simulation.network_result import ImpactEvent
-from klack.simulation.rest import effective_mass, longest_period, rest_time
+from klack.simulation.rest import effective_mass, longest_period, mobility, rest_time
 
 __all__ = ["ImpactFinder"]
 
@@ -23,14 +23,17 @@ Vector = NDArray[np.float64]
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
+_BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
 _PART = ("impulse", "peak", "peak_time")
 _STATE = np.dtype(
     [
         (name, np.float64)
         for name in (
-            # the run: its start, the last step with a force and the last two records
-            *("run_start", "row_time", "time1", "rate1", "time0", "rate0"),
+            # the run: its start, the last step with a force and the last record
+            *("run_start", "row_time", "time", "rate"),
+            # impulse of the interface since then; what all other forces did before it
+            *("carried", "span", "trend", "bend"),
             # film that may lead into a contact
             *("lead", "lead_fastest", *(f"lead_{part}" for part in _PART)),
             # the contact that is closed now
@@ -60,6 +63,9 @@ class ImpactFinder:
     highest ones while it presses, and within two of these periods while it pulls.  An impact whose
     last contact lasts until the bodies are at rest ends there; the stop is left later.
 
+    Between two records the speed of the gap follows from the impulse of the interface itself, step
+    by step: a film stops a body within less than their spacing.  All other forces change evenly.
+
     Parameters
     ----------
     rows : Rows
@@ -76,12 +82,15 @@ class ImpactFinder:
         ]
         self._period = [longest_period(bodies) for bodies in self._bodies]
         self._mass = [effective_mass(bodies) for bodies in self._bodies]
+        self._mobility = [
+            mobility(row, bodies) for row, bodies in zip(rows.interfaces, self._bodies, strict=True)
+        ]
         self._rest = [
             rest_time(row, bodies)
             for row, bodies in zip(rows.interfaces, self._bodies, strict=True)
         ]
         self._state = np.zeros(len(self._stops), dtype=_STATE)
-        for name in ("row_time", "time1", "time0"):
+        for name in ("row_time", "time"):
             self._state[name] = -np.inf
         self._state["run_start"] = start
         self._found: list[ImpactEvent] = []
@@ -114,7 +123,8 @@ class ImpactFinder:
             out = np.empty((min(closings, len(rows) // 2 + 1) + 1, len(_EVENT)))
             pause = _PAUSE_SHARE * self._rest[c]
             count = _feed(
-                self._state, c, self._period[c], self._rest[c], pause, rows, time, rate, out
+                *(self._state, c, self._period[c], self._rest[c], pause, self._mobility[c]),
+                *(rows, time, rate, out),
             )
             self._found += [self._event(c, row) for row in out[:count]]
 
@@ -169,6 +179,7 @@ def _feed(
     period: float,
     rest: float,
     pause: float,
+    mobility: float,
     rows: Any,
     times: Vector,
     rates: Vector,
@@ -180,37 +191,57 @@ def _feed(
     for i in range(rows.shape[0]):
         t, h, contact, film = rows[i, 0], rows[i, 1], rows[i, 2], rows[i, 3]
         while place < times.size and times[place] <= t:
-            _record(s, period, times[place], rates[place])
+            _record(s, period, mobility, times[place], rates[place])
             place += 1
         if contact > 0.0:
-            _closed_step(s, rest, pause, t, h, contact + film)
+            _closed_step(s, rest, pause, mobility, t, h, contact + film)
         else:
             if s.closed > 0.0:
-                count += _contact_over(s, period, t, out, count)
-            _open_step(s, period, pause, t, h, film)
+                count += _contact_over(s, period, mobility, t, out, count)
+            _open_step(s, period, pause, mobility, t, h, film)
         s.row_time = t
     while place < times.size:
-        _record(s, period, times[place], rates[place])
+        _record(s, period, mobility, times[place], rates[place])
         place += 1
     return count
 
 
 @inner
-def _record(s: Any, period: float, time: float, rate: float) -> None:
+def _record(s: Any, period: float, mobility: float, time: float, rate: float) -> None:
     """Take in the speed of the gap at a time."""
-    s.time0, s.rate0 = s.time1, s.rate1
-    s.time1, s.rate1 = time, rate
+    if s.time > -np.inf:
+        before, had_one = s.trend, s.span > 0.0
+        s.span = time - s.time
+        s.trend = (rate - s.rate - mobility * s.carried) / s.span
+        if had_one:  # a jump of another force does not go on
+            most = _BEND * abs(s.trend)
+            s.bend = max(-most, min(most, s.trend - before)) / s.span
+    s.time, s.rate, s.carried = time, rate, 0.0
     if s.closed > 0.0:
         return
     if s.lead > 0.0:
         s.lead_fastest = max(s.lead_fastest, -rate)
     if s.impact > 0.0:
-        _after_contact(s, period, time, rate)
+        _after_contact(s, period, mobility, time, rate)
 
 
 @inner
-def _after_contact(s: Any, period: float, time: float, rate: float) -> None:
-    """Speed of the gap after the last contact of an impact."""
+def _rate_at(s: Any, mobility: float, time: float) -> float:
+    """Speed of the gap after the last record: by the interface, and by all other forces as before.
+
+    These changed it at the mean rate ``trend`` in the middle of the last interval, ``bend`` more
+    per time since then.
+    """
+    if s.time == -np.inf:
+        return np.inf
+    late = time - s.time
+    trend = s.trend + 0.5 * s.bend * (s.span + late)
+    return float(s.rate + mobility * s.carried + trend * late)
+
+
+@inner
+def _after_contact(s: Any, period: float, mobility: float, time: float, rate: float) -> None:
+    """Speed of the gap after the last contact of an impact, and what it were without its film."""
     s.between_earlier = s.between
     s.between = max(s.between, rate)
     pull = s.last
@@ -218,17 +249,20 @@ def _after_contact(s: Any, period: float, time: float, rate: float) -> None:
         pull = period
     if s.tail > 0.0 and time < s.stop + 2.0 * pull:
         s.candidate = max(s.candidate, rate)
+    free = rate - mobility * (s.tail_impulse + s.flight_impulse)
     if s.leaves == 0.0:
-        s.leave_time0, s.leave_rate0 = time, rate
+        s.leave_time0, s.leave_rate0 = time, free
     elif s.leaves == 1.0:
-        s.leave_time1, s.leave_rate1 = time, rate
+        s.leave_time1, s.leave_rate1 = time, free
     if s.leaves < 2.0:
         s.leaves += 1.0
         s.impact_news = 1.0
 
 
 @inner
-def _closed_step(s: Any, rest: float, pause: float, t: float, h: float, force: float) -> None:
+def _closed_step(
+    s: Any, rest: float, pause: float, mobility: float, t: float, h: float, force: float
+) -> None:
     if s.closed == 0.0:
         if not t - s.row_time < max(pause, _PAUSE_STEPS * h):
             s.lead = 0.0
@@ -236,18 +270,14 @@ def _closed_step(s: Any, rest: float, pause: float, t: float, h: float, force: f
         s.steps = s.rests = 0.0
         s.contact_impulse, s.contact_peak, s.contact_peak_time = 0.0, -np.inf, t
         s.from_start = 1.0 if t <= s.run_start + h else 0.0
-        speed = -np.inf
-        if s.time1 > -np.inf:
-            rate = s.rate1
-            if s.time0 > -np.inf:
-                rate += (s.rate1 - s.rate0) / (s.time1 - s.time0) * (t - s.time1)
-            speed = -rate
+        speed = -_rate_at(s, mobility, t)
         if s.lead > 0.0:
             speed = max(speed, s.lead_fastest)
         s.before = -speed
         # the speed at the moment of touch is that of the approach
-        s.opened = s.between_earlier if s.time1 == t else s.between
+        s.opened = s.between_earlier if s.time == t else s.between
     s.until = t + h
+    s.carried += force * h
     if s.rests == 0.0:
         s.contact_impulse += force * h
         if force > s.contact_peak:
@@ -259,7 +289,7 @@ def _closed_step(s: Any, rest: float, pause: float, t: float, h: float, force: f
 
 
 @inner
-def _contact_over(s: Any, period: float, t: float, out: Any, count: int) -> int:
+def _contact_over(s: Any, period: float, mobility: float, t: float, out: Any, count: int) -> int:
     """End the contact at ``t``: a part of the impact so far, or the beginning of the next one."""
     s.until = t
     emitted = 0
@@ -276,8 +306,8 @@ def _contact_over(s: Any, period: float, t: float, out: Any, count: int) -> int:
     s.flight_impulse, s.flight_peak = 0.0, -np.inf
     s.between = s.between_earlier = s.candidate = s.fastest = -np.inf
     s.leaves = 0.0
-    if s.time1 == t:
-        _after_contact(s, period, t, s.rate1)
+    if s.time == t:
+        _after_contact(s, period, mobility, t, s.rate)
     return emitted
 
 
@@ -325,7 +355,9 @@ def _add_tail(s: Any) -> None:
 
 
 @inner
-def _open_step(s: Any, period: float, pause: float, t: float, h: float, film: float) -> None:
+def _open_step(
+    s: Any, period: float, pause: float, mobility: float, t: float, h: float, film: float
+) -> None:
     """Film between two contacts: the end of one impact, the beginning of another, or both."""
     gapless = t - s.row_time < max(pause, _PAUSE_STEPS * h)
     if s.impact > 0.0 and s.impact_rests == 0.0:
@@ -341,13 +373,16 @@ def _open_step(s: Any, period: float, pause: float, t: float, h: float, film: fl
             s.flight_impulse += film * h
             if film > s.flight_peak:
                 s.flight_peak, s.flight_peak_time = film, t + 0.5 * h
+    begin = _rate_at(s, mobility, t)
+    s.carried += film * h
     if film <= 0.0:
         s.lead = 0.0
         return
     if s.lead == 0.0 or not gapless:
         s.lead = 1.0
-        s.lead_fastest = -s.rate1 if s.time1 == t else -np.inf
+        s.lead_fastest = -begin
         s.lead_impulse, s.lead_peak = 0.0, -np.inf
+    s.lead_fastest = max(s.lead_fastest, -_rate_at(s, mobility, t + h))
     s.lead_impulse += film * h
     if film > s.lead_peak:
         s.lead_peak, s.lead_peak_time = film, t + 0.5 * h

@@ -475,7 +475,7 @@ def _advance(
         grid.sizes.middle,
         0.0,
         grid.step,
-        grid.sizes.coarse > 1,
+        int(grid.sizes.coarse > 1),
         network.arrays,
         recording,
         scratch_of(network, recording),
@@ -634,7 +634,7 @@ def _read_stores(network: CompiledNetwork) -> None:
                     network.accounts.rows[account] = rows.outputs[first + j]
 
 
-_IMPACTS = "impacts.unfinished"
+_IMPACTS = "impacts.under_way"
 _SLIDERS = "sliders."
 _LAST = "record.last"
 _RECORDS = "moving.impact_"

@@ -7,7 +7,14 @@ import numpy as np
 from klack.network.protocols import InterfaceLaw
 from klack.network.rows import BodyRow, InterfaceRow
 
-__all__ = ["bounce_time", "effective_mass", "longest_period", "rest_time", "resting_dissipation"]
+__all__ = [
+    "bounce_time",
+    "effective_mass",
+    "longest_period",
+    "mobility",
+    "rest_time",
+    "resting_dissipation",
+]
 
 _PERIODS = 3.0
 _BOUNCES = 4.0
@@ -108,6 +115,29 @@ def effective_mass(bodies: Sequence[BodyRow | None]) -> float:
     """Mass of the relative motion of the moving bodies [kg]; infinite if none moves."""
     inverse = sum(1.0 / b.body.mass for b in bodies if b is not None and b.body.rigid_count > 0)
     return 1.0 / inverse if inverse > 0.0 else np.inf
+
+
+def mobility(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
+    """Speed at which the centres of mass of both bodies part, per impulse of the interface [1/kg].
+
+    Parameters
+    ----------
+    row : InterfaceRow
+    bodies : sequence of BodyRow or None
+        Upper and lower one; None is the ground.
+
+    Returns
+    -------
+    float
+        0 where neither body can fly, or a given motion drives it.
+    """
+    found = 0.0
+    for handle, owner in zip((row.upper, row.lower), bodies, strict=True):
+        if owner is None or owner.course is not None:
+            continue
+        body, port = owner.body, owner.ports.index(handle)
+        found += float(body.rigid_axial @ body.port_shapes[: body.rigid_count, port]) / body.mass
+    return found
 
 
 def _depth(law: InterfaceLaw, energy: float) -> float:

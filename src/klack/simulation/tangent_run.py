@@ -80,6 +80,8 @@ _CHUNK = 32  # looks between two searches for touches
 _STRETCHED = 16  # looks before a touch in which the steps stretch
 _QUIET = 8  # looks before a touch in which they do not: the end of its approach
 _NOTICED = 0.02  # of the fastest touch: slower ones have no phase to keep
+_PASSES = 2  # at least, of a macro step: the first one leaves derivatives where the guess had them
+_WITHOUT_BOUND = 1e3  # of the longest displacement: bounces alone let derivatives grow to 1e2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -194,6 +196,18 @@ class TangentRun:
             for stop, own in mass.items()
             if np.isfinite(own)
         }
+
+    def without_bound(self, direction: int, amount: float) -> float | None:
+        """Time from which derivatives grow without bound; None where they do not.
+
+        From there on, by them a change of the parameter by ``amount`` would move a port a thousand
+        times as far as any port moves.
+        """
+        ports = [i for i, c in enumerate(self._columns[1]) if c.name.endswith(" displacement")]
+        longest = np.max(np.abs(self._points[:, ports, 0]), initial=0.0)
+        moved = np.abs(amount * self._points[:, ports, _FIRST + direction])
+        looks = np.flatnonzero(np.any(~(moved <= _WITHOUT_BOUND * longest), axis=1))
+        return float(self._time[looks[0], 0]) if len(looks) and longest > 0.0 else None
 
     def rates(self, direction: int) -> tuple[NetworkResult, NDArray[np.float64]]:
         """Derivatives with the parameter of a direction, at times that move along.
@@ -514,7 +528,7 @@ class _Running:
             self.sizes.middle,
             self.origin,
             self.h,
-            self.sizes.coarse > 1,
+            _PASSES if self.sizes.coarse > 1 else 0,
             self.numbers,
             self.recording,
             self.scratch,

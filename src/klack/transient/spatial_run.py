@@ -592,7 +592,7 @@ class _Moving:
                 sizes.middle,
                 0.0,
                 sizes.step,
-                sizes.coarse > 1,
+                int(sizes.coarse > 1),
                 self.arrays,
                 part,
                 run.scratch,

@@ -7,10 +7,13 @@ from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.units import is_level
 
-__all__ = ["HOLDS", "ImpactSlope", "MeasureSlopes", "SensitivityRecord", "SlopeParameter"]
+__all__ = ["HOLDS", "MISSED", "ImpactSlope", "MeasureSlopes", "SensitivityRecord", "SlopeParameter"]
 
 HOLDS = 0.25
 """Deviation from two runs beyond which a derivative says nothing about them."""
+
+MISSED = 0.05
+"""Deviation from two runs beyond which it is told."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,10 +99,28 @@ class MeasureSlopes:
         """Whether other runs tell something else."""
         if self.has_strayed:
             return True
+        return self._is_apart and (self.deviation is None or self.deviation > HOLDS)
+
+    @property
+    def is_rough(self) -> bool:
+        """Whether two runs miss it by more than :data:`MISSED`, but not by so much as to doubt."""
+        return self._is_apart and self._is_missed and not self.is_doubtful
+
+    @property
+    def is_unconfirmed(self) -> bool:
+        """Whether the steps do not resolve the change of the check to :data:`MISSED` of it."""
+        return self._is_missed and not self._is_apart and not self.is_doubtful
+
+    @property
+    def _is_missed(self) -> bool:
+        return self.deviation is not None and self.deviation > MISSED
+
+    @property
+    def _is_apart(self) -> bool:
+        """Whether both predictions differ by more than the steps resolve."""
         if self.predicted is None or self.secant is None:
             return False
-        resolved = abs(self.predicted - self.secant) > self.resolution
-        return resolved and (self.deviation is None or self.deviation > HOLDS)
+        return abs(self.predicted - self.secant) > self.resolution
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -10,6 +10,7 @@ from klack.analyses.sensitivities.asked_measures import asked_measures
 from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
 from klack.analyses.sensitivities.record import (
     HOLDS,
+    MISSED,
     ImpactSlope,
     MeasureSlopes,
     SensitivityRecord,
@@ -26,7 +27,7 @@ from klack.case.valve_roles import find_roles
 from klack.errors import ConvergenceError, InputError
 from klack.input.problem import one_of
 from klack.progress import Progress, silent
-from klack.simulation.tangent_run import TangentRun
+from klack.simulation.tangent_run import DIRECTIONS, TangentRun
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si, is_level
 
@@ -115,6 +116,7 @@ def run_sensitivities(
             *notes,
             *runner.notes,
             *not_checked,
+            *_unbounded(runs, space),
             *_doubts(found, impacts, others),
         ),
     )
@@ -304,6 +306,24 @@ def _touch_time(variant: StrokeVariant, stop: str, number: int) -> float | None:
     return events[number - 1].time if number <= len(events) else None
 
 
+def _unbounded(runs: Sequence[TangentRun], space: SlopeSpace) -> tuple[str, ...]:
+    """What tells that tangents have left the motion, with the parameter that does so first."""
+    found = []
+    for k, item in enumerate(space.varied):
+        time = runs[k // DIRECTIONS].without_bound(k % DIRECTIONS, item.size)
+        if time is not None:
+            found.append((time, item.name))
+    if not found:
+        return ()
+    time, name = min(found)
+    return (
+        f"From {format_si(time, 's', 4)} on derivatives with {name} grow without bound: "
+        "either bounces are chaotic, or a contact at rest answers pressures one macro step late, "
+        "which its motion does not show and its derivatives do. What comes later has none. "
+        "Try: run.coarse: 16.",
+    )
+
+
 def _doubts(
     measures: Sequence[MeasureSlopes],
     impacts: Sequence[ImpactSlope],
@@ -317,6 +337,19 @@ def _doubts(
             f"The derivatives of {one_of(wrong)} do not predict runs with all parameters changed "
             f"by {_SHARE:.0%}: they tell nothing about changes of this size."
             + ("" if others is None else _why(others))
+        )
+    rough = [f"{item.name} ({item.deviation:.0%})" for item in measures if item.is_rough]
+    if rough:
+        found.append(
+            f"Derivatives that miss runs with all parameters changed by {_SHARE:.0%} by more than "
+            f"{MISSED:.0%}: {', '.join(rough)}."
+        )
+    unsure = [item.name for item in measures if item.is_unconfirmed]
+    if unsure:
+        found.append(
+            f"The derivatives of {one_of(unsure)} are not confirmed: what all parameters change "
+            f"together by {_SHARE:.0%} is too little for the steps of a run to tell it to "
+            f"{MISSED:.0%}. Try: run.accuracy: fine, or a study with larger changes."
         )
     strayed = [item.name for item in measures if item.has_strayed]
     if strayed:
