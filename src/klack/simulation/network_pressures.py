@@ -38,7 +38,7 @@ __all__ = [
 
 _MOST_NEWTON = 80
 _FULL_NEWTON = 15  # of them with whole steps
-_PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
+_PRESSURE_LEFT = 1e-5  # last Newton step, see _size; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _CURVED = (
     0.1  # of the slope of the density: change in a step that the mean pressure does not follow
@@ -153,7 +153,10 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
         if finite and worst < _PRESSURE_LEFT and changes <= nodes.volumes:
             if iteration >= _FULL_NEWTON or _flows_follow(fluid, step.H):
                 _step_by(fluid, 1.0)
-                break
+                if not _fully_implicit(fluid):
+                    break
+                iteration = changes = 0
+                continue
         # a root-like law about no drop lets Newton's method swing across for ever
         share = 1.0 if iteration < _FULL_NEWTON else 0.5
         _step_by(fluid, share)
@@ -171,6 +174,30 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     for i in range(nodes.volumes):
         trial.V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
     return STATUS_DONE
+
+
+@phase
+def _fully_implicit(fluid: Any) -> bool:
+    """Let volumes that boil or fill within the step feel its end alone; whether any did not.
+
+    Between both ends the energy of such a volume is no parabola: a mean pressure could return more
+    than the step loses.  With the pressure of its end it cannot, as that energy is convex.
+    """
+    nodes, state, trial, changed = fluid.nodes, fluid.state, fluid.trial, False
+    for i in range(nodes.chambers):
+        if trial.theta[i] < 1.0 and _is_curved(trial.slope[i], state.slope[i]):
+            trial.theta[i] = 1.0
+            trial.p[i] = trial.end[i]
+            changed = True
+    if changed:
+        _forget_intervals(fluid)
+    return changed
+
+
+@phase
+def _is_curved(slope: float, before: float) -> bool:
+    """Whether the slope of the density changes so much in a step that no mean pressure fits."""
+    return abs(slope - before) > _CURVED * slope
 
 
 @phase
@@ -395,35 +422,53 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
     for i in range(nodes.volumes):
         total += r[i]
         theta = trial.theta[i]
-        target = rho[i] + trial.slope[i] * r[i] / theta
+        target, is_inside = rho[i] + trial.slope[i] * r[i] / theta, False
         large = i < nodes.chambers and abs(r[i]) > _LARGE_STEP * p[i]
         # a step that may be the last stays as the flows have it: else they would leave mass behind
-        last = abs(r[i]) < _PRESSURE_LEFT * max(theta * trial.end[i], nodes.ambient)
+        last = _size(fluid, i) < _PRESSURE_LEFT
         if i < nodes.chambers and iteration >= _PLAIN_NEWTON and not last:
             if (iteration - _PLAIN_NEWTON) % _SAME_INTERVAL == 0:
                 lower[i], upper[i] = 0.0, np.inf  # the other volumes may have moved the root
             wanted = target
             target, lower[i], upper[i] = bracketed(target, rho[i], lower[i], upper[i])
-            if target != wanted:
+            is_inside = target != wanted
+            if is_inside:
                 # a step that a narrow interval made short has found no balance
-                worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
+                worst = max(worst, _size(fluid, i))
             large = True
         if large:
-            # boiling: the density takes the step, the pressure follows it
+            # boiling: the density takes the step, the pressure follows it; from vapour towards
+            # liquid it would follow far too far, there its own step is the shorter one
             if nodes.slow_gas > 0:
                 new = pressure_of_mixture(fluid, i, target)
             else:
                 new, hint[i] = pressure_at(nodes.fluid, target, hint[i])
-            r[i] = theta * (new - trial.end[i])
-        worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
+            step = theta * (new - trial.end[i])
+            if is_inside or abs(step) < abs(r[i]):
+                r[i] = step
+        worst = max(worst, _size(fluid, i))
     return worst, total
 
 
 @phase
+def _size(fluid: Any, i: int) -> float:
+    """Newton step over the pressure, or over the ambient one, and of a density over the density.
+
+    In a volume that is all but empty a step that is nothing beside the ambient pressure is many
+    times its own, and its density.
+    """
+    trial, step = fluid.trial, abs(fluid.trial.r[i])
+    size = step / max(trial.theta[i] * trial.end[i], fluid.nodes.ambient)
+    if i < fluid.nodes.chambers:
+        size = max(size, trial.slope[i] * step / (trial.theta[i] * trial.rho_end[i]))
+    return size
+
+
+@phase
 def _worst_volume(fluid: Any, worst: float) -> int:
-    trial, r, found = fluid.trial, fluid.trial.r, 0
+    found = 0
     for i in range(fluid.nodes.volumes):
-        if abs(r[i]) / max(trial.theta[i] * trial.end[i], fluid.nodes.ambient) == worst:
+        if _size(fluid, i) == worst:
             found = i
     return found
 
@@ -542,7 +587,7 @@ def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
         state.held[i] = V[i]
     for i in range(nodes.chambers):
         state.rate[i] = trial.balanced[i] / (trial.theta[i] * trial.stored[i] * H)
-        if abs(trial.slope[i] - state.slope[i]) > _CURVED * trial.slope[i]:
+        if _is_curved(trial.slope[i], state.slope[i]):
             state.rate[i] = AT_ONCE  # boiling, or about to fill
         state.slope[i] = trial.slope[i]
     for i in range(nodes.volumes, nodes.nodes):
