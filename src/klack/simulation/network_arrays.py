@@ -316,7 +316,7 @@ class NodeTrial(NamedTuple):
     own: Vector
     stored: Vector  # of ``own``: in the volume itself
     balanced: Vector  # what the pressure changes in flows
-    cavity: Vector  # of a junction: 1 open, 2 closes in this step, 3 cannot; 0 none
+    cavity: Vector  # of a junction: 1 open, 0 none
     freed: Vector  # way to equilibrium that release goes in the step, first number
     taken: Vector  # the same of absorption
     share: Vector  # free share of the gas that is found

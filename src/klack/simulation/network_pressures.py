@@ -38,7 +38,7 @@ __all__ = [
 
 _MOST_NEWTON = 80
 _FULL_NEWTON = 15  # of them with whole steps
-_PRESSURE_LEFT = 1e-5  # last Newton step over the pressure; what is left of it is its square
+_PRESSURE_LEFT = 1e-5  # last Newton step, see _size; what is left of it is its square
 _LEAST_PRESSURE = 1.0  # [Pa]
 _CURVED = (
     0.1  # of the slope of the density: change in a step that the mean pressure does not follow
@@ -50,10 +50,10 @@ _LARGE_STEP = 1e-3  # of the pressure
 _PLAIN_NEWTON = 12  # iterations, more than nearly all need; then the root is kept in an interval
 _SAME_INTERVAL = 12  # iterations with it
 _MOST_OF = 0.9  # longest step within this interval
-# cavity at a junction; one that closes in this step; one that did, and cannot
-_OPEN, _CLOSED, _KEPT = 1.0, 2.0, 3.0
+_OPEN, _NONE = 1.0, 0.0  # cavity at a junction
 _HELD = 1.0  # [kg/Pa] what holds the pressure of an open one, far more than any flow answers
-_BALANCED = 1e-9  # of the flows of a junction: what its cavity may be filled too much
+_BALANCED = 1e-12  # of the flows of a junction: what round-off fills its cavity too much
+_AT_BOILING = 1e-6  # of that pressure: by so much an open cavity of the last step was missed
 _NARROW = 1e-13  # such an interval over the density: the other volumes have moved the root
 
 
@@ -65,7 +65,6 @@ def begin_fluid(fluid: Any) -> None:
         trial.p[i] = trial.end[i] = fluid.state.p[i]
         trial.theta[i] = 1.0
         trial.known[i] = -1.0
-        trial.cavity[i] = 0.0
     for e in range(fluid.nodes.ends):
         flows.Z[e] = 1.0
 
@@ -97,6 +96,9 @@ def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
     about its end where :math:`k H > 2`; :math:`\theta = 1 - 1/(k H)` is the smallest that does not.
     """
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
+    for i in range(nodes.chambers, nodes.volumes):
+        open_before = state.p[i] < (1.0 + _AT_BOILING) * nodes.boiling
+        trial.cavity[i] = _OPEN if open_before else _NONE
     for i in range(nodes.volumes):
         theta, balanced = _LEAST_THETA, state.rate[i] * H
         if balanced > 1.0 / (1.0 - _LEAST_THETA):
@@ -104,7 +106,8 @@ def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
         trial.theta[i] = theta
         trial.end[i] = state.p[i]
         if straight:
-            trial.end[i] = max(2.0 * state.p[i] - state.before[i], _LEAST_PRESSURE)
+            least = _LEAST_PRESSURE if i < nodes.chambers else nodes.boiling
+            trial.end[i] = max(2.0 * state.p[i] - state.before[i], least)
         trial.p[i] = state.p[i] + theta * (trial.end[i] - state.p[i])
     if nodes.slow_gas > 0:
         begin_gas(fluid, H)
@@ -116,14 +119,17 @@ def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
 
 @phase
 def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
-    """All pressures and flows at the end of the step, with ports where the last sweep left them."""
+    """All pressures and flows at the end of the step, with ports where the last sweep left them.
+
+    Newton's method, in which the cavities of the junctions are those of the linear equations of
+    each iteration: see :func:`_cavities_change`.
+    """
     nodes, trial = fluid.nodes, fluid.trial
     p, r = trial.p, trial.r
     gamma = shift(nodes.gamma, min(step.level, 1) * max(nodes.volumes, 1))
     _place_walls(fluid, S)
-    for i in range(nodes.chambers, nodes.volumes):
-        trial.cavity[i] = 1.0 if _is_held(trial.cavity[i]) else 0.0
-    for iteration in range(_MOST_NEWTON):
+    iteration = changes = 0
+    while True:
         if nodes.slow_gas > 0:
             look_up_mixture(fluid)
         else:
@@ -139,14 +145,18 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
             r[0] /= trial.own[0]
         else:
             solve_mass_balance(trial.matrix, trial.own, r, nodes.volumes)
-        opens = _open_cavities(fluid)
+        if changes <= nodes.volumes and _cavities_change(fluid, step.H):
+            changes += 1
+            continue
         worst, total = _limit_steps(fluid, iteration)
         finite = abs(total) < np.inf
-        if finite and worst < _PRESSURE_LEFT and not opens:
+        if finite and worst < _PRESSURE_LEFT and changes <= nodes.volumes:
             if iteration >= _FULL_NEWTON or _flows_follow(fluid, step.H):
-                if not _cavities_close(fluid, step.H):
-                    _step_by(fluid, 1.0)
+                _step_by(fluid, 1.0)
+                if not _fully_implicit(fluid):
                     break
+                iteration = changes = 0
+                continue
         # a root-like law about no drop lets Newton's method swing across for ever
         share = 1.0 if iteration < _FULL_NEWTON else 0.5
         _step_by(fluid, share)
@@ -156,6 +166,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
                 return STATUS_REFUSED
             report[0], report[2] = _worst_volume(fluid, worst), step.t
             return STATUS_PRESSURES
+        iteration, changes = iteration + 1, 0
     failed, code = _finish_flows(fluid)
     if code != 0:
         report[0], report[1], report[2] = failed, code, step.t
@@ -163,6 +174,30 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     for i in range(nodes.volumes):
         trial.V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
     return STATUS_DONE
+
+
+@phase
+def _fully_implicit(fluid: Any) -> bool:
+    """Let volumes that boil or fill within the step feel its end alone; whether any did not.
+
+    Between both ends the energy of such a volume is no parabola: a mean pressure could return more
+    than the step loses.  With the pressure of its end it cannot, as that energy is convex.
+    """
+    nodes, state, trial, changed = fluid.nodes, fluid.state, fluid.trial, False
+    for i in range(nodes.chambers):
+        if trial.theta[i] < 1.0 and _is_curved(trial.slope[i], state.slope[i]):
+            trial.theta[i] = 1.0
+            trial.p[i] = trial.end[i]
+            changed = True
+    if changed:
+        _forget_intervals(fluid)
+    return changed
+
+
+@phase
+def _is_curved(slope: float, before: float) -> bool:
+    """Whether the slope of the density changes so much in a step that no mean pressure fits."""
+    return abs(slope - before) > _CURVED * slope
 
 
 @phase
@@ -249,7 +284,7 @@ def _add_up_volumes(fluid: Any, gamma: Any) -> None:
         trial.stored[i] = V[i] * trial.slope[i] / trial.theta[i]
         trial.own[i] = trial.stored[i] + rho[i] * gamma[i]
     for i in range(nodes.chambers, nodes.volumes):
-        if _is_held(trial.cavity[i]):
+        if trial.cavity[i] == _OPEN:
             trial.r[i] = _HELD * (nodes.boiling - p[i])
             trial.stored[i] = trial.own[i] = _HELD
 
@@ -296,25 +331,25 @@ def _add_up_ends(fluid: Any, H: float) -> None:
 
 
 @phase
-def _open_cavities(fluid: Any) -> bool:
-    """Hold junctions at the pressure of boiling where a Newton step leads below; whether any is."""
-    nodes, trial, opens = fluid.nodes, fluid.trial, False
+def _cavities_change(fluid: Any, H: float) -> bool:
+    r"""Open and close cavities as the solved linear equations want them; whether any changes.
+
+    At each junction either nothing is missing and :math:`p \ge p_b`, or :math:`p = p_b` and
+    :math:`M \le 0`.  Of linear equations whose matrix is an M-matrix, as that of the flows is, this
+    has one solution.  Policy iteration finds it, whatever cavities it begins with, in at most one
+    solution more than there are junctions (Howard 1960; Bokanowski, Maroso & Zidani 2009): close
+    those that would be filled, open those whose pressure would be too low, solve again.
+    """
+    nodes, trial, changes = fluid.nodes, fluid.trial, False
     for i in range(nodes.chambers, nodes.volumes):
-        if trial.p[i] + trial.r[i] < nodes.boiling and not _is_held(trial.cavity[i]):
-            trial.r[i] = nodes.boiling - trial.p[i]
-            if trial.cavity[i] == 0.0:
-                trial.cavity[i] = _OPEN
-            elif trial.p[i] <= nodes.boiling:  # not an overshoot: it leads below from there
-                trial.cavity[i] = _KEPT
-            opens = True
-    if opens:
+        if trial.cavity[i] == _OPEN:
+            if _fills(fluid, i, H):
+                trial.cavity[i], changes = _NONE, True
+        elif trial.p[i] + trial.r[i] < nodes.boiling:
+            trial.cavity[i], changes = _OPEN, True
+    if changes:
         _forget_intervals(fluid)
-    return opens
-
-
-@phase
-def _is_held(cavity: float) -> bool:
-    return cavity == _OPEN or cavity == _KEPT
+    return changes
 
 
 @phase
@@ -322,18 +357,6 @@ def _forget_intervals(fluid: Any) -> None:
     """Let the densities be anywhere: a cavity that opened or closed has moved the roots."""
     for i in range(fluid.nodes.volumes):
         fluid.trial.lower[i], fluid.trial.upper[i] = 0.0, np.inf
-
-
-@phase
-def _cavities_close(fluid: Any, H: float) -> bool:
-    """Whether more flows into the cavity of a junction than it has room for; it is shut then."""
-    nodes, trial, closes = fluid.nodes, fluid.trial, False
-    for i in range(nodes.chambers, nodes.volumes):
-        if trial.cavity[i] == _OPEN and _fills(fluid, i, H):
-            trial.cavity[i], closes = _CLOSED, True
-    if closes:
-        _forget_intervals(fluid)
-    return closes
 
 
 @phase
@@ -399,35 +422,53 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
     for i in range(nodes.volumes):
         total += r[i]
         theta = trial.theta[i]
-        target = rho[i] + trial.slope[i] * r[i] / theta
-        large = abs(r[i]) > _LARGE_STEP * p[i]
+        target, is_inside = rho[i] + trial.slope[i] * r[i] / theta, False
+        large = i < nodes.chambers and abs(r[i]) > _LARGE_STEP * p[i]
         # a step that may be the last stays as the flows have it: else they would leave mass behind
-        last = abs(r[i]) < _PRESSURE_LEFT * max(theta * trial.end[i], nodes.ambient)
-        if iteration >= _PLAIN_NEWTON and not last:
+        last = _size(fluid, i) < _PRESSURE_LEFT
+        if i < nodes.chambers and iteration >= _PLAIN_NEWTON and not last:
             if (iteration - _PLAIN_NEWTON) % _SAME_INTERVAL == 0:
                 lower[i], upper[i] = 0.0, np.inf  # the other volumes may have moved the root
             wanted = target
             target, lower[i], upper[i] = bracketed(target, rho[i], lower[i], upper[i])
-            if target != wanted:
+            is_inside = target != wanted
+            if is_inside:
                 # a step that a narrow interval made short has found no balance
-                worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
+                worst = max(worst, _size(fluid, i))
             large = True
         if large:
-            # boiling: the density takes the step, the pressure follows it
+            # boiling: the density takes the step, the pressure follows it; from vapour towards
+            # liquid it would follow far too far, there its own step is the shorter one
             if nodes.slow_gas > 0:
                 new = pressure_of_mixture(fluid, i, target)
             else:
                 new, hint[i] = pressure_at(nodes.fluid, target, hint[i])
-            r[i] = theta * (new - trial.end[i])
-        worst = max(worst, abs(r[i]) / max(theta * trial.end[i], nodes.ambient))
+            step = theta * (new - trial.end[i])
+            if is_inside or abs(step) < abs(r[i]):
+                r[i] = step
+        worst = max(worst, _size(fluid, i))
     return worst, total
 
 
 @phase
+def _size(fluid: Any, i: int) -> float:
+    """Newton step over the pressure, or over the ambient one, and of a density over the density.
+
+    In a volume that is all but empty a step that is nothing beside the ambient pressure is many
+    times its own, and its density.
+    """
+    trial, step = fluid.trial, abs(fluid.trial.r[i])
+    size = step / max(trial.theta[i] * trial.end[i], fluid.nodes.ambient)
+    if i < fluid.nodes.chambers:
+        size = max(size, trial.slope[i] * step / (trial.theta[i] * trial.rho_end[i]))
+    return size
+
+
+@phase
 def _worst_volume(fluid: Any, worst: float) -> int:
-    trial, r, found = fluid.trial, fluid.trial.r, 0
+    found = 0
     for i in range(fluid.nodes.volumes):
-        if abs(r[i]) / max(trial.theta[i] * trial.end[i], fluid.nodes.ambient) == worst:
+        if _size(fluid, i) == worst:
             found = i
     return found
 
@@ -546,7 +587,7 @@ def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
         state.held[i] = V[i]
     for i in range(nodes.chambers):
         state.rate[i] = trial.balanced[i] / (trial.theta[i] * trial.stored[i] * H)
-        if abs(trial.slope[i] - state.slope[i]) > _CURVED * trial.slope[i]:
+        if _is_curved(trial.slope[i], state.slope[i]):
             state.rate[i] = AT_ONCE  # boiling, or about to fill
         state.slope[i] = trial.slope[i]
     for i in range(nodes.volumes, nodes.nodes):
