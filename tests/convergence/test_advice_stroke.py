@@ -3,6 +3,8 @@
 The demo stroke with coarse contacts and few modes, until its needle has opened.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ from klack.analyses.advice.stroke import (
 from klack.assembling.valve import build_valve
 from klack.case.shipped import find_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_valve_case
+from klack.case.valve_reader import load_valve_case, read_valve_case
 
 pytestmark = pytest.mark.slow
 
@@ -65,3 +67,42 @@ def test_three_levels_of_every_setting_and_a_check():
     present, advised = (float(np.max(item[:3])) for item in advice.checked)
     assert advised < present
     assert advised <= float(np.max(advice.then[:3]))
+
+
+PUSHED = """
+klack: 1
+title: A pushed needle beside a line of cells
+network:
+  fluid: n-heptane
+  components:
+    tank: {type: pressure-source, pressure: 20 bar}
+    pipe:
+      {type: line, length: 30 mm, diameter: 2 mm, pressure: 20 bar, properties: local, cells: 10}
+    inlet: {type: chamber, volume: 100 mm^3, pressure: 20 bar}
+    nozzle: {type: orifice, diameter: 0.4 mm}
+    face: {type: pressure-face, direction: opening, outer_diameter: 4 mm}
+    needle: {type: rigid-mass, mass: 3 g, points: [tip]}
+    spring: {type: spring, stiffness: 10 N/mm, preload: 12 N}
+    stop: {type: end-stop, gap: 60 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.5}
+    seat: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.5}
+  connections:
+    - [tank.fluid, pipe.a]
+    - [pipe.b, inlet.fluid, nozzle.a, face.fluid]
+    - [nozzle.b, ambient]
+    - [needle.tip, seat.upper, spring.end, face.body, stop.lower]
+    - [seat.lower, ground]
+    - [stop.upper, ground]
+run: {duration: 0.3 ms, variants: [wet]}
+"""
+
+
+@pytest.mark.parametrize(("cells", "words"), [(10, "wet: h, h/2, h/4"), (4, "wet: 2h, h, h/2")])
+def test_a_line_of_cells_bounds_the_step_that_is_tried(cells, words):
+    """10 cells of 3 mm allow steps of 1.12 us, 4 cells of 2.81 us; two macro steps take 1.28 us."""
+    text = PUSHED.replace("cells: 10", f"cells: {cells}")
+    valve = build_valve(read_valve_case(text, Path("pushed.yaml")))
+
+    found = step_ladder(valve, first_impacts(valve), stroke_measures(0.01))
+
+    assert found.runs == words
+    assert found.coarsest == 1.0 if cells == 10 else found.coarsest > 1.0

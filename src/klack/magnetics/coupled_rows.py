@@ -1,11 +1,13 @@
 """Windings that share a magnet or a capacitor as one row of a network."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.errors import AccuracyWarning, InputError
 from klack.magnetics.coupled_step import coupled_step
 from klack.magnetics.coupled_table import (
     MAGNET_ROW,
@@ -17,7 +19,7 @@ from klack.magnetics.coupled_table import (
 from klack.magnetics.flux_step import FAILURES
 from klack.magnetics.network_loops import loop_names
 from klack.magnetics.output_stage import Capacitor
-from klack.magnetics.remanent_start import remanent_state
+from klack.magnetics.remanent_start import magnetised_otherwise, remanent_state
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import Book, Channel, ElementRow, Rows
 
@@ -72,8 +74,17 @@ def coupled_rows(
         Of the windings that draw from a capacitor which is a component, by electric node: its
         name, and its numbers.
     """
+    _tell_remanence(placed)
     system, capacitors = _system(placed, shared or {})
-    parameters = system.numbers()
+    try:
+        parameters = system.numbers()
+    except InputError as error:
+        raise InputError(
+            f"components.{rows.component}",
+            got=f"{error.got} ({', '.join(part.component for part in placed)})",
+            expected=error.expected,
+            hint=error.hint,
+        ) from None
     first = system.first_states()
 
     def at_rest(displacement: Vector) -> Vector:
@@ -143,6 +154,25 @@ def _system(
             windings.append(winding)
         magnets.append(replace(part.magnet, windings=tuple(windings)))
     return CoupledSystem(magnets=tuple(magnets), capacitors=tuple(capacitors)), names
+
+
+def _tell_remanence(placed: Sequence[PlacedMagnet]) -> None:
+    """Doubt a remanent start that depends on which circuit acted last."""
+    for part in placed:
+        if not part.remanent:
+            continue
+        circuit = part.magnet.circuit
+        names = [w.circuit for w in part.magnet.windings if w.circuit]
+        for name, parts in magnetised_otherwise(circuit, names, gap=part.magnet.gap).items():
+            warnings.warn(
+                f"components.{part.component}.start: remanent iron starts as the coils at "
+                f"'terminals' leave it; a strong current of '{name}' would leave "
+                f"{', '.join(parts)} magnetised otherwise. Try: if '{name}' acts last, put its "
+                "coil at 'terminals'; or run two strokes with start: demagnetised, and take the "
+                "second.",
+                AccuracyWarning,
+                stacklevel=4,
+            )
 
 
 def _resting(part: PlacedMagnet, gap: float) -> tuple[Vector, Vector]:

@@ -149,9 +149,10 @@ class CoupledSystem:
         if len(windings) > MOST_WINDINGS:
             raise InputError(
                 "windings",
-                got=f"{len(windings)} that share magnets or a capacitor",
+                got=f"{len(windings)} windings that share magnets or a capacitor",
                 expected=f"at most {MOST_WINDINGS}",
-                hint="give some of them a capacitor of their own.",
+                hint="give some of their drivers a capacitance of their own; coils of one magnet "
+                "in series need one circuit only.",
             )
         rows_m = _HEAD
         rows_w = rows_m + MAGNET_ROW * len(self.magnets)

@@ -289,7 +289,10 @@ def _reversal(curve: IronCurve, coercivity: float, initial_permeability: float) 
             "hysteresis: initial_permeability",
             got=f"{initial_permeability:g}",
             expected=f"above 1 and below {most:.6g}, that of the mean curve at the origin",
-            hint="soft magnetic iron has 100 to 1000 after it was demagnetised.",
+            hint="soft magnetic iron has 100 to 1000 after it was demagnetised."
+            if most > 100.0
+            else "the curve of this material begins flatter than iron does: give a curve of your "
+            "own, the mean of both branches of its loop.",
         )
     return 2.0 * coercivity / (1.0 / (VACUUM_PERMEABILITY * initial_permeability) - steep)
 

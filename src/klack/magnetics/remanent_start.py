@@ -7,10 +7,12 @@ balance with that at the gap and the current of the start:
 .. math:: C^T\bigl[\Theta_b(\varphi_b, x) - \Theta_{0,b} - w_b(\varphi_b) - N_b i\bigr] = 0 .
 
 Limits: iron that came back from its tip by less than twice the flux density of a reversal is a
-little beside that branch.
+little beside that branch.  The strong current is that of the terminals alone: iron that another
+circuit magnetises the other way, or that the terminals do not reach, depends on which acted last
+(:func:`magnetised_otherwise`).
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -20,9 +22,9 @@ from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.flux_table import tubes_of
 from klack.magnetics.hysteresis import IronStops
-from klack.magnetics.static import static_state
+from klack.magnetics.static import StaticState, static_state
 
-__all__ = ["remanent_state"]
+__all__ = ["magnetised_otherwise", "remanent_state"]
 
 Vector = NDArray[np.float64]
 
@@ -54,8 +56,7 @@ def remanent_state(
     ConvergenceError
         If the fluxes do not settle.
     """
-    turns = float(np.max(np.abs(circuit.turns)))
-    strong = static_state(circuit, current=_STRONG / turns, gap=gap)
+    strong = _saturated(circuit, "", gap)
     signs = np.sign(strong.branch_fluxes)
     widths = np.zeros(len(circuit.branches))
     found = static_state(circuit, current=current, gap=gap, others=others)
@@ -93,6 +94,40 @@ def remanent_state(
         sign = float(np.sign(tube.row @ strong.loop_fluxes))
         stops += [-sign * part.share * width_of(part, flux) for part in tube.stops]
     return found.loop_fluxes, np.concatenate([np.zeros(0), *stops])
+
+
+def magnetised_otherwise(
+    circuit: MagneticCircuit, others: Iterable[str], *, gap: float
+) -> dict[str, tuple[str, ...]]:
+    """Hysteretic parts that a strong current of each other circuit leaves otherwise, by circuit.
+
+    That is with a flux against the one that a strong current of the terminals leaves, or with one
+    where the terminals drive none.  Circuits without such parts are not in it.
+    """
+    main = _saturated(circuit, "", gap).branch_fluxes
+    least = 1e-9 * float(np.max(np.abs(main)))
+    found = dict[str, tuple[str, ...]]()
+    for name in others:
+        own = _saturated(circuit, name, gap).branch_fluxes
+        parts = tuple(
+            branch.name
+            for branch, here, there in zip(circuit.branches, main, own, strict=True)
+            if branch.stops is not None
+            and abs(there) > least
+            and (abs(here) <= least or here * there < 0.0)
+        )
+        if parts:
+            found[name] = parts
+    return found
+
+
+def _saturated(circuit: MagneticCircuit, name: str, gap: float) -> StaticState:
+    """Fields at a strong current of one electric circuit; an empty name is the terminals."""
+    turns = [abs(branch.turns) for branch in circuit.branches if branch.circuit == name]
+    strong = _STRONG / max(turns)
+    if not name:
+        return static_state(circuit, current=strong, gap=gap)
+    return static_state(circuit, current=0.0, gap=gap, others={name: strong})
 
 
 def width_of(stops: IronStops, flux: float) -> float:

@@ -6,6 +6,7 @@ Later impacts are chaotic and tell nothing about convergence, so none is judged.
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from math import inf
 from time import perf_counter
 
 import numpy as np
@@ -234,6 +235,9 @@ def step_ladder(
 ) -> Measured:
     """Twice, once and half the step of the network.
 
+    Where a wave in a line would cross a cell within the doubled macro step, which the network
+    refuses: once, half and a quarter of it, and no longer step is advised.
+
     Parameters
     ----------
     valve : Valve
@@ -241,14 +245,25 @@ def step_ladder(
         First impacts with the step of the case.
     measures : sequence of Measure
     """
-    step = valve.case.run.fine_step
-    runs = [now if f == 1.0 else first_impacts(valve, step=f * step) for f in _NEAR]
+    step, doubles = valve.case.run.fine_step, _may_double(valve)
+    factors = _NEAR if doubles else _REST
+    runs = [now if f == 1.0 else first_impacts(valve, step=f * step) for f in factors]
     value = SettingValue(key=("run", "step"), value=step, unit="s")
+    words = "2h, h, h/2" if doubles else "h, h/2, h/4"
     return Measured(
         setting=Setting(name="step of the network", group="step", values=(value,)),
-        ladder=_ladder(_NEAR, runs, measures, _STEP_ORDER),
-        runs=f"{_variant(valve.case)}: 2h, h, h/2",
+        ladder=_ladder(factors, runs, measures, _STEP_ORDER),
+        runs=f"{_variant(valve.case)}: {words}",
+        at_least=inf if doubles else 1.0,
     )
+
+
+def _may_double(valve: Valve) -> bool:
+    """Whether waves in lines of cells take at least two of the macro steps of the case."""
+    rows, run = variant_network(valve, _variant(valve.case)).rows(), valve.case.run
+    sizes = step_sizes(rows, run.accuracy, step=run.step, coarse=run.coarse)
+    crossing = min((wave.crossing for wave in rows.waves), default=inf)
+    return crossing >= 2.0 * sizes.coarse * sizes.step
 
 
 def _ladder(
