@@ -12,7 +12,7 @@ from nicegui import ui
 
 from klack.app.answers import Finding, PartFacts, Review
 from klack.app.drawing_table import EXAMPLES
-from klack.app.folder import LARGEST_FILE
+from klack.app.folder import LARGEST_FILE, result_names
 from klack.app.guard import LARGEST_UPLOAD
 from klack.app.pages.faces import FacesStep
 from klack.app.pages.fields import choice_field, text_field
@@ -502,9 +502,10 @@ class _Guide:
                 files[f"{body}.step"] = await asyncio.to_thread(self._state.folder.read, file)
             await asyncio.to_thread(self._state.folder.make_folder, name, files)
             if then == "run":
-                await asyncio.to_thread(
-                    self._state.jobs.start, "impact", f"{name}/case.yaml", f"klack-results/{name}"
-                )
+                case = f"{name}/case.yaml"
+                known = (await asyncio.to_thread(self._state.folder.look)).cases
+                out = f"klack-results/{result_names({*known, case})[case]}"
+                await asyncio.to_thread(self._state.jobs.start, "impact", case, out)
         except (KlackError, OSError) as error:
             self._message.set_text(str(error))
             return
