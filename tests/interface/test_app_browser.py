@@ -135,7 +135,8 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, 
 LATE = """
 window.WebSocket = class extends WebSocket {  // hears nothing until it is released
   set onmessage(hear) {
-    super.onmessage = (message) => window.heard ? window.heard.push(() => hear(message)) : hear(message);
+    super.onmessage = (message) =>
+      window.heard ? window.heard.push(() => hear(message)) : hear(message);
   }
 };
 window.heard = [];

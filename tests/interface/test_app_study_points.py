@@ -335,6 +335,15 @@ def test_what_is_offered_are_numbers_of_the_case_and_measures_of_the_valve():
     assert "wall_time" not in {item.name for item in offer.measures}
 
 
+def test_a_value_of_a_million_digits_is_refused_as_a_text():
+    text, path = CASE.read_text("utf-8"), str(CASE)
+    place = ("network", "components", "spring", "preload")
+    changed = exchanged_text(text, path, place, "9" * 500_000)
+
+    assert len(changed) > 500_000
+    assert "spring.preload: got '999" in checked_text(changed, path).error
+
+
 def test_a_study_has_a_form_and_the_messages_of_the_checker():
     text, path = STUDY_FILE.read_text("utf-8"), str(STUDY_FILE)
     found = checked_text(text, path)
