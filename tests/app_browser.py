@@ -9,7 +9,7 @@ from browser_pages import watched
 from page_rules import WIDTHS
 from served_app import Served
 
-__all__ = ["LONG", "page", "require_within", "server"]
+__all__ = ["LONG", "client", "page", "require_within", "server"]
 
 LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
 
@@ -17,6 +17,15 @@ LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
 @pytest.fixture(scope="module")
 def server(folder: Path) -> Iterator[Served]:
     with Served(folder) as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def client(server: Served) -> Iterator[Any]:
+    """A client without a browser that has the cookie."""
+    httpx = pytest.importorskip("httpx")
+    with httpx.Client(base_url=server.base, timeout=60.0) as found:
+        found.get(server.address)
         yield found
 
 

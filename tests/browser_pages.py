@@ -34,15 +34,19 @@ class Place:
         Selector of what is there once the page is.
     then : callable
         What is done before it is looked at, for what opens on a page: a dialog.
+    before : callable
+        What is made in the folder before it is opened.
     """
 
     name: str
     address: str
     ready: str
     then: Callable[[Any], None] = lambda page: None
+    before: Callable[[Path], None] = lambda folder: None
 
     def open(self, page: Any, base: str, folder: Path) -> None:
         """Show it."""
+        self.before(folder)
         kind, _, rest = self.address.partition("file:")
         page.goto((folder / rest).as_uri() if rest else base + kind)
         page.wait_for_selector(self.ready)
@@ -71,6 +75,26 @@ def _refused(page: Any) -> None:
     page.wait_for_selector("text=not valid, not saved")
 
 
+def _planned(step: int, **other: str) -> Callable[[Path], None]:
+    """The guide at a step, with the drawings of the example and their faces chosen."""
+
+    def keep(folder: Path) -> None:
+        from klack.app.drawing_table import EXAMPLES
+        from klack.app.folder import OpenFolder
+        from klack.app.valve_plan import Plans, ValvePlan
+
+        given = {f"{body}_table": rows for body, rows in EXAMPLES.items()}
+        given |= {"needle_contact": "tip", "housing_contact": "seat"} | other
+        plan = ValvePlan(step=step, source="table", held=("rim",), **given)
+        Plans(OpenFolder(folder)).keep(plan)
+
+    return keep
+
+
+def _unplanned(folder: Path) -> None:
+    (folder / ".klack-app" / "new-valve.json").unlink(missing_ok=True)
+
+
 _REPORT = "/report?path=klack-results/{}/report.html"
 _BOTH = "a=klack-results/impact&b=klack-results/impact"
 
@@ -89,7 +113,19 @@ PAGES = (
     Place("points", "/points?path=klack-results/study", "#kp-root[data-points]"),
     Place("bodies of a case", "/show?path=stroke/case.yaml", ".ks-view canvas"),
     Place("bodies of a result", "/show?path=klack-results/impact", ".ks-view canvas"),
-    Place("new valve", "/new", ".k-steps button"),
+    Place("new valve", "/new", ".k-steps button", before=_unplanned),
+    *(
+        Place(f"new valve, {name}", "/new", ready, before=_planned(step, **other))
+        for step, name, ready, other in (
+            (0, "drawings", "textarea", {}),
+            (1, "faces", ".ks-view canvas", {}),
+            (2, "materials", "text=Young's modulus", {}),
+            (3, "motion", "text=Speed at the impact", {}),
+            (4, "check", ".k-finding", {}),
+            (4, "check, with errors", ".k-badge.out", {"speed": "fast"}),
+            (5, "case", "text=klack: 1", {}),
+        )
+    ),
     *(Place(f"report, {name}", _REPORT.format(name), ".main-svg") for name, *_ in _COMPUTED),
     *(Place(f"show, {name}", f"file:show-{name}.html", ".ks-panel h3") for name, _ in _SHOWN),
 )

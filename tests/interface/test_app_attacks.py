@@ -2,18 +2,20 @@
 
 import socket
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import psutil
 import pytest
+from app_browser import LONG, client, server
 from browser_pages import watched
 from served_app import Served
 
 httpx = pytest.importorskip("httpx")
 pytest.importorskip("nicegui")
 pytestmark = pytest.mark.slow
+
+__all__ = ["client", "server"]  # fixtures
 
 SCRIPT = "<script>window.attacked=1</script><img src=x onerror=window.attacked=1>"
 HOSTILE = f"""<!doctype html><title>report</title><p id=told>nothing</p>{SCRIPT}<script>
@@ -53,20 +55,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     (inner / f"{SCRIPT.replace('/', '')}.yaml").write_text("klack: 1\ntitle: x\n")
     return inner
-
-
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[Served]:
-    with Served(folder) as found:
-        yield found
-
-
-@pytest.fixture(scope="module")
-def client(server: Served) -> Iterator[Any]:
-    """A client that has the cookie."""
-    with httpx.Client(base_url=server.base, timeout=60.0) as found:
-        found.get(server.address)
-        yield found
 
 
 def memory(server: Served) -> float:
@@ -231,7 +219,7 @@ def test_another_page_gets_no_socket_nor_a_foreign_name(server, client):
 def test_nothing_that_lies_in_the_folder_runs_in_a_page(browser, server, folder):
     context = browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(LONG)
     said = watched(page, server.base)
     page.goto(server.address)
     page.get_by_text("case.yaml").first.wait_for()
@@ -251,6 +239,21 @@ def test_nothing_that_lies_in_the_folder_runs_in_a_page(browser, server, folder)
     assert page.evaluate("document.cookie") == ""
     assert said == []
     context.close()
+
+
+def test_a_file_of_a_hundred_megabytes_is_told_and_not_read(browser, server, folder):
+    huge = folder / "huge.yaml"
+    with huge.open("wb") as file:
+        file.write(b"klack: 1\nx: ")
+        file.truncate(100_000_000)
+    page = browser.new_page()
+    page.set_default_timeout(LONG)
+    page.goto(server.address)
+    page.locator(".k-row", has_text="100000000 bytes, expected no more than 1000000").wait_for()
+    page.get_by_role("button", name="Duplicate huge.yaml").click()
+    page.locator(".q-notification", has_text="100000000 bytes").wait_for()
+    huge.unlink()
+    page.close()
 
 
 def test_a_hostile_report_reaches_nothing(browser, server, folder):
@@ -274,7 +277,7 @@ def test_a_text_longer_than_is_taken_is_told_and_the_page_stays(browser, server,
     (folder / "large.yaml").write_text("klack: 1\ntitle: x\n")
     context = browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(LONG)
     page.goto(server.address)
     page.wait_for_selector("#k-body")
     page.goto(f"{server.base}/case?path=large.yaml")

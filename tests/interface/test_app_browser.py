@@ -130,3 +130,29 @@ def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, 
     assert page.locator("tbody tr").first.locator("td").last.inner_text() == "+0.00 %"
     require_within(page)
     assert (folder / "klack-results" / "one" / "report.html").is_file()
+
+
+LATE = """
+window.WebSocket = class extends WebSocket {  // hears nothing until it is released
+  set onmessage(hear) {
+    super.onmessage = (message) =>
+      window.heard ? window.heard.push(() => hear(message)) : hear(message);
+  }
+};
+window.heard = [];
+window.release = () => { const all = window.heard; window.heard = null; all.forEach(f => f()); };
+"""
+
+
+def test_what_is_pressed_before_the_server_listens_is_done_once_it_does(page, server):
+    page.add_init_script(LATE)
+    page.goto(f"{server.base}/case?path={CASE}")
+    page.get_by_label("case file, YAML").fill("klack: 1\ntitle: early\n")
+    page.wait_for_selector("#k-link >> text=connecting")
+    assert not page.evaluate("window.did_handshake")
+    page.evaluate("window.release()")
+
+    page.wait_for_selector("text=not valid, not saved")
+    assert page.locator("#k-link").inner_text() == ""
+    page.get_by_role("button", name="Discard changes").click()
+    page.wait_for_selector("text=valid impact, saved")

@@ -12,6 +12,7 @@ from klack.analyses import store
 from klack.app import folder as app_folder
 from klack.app.folder import LARGEST_CASE, OpenFolder, result_names
 from klack.app.state import Notes, Sounds, State
+from klack.case import case_text
 from klack.errors import InputError
 
 TEXT = "klack: 1\ntitle: <script>alert(1)</script>\n"
@@ -79,9 +80,10 @@ def test_a_pipe_does_not_block(folder):
 def test_files_are_bounded(folder):
     (folder.path / "large.yaml").write_bytes(b"#" * (LARGEST_CASE + 1))
 
-    with pytest.raises(InputError, match="more than"):
+    assert LARGEST_CASE == case_text.LARGEST_CASE
+    with pytest.raises(InputError, match="bytes, expected no more than 1000000"):
         folder.case_text("large.yaml")
-    with pytest.raises(InputError, match="more than"):
+    with pytest.raises(InputError, match="bytes, expected no more than 1000000"):
         folder.write("new.yaml", "#" * (LARGEST_CASE + 1))
     assert not (folder.path / "new.yaml").exists()
 

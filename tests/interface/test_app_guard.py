@@ -188,7 +188,11 @@ def test_the_password_and_not_the_token_opens_to_other_hosts():
     good = login("a long enough password")
     assert good.status_code == 200
     assert access.session in good.headers["set-cookie"]
-    assert login("wrong").status_code == 403
+    wrong = login("wrong")
+    assert wrong.status_code == 403
+    assert 'role="alert"' in wrong.text
+    # with no-referrer a browser sends the form with the origin "null", which is refused
+    assert wrong.headers["referrer-policy"] == "same-origin"
     assert login("a long enough password").status_code == 403  # closed for a second
     assert ask(access, "POST", "/login", headers=own, content=b"x" * 999_999).status_code == 413
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from app_browser import LONG, server
 from browser_pages import PAGES, Place, made_folder, watched
 from page_rules import (
     HAS_AXE,
@@ -16,22 +17,16 @@ from page_rules import (
 )
 from served_app import Served
 
+__all__ = ["server"]  # fixture
+
 pytest.importorskip("nicegui")
 pytest.importorskip("playwright.sync_api")
 pytestmark = pytest.mark.slow
-
-_LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return made_folder(tmp_path_factory.mktemp("pages"))
-
-
-@pytest.fixture(scope="module")
-def server(folder: Path) -> Iterator[Served]:
-    with Served(folder) as found:
-        yield found
 
 
 @pytest.fixture(scope="module")
@@ -48,17 +43,15 @@ def context(browser: Any, server: Served) -> Iterator[Any]:
 def page(context: Any, server: Served) -> Iterator[Any]:
     """A page; at its end nothing was complained of or asked of other hosts."""
     found = context.new_page()
-    found.set_default_timeout(_LONG)
+    found.set_default_timeout(LONG)
     said = watched(found, server.base)
     yield found
     found.close()
     assert said == []
 
 
-@pytest.mark.parametrize("place", PAGES, ids=lambda place: place.name)
-def test_a_page_is_sound_at_every_width_in_light_and_dark(place: Place, page, server, folder):
-    place.open(page, server.base, folder)
-    page.wait_for_timeout(300)
+def findings_everywhere(page: Any) -> tuple[dict[str, list[str]], list[str], int]:
+    """What breaks a rule, with where; what does not show the focus; how many places have it."""
     said: dict[str, list[str]] = {}
     for scheme in SCHEMES:
         page.emulate_media(color_scheme=scheme)
@@ -72,10 +65,36 @@ def test_a_page_is_sound_at_every_width_in_light_and_dark(place: Place, page, se
     page.set_viewport_size({"width": 1000, "height": 900})
     page.wait_for_timeout(250)
     count, unseen = focus_findings(page)
+    return said, unseen, count
+
+
+@pytest.mark.parametrize("place", PAGES, ids=lambda place: place.name)
+def test_a_page_is_sound_at_every_width_in_light_and_dark(place: Place, page, server, folder):
+    place.open(page, server.base, folder)
+    page.wait_for_timeout(300)
+    said, unseen, count = findings_everywhere(page)
 
     assert said == {}
     assert unseen == []
     assert count >= 3
+
+
+def test_the_page_that_asks_for_the_password_is_sound_and_says_what_was_wrong(browser, tmp_path):
+    (tmp_path / "password.txt").write_text("several words of it")
+    options = ("--host", "127.0.0.2", "--password-file", str(tmp_path / "password.txt"))
+    with Served(tmp_path, *options) as server:
+        page = browser.new_page()
+        page.set_default_timeout(LONG)
+        page.goto(f"{server.base}/case?path=x.yaml")
+        page.get_by_label("Password").fill("something else")
+        page.get_by_role("button", name="Open").click()
+        page.get_by_role("alert").wait_for()
+        assert findings_everywhere(page) == ({}, [], 2)
+        page.wait_for_timeout(1100)
+        page.get_by_label("Password").fill("several words of it")
+        page.get_by_role("button", name="Open").click()
+        page.wait_for_selector("text=Cases and results")
+        page.close()
 
 
 @pytest.mark.skipif(HAS_AXE, reason="axe-core is here")

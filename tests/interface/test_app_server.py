@@ -2,17 +2,17 @@
 
 import re
 import signal
-import subprocess
-import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
+from app_browser import client, server
+from served_app import Served
 
 httpx = pytest.importorskip("httpx")
 pytest.importorskip("nicegui")
 pytestmark = pytest.mark.slow  # a server starts
+
+__all__ = ["client", "server"]  # fixtures
 
 ATTACK = "</script><script>alert(1)</script>`${alert(2)}`"
 
@@ -30,33 +30,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return place / "cases"
 
 
-@pytest.fixture(scope="module")
-def address(folder: Path) -> Iterator[str]:
-    """Address with the token, of a server that runs."""
-    server = subprocess.Popen(
-        [sys.executable, "-P", "-m", "klack", "app", str(folder), "--no-open"],
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert server.stdout is not None
-    server.stdout.readline()
-    yield server.stdout.readline().strip()
-    server.send_signal(signal.SIGINT)
-    assert server.wait(20) in (0, 130)
-
-
-@pytest.fixture(scope="module")
-def client(address: str) -> Iterator[Any]:
-    """A client that has the cookie."""
-    base = address.partition("?")[0]
-    with httpx.Client(base_url=base, timeout=30.0) as found:
-        found.get(address)
-        yield found
-
-
-def test_it_listens_on_this_machine_alone_with_a_token(address):
-    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{43}", address)
-    assert httpx.get(address.partition("?")[0]).status_code == 403
+def test_it_listens_on_this_machine_alone_with_a_token(server):
+    assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[\w-]{43}", server.address)
+    assert httpx.get(server.base).status_code == 403
 
 
 @pytest.mark.parametrize(
@@ -134,8 +110,8 @@ def test_what_is_not_there_is_told_so(client):
         assert client.get(path).status_code == 404
 
 
-def test_a_huge_body_is_refused(client, address):
-    own = {"origin": address.partition("/?")[0]}
+def test_a_huge_body_is_refused(client, server):
+    own = {"origin": server.base}
     answer = client.post("/_nicegui_ws/socket.io/", headers=own, content=b"x" * (4 * 2**20 + 1))
 
     assert answer.status_code == 413
@@ -148,3 +124,10 @@ def test_another_origin_gets_no_socket(client):
     )
 
     assert answer.status_code == 403
+
+
+def test_it_ends_when_it_is_interrupted(tmp_path):
+    with Served(tmp_path) as own:
+        own.process.send_signal(signal.SIGINT)
+
+        assert own.process.wait(20) in (0, 130)

@@ -101,7 +101,7 @@ def test_a_study_is_made_started_stopped_and_resumed_without_its_server(
         context.close()
         other.kill()
 
-    page.goto(f"{server.base}/points?path=klack-results/small_study")
+    page.goto(f"{server.base}/points?path=klack-results/study/small_study")
     page.wait_for_selector("text=study runs, ")
     page.get_by_text(re.compile("about .* left")).wait_for()
     page.get_by_role("button", name="Stop").click()

@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 import pytest
@@ -239,11 +239,35 @@ def test_a_study_names_a_case_below_the_folder_only(tmp_path):
 def test_names_of_results_and_new_files_are_plain(tmp_path):
     folder = OpenFolder(tmp_path)
     (tmp_path / "a_point_1.yaml").write_text("")
-    assert result_of_study("study", "valve/case.yaml") == "klack-results/valve-study"
-    assert result_of_study("optimise", "small_study.yaml") == "klack-results/small_study-optimum"
-    assert result_of_study("study", "small_study.yaml") == "klack-results/small_study"
     assert free_name(folder, "", "a_point_1.yaml", "b.yaml") == "a_point_1_2.yaml"
     assert free_name(folder, "x", "../a.yaml", "b.yaml") == "x/b.yaml"
+
+
+ALIKE = [
+    *("study.yaml", "study.yml", "a/study.yaml", "b/study.yaml", "a/b/study.yaml", "a-study.yaml"),
+    *("a.study.yaml", "a/b.study.yaml", "a.b/study.yaml", "a.b.study.yaml", "a/study.yml"),
+    *("a+study.yaml", "valve.yaml", "valve/case.yaml", "small_study.yaml", "small.yaml", ".yaml"),
+    *("small-study.yaml", "ö/study.yaml", "o/study.yaml", "A/study.yaml", "a/.yaml", "..yaml"),
+    *("x" * 200 + ".yaml", "x" * 201 + ".yaml", "x" * 200 + "/study.yaml", "a/study.yaml.yaml"),
+]
+
+
+def test_no_two_studies_share_a_result_and_each_finds_its_own_again():
+    asked = [
+        (command, study, case)
+        for command in ("study", "optimise")
+        for study in ALIKE
+        for case in ("", *ALIKE)
+    ]
+    names = [result_of_study(*one) for one in asked]
+
+    assert len(set(names)) == len(asked)
+    assert names == [result_of_study(*one) for one in asked]
+    assert all(len(PurePosixPath(name).parts) == 3 for name in names)  # no case writes there
+    assert max(len(name.encode()) for name in names) < 200
+    assert result_of_study("study", "valve/study.yaml") == "klack-results/study/valve.study"
+    hashed = PurePosixPath(result_of_study("study", "a.b/study.yaml")).name
+    assert result_of_study("study", f"{hashed}.yaml") not in names
 
 
 def test_the_case_of_a_result_is_found_by_its_text(tmp_path):
@@ -309,6 +333,15 @@ def test_what_is_offered_are_numbers_of_the_case_and_measures_of_the_valve():
     assert PRELOAD in {item.key for item in offer.parameters}
     assert [item.name for item in offer.measures[:2]] == ["opening_time", "closing_time"]
     assert "wall_time" not in {item.name for item in offer.measures}
+
+
+def test_a_value_of_a_million_digits_is_refused_as_a_text():
+    text, path = CASE.read_text("utf-8"), str(CASE)
+    place = ("network", "components", "spring", "preload")
+    changed = exchanged_text(text, path, place, "9" * 500_000)
+
+    assert len(changed) > 500_000
+    assert "spring.preload: got '999" in checked_text(changed, path).error
 
 
 def test_a_study_has_a_form_and_the_messages_of_the_checker():

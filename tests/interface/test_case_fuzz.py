@@ -117,6 +117,8 @@ HOSTILE = {
     "deep blocks": "".join(f"{' ' * i}a:\n" for i in range(900)),
     "long key": "? " + "k" * 500_000 + "\n: 1\n",
     "long number": "klack: " + "9" * 400_000,
+    "long number in hex": "klack: 0x" + "f" * 400_000,
+    "long fraction": "klack: 0." + "1" * 400_000,
     "long quantity": "motion: {speed: '" + "9" * 400_000 + " m/s'}",
     "many keys": "".join(f"k{i}: 1\n" for i in range(60_000)),
     "many documents": "---\na: 1\n" * 50_000,

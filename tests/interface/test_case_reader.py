@@ -267,6 +267,10 @@ def test_further_mistakes_are_counted():
         ("a: &a {b: {<<: [*a]}}\n", "plain tree"),
         ("a: " + "[" * 5000, "more than 40 levels"),
         ("{a: " * 5000, "more than 40 levels"),
+        ("a: 0x" + "f" * 50_000, ":1: got a number of 50002 characters"),
+        ("a: 0b" + "1" * 50_000, ":1: got a number of 50002 characters"),
+        ("b: 1\na: [1, " + "9" * 50_000 + "]", ":2: got a number of 50000 characters"),
+        ("a: 1\n" + "#" * 1_000_000, "a larger file"),
     ],
 )
 def test_what_is_no_case_is_refused(text, word):

@@ -22,7 +22,7 @@ __all__ = ["RESULT_NAME", "Found", "OpenFolder", "result_names"]
 RESULT_NAME = "result.zarr"
 """Of :mod:`klack.analyses.store`, whose import takes seconds."""
 
-LARGEST_CASE = 2 * 2**20  # [byte] of a case file
+LARGEST_CASE = 1_000_000  # [byte] of a case file; of klack.case.case_text, which takes its time
 LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
 _DEEPEST, _MOST = 5, 2000  # levels, and entries that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
@@ -120,7 +120,7 @@ class OpenFolder:
                 if not stat.S_ISREG(state.st_mode):
                     raise _refused(relative, "no plain file")
                 if state.st_size > largest:
-                    raise _refused(relative, f"{state.st_size} bytes, more than {largest}")
+                    raise _too_large(relative, state.st_size, largest)
                 return file.read(largest + 1)
 
     def case_text(self, relative: str) -> str:
@@ -136,7 +136,7 @@ class OpenFolder:
         """Replace a text file, or make a new one; it is whole at every moment."""
         data = text.encode()
         if len(data) > LARGEST_CASE:
-            raise _refused(relative, f"{len(data)} bytes, more than {LARGEST_CASE}")
+            raise _too_large(relative, len(data), LARGEST_CASE)
         with self._parent(relative) as (held, name):
             state = held.state(name)
             if state is not None and not stat.S_ISREG(state.st_mode):
@@ -269,6 +269,15 @@ def _is_case(path: Path) -> bool:
     except OSError:
         return False
     return any(line.startswith(b"klack:") for line in head.splitlines())
+
+
+def _too_large(relative: str, size: int, largest: int) -> InputError:
+    return InputError(
+        f"file {relative[:200]!r}",
+        got=f"{size} bytes",
+        expected=f"no more than {largest}",
+        hint="is it a mesh or a result? A case names such files and stays small.",
+    )
 
 
 def _refused(relative: str, got: str) -> InputError:

@@ -19,6 +19,7 @@ __all__ = ["checked_text", "exchanged_text", "form_of"]
 
 _SIGNS = (("gt", ">"), ("ge", "≥"), ("lt", "<"), ("le", "≤"))
 _MOST = 400
+_LONGEST_NUMBER = 40  # characters
 
 
 def checked_text(text: str, path: str) -> Checked:
@@ -165,7 +166,7 @@ def _scalar(text: str) -> str:
 
     plain = text.strip()
     try:
-        float(plain)
+        float(plain if len(plain) <= _LONGEST_NUMBER else "text")
     except ValueError:
         return plain if plain in ("true", "false") else json.dumps(plain, ensure_ascii=False)
     return plain

@@ -143,7 +143,7 @@ class Guard:
         query = parse_qs(scope.get("query_string", b"").decode("latin-1"))
         target = _local(query.get("next", ["/"])[0])
         if scope["method"] == "GET":
-            await _answer(send, 200, _LOGIN_PAGE, b"text/html; charset=utf-8")
+            await _ask_password(send, 200, "")
             return
         try:
             body = await _body(receive, _LONGEST_LOGIN)
@@ -155,7 +155,8 @@ class Guard:
         if self._access.gate.opens(given):
             await self._enter(send, target)
         else:
-            await _refuse(scope, send, 403, "That is not the password. Wait a second, try again.")
+            told = "That is not the password. Wait a second, try again."
+            await _ask_password(send, 403, f'<p role="alert">{told}</p>')
 
     async def _hand_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         came, begun, is_read = 0, False, scope["method"] in _SAFE
@@ -193,12 +194,12 @@ _ENTERED = """<!doctype html><html lang="en"><meta charset="utf-8"><title>klack<
 
 _LOGIN_PAGE = """<!doctype html><html lang="en"><meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1"><title>klack</title>
-<style>:root{color-scheme:light dark}body{font:16px/1.5 system-ui,sans-serif;display:grid;
-place-items:center;min-height:90vh;margin:0}form{display:grid;gap:.8rem;width:min(20rem,86vw)}
-input,button{font:inherit;padding:.55rem .7rem}</style>
-<form method="post"><h1>klack</h1><label for="p">Password</label>
+<style>:root{{color-scheme:light dark}}body{{font:16px/1.5 system-ui,sans-serif;display:grid;
+place-items:center;min-height:90vh;margin:0}}form{{display:grid;gap:.8rem;width:min(20rem,86vw)}}
+h1,p{{margin:0}}input,button{{font:inherit;padding:.55rem .7rem}}</style>
+<main><form method="post"><h1>klack</h1>{told}<label for="p">Password</label>
 <input id="p" type="password" name="password" autofocus required autocomplete="current-password">
-<button>Open</button></form></html>"""
+<button>Open</button></form></main></html>"""
 
 
 def _local(path: str) -> str:
@@ -243,6 +244,13 @@ def _with_headers(headers: Iterable[tuple[bytes, bytes]]) -> list[tuple[bytes, b
 
 async def _redirect(send: Send, target: str) -> None:
     await _answer(send, 303, "", b"text/plain", (b"location", target.encode()))
+
+
+async def _ask_password(send: Send, status: int, told: str) -> None:
+    """The form; with no referrer at all, browsers would send it without its origin."""
+    policy = (b"referrer-policy", b"same-origin")
+    page = _LOGIN_PAGE.format(told=told)
+    await _answer(send, status, page, b"text/html; charset=utf-8", policy)
 
 
 async def _answer(

@@ -1,6 +1,7 @@
 """Which case a study belongs to, and where its results go; paths from the opened folder."""
 
 import re
+from hashlib import sha256
 from pathlib import PurePosixPath
 
 from klack.app.folder import OpenFolder
@@ -10,6 +11,9 @@ from klack.errors import InputError, KlackError
 __all__ = ["beside_case", "case_of_study", "free_name", "result_of_study"]
 
 _PLAIN = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,80}")
+_UNMISTAKABLE = re.compile(r"[^.+]+\.yaml")  # path without a separator of the name of its result
+_NOT_PLAIN = re.compile(r"[^A-Za-z0-9_.+-]")
+_LONGEST_NAME = 100  # bytes
 
 
 def case_of_study(folder: OpenFolder, study: str, named: str) -> str:
@@ -46,12 +50,35 @@ def _outside(named: str) -> InputError:
     )
 
 
-def result_of_study(command: str, study: str) -> str:
-    """Folder of the result of a study file, or of a case with a study in it."""
-    path = PurePosixPath(study)
-    name = path.parent.name if path.stem == "case" and path.parent.name else path.stem
-    word = "optimum" if command == "optimise" else "study"
-    return f"klack-results/{name}" if name.endswith(word) else f"klack-results/{name}-{word}"
+def result_of_study(command: str, study: str, case: str = "") -> str:
+    """Folder of the result of a study: the same for the same files, and of no other ones.
+
+    The parts of the path are joined by dots.  A path that has dots of its own, or another ending,
+    or that is long, is told from others by a hash after two dots, which no plain name has.
+
+    Parameters
+    ----------
+    command : str
+        ``"study"`` or ``"optimise"``.
+    study : str
+        File of the study, or case with a study in it.
+    case : str
+        Chosen for a study that names none.
+
+    Examples
+    --------
+    >>> result_of_study("study", "valve/study.yaml")
+    'klack-results/study/valve.study'
+    >>> result_of_study("optimise", "softer.yaml", "valve/case.yaml")
+    'klack-results/optimum/softer+valve.case'
+    """
+    files = [file for file in (study, case) if file]
+    name = "+".join(file.removesuffix(".yaml").replace("/", ".") for file in files)
+    is_plain = all(_UNMISTAKABLE.fullmatch(file) for file in files)
+    if not is_plain or len(name.encode()) > _LONGEST_NAME:
+        start = _NOT_PLAIN.sub("_", name)[:_LONGEST_NAME].strip(".")
+        name = f"{start}..{sha256('+'.join(map(repr, files)).encode()).hexdigest()[:12]}"
+    return f"klack-results/{'optimum' if command == 'optimise' else 'study'}/{name}"
 
 
 def beside_case(folder: OpenFolder, job: Job | None, name: str, text: str) -> str:

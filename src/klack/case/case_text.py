@@ -51,9 +51,7 @@ def text_of(path: Path) -> str:
         with path.open("rb") as file:
             raw = file.read(LARGEST_CASE + 1)
         if len(raw) > LARGEST_CASE:
-            hint = "is it a mesh or a result? A case names such files and stays small."
-            expected = f"a case file below {LARGEST_CASE / 1e6:g} MB"
-            raise InputError(str(path), got="a larger file", expected=expected, hint=hint)
+            raise _too_large(path)
         return raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = raw[: error.start].count(b"\n") + 1
@@ -70,8 +68,19 @@ def text_of(path: Path) -> str:
 
 def parse(text: str, path: Path) -> tuple[Any, Lines]:
     """Plain data of a YAML text, and the position of each key and value."""
+    if len(text) > LARGEST_CASE:  # of a program; files are not read so far
+        raise _too_large(path)
     data, lines = _parsed(text, path)
     return deepcopy(data), lines
+
+
+def _too_large(path: Path) -> InputError:
+    return InputError(
+        str(path),
+        got="a larger file",
+        expected=f"a case file below {LARGEST_CASE / 1e6:g} MB",
+        hint="is it a mesh or a result? A case names such files and stays small.",
+    )
 
 
 @lru_cache(maxsize=4)
@@ -86,7 +95,7 @@ def _parsed(text: str, path: Path) -> tuple[Any, Lines]:
             f"{path}:{error.problem_mark.line + 1}",
             got=str(error.problem),
             expected="a plain tree of keys and values",
-            hint="close the brackets; write out aliases.",
+            hint="close the brackets; write out aliases; shorten numbers.",
         ) from None
     except MarkedYAMLError as error:
         raise _syntax_error(error, path) from None

@@ -1,20 +1,24 @@
 """Bounds on the tree that a YAML text describes, kept while it is read and not afterwards.
 
 A hundred bytes of aliases can stand for more values than a machine holds, a mapping can hold
-itself, and five thousand brackets keep the parser busy for a while.  The composer of ruamel.yaml
-sees every node once, so that is where they are counted: each alias with all that it stands for.
+itself, five thousand brackets keep the parser busy for a while, and so do a million digits.  The
+composer of ruamel.yaml sees every node once, so that is where they are counted: each alias with
+all that it stands for.
 """
 
+import re
 from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.composer import Composer, ComposerError
-from ruamel.yaml.events import AliasEvent
+from ruamel.yaml.events import AliasEvent, ScalarEvent
 
 __all__ = ["UnboundedTree", "bounded_yaml"]
 
 _MOST_VALUES = 200_000
 _DEEPEST = 40
+_LONGEST_NUMBER = 1000  # characters; the time of a conversion grows with their square
+_OF_NUMBERS = re.compile(r"[0-9A-Fa-fox_.:+-]*")
 
 
 class UnboundedTree(ComposerError):
@@ -46,6 +50,8 @@ class _BoundedComposer(Composer):
         before, outside, self.deepest = self.values, self.deepest, 0
         self.level += 1
         self._require_bounded(1, 0, event.start_mark)
+        if isinstance(event, ScalarEvent) and event.style is None:
+            _require_short(event.value, event.start_mark)
         node = super().compose_node(parent, index)
         if is_alias:
             if id(node) not in self.extent:
@@ -66,3 +72,8 @@ class _BoundedComposer(Composer):
             raise UnboundedTree(f"more than {_MOST_VALUES} values, aliases counted", mark)
         if self.level + levels > _DEEPEST:
             raise UnboundedTree(f"values nested in more than {_DEEPEST} levels", mark)
+
+
+def _require_short(text: str, mark: Any) -> None:
+    if len(text) > _LONGEST_NUMBER and _OF_NUMBERS.fullmatch(text):
+        raise UnboundedTree(f"a number of {len(text)} characters", mark)

@@ -36,6 +36,7 @@ def frame(state: State, title: str, subtitle: str = "") -> Iterator[None]:
             plain("klack")
         place = state.folder.path
         plain(place.name or str(place)).classes("k-place").props["title"] = str(place)
+        plain("").classes("k-soft").props("id=k-link role=status")
         link("Cases and results", "/")
         theme = button("Auto").props('id=k-theme aria-label="Colours: auto, light or dark"')
         theme.on("click", js_handler="() => window.klackTheme()")

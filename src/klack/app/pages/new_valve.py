@@ -1,7 +1,7 @@
 """Guide for a new valve: parts, faces, materials, motion, checks, and the case file."""
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import PurePosixPath
@@ -12,7 +12,7 @@ from nicegui import ui
 
 from klack.app.answers import Finding, PartFacts, Review
 from klack.app.drawing_table import EXAMPLES
-from klack.app.folder import LARGEST_FILE
+from klack.app.folder import LARGEST_FILE, result_names
 from klack.app.guard import LARGEST_UPLOAD
 from klack.app.pages.faces import FacesStep
 from klack.app.pages.fields import choice_field, text_field
@@ -41,12 +41,15 @@ async def new_valve_page(state: State, given: Mapping[str, str]) -> None:
 
 
 class _Guide:
-    """One step at a time; the plan is kept at each change."""
+    """One step at a time; the plan is kept at each change.
+
+    What is pressed while parts are read or a step is drawn waits for its turn.
+    """
 
     def __init__(self, state: State, plan: ValvePlan) -> None:
         self._state, self._plan = state, plan
         self._facts: dict[str, PartFacts | str] = {}
-        self._writing = asyncio.Lock()
+        self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
 
     def build(self) -> None:
         """Make the page, then read the parts while it is shown already."""
@@ -58,12 +61,19 @@ class _Guide:
             self._next = button("Next", partial(self._move, 1), main=True).props("id=k-next")
             self._why = plain("", "span").classes("k-soft").props("role=status")
             plain("").style("flex:1 1 auto")
-            button("Start over", self._start_over)
+            self._over = button("Start over", self._start_over)
+        for found in (self._back, self._next, self._over):  # until there is a step to leave
+            found.props["disabled"] = True
+        with self._body:
+            plain("Reading the parts ...", "p").classes("k-soft").props("role=status")
         ui.timer(0.05, self._opened, once=True)
 
     async def _opened(self) -> None:
-        await self._read_parts()
-        await self._show()
+        async with self._turn:
+            await self._read_parts()
+            await self._show()
+        self._over.props.pop("disabled")
+        self._over.update()
 
     # ----------------------------------------------------------------------- keeping
 
@@ -86,17 +96,19 @@ class _Guide:
                 show_error(error)
 
     async def _move(self, by: int) -> None:
-        await self._go(self._plan.step + by)
+        await self._go(lambda: self._plan.step + by)
 
-    async def _go(self, step: int) -> None:
-        step = min(max(step, 0), self._furthest())
-        await self.keep(replace(self._plan, step=step))
-        await self._show()
+    async def _go(self, step: Callable[[], int]) -> None:
+        async with self._turn:
+            chosen = min(max(step(), 0), self._furthest())
+            await self.keep(replace(self._plan, step=chosen))
+            await self._show()
 
     async def _start_over(self) -> None:
-        await asyncio.to_thread(self._state.plans.forget)
-        self._plan, self._facts = ValvePlan(), {}
-        await self._show()
+        async with self._turn:
+            await asyncio.to_thread(self._state.plans.forget)
+            self._plan, self._facts = ValvePlan(), {}
+            await self._show()
 
     # ----------------------------------------------------------------------- the parts
 
@@ -115,16 +127,17 @@ class _Guide:
         return {body: source for body, source in found.items() if source is not None}
 
     async def _read_parts(self) -> None:
-        self._facts = {}
+        facts: dict[str, PartFacts | str] = {}
         for body in BODIES:
             try:
                 source = self.source(body)
                 if source is not None:
                     if source[0] == "step":
                         self._require_small(self._plan.of(body, "file"))
-                    self._facts[body] = await self._state.shapes.call("part", body, source)
+                    facts[body] = await self._state.shapes.call("part", body, source)
             except (KlackError, OSError) as error:
-                self._facts[body] = str(error).replace(f"{self._state.folder.path}/", "")
+                facts[body] = str(error).replace(f"{self._state.folder.path}/", "")
+        self._facts = facts
 
     def _require_small(self, file: str) -> None:
         size = self._state.folder.absolute(file).stat().st_size
@@ -161,7 +174,7 @@ class _Guide:
         self._steps.clear()
         with self._steps:
             for number, name in enumerate(STEPS):
-                found = button(f"{number + 1} {name}", partial(self._go, number))
+                found = button(f"{number + 1} {name}", partial(self._go, partial(int, number)))
                 found.props["aria-current"] = "step" if number == self._plan.step else "false"
                 if number > furthest:
                     found.props["disabled"] = True
@@ -252,8 +265,9 @@ class _Guide:
         if not isinstance(answer, dict):
             return
         if answer.get("error"):
-            self._facts[body] = str(answer["error"])[:2000]
-            await self._show()
+            async with self._turn:
+                self._facts[body] = str(answer["error"])[:2000]
+                await self._show()
             return
         await self._change_file(body, str(answer.get("file", "")), str(answer.get("name", "")))
 
@@ -267,12 +281,13 @@ class _Guide:
 
     async def _with_parts(self, plan: ValvePlan) -> None:
         """Read other parts; faces that they do not have are chosen no more."""
-        await self.keep(plan)
-        await self._read_parts()
-        known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
-        if all(self.facts(body) is not None for body in BODIES):
-            await self.keep(self._plan.with_faces(known))
-        await self._show()
+        await self.keep(plan)  # at once: the page may be left while parts are read
+        async with self._turn:
+            await self._read_parts()
+            known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
+            if all(self.facts(body) is not None for body in BODIES):
+                await self.keep(self._plan.with_faces(known))
+            await self._show()
 
     def _faces_of(self, body: str) -> tuple[Any, ...]:
         facts = self.facts(body)
@@ -372,7 +387,8 @@ class _Guide:
     async def _change_material(self, body: str, value: str) -> None:
         if value in MATERIALS:
             await self.keep(self._plan.with_body(body, "material", value))
-            await self._show()
+            async with self._turn:
+                await self._show()
 
     # ----------------------------------------------------------------------- 4 motion
 
@@ -448,7 +464,7 @@ class _Guide:
                 if finding.advice:
                     plain(f"Try: {finding.advice}", "div")
             if finding.grade != "good":
-                button(f"To {STEPS[finding.step].lower()}", partial(self._go, finding.step))
+                button(f"To {STEPS[finding.step].lower()}", partial(self._go, lambda: finding.step))
 
     # ----------------------------------------------------------------------- 6 case
 
@@ -502,9 +518,10 @@ class _Guide:
                 files[f"{body}.step"] = await asyncio.to_thread(self._state.folder.read, file)
             await asyncio.to_thread(self._state.folder.make_folder, name, files)
             if then == "run":
-                await asyncio.to_thread(
-                    self._state.jobs.start, "impact", f"{name}/case.yaml", f"klack-results/{name}"
-                )
+                case = f"{name}/case.yaml"
+                known = (await asyncio.to_thread(self._state.folder.look)).cases
+                out = f"klack-results/{result_names({*known, case})[case]}"
+                await asyncio.to_thread(self._state.jobs.start, "impact", case, out)
         except (KlackError, OSError) as error:
             self._message.set_text(str(error))
             return

@@ -221,8 +221,12 @@ class _Overview:
             make,
         )
 
-    def _ask_copy(self, case: str) -> None:
-        text = self._state.folder.case_text(case)
+    async def _ask_copy(self, case: str) -> None:
+        try:
+            text = await asyncio.to_thread(self._state.folder.case_text, case)
+        except KlackError as error:  # one that is too large, or gone
+            show_error(error)
+            return
         path = PurePosixPath(case)
 
         def make(source: str, name: str) -> None:

@@ -33,6 +33,7 @@ class StudyPanel:
     def __init__(self, state: State, path: str) -> None:
         self._state, self._path = state, path
         self._case, self._own, self._text = "", False, ""
+        self._asked, self._named = "", ""  # case that the study names, as written and as found
         self._seen: tuple[object, ...] | None = None
 
     def build(self) -> None:
@@ -56,6 +57,8 @@ class StudyPanel:
             self._tell("", "", found)
             return
         self._own = found.kind != "study"
+        if found.case != self._asked:  # the text names another one now
+            self._asked, self._named, self._case = found.case, "", ""
         if not self._case:
             await self._find_case(found)
         if self._case:
@@ -68,7 +71,7 @@ class StudyPanel:
             return
         if found.case:
             try:
-                self._case = await asyncio.to_thread(
+                self._case = self._named = await asyncio.to_thread(
                     case_of_study, self._state.folder, self._path, found.case
                 )
             except KlackError as error:
@@ -154,13 +157,17 @@ class StudyPanel:
                 self._state.jobs.start,
                 command,
                 self._case,
-                result_of_study(command, self._path),
+                result_of_study(command, self._path, self._chosen()),
                 (),
                 "" if self._own else self._path,
             )
         except (KlackError, OSError) as error:
             show_error(error)
         await self._follow()
+
+    def _chosen(self) -> str:
+        """The case, unless the study itself tells it: another one has results of its own."""
+        return "" if self._own or self._case == self._named else self._case
 
     async def _follow(self) -> None:
         jobs = await asyncio.to_thread(self._state.jobs.all)

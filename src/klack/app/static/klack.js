@@ -26,6 +26,12 @@
   const wait = setInterval(() => {
     if (document.getElementById("k-theme") && window.Quasar) { clearInterval(wait); apply(); }
   }, 30);
+  // what is pressed before the server listens is sent once it does: say so where that takes a while
+  const linking = setInterval(() => {
+    const told = document.getElementById("k-link");
+    if (told) told.textContent = window.did_handshake || performance.now() < 700 ? "" : "connecting ...";
+    if (told && window.did_handshake) clearInterval(linking);
+  }, 100);
   // Ctrl+S saves in the editor instead of the page
   document.addEventListener("keydown", (event) => {
     const save = document.getElementById("k-save");
