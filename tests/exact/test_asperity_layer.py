@@ -104,10 +104,17 @@ def test_the_ladder_of_two_rods_is_bodies_and_layer_in_series(tmp_path):
         assert rough.space.axial @ found == pytest.approx(force, rel=1e-3)
 
 
-@pytest.mark.parametrize("keys", [(SUMMITS,), (SOFT, "crown: 1 um")], ids=["summits", "crowned"])
-def test_energy_of_the_layer_comes_back(tmp_path, keys):
-    levels = ("reduced", "interface", "full")
-    study = run_impact(rods(tmp_path, *keys, speed="0.2 m/s"), levels=levels, certify=False)
+LEVELS = ("reduced", "interface", "full")
+
+
+@pytest.fixture(scope="module", params=[(SOFT,), (SUMMITS, "crown: 1 um")], ids=["flat", "crowned"])
+def study(request, tmp_path_factory):
+    """One impact of rough rods at all levels: both kinds of layer, flat and crowned faces."""
+    case = rods(tmp_path_factory.mktemp("rods"), *request.param, speed="0.2 m/s")
+    return run_impact(case, levels=LEVELS, certify=False)
+
+
+def test_energy_of_the_layer_comes_back(study):
     for level in study.levels.values():
         assert abs(level.energy_residual) < 1e-10
     full = study.levels["full"]
@@ -128,14 +135,9 @@ def test_the_ledger_closes_while_the_layer_is_pressed(tmp_path):
     assert held[0] == pytest.approx(held[1], rel=0.2)
 
 
-@pytest.mark.parametrize("keys", [(SOFT,), (SUMMITS, "crown: 1 um")], ids=["flat", "crowned"])
-def test_rough_rods_are_the_same_at_all_levels(tmp_path, keys):
+def test_rough_rods_are_the_same_at_all_levels(study):
     """Within 2 % of the full order in plateau, length and rise; the interface level in 0.3 %."""
-    case = rods(tmp_path, *keys, speed="0.2 m/s")
-    names = ("reduced", "interface", "full")
-    levels = run_impact(case, levels=names, certify=False).levels
-
-    reduced, interface, full = (pulse(levels[name].history) for name in names)
+    reduced, interface, full = (pulse(study.levels[name].history) for name in LEVELS)
 
     assert reduced == pytest.approx(full, rel=0.02)
     assert interface[:2] == pytest.approx(full[:2], rel=3e-3)

@@ -35,6 +35,13 @@ def said(study):
     return [note for note in study.warnings if SAID in note]
 
 
+@pytest.fixture(scope="module")
+def flat(tmp_path_factory):
+    """The case of flat rods and its impact at levels with modes and without."""
+    case = rods(tmp_path_factory.mktemp("flat"))
+    return case, run_impact(case, levels=("reduced", "interface", "full"), certify=False)
+
+
 def test_unequal_bodies_share_the_speed():
     """Aluminium on steel: p = v z_a z_b / (z_a + z_b)."""
     soft = Material(name="aluminium", young=70e9, poisson=0.0, density=2700.0)
@@ -43,11 +50,11 @@ def test_unequal_bodies_share_the_speed():
     assert front_pressure(3.0, STEEL, soft) == pytest.approx(3.0 * z[0] * z[1] / sum(z), rel=1e-12)
 
 
-def test_the_front_is_the_force_of_the_full_order(tmp_path):
+def test_the_front_is_the_force_of_the_full_order(flat):
     """Poisson's ratio 0: the plateau of the rods is the front, rho c A v / 2 = 255 N."""
-    case = rods(tmp_path)
+    case, study = flat
     area = area_at_once(build_problem(case, silent).space, 1e-9)
-    history = run_impact(case, levels=("full",), certify=False).levels["full"].history
+    history = study.levels["full"].history
 
     plateau = history.force[(history.time > 4e-6) & (history.time < 12e-6)].mean()
 
@@ -55,10 +62,9 @@ def test_the_front_is_the_force_of_the_full_order(tmp_path):
     assert area * front_pressure(1.0, STEEL, STEEL) == pytest.approx(plateau, rel=0.005)
 
 
-def test_flat_faces_are_told_of_at_levels_of_modes(tmp_path):
+def test_flat_faces_are_told_of_at_levels_of_modes(flat):
     """One note, with the keys of a real face; the full order is not meant."""
-    levels = ("reduced", "interface", "full")
-    study = run_impact(rods(tmp_path), levels=levels, certify=False)
+    _, study = flat
 
     (note,) = said(study)
     assert "'reduced', 'interface'" in note

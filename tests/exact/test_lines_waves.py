@@ -18,7 +18,6 @@ from klack.hydraulics.line_friction import (
 )
 from klack.network.rows import Ambient, LineRow, Rows
 from klack.simulation.delay_line import compile_lines, lines_commit, lines_incoming, start_lines
-from klack.verification.lines import checks
 from klack.verification.single_line import (
     End,
     exponential_decay,
@@ -27,11 +26,6 @@ from klack.verification.single_line import (
     ringing,
     run_line,
 )
-
-
-@pytest.mark.parametrize("check", checks(), ids=lambda check: check.name)
-def test_check_of_the_group_passes(check):
-    assert check.passed, f"{check.computed} instead of {check.expected}"
 
 
 @pytest.mark.parametrize(

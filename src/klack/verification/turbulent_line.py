@@ -80,7 +80,9 @@ def darcy(reynolds: float) -> float:
         return 64.0 / reynolds
     root = 8.0  # 1/sqrt(f)
     for _ in range(100):
-        root = -2.0 * log10(ROUGH / (3.7 * BORE) + 2.51 / reynolds * root)
+        before, root = root, -2.0 * log10(ROUGH / (3.7 * BORE) + 2.51 / reynolds * root)
+        if abs(root - before) <= 1e-15 * root:  # a tenth of the distance is left at each time
+            break
     return root**-2
 
 
