@@ -144,8 +144,9 @@ class ElementRow:
     element has at the start once its ports rest at given displacements [m]; without it the states
     at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
     point, where they differ.  ``interval`` [s] is that of its exchange with something outside, in
-    whole steps; no step is longer than it, nor than ``longest`` [s].  ``state_names`` are name and unit of states that no channel records, by index;
-    ``component.name`` in a row that stands for several.  ``inflows`` are inputs of its linear law.
+    whole steps; no step is longer than it, nor than ``longest`` [s].  ``state_names`` are name and
+    unit of states that no channel records, by index; ``component.name`` in a row that stands for
+    several.  ``inflows`` are inputs of its linear law.
     """
 
     component: str

@@ -8,7 +8,7 @@ delays: with the waves :math:`w` that arrive at the ends of segments and :math:`
           z = C_z x + D_z u + D_{zw} w, \quad w_i(t) = z_i(t - T_i).
 
 Mass balance of a volume: :math:`V \varrho' \dot p + \varrho \sum A_i v_i = \sum \dot m`.  A
-junction stores nothing: its pressure is that with which its flows add up to zero, and is eliminated.
+junction stores nothing: its pressure, at which its flows add up to zero, is eliminated.
 """
 
 from collections.abc import Collection, Mapping, Sequence
