@@ -13,6 +13,8 @@ from klack.analyses.linearisation.loops import loop_margins, return_ratio
 from klack.errors import InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.junction import Junction
+from klack.hydraulics.line import Line
 from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_source import PressureSource
@@ -237,6 +239,35 @@ def test_a_spring_with_mass_surges_at_its_frequencies():
     z = brentq(lambda x: x * np.tan(x) - spring_mass / MASS, 1e-6, pi / 2 - 1e-9)
     first = min(mode.root.imag for mode in modes(found.system, 1e5)[0] if mode.root.imag > 0.0)
     assert first == pytest.approx(z * sqrt(RATE / spring_mass), rel=1e-6)
+
+
+def test_two_lines_at_a_junction_are_one_line():
+    """Pipe closed by a junction: its resonances are those of a pipe of the whole length.
+
+    Truth: omega = pi a (2 k + 1)/(2 L) of a pipe open at one end, closed at the other.
+    """
+    parts = needle(
+        rail=PressureSource(pressure=5e6),
+        one=Line(length=0.3, diameter=3e-3, pressure=5e6, friction="none"),
+        tee=Junction(),
+        two=Line(length=0.2, diameter=3e-3, pressure=5e6, friction="none"),
+        end=Junction(),
+    )
+    joints = [
+        ["needle.tip", "spring.end"],
+        ["rail.fluid", "one.a"],
+        ["one.b", "tee.fluid", "two.a"],
+        ["two.b", "end.fluid"],
+    ]
+
+    found = linear(parts, joints)
+
+    assert not any(signal.owner in ("tee", "end") for signal in found.system.states)
+    speed = sqrt(float(FLUID.bulk_modulus(5e6)) / float(FLUID.density(5e6)))
+    listed = [mode for mode in modes(found.system, 4e3)[0] if mode.root.imag > 0.0]
+    waves = sorted(mode.root.imag for mode in listed if "needle" != next(iter(mode.participation)))
+    truth = [pi * speed * (2 * k + 1) / (2 * 0.5) for k in range(3)]
+    assert waves[:3] == pytest.approx(truth, rel=1e-6)
 
 
 class Magnet(Component):

@@ -190,14 +190,19 @@ class Film(Section):
                 expected=f"less than the pressure around the film, {words}",
                 hint="pressures are absolute; leave it out for the vapour pressure.",
             )
-        key = "network.ambient.pressure"
+        key, hint = (
+            "network.ambient.pressure",
+            f"give {film} its own 'pressure', that of the valve; surroundings have about 1 bar "
+            "absolute, at which a hot fluid may boil.",
+        )
         if self.pressure is not None:
             key = f"network.components.{component}.film.pressure"
+            hint = "pressures are absolute; a hot fluid boils at a higher one."
         return InputError(
             key,
             got=f"{words} absolute around {film}",
             expected=f"more than the vapour pressure of {fluid}, {limit}",
-            hint="pressures are absolute: surroundings have about 1 bar.",
+            hint=hint,
         )
 
 

@@ -154,5 +154,5 @@ class SurgingSpring(Component):
                 for i in range(len(table))
                 for k, (word, unit) in enumerate((("", "m"), (" velocity", "m/s")))
             },
-            interval=1.0 / (_STEPS_OF_PERIOD * float(self.frequencies()[-1])),
+            longest=1.0 / (_STEPS_OF_PERIOD * float(self.frequencies()[-1])),
         )

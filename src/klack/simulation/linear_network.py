@@ -7,7 +7,8 @@ delays: with the waves :math:`w` that arrive at the ends of segments and :math:`
 .. math:: \dot x = A x + B u + B_w w, \quad y = C x + D u + D_w w, \quad
           z = C_z x + D_z u + D_{zw} w, \quad w_i(t) = z_i(t - T_i).
 
-Mass balance of a volume: :math:`V \varrho' \dot p + \varrho \sum A_i v_i = \sum \dot m`.
+Mass balance of a volume: :math:`V \varrho' \dot p + \varrho \sum A_i v_i = \sum \dot m`.  A
+junction stores nothing: its pressure, at which its flows add up to zero, is eliminated.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -120,6 +121,7 @@ class _Assembly:
         self.p = network.node_state.p.copy()
         self.fluid = fluids_at(nodes.fluid, self.p) if self.p.size else np.zeros((0, 3))
         self.node_names = [self.rows.nodes[k].component for k in network.node_order]
+        self.junction = np.array([self.rows.nodes[k].junction for k in network.node_order], bool)
         self.linear = [
             *(self._row(network.elements, k, row, h) for k, row in enumerate(self.rows.elements)),
             *(self._row(network.branches, k, row, h) for k, row in enumerate(self.rows.branches)),
@@ -210,6 +212,8 @@ class _Assembly:
                     "motions that slide, with the viscous part alone."
                 )
         for i in range(self.network.nodes.volumes):
+            if self.junction[i]:
+                continue
             around = fluids_at(self.network.nodes.fluid, self.p[i] * np.array([0.999, 1.001]))
             if abs(around[1, 1] - around[0, 1]) > _BENT * abs(self.fluid[i, 1]):
                 self.doubts.append(
@@ -253,9 +257,11 @@ class _Assembly:
             self.states += [
                 named.get(j, Signal(row_.component, f"state {j}", "")) for j in found.kept
             ]
-        self.pressures = self._add("", *())
-        for i in range(self.network.nodes.volumes):
-            self.states.append(Signal(self.node_names[i], "pressure", "Pa"))
+        self.pressures = {
+            i: self._add(self.node_names[i], ("pressure", "Pa"))
+            for i in range(self.network.nodes.volumes)
+            if not self.junction[i]
+        }
         at = self.network.interfaces
         self.indents = {
             c: self._add(row.component, ("indentation", "m"))
@@ -293,8 +299,11 @@ class _Assembly:
             owner, _, quantity = key.rpartition(".")
             self.inputs.append(Signal(owner, quantity, unit))
         nx, nu = len(self.states), len(self.inputs)
-        self.width = nx + nu + len(self.delays)
         self.first_input, self.first_wave = nx, nx + nu
+        self.first_junction = nx + nu + len(self.delays)  # eliminated in the end
+        joined = np.flatnonzero(self.junction)
+        self.pressures |= {int(i): self.first_junction + k for k, i in enumerate(joined)}
+        self.width = self.first_junction + joined.size
         self.input_at = {x.name: self.first_input + j for j, x in enumerate(self.inputs)}
 
     def _add(self, component: str, *labels: tuple[str, str]) -> int:
@@ -321,7 +330,7 @@ class _Assembly:
         self.pressure = np.array(
             [
                 self._unit(
-                    self.pressures + i
+                    self.pressures[i]
                     if i < nodes.volumes
                     else self.input_at[f"{self.node_names[i]}.pressure"]
                 )
@@ -343,9 +352,10 @@ class _Assembly:
         self._put_volumes()
         self._put_bodies()
         nx, nu = len(self.states), len(self.inputs)
-        blocks = (slice(0, nx), slice(nx, nx + nu), slice(nx + nu, None))
+        blocks = (slice(0, nx), slice(nx, nx + nu), slice(nx + nu, self.first_junction))
         forms = np.array([form for _, form in self.outputs]).reshape(-1, self.width)
-        matrices = [part[:, block] for part in (self.rates, forms, self.left) for block in blocks]
+        parts = [self._without_junctions(part) for part in (self.rates, forms, self.left)]
+        matrices = [part[:, block] for part in parts for block in blocks]
         A, B, Bw, C, D, Dw, Cz, Dz, Dzw = matrices
         system = LinearSystem(
             A=A, B=B, Bw=Bw, C=C, D=D, Dw=Dw, Cz=Cz, Dz=Dz, Dzw=Dzw,
@@ -361,6 +371,13 @@ class _Assembly:
             for name, (place, sign) in self.adds.items()
         }
         return LinearNetwork(system=system, adds=adds, doubts=tuple(dict.fromkeys(self.doubts)))
+
+    def _without_junctions(self, forms: Matrix) -> Matrix:
+        """Put the pressures at which what flows into each junction adds up to zero into forms."""
+        kept, last = slice(0, self.first_junction), slice(self.first_junction, None)
+        inflow = self.inflow[self.junction]
+        pressure = -np.linalg.solve(inflow[:, last], inflow[:, kept])
+        return np.asarray(forms[:, kept] + forms[:, last] @ pressure)
 
     def _move_ports(self) -> None:
         """Displacement and speed of every port."""
@@ -546,9 +563,9 @@ class _Assembly:
         swept = np.zeros((nodes.nodes, self.width))
         for w in range(nodes.walls):
             swept[nodes.wall_node[w]] += nodes.wall_area[w] * self.speed[nodes.wall_port[w]]
-        for i in range(nodes.volumes):
+        for i in np.flatnonzero(~self.junction[: nodes.volumes]):
             rho, slope = self.fluid[i, 0], self.fluid[i, 1]
-            self.rates[self.pressures + i] = (self.inflow[i] - rho * swept[i]) / (
+            self.rates[self.pressures[int(i)]] = (self.inflow[i] - rho * swept[i]) / (
                 float(state.held[i]) * slope
             )
 

@@ -94,6 +94,7 @@ _SHALLOW = 1e-6  # [m] no contact is looked at that is less deep
 _DEEP = 10.0  # of the way between the stops: nobody means a stop so soft
 _ROUND_OFF = 1e-14  # of the sum of absolute forces, flows and displacements: they balance
 _IDLE = 1e-6  # of the largest flow: where less flows, behind closed valves, that is the measure
+_FILLED = 1e-6  # of ambient pressure: a closed volume that something has filled
 _NEARLY = 1e-9  # the same where they come no closer
 
 
@@ -596,10 +597,13 @@ class _Balance:
                 share *= 0.5
             else:
                 return None
-            state = tried
+            former, state = state, tried
             last = last_change(self.couplings, change, state.y, state.p, _LENGTH * self.step)
-            if share == 1.0 and (last <= _FOUND or (last <= _STUCK and last >= 0.5 * before)):
+            if share == 1.0 and last <= _FOUND:
                 return state
+            if share == 1.0 and last <= _STUCK and last >= 0.5 * before:
+                # a valve about to close: from there the step leads back to where it began
+                return state if last <= before else former
             if np.any(state.p[self.free] < _EMPTY):
                 self.emptied = self._unstated(state.p < _EMPTY)
                 if self.is_steady:  # perhaps a shorter step leaves something in it
@@ -1055,16 +1059,20 @@ class _Balance:
             stated={names[i]: bool(self.stated[i]) for i in range(nodes.volumes)},
             flow=flow,
             residual=self.left_on_bodies(),
-            notes=(*notes, *(self._closed(names) if tells_closed else ())),
+            notes=(*notes, *(self._closed(names, state.p) if tells_closed else ())),
         )
 
-    def _closed(self, names: list[str]) -> tuple[str, ...]:
-        """Words for volumes without a stated pressure that nothing fills or empties."""
-        first = self.ports + 1
+    def _closed(self, names: list[str], p: Vector) -> tuple[str, ...]:
+        """Words for volumes without a stated pressure that nothing fills or empties.
+
+        One that a valve has filled until it closed has a pressure of its own.
+        """
+        first, ambient = self.ports + 1, self.network.rows.ambient.pressure
         told = []
         for j, i in enumerate(self.free):
             column = self.by_pressure[first + i, j] != 0.0 or bool(np.any(self.ends == i))
-            if not column and not self.given[i]:
+            filled = abs(float(p[i]) - ambient) > _FILLED * ambient
+            if not (column or filled or self.given[i]):
                 told.append(
                     f"'{names[i]}' is closed at the start: it starts at ambient "
                     "pressure; give its 'pressure' if that differs."

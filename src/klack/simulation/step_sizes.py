@@ -94,7 +94,8 @@ def _chosen(rows: Rows, macro: float, h: float) -> int:
     longest = min([longest, *(wave.crossing for wave in rows.waves)])
     intervals = [row.interval for row in rows.elements if row.interval is not None]
     intervals += [row.period for row in rows.controllers]
-    longest = min([longest, *intervals])
+    shortest = [row.longest for row in rows.elements if row.longest is not None]
+    longest = min([longest, *intervals, *shortest])
     most = min(int(longest / h * (1.0 + _WHOLE)), _MOST_COARSE)
     if most < 2:
         return 1

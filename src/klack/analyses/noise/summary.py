@@ -65,6 +65,7 @@ class NoiseJson(DesignNoiseJson):
     schema: Literal["klack-noise/1"]
     case: str
     designs: Annotated[dict[str, DesignNoiseJson], Field(description="All of them by name.")]
+    warnings: list[str]
 
 
 def noise_told(study: NoiseStudy) -> Iterator[TextTable | str]:
@@ -115,6 +116,7 @@ def noise_to_json(study: NoiseStudy) -> NoiseJson:
         "case": study.case,
         **designs[study.reference.name],
         "designs": designs,
+        "warnings": list(study.warnings),
     }
 
 

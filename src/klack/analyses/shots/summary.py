@@ -71,6 +71,7 @@ class ShotsJson(TypedDict):
     shot_time_s: Real
     workers: int
     resumed: Annotated[int, Field(description="Shots resumed from an interrupted run.")]
+    warnings: list[str]
 
 
 def shots_to_json(study: ShotsStudy) -> ShotsJson:
@@ -100,6 +101,7 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
         "shot_time_s": number_or_none(study.shot_time),
         "workers": study.workers,
         "resumed": study.resumed,
+        "warnings": list(study.warnings),
     }
 
 

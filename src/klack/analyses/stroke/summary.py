@@ -155,6 +155,7 @@ class StrokeJson(VariantJson):
         dict[str, ContactJson],
         Field(description="By the name of the end stop; all variants but lumped ones share them."),
     ]
+    warnings: list[str]
 
 
 def stroke_to_json(study: StrokeStudy) -> StrokeJson:
@@ -170,6 +171,7 @@ def stroke_to_json(study: StrokeStudy) -> StrokeJson:
         **variants[reference],
         "variants": variants,
         "stops": {stop.name: contact_to_json(stop) for stop in study.stops},
+        "warnings": list(study.warnings),
     }
 
 

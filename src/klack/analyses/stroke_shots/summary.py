@@ -130,6 +130,7 @@ class StrokeShotsJson(TypedDict):
     stroke_time_s: Real
     workers: int
     resumed: Annotated[int, Field(description="Strokes resumed from an interrupted run.")]
+    warnings: list[str]
 
 
 def stroke_shots_to_json(study: StrokeShotsStudy) -> StrokeShotsJson:
@@ -147,6 +148,7 @@ def stroke_shots_to_json(study: StrokeShotsStudy) -> StrokeShotsJson:
         "stroke_time_s": number_or_none(study.stroke_time),
         "workers": study.workers,
         "resumed": study.resumed,
+        "warnings": list(study.warnings),
     }
 
 
