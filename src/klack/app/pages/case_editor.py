@@ -216,7 +216,12 @@ class _Editor:
 
     async def _exchange(self, item: FormField, value: str) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
-        if value == self._given.get(item.key, item.written) or not value.strip():
+        now = self._given.get(item.key, item.written)
+        if value == now:
+            return
+        if not value.strip():  # to remove a key is for the text, which shows what goes with it
+            self._fill(item, now)
+            ui.notify(f"{item.label} stays as it was. To remove the key, delete it in the text.")
             return
         try:
             text = await self._state.reader.call(
@@ -228,6 +233,12 @@ class _Editor:
         self._given[item.key] = value  # the form of a text that is not valid stays as it was
         self._set(text)
         await self._check()
+
+    def _fill(self, item: FormField, value: str) -> None:
+        """Show a value in the box of the form again."""
+        self._area.client.run_javascript(
+            f"document.getElementById({json.dumps(f'f-{item.key}')}).value = {json.dumps(value)}"
+        )
 
     def _set(self, text: str) -> None:
         self._text = text

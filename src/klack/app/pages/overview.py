@@ -38,7 +38,7 @@ _WORDS = {
     "done": "done",
     "failed": "failed",
     "cancelled": "cancelled",
-    "lost": "ended without a word",
+    "lost": "ended without a result or a message",
 }
 
 
