@@ -25,6 +25,7 @@ _OTHERS = (
     "Another page holds a text of this case that is not saved. Yours is kept in this page alone, "
     "until you save it."
 )
+_PAGE_ALONE = "What is not saved is kept in this page alone: do not close or reload it."
 
 
 async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
@@ -113,8 +114,13 @@ class _Editor:
     async def _check(self) -> None:
         """Keep the draft; say what the checker says; make the form of a valid text."""
         text, mine = self._text, self._changes
+        trouble = ""
         try:
-            is_kept = await self._keep(text if text != self._saved else None)
+            if not await self._keep(text if text != self._saved else None):
+                trouble = _OTHERS
+        except (KlackError, OSError) as error:  # a full disk: the text is checked all the same
+            trouble = f"{_PAGE_ALONE}\n{error}"
+        try:
             found: Checked = await self._state.reader.call("check", text, self._path)
         except (KlackError, OSError) as error:
             show_error(error)
@@ -122,9 +128,7 @@ class _Editor:
         if mine != self._changes:
             return
         with self._form:
-            self._message.set_text(
-                "\n".join(filter(None, (found.error, "" if is_kept else _OTHERS)))
-            )
+            self._message.set_text("\n".join(filter(None, (found.error, trouble))))
             unsaved = "not saved" if text != self._saved else "saved"
             self._status.classes(remove="good fair out", add="out" if found.error else "good")
             valid = "not valid" if found.error else f"valid {found.kind}"
@@ -183,7 +187,7 @@ class _Editor:
             with ui.element("div"):
                 with ui.element("label") as label:
                     label.props["for"] = f"f-{item.key}"
-                    plain(item.label)
+                    plain(item.label.replace(".", ".\u200b"))  # long keys break at their dots
                 words = [item.description]
                 if item.kind:
                     words.append(f"{item.kind}, e.g. {item.example}")
@@ -262,6 +266,7 @@ class _Editor:
                 return
             await asyncio.to_thread(self._state.folder.write, self._case, text)
         except (KlackError, OSError) as error:
+            self._message.set_text(f"Not saved. {error}")
             show_error(error)
             return
         self._saved = text
