@@ -72,6 +72,34 @@ def test_form_and_text_follow_each_other_and_survive(page, server, folder):
     require_within(page)
 
 
+def test_text_typed_while_the_server_is_away_comes_back(folder, browser):
+    (folder / "valve" / "away.yaml").write_text((folder / CASE).read_text("utf-8"), "utf-8")
+    query = "/case?path=valve/away.yaml"
+    context = browser.new_context()
+    page = context.new_page()
+    page.set_default_timeout(LONG)
+    with Served(folder) as first:
+        port = first.base.rpartition(":")[2]
+        page.goto(first.address)
+        page.goto(f"{first.base}{query}")
+        page.wait_for_selector("text=valid impact, saved")
+        page.get_by_label("speed", exact=True).fill("")
+        page.get_by_label("speed", exact=True).press("Enter")
+        page.wait_for_selector("text=speed stays as it was")
+        assert page.get_by_label("speed", exact=True).input_value() == "0.3 m/s"
+        first.kill()
+    page.wait_for_function("!window.socket.connected")
+    area = page.get_by_label("case file, YAML")
+    area.fill(area.input_value().replace("0.3 m/s", "0.36 m/s"))
+    with Served(folder, "--port", port) as again:
+        context.new_page().goto(again.address)  # the token of the new server
+        page.goto(f"{again.base}{query}")
+        page.wait_for_selector("text=valid impact, not saved")
+        assert "0.36 m/s" in area.input_value()
+    context.close()
+    (folder / "valve" / "away.yaml").unlink()
+
+
 def test_sliders_answer_by_keyboard(page, server):
     page.goto(f"{server.base}/sliders?path={CASE}")
     speed = page.get_by_label("speed")

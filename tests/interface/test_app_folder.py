@@ -1,6 +1,7 @@
 """Files of the browser application: only below the folder, whole, bounded."""
 
 import asyncio
+import errno
 import os
 import subprocess
 import sys
@@ -210,3 +211,28 @@ def test_a_page_that_was_left_makes_room_for_another(folder):
     with pytest.raises(InputError, match="3 open slider pages"):
         state.explorer()
     state.close()
+
+
+def test_a_folder_that_was_renamed_is_named_and_not_made_again(folder):
+    notes = Notes(folder)
+    folder.path.rename(folder.path.with_name("moved"))
+
+    for act in (
+        lambda: notes.set_draft("case.yaml", "typed"),
+        lambda: folder.case_text("case.yaml"),
+        lambda: folder.write("case.yaml", "typed"),
+    ):
+        with pytest.raises(InputError, match="former name"):
+            act()
+    assert not folder.path.exists()
+
+
+def test_a_full_disk_is_named_as_such(folder, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(app_folder, "synchronise", full)
+
+    with pytest.raises(InputError, match="No space left on device, expected room") as refused:
+        folder.write("case.yaml", "typed")
+    assert "reload" not in str(refused.value)  # the text is in the page alone

@@ -1,6 +1,8 @@
 """Runs of the browser application: found again, cancelled, told apart."""
 
+import errno
 import json
+import os
 import subprocess
 import sys
 import time
@@ -127,3 +129,16 @@ def test_damaged_files_of_a_run_are_no_run(folder):
     for text in ("", "[]", "{}", '{"command": 1}', "{"):
         (place / "job.json").write_text(text)
         assert Jobs(folder).all() == []
+
+
+def test_a_run_that_cannot_be_written_down_is_not_left_running(folder, sleeping, monkeypatch):
+    def write(path, values):
+        if path.name == "process.json":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(jobs_module, "_write", write)
+
+    with pytest.raises(InputError, match="No space left on device, expected room"):
+        Jobs(folder).start("impact", "bad.yaml", "klack-results/bad")
+    assert [child.poll() is not None for child in sleeping] == [True]
+    assert list((folder.path / ".klack-app" / "jobs").iterdir()) == []

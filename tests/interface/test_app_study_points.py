@@ -361,3 +361,14 @@ def test_a_study_has_a_form_and_the_messages_of_the_checker():
         text.replace("spring.preload", "spring.prelaod"), path, CASE.read_text("utf-8"), str(CASE)
     )
     assert "preload" in wrong.error
+
+
+def test_a_title_of_digits_is_text_and_a_speed_of_digits_lacks_its_unit():
+    text, path = CASE.read_text("utf-8"), str(CASE)
+
+    named = exchanged_text(text, path, ("title",), "2026")
+
+    assert 'title: "2026"' in named.splitlines()
+    assert checked_text(named, path).error == ""
+    bare = exchanged_text(text, path, ("network", "components", "spring", "preload"), "12")
+    assert "without unit" in checked_text(bare, path).error

@@ -4,6 +4,7 @@ A path that comes from a browser is followed one name at a time from the held fo
 a link, so that neither ``..`` nor a link leads out.
 """
 
+import errno
 import os
 import secrets
 import stat
@@ -27,6 +28,7 @@ LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
 _DEEPEST, _MOST = 5, 2000  # levels, and entries that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
+_NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 _STEP_ENDINGS = (".step", ".stp")
 
 
@@ -217,7 +219,25 @@ class OpenFolder:
                     held = stack.enter_context(held.inner(part))
                 yield held, parts[-1]
             except OSError as error:
-                raise _refused(relative, error.strerror or str(error)) from None
+                self.require_here()
+                raise _failed(relative, error) from None
+
+    def require_here(self) -> None:
+        """Refuse to go on in a folder that was renamed or removed meanwhile.
+
+        Raises
+        ------
+        InputError
+            With what to do.
+        """
+        if not self.path.is_dir():
+            raise InputError(
+                f"folder {self.path}",
+                got="nothing there any more",
+                expected="the folder that klack app has opened",
+                hint="give it its former name, or start klack app with its new one. This page "
+                "keeps what is typed in it.",
+            )
 
 
 def result_names(cases: Iterable[str]) -> dict[str, str]:
@@ -277,6 +297,18 @@ def _too_large(relative: str, size: int, largest: int) -> InputError:
         got=f"{size} bytes",
         expected=f"no more than {largest}",
         hint="is it a mesh or a result? A case names such files and stays small.",
+    )
+
+
+def _failed(relative: str, error: OSError) -> InputError:
+    """Of a disk that is full, or a folder without the right to write."""
+    if error.errno not in _NO_WRITING:
+        return _refused(relative, error.strerror or str(error))
+    return InputError(
+        f"file {relative[:200]!r}",
+        got=error.strerror,
+        expected="room on the disk, and the right to read and write there",
+        hint="make room, or change the rights, then try again; keep the page open until then.",
     )
 
 

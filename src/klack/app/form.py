@@ -61,7 +61,8 @@ def exchanged_text(text: str, path: str, place: Key, written: str) -> str:
     InputError
         If the file cannot have the value there.
     """
-    return with_values(tree_of(text, Path(path)), {place: _scalar(written)})
+    tree = tree_of(text, Path(path))
+    return with_values(tree, {place: _scalar(written, is_text=_takes_text(tree, place))})
 
 
 def form_of(case: Section, tree: CaseTree) -> Iterator[FormField]:
@@ -160,11 +161,23 @@ def _shown(value: Any) -> str:
     return str(value)
 
 
-def _scalar(text: str) -> str:
-    """YAML of what was typed: a number and true or false stay what they are."""
+def _takes_text(tree: CaseTree, place: Key) -> bool:
+    """Whether a key takes any text: a title of digits is no number."""
+    try:
+        case = study_source(tree.text, tree.path)[0] if is_study(tree.data) else tree.any_case()
+        _, info = node_at(case, place)
+    except (KlackError, CaseProblem):  # of a text that is not valid the kinds are not known
+        return False
+    return info is not None and info.annotation in (str, str | None)
+
+
+def _scalar(text: str, *, is_text: bool) -> str:
+    """YAML of what was typed: a number and true or false stay what they are where they may."""
     import json
 
     plain = text.strip()
+    if is_text:
+        return json.dumps(plain, ensure_ascii=False)
     try:
         float(plain if len(plain) <= _LONGEST_NUMBER else "text")
     except ValueError:

@@ -134,10 +134,28 @@ class Jobs:
             raise _refused(f"a run that writes to {out}, beside another", "one at a time")
         name = time.strftime("%Y%m%d-%H%M%S-") + secrets.token_hex(4)
         place = self._place / name
-        place.mkdir(parents=True, mode=0o700)
         job = Job(name=name, command=command, case=case, out=out, started=time.time(), study=study)
-        _write(place / "job.json", asdict(job))
         arguments = [command, str(path), "--out", str(self._folder.path / out), *options]
+        try:
+            place.mkdir(parents=True, mode=0o700)
+            _write(place / "job.json", asdict(job))
+            self._launch(name, place, arguments)
+        except (OSError, InputError) as error:
+            child = self._children.pop(name, None)
+            if child is not None:  # nobody could tell it from another process
+                child.kill()
+                child.wait()
+            rmtree(place, ignore_errors=True)
+            raise InputError(
+                f"run of {case}",
+                got=error.got if isinstance(error, InputError) else error.strerror or str(error),
+                expected="room on the disk, and the right to write there",
+                hint="make room, or change the rights of the folder, then run it again.",
+            ) from None
+        return job
+
+    def _launch(self, name: str, place: Path, arguments: list[str]) -> None:
+        """Start the process of a run, and write down which one it is."""
         with (place / "stdout").open("wb") as output, (place / "stderr").open("wb") as errors:
             child = subprocess.Popen(
                 # -P: not from the opened folder, where a stranger's numpy.py may lie
@@ -149,10 +167,9 @@ class Jobs:
                 stderr=errors,
                 start_new_session=True,
             )
+        self._children[name] = child
         begun = psutil.Process(child.pid).create_time()
         _write(place / "process.json", {"pid": child.pid, "begun": begun})
-        self._children[name] = child
-        return job
 
     def all(self) -> list[Job]:
         """Every run, the latest first."""

@@ -66,7 +66,7 @@ class Notes:
     """
 
     def __init__(self, folder: OpenFolder) -> None:
-        self._home = folder.path / ".klack-app"
+        self._folder, self._home = folder, folder.path / ".klack-app"
 
     def note(self, of: str) -> str:
         """Note on a case or result."""
@@ -126,6 +126,7 @@ class Notes:
         if not kept:
             file.unlink(missing_ok=True)
             return
+        self._folder.require_here()  # else a folder of its former name would be made
         with whole_file(file) as new:
             new.write_text(json.dumps(kept), encoding="utf-8")
 

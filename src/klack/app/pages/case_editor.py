@@ -25,6 +25,7 @@ _OTHERS = (
     "Another page holds a text of this case that is not saved. Yours is kept in this page alone, "
     "until you save it."
 )
+_PAGE_ALONE = "What is not saved is kept in this page alone: do not close or reload it."
 
 
 async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
@@ -113,8 +114,13 @@ class _Editor:
     async def _check(self) -> None:
         """Keep the draft; say what the checker says; make the form of a valid text."""
         text, mine = self._text, self._changes
+        trouble = ""
         try:
-            is_kept = await self._keep(text if text != self._saved else None)
+            if not await self._keep(text if text != self._saved else None):
+                trouble = _OTHERS
+        except (KlackError, OSError) as error:  # a full disk: the text is checked all the same
+            trouble = f"{_PAGE_ALONE}\n{error}"
+        try:
             found: Checked = await self._state.reader.call("check", text, self._path)
         except (KlackError, OSError) as error:
             show_error(error)
@@ -122,9 +128,7 @@ class _Editor:
         if mine != self._changes:
             return
         with self._form:
-            self._message.set_text(
-                "\n".join(filter(None, (found.error, "" if is_kept else _OTHERS)))
-            )
+            self._message.set_text("\n".join(filter(None, (found.error, trouble))))
             unsaved = "not saved" if text != self._saved else "saved"
             self._status.classes(remove="good fair out", add="out" if found.error else "good")
             valid = "not valid" if found.error else f"valid {found.kind}"
@@ -183,7 +187,7 @@ class _Editor:
             with ui.element("div"):
                 with ui.element("label") as label:
                     label.props["for"] = f"f-{item.key}"
-                    plain(item.label)
+                    plain(item.label.replace(".", ".\u200b"))  # long keys break at their dots
                 words = [item.description]
                 if item.kind:
                     words.append(f"{item.kind}, e.g. {item.example}")
@@ -216,7 +220,12 @@ class _Editor:
 
     async def _exchange(self, item: FormField, value: str) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
-        if value == self._given.get(item.key, item.written) or not value.strip():
+        now = self._given.get(item.key, item.written)
+        if value == now:
+            return
+        if not value.strip():  # to remove a key is for the text, which shows what goes with it
+            self._fill(item, now)
+            ui.notify(f"{item.label} stays as it was. To remove the key, delete it in the text.")
             return
         try:
             text = await self._state.reader.call(
@@ -228,6 +237,12 @@ class _Editor:
         self._given[item.key] = value  # the form of a text that is not valid stays as it was
         self._set(text)
         await self._check()
+
+    def _fill(self, item: FormField, value: str) -> None:
+        """Show a value in the box of the form again."""
+        self._area.client.run_javascript(
+            f"document.getElementById({json.dumps(f'f-{item.key}')}).value = {json.dumps(value)}"
+        )
 
     def _set(self, text: str) -> None:
         self._text = text
@@ -251,6 +266,7 @@ class _Editor:
                 return
             await asyncio.to_thread(self._state.folder.write, self._case, text)
         except (KlackError, OSError) as error:
+            self._message.set_text(f"Not saved. {error}")
             show_error(error)
             return
         self._saved = text

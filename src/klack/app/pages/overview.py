@@ -38,7 +38,7 @@ _WORDS = {
     "done": "done",
     "failed": "failed",
     "cancelled": "cancelled",
-    "lost": "ended without a word",
+    "lost": "ended without a result or a message",
 }
 
 
@@ -149,6 +149,13 @@ class _Overview:
             button("New case", self._ask_new)
         if not is_whole:
             plain("There is more below this folder than is looked at.", "p").classes("k-error")
+        if not self._state.folder.path.is_dir():
+            plain(
+                f"The folder {self._state.folder.path} is not there any more. Give it its former "
+                "name, or start klack app with its new one.",
+                "p",
+            ).classes("k-error").props("role=alert")
+            return
         if not cases:
             plain(
                 "No case file (YAML) below this folder yet. New valve makes one from STEP files "

@@ -219,7 +219,7 @@ def show_study_run(state: State, job: Job) -> None:
 def _status(job: Job) -> str:
     began = time.strftime("%d %b %H:%M", time.localtime(job.started))
     if job.state != "running":
-        return f"{_WORDS.get(job.state, 'ended without a word')}, {began}"
+        return f"{_WORDS.get(job.state, 'ended without a result or a message')}, {began}"
     count = job.points
     if count is None:
         return f"{job.stage}, since {began}"

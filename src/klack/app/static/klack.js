@@ -84,3 +84,30 @@ document.addEventListener("keydown", (event) => {
   const to = !dialog.contains(now) ? first : event.shiftKey && !found.slice(1).includes(now) ? last : !event.shiftKey && now === last ? first : null;
   if (to) { event.preventDefault(); to.focus(); }
 });
+// Without the server: what is typed into the text of a case is kept in this tab, until a page of it is connected again.
+(() => {
+  const key = () => `klack-text:${location.pathname}${location.search}`;
+  const area = () => document.getElementById("k-yaml");
+  const connected = () => window.socket?.connected && window.did_handshake;
+  document.addEventListener("input", (event) => {
+    if (event.target !== area() || connected()) return;
+    try { sessionStorage.setItem(key(), event.target.value); } catch { /* no room: it stays in the page */ }
+  });
+  const words = () => {
+    const spans = document.querySelectorAll("#popup > span");
+    if (spans.length !== 2) return;
+    spans[0].textContent = "No connection to klack app.";
+    spans[1].textContent = "Was it stopped? Start it again, and open the address that it prints. Changes on this page do not reach it; runs continue.";
+    document.getElementById("popup").setAttribute("role", "status");
+  };
+  document.addEventListener("DOMContentLoaded", words);
+  setInterval(() => {
+    const found = area();
+    if (!found || !connected()) return;
+    let kept = null;
+    try { kept = sessionStorage.getItem(key()); sessionStorage.removeItem(key()); } catch { return; }
+    if (kept === null || kept === found.value) return;
+    found.value = kept;
+    found.dispatchEvent(new Event("input", { bubbles: true }));
+  }, 500);
+})();

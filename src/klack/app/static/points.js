@@ -239,7 +239,7 @@
         if (job.left !== null && job.left > 0) parts.push(`about ${spent(job.left)} left`);
         this.tell(parts.join(", "), "");
       } else if (this.live) {
-        const words = { cancelled: "stopped", lost: "ended without a word", failed: "failed" };
+        const words = { cancelled: "stopped", lost: "ended without a result or a message", failed: "failed" };
         this.tell(`${words[job.state] || job.state}; the points so far are kept`, job.state === "failed" ? "out" : "fair");
       } else {
         this.tell(study && !study.feasible ? "complete; no point keeps all bounds" : "complete", study && !study.feasible ? "fair" : "good");
