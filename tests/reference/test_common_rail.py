@@ -1,6 +1,7 @@
 """The page of a common rail says what its case gives; truth: Joukowsky, and the time of a wave."""
 
 import re
+import warnings
 from math import pi
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from klack.analyses.operating_point.analysis import OPERATING_POINT
-from klack.case.valve_reader import load_valve_case
+from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
 
@@ -85,9 +86,9 @@ def test_the_first_wave_is_that_of_joukowsky_and_takes_its_time(case, result):
     assert back.max() - START == pytest.approx(1e5 * told(r"adds ([\d.]+) bar")[0], abs=0.6e5)
 
 
-def test_each_injector_injects_once_in_each_cycle(result):
+def injected(result) -> np.ndarray:
+    """Mass of each injection [mg], by injector and cycle."""
     time, cycle = result.time, 25e-3
-    least, most = told(r"between ([\d.]+) mg and ([\d.]+) mg: the mass")
     masses = []
     for place, number in enumerate((1, 3, 4, 2)):
         flow = result.channels[f"injector{number}_holes mass flow"].values
@@ -95,10 +96,38 @@ def test_each_injector_injects_once_in_each_cycle(result):
             start = 1e-3 + (turn + place / 4) * cycle
             inside = (time > start) & (time <= start + cycle / 4)
             masses.append(1e6 * float(flow[inside].sum() * (time[1] - time[0])))
+    return np.array(masses)
+
+
+def test_each_injector_injects_once_in_each_cycle(result):
+    least, most = told(r"between ([\d.]+) mg and ([\d.]+) mg: the mass")
+    masses = injected(result)
+    for number in (1, 3, 4, 2):
         stops = [e for e in result.events if e.stop == f"injector{number}_stop"]
         assert sum(event.approach_speed > 0.5 for event in stops) == 4
     assert min(masses) == pytest.approx(least, abs=0.01)
     assert max(masses) == pytest.approx(most, abs=0.01)
+
+
+@pytest.mark.slow
+def test_turbulent_friction_changes_the_injected_masses_as_little_as_the_page_says(result):
+    laminar = (HOW_TO / "common_rail.yaml").read_text(encoding="utf-8")
+    lines = r"(type: line, .*pressure: = p_rail)"
+    text, count = re.subn(lines, r"\1, friction: turbulent, roughness: 1.5 um", laminar)
+    assert count == 5
+    case = read_valve_case(text, HOW_TO / "common_rail.yaml")
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # no note of a Reynolds number
+        turbulent = simulate_network(
+            case.network.network().rows(), duration=case.run.duration, record=case.run.record
+        )
+
+    least, share = told(r"changes by more than ([\d.]+) mg, or ([\d.]+) %")
+    masses = injected(result)
+    change = np.abs(injected(turbulent) - masses)
+    assert 0.5 * least < change.max() < least + 5e-3
+    assert (change / masses).max() < 1e-2 * share
 
 
 def test_at_rest_the_relief_valve_passes_what_the_pump_delivers(tmp_path, monkeypatch):

@@ -45,10 +45,12 @@ __all__ = [
     "TERMS",
     "kinetic_energy",
     "line_cells_step",
+    "look_up_cells",
     "loss_per_length",
     "mach_number",
     "pressure_of",
     "pressure_of_total",
+    "rates_of_cells",
 ]
 
 TERMS = len(KAGAWA.rates)
@@ -137,8 +139,8 @@ def _limited(before: float, here: float, after: float) -> float:
 
 
 @njit(error_model="numpy", _nrt=False)
-def _look_up(par: Any, M: Any, J: Any, p: Any, hint: Any, work: Any) -> bool:
-    """``g``, ``Pi``, ``u``, ``a`` of every cell into ``work``; False where one is empty."""
+def look_up_cells(par: Any, M: Any, J: Any, p: Any, hint: Any, work: Any) -> bool:
+    """Write ``g``, ``Pi``, ``u``, ``a`` of every cell into ``work``; False where one is empty."""
     n, area, stretch, ambient = int(par[0]), par[2], par[3], par[4]
     table = shift(par, int(par[9]))
     for i in range(n):
@@ -157,7 +159,7 @@ def _look_up(par: Any, M: Any, J: Any, p: Any, hint: Any, work: Any) -> bool:
 
 
 @njit(error_model="numpy", _nrt=False)
-def _rates(n: int, dx: float, M: Any, work: Any, ends: Any, dM: Any, dJ: Any) -> None:
+def rates_of_cells(n: int, dx: float, M: Any, work: Any, ends: Any, dM: Any, dJ: Any) -> None:
     """Rates of mass and momentum of all cells; ``ends``: flow and flux of momentum at a and b."""
     g, Pi, u, a = work, shift(work, n), shift(work, 2 * n), shift(work, 3 * n)
     last_M, last_J = ends[0], ends[1]
@@ -384,7 +386,7 @@ def line_cells_step(par: Any, state: Any, inp: Any, out: Any) -> int:
     memory = shift(M, 4 * n)
     work = shift(memory, TERMS * n)
     if state[0] == 0.0:
-        if not _look_up(par, M, J, p, hint, work):
+        if not look_up_cells(par, M, J, p, hint, work):
             return _EMPTY
         state[0] = 1.0
     if inp[0] == WAVE_STORE:
@@ -420,14 +422,14 @@ def line_cells_step(par: Any, state: Any, inp: Any, out: Any) -> int:
         for i in range(n):
             M0[i], J0[i] = M[i], J[i]
         for stage in range(3):
-            if part + stage > 0 and not _look_up(par, M, J, p, hint, work):
+            if part + stage > 0 and not look_up_cells(par, M, J, p, hint, work):
                 return _EMPTY
-            _rates(n, dx, M, work, ends, dM, dJ)
+            rates_of_cells(n, dx, M, work, ends, dM, dJ)
             old = 0.0 if stage == 0 else (0.75 if stage == 1 else 1.0 / 3.0)
             for i in range(n):
                 M[i] = old * M0[i] + (1.0 - old) * (M[i] + h * dM[i])
                 J[i] = old * J0[i] + (1.0 - old) * (J[i] + h * dJ[i])
-    if not _look_up(par, M, J, p, hint, work):
+    if not look_up_cells(par, M, J, p, hint, work):
         return _EMPTY
     after = _energy(par, M, J, memory, work)
     left = 0.0

@@ -7,11 +7,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.compiling.jit import njit
 from klack.hydraulics.fluid_table import fluid_at
-from klack.hydraulics.line_cells import SCALARS, TERMS, line_cells_step
+from klack.hydraulics.line_cells import (
+    SCALARS,
+    TERMS,
+    line_cells_step,
+    look_up_cells,
+    rates_of_cells,
+)
 from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE
 from klack.network.step_function import address_of, call, first
 
-__all__ = ["CellEnd", "CellRun", "cell_state", "run_cells"]
+__all__ = ["CellEnd", "CellRun", "cell_rates", "cell_state", "run_cells"]
 
 Vector = NDArray[np.float64]
 
@@ -100,6 +106,28 @@ def run_cells(
         energy_residual=float((change[0] + losses.sum() - power.sum()) / np.abs(power).sum()),
         mass_residual=float((change[1] - h * flow.sum()) / held[0, 1]),
     )
+
+
+def cell_rates(parameters: Vector, state: Vector) -> tuple[Vector, Vector]:
+    """Wave speed [m/s] and rate of the mass per length [kg/(m s)] of each cell, ends closed."""
+    n = int(parameters[0])
+    cells = state[SCALARS : SCALARS + 4 * n].copy()
+    speed, rate = np.zeros(n), np.zeros(n)
+    assert _rates(parameters, cells, speed, rate)
+    return speed, rate
+
+
+@njit
+def _rates(par: Vector, cells: Vector, speed: Vector, rate: Vector) -> bool:
+    n = speed.size
+    M, J, p, hint = cells[:n], cells[n : 2 * n], cells[2 * n : 3 * n], cells[3 * n :]
+    work, ends, force = np.zeros(8 * n), np.zeros(4), np.zeros(n)
+    at = first(par)
+    if not look_up_cells(at, first(M), first(J), first(p), first(hint), first(work)):
+        return False
+    speed[:] = work[3 * n : 4 * n]
+    rates_of_cells(n, par[1], first(M), first(work), first(ends), first(rate), first(force))
+    return True
 
 
 @njit

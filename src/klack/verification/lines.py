@@ -17,6 +17,7 @@ from klack.hydraulics.line_friction import (
 from klack.network.rows import LineRow
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.line_junctions import line_junctions
+from klack.verification.local_line_cells import local_line_cells
 from klack.verification.local_lines import local_lines
 from klack.verification.single_line import (
     End,
@@ -53,6 +54,7 @@ def checks() -> list[Check]:
         *_cavity(),
         *_books(),
         *line_junctions(),
+        *local_line_cells(),
         *turbulent_line(),
         *local_lines(),
     ]
