@@ -15,10 +15,13 @@ from klack.network.step_function import is_step_function
 from klack.warming.groups import all_steps
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
-# an output stage with capacitor, gas, and more than one free volume at the start
+# an output stage with capacitor, gas, several free volumes at the start, three dimensions
 STROKES = (
     *("demo-stroke", "measured"),
-    *(HOW_TO / f"{name}.yaml" for name in ("boost_driver", "pneumatic_valve", "common_rail")),
+    *(
+        HOW_TO / f"{name}.yaml"
+        for name in ("boost_driver", "pneumatic_valve", "common_rail", "half_section_stroke")
+    ),
 )
 COUNT = """
 import sys
@@ -74,7 +77,7 @@ def test_it_says_what_was_compiled_and_where(warm):
     assert numbers["folder"] in said
     assert numbers["count"] > 150
     assert numbers["size_B"] > 1e6
-    assert set(numbers["groups"]) == {"loop", "rest", "components", "valve", "impact"}
+    assert set(numbers["groups"]) == {*("loop", "rest", "components", "valve", "spatial", "impact")}
 
 
 @pytest.mark.slow
@@ -82,7 +85,7 @@ def test_a_second_time_compiles_nothing(warm, capsys):
     assert main(["warm", "--json", "-"]) == 0
 
     again = json.loads(capsys.readouterr().out)
-    assert [group["compiled"] for group in again["groups"].values()] == [0] * 5
+    assert [group["compiled"] for group in again["groups"].values()] == [0] * 6
     assert again["count"] >= warm[0]["count"]  # other processes may add to the store
 
 

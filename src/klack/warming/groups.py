@@ -78,6 +78,14 @@ def _valve() -> None:
     run_stroke(case.model_copy(update={"run": short}))
 
 
+def _spatial() -> None:
+    from klack.analyses.stroke.run import run_stroke
+    from klack.warming.spatial_valve import spatial_valve
+
+    run_stroke(spatial_valve("axisymmetric"))
+    run_stroke(spatial_valve("swept"))
+
+
 def _impact() -> None:
     from klack.analyses.impact.run import run_impact
     from klack.case.reader import load_case
@@ -90,6 +98,7 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         "loop": Group("time loop of a network", _loop),
         "valve": Group("meshes, bodies and contacts of a valve", _valve),
+        "spatial": Group("strokes in three dimensions", _spatial),
         "components": Group("steps of all components", _components),
         "rest": Group("static equilibrium", _rest),
         "impact": Group("impacts between bodies", _impact),
