@@ -69,7 +69,7 @@ def test_points_carry_front_bounds_doubts_and_failures():
 
 
 class Listed:
-    """Workers that compute nothing, and note the order they were asked in; a log that keeps nothing."""
+    """Workers that compute nothing and note the order they were asked in; an empty log."""
 
     count, words = 1, ""
 
