@@ -1,12 +1,19 @@
-"""Time until klack answers: its help, its import, a first small impact, a first stroke."""
+"""Time until klack answers: its help, its import, a first small impact, a first stroke, a page.
+
+The page is that of ``klack app`` on an empty folder, in Chromium without a display that runs
+already; it is left out where there is none.
+"""
 
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+from importlib.util import find_spec
 from pathlib import Path
 from time import perf_counter
 
+import psutil
 from number import Number, Size
 
 __all__ = ["numbers"]
@@ -31,12 +38,46 @@ def numbers(size: Size) -> list[Number]:
         impact = [*_KLACK, "impact", "two-rods", "--level", "reduced", "--quiet"]
         name = "klack impact two-rods, reduced, with the report"
         found.append(Number(name=name, value=_with_output(impact, repeats), unit="s"))
+        found += _pages(repeats)
     if size == "full":
         with tempfile.TemporaryDirectory() as cache:
             seconds = _with_output(impact, 1, NUMBA_CACHE_DIR=cache)
         found.append(Number(name="the same with nothing compiled yet", value=seconds, unit="s"))
         found += _strokes(repeats)
     return found
+
+
+def _pages(repeats: int) -> list[Number]:
+    """From the command to the first page, drawn with all that is on it."""
+    program = shutil.which("chromium")
+    if program is None or not all(map(find_spec, ("nicegui", "playwright"))):
+        return []
+    from playwright.sync_api import sync_playwright
+
+    walls, spent = [], []
+    with sync_playwright() as library, tempfile.TemporaryDirectory() as folder:
+        browser = library.chromium.launch(executable_path=program, args=["--no-sandbox"])
+        for _ in range(repeats + 1):  # the first one warms the caches of the machine
+            page = browser.new_page()
+            begin = perf_counter()
+            with subprocess.Popen(
+                [*_KLACK, "app", folder, "--no-open"], stdout=subprocess.PIPE, text=True
+            ) as server:
+                assert server.stdout is not None
+                address = next(line.strip() for line in server.stdout if "http://" in line)
+                page.goto(address)
+                page.wait_for_selector("text=No case file")
+                walls.append(perf_counter() - begin)
+                used = psutil.Process(server.pid).cpu_times()
+                spent.append(used.user + used.system)
+                server.terminate()
+            page.close()
+        browser.close()
+    name = "klack app, first page drawn"
+    return [
+        Number(name=name, value=min(walls[1:]), unit="s", goal=3.0),
+        Number(name=f"{name}, processor time of the server", value=min(spent[1:]), unit="s"),
+    ]
 
 
 def _strokes(repeats: int) -> list[Number]:

@@ -11,9 +11,10 @@ from made_study import made_study
 
 from klack.analyses.study import live_record
 from klack.analyses.study.analysis import STUDY
+from klack.analyses.study.evaluation import Evaluation
 from klack.analyses.study.live_record import LiveRecord
 from klack.analyses.study.record import NOT_YET, StudyRecord
-from klack.analyses.study.run import run_study
+from klack.analyses.study.run import asked_points, run_study
 from klack.app import study_points
 from klack.app.answers import StudyChoice
 from klack.app.folder import OpenFolder
@@ -65,6 +66,30 @@ def test_points_carry_front_bounds_doubts_and_failures():
     for k in range(3, 200):
         beaten = np.any(np.all(pairs < pairs[k], axis=1))
         assert beaten != (k in found["front"])
+
+
+class Listed:
+    """Workers that compute nothing and note the order they were asked in; an empty log."""
+
+    count, words = 1, ""
+
+    def __init__(self) -> None:
+        self.done: dict = {}
+        self.asked: tuple[int, ...] = ()
+
+    def compute(self, asked, places, keep, progress) -> None:
+        self.asked = places
+
+
+def test_the_case_as_it_is_is_computed_before_the_points_of_a_study():
+    tree = read_case_tree(CASE)
+    case = tree.any_case()
+    points, asked = asked_points(case, tree, study_of(case, tree, STUDY_FILE))
+    listed = Listed()
+
+    Evaluation(listed, listed).rows(asked, silent)
+
+    assert listed.asked == (len(points.values), *range(len(points.values)))
 
 
 def test_a_study_with_objectives_has_the_front_that_its_text_asks_for():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.store import load_record
 from klack.analyses.study.analysis import STUDY
-from klack.analyses.study.goals import Goals, bound_text, goals_of
+from klack.analyses.study.goals import Goals, goals_of
 from klack.analyses.study.record import NOT_YET, StudyColumn, StudyRecord
 from klack.analyses.study.wording import short_labels, shown_unit
 from klack.case.reader import parse, validated
@@ -153,12 +153,10 @@ def front_of(record: StudyRecord) -> Front:
     objectives, violations = goals.objective_values(of), goals.violations(of)
     front = find_front(objectives, violations)
     points = front.points[np.argsort(objectives[front.points, 0], kind="stable")]
-    signs = zip(goals.objectives, goals.signs, strict=True)
     return Front(
-        ways={name: "minimise" if sign > 0 else "maximise" for name, sign in signs},
-        bounds=tuple(
-            f"{bound.measure} {bound_text(bound, columns[bound.measure].unit)}"
-            for bound in goals.bounds
+        ways=dict(zip(goals.objectives, goals.ways, strict=True)),
+        bounds=goals.bound_texts(
+            {name: item.unit for name, item in columns.items()}, lambda measure, _: measure
         ),
         points=tuple(map(int, points)),
         best=int(points[compromise(objectives[points])]) if points.size else -1,

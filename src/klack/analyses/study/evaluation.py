@@ -97,7 +97,9 @@ class Evaluation:
                 self._log.add(key, before.with_row(measures, row))
 
         if first:
-            self._workers.compute(asked, tuple(first.values()), keep, progress)
+            # the case as it is first: who watches compares every point with it
+            order = sorted(first.values(), key=lambda place: bool(asked.points.written[place]))
+            self._workers.compute(asked, tuple(order), keep, progress)
         self.seconds += perf_counter() - begin
         return [
             row or self._as(rows, first, key, measures) for key, row in zip(keys, rows, strict=True)

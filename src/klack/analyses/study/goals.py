@@ -1,7 +1,7 @@
 """What an optimisation looks for: measures to minimise or maximise, and bounds to keep."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,6 +66,28 @@ class Goals:
         """Measures that are looked at, each with whether it is worse when it is higher."""
         own = zip(self.objectives, (sign > 0.0 for sign in self.signs), strict=True)
         return tuple(dict.fromkeys([*own, *((b.measure, b.is_most) for b in self.bounds)]))
+
+    @property
+    def ways(self) -> tuple[str, ...]:
+        """``"minimise"`` or ``"maximise"``, of each objective."""
+        return tuple("minimise" if sign > 0.0 else "maximise" for sign in self.signs)
+
+    def bound_texts(
+        self, units: Mapping[str, str], name: Callable[[str, bool], str]
+    ) -> tuple[str, ...]:
+        """Bounds in words.
+
+        Parameters
+        ----------
+        units : mapping of str to str
+            Of the measures.
+        name : callable
+            Name of the column of a measure and side.
+        """
+        named = [(name(bound.measure, bound.is_most), bound) for bound in self.bounds]
+        return tuple(
+            f"{column} {bound_text(bound, units[bound.measure])}" for column, bound in named
+        )
 
     def objective_values(self, of: Mapping[Side, NDArray[np.float64]]) -> NDArray[np.float64]:
         """Numbers to minimise, shape (points, objectives), from columns of measures."""

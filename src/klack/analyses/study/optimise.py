@@ -19,7 +19,7 @@ from klack.analyses.study.columns import (
 )
 from klack.analyses.study.computing import sounds_of
 from klack.analyses.study.evaluation import Evaluation, asked_of
-from klack.analyses.study.goals import Goals, Side, bound_text, goals_of
+from klack.analyses.study.goals import Goals, Side, goals_of
 from klack.analyses.study.gradients import Gradients, require_gradients
 from klack.analyses.study.live_record import Seen
 from klack.analyses.study.log import point_log_form
@@ -409,15 +409,12 @@ def _optimum(
         return measure if made is None else made.name((measure, high))
 
     signs = zip(goals.objectives, goals.signs, strict=True)
-    bounds = [
-        f"{name(b.measure, b.is_most)} {bound_text(b, units[b.measure])}" for b in goals.bounds
-    ]
     kept = np.all(front.violations <= 0.0, axis=1) & np.isfinite(front.objectives).all(axis=1)
     return Optimum(
         algorithm=f"{words}, seed {given.seed}",
         objectives=tuple(name(measure, sign > 0.0) for measure, sign in signs),
-        ways=tuple(source.study.objectives.values()),
-        bounds=tuple(bounds),
+        ways=goals.ways,
+        bounds=goals.bound_texts(units, name),
         kept=kept,
         front=front.ordered,
         best=front.best,

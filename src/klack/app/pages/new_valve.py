@@ -219,7 +219,9 @@ class _Guide:
             plain(
                 "Axis of motion is z, in both files; the needle is above. One body in each file: "
                 "several solids of one file are glued where they touch. An assembly of both bodies "
-                "is not taken apart: export each body by itself."
+                "is not split here: in the CAD program, hide or suppress all parts but one, save "
+                "that as STEP, and do the same with the other, both in the coordinates of the "
+                "assembly."
                 if self._plan.source == "step"
                 else "In mm. Each row: r, z, name of the surface that leads there; for an arc also "
                 "r and z of its centre. The first row is the start, and the outline closes itself.",
