@@ -8,6 +8,7 @@ from typing import Any
 
 import psutil
 import pytest
+from app_browser import LONG
 from browser_pages import watched
 from served_app import Served
 
@@ -231,7 +232,7 @@ def test_another_page_gets_no_socket_nor_a_foreign_name(server, client):
 def test_nothing_that_lies_in_the_folder_runs_in_a_page(browser, server, folder):
     context = browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(LONG)
     said = watched(page, server.base)
     page.goto(server.address)
     page.get_by_text("case.yaml").first.wait_for()
@@ -274,7 +275,7 @@ def test_a_text_longer_than_is_taken_is_told_and_the_page_stays(browser, server,
     (folder / "large.yaml").write_text("klack: 1\ntitle: x\n")
     context = browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(120_000)
+    page.set_default_timeout(LONG)
     page.goto(server.address)
     page.wait_for_selector("#k-body")
     page.goto(f"{server.base}/case?path=large.yaml")

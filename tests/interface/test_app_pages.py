@@ -20,7 +20,7 @@ pytest.importorskip("nicegui")
 pytest.importorskip("playwright.sync_api")
 pytestmark = pytest.mark.slow
 
-_LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
+_LONG = 300_000  # [ms]: a loaded machine meshes, imports and compiles
 
 
 @pytest.fixture(scope="module")
