@@ -28,13 +28,13 @@ from klack.case.shipped import find_case
 
 _MOVES_AT_ONCE = 500
 _PAGES_AT_ONCE = 10
-_PATIENCE = 120_000  # [ms]
+_PATIENCE = 300_000  # [ms]
 _MOVED = """([bar, share]) => {
   const took = document.getElementById('k-took');
   bar.value = +bar.min + share * (+bar.max - +bar.min);
   const begin = performance.now();
   return new Promise((done, fail) => {
-    setTimeout(() => fail(new Error('no answer to a move')), 60000);
+    setTimeout(() => fail(new Error('no answer to a move')), 300000);
     new MutationObserver((_, seen) => {
       seen.disconnect();
       requestAnimationFrame(() => setTimeout(() => done(performance.now() - begin)));

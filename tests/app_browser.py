@@ -11,7 +11,7 @@ from served_app import Served
 
 __all__ = ["LONG", "client", "page", "require_within", "server"]
 
-LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
+LONG = 300_000  # [ms]: a loaded machine meshes, imports and compiles
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +51,6 @@ def require_within(page: Any) -> None:
         page.wait_for_timeout(300)  # charts are drawn again, in seconds on a loaded machine
         page.wait_for_function(
             "document.documentElement.scrollWidth <= document.documentElement.clientWidth",
-            timeout=10_000,
+            timeout=LONG,
         )
     page.set_viewport_size(before)

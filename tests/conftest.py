@@ -5,7 +5,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from zlib import crc32
 
@@ -37,6 +37,21 @@ collect_ignore_glob = [
     "viewer_case.py",
     "data/*.py",
 ]
+
+
+@pytest.fixture(scope="module")
+def kept_results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Keep meshes, modes and contact laws as for a user, in one empty store for this test run.
+
+    For tests of pages and commands whose bodies are only the material.  All workers share it.  Not
+    for tests that compute something twice to compare it, or that replace a function of klack.
+    """
+    folder = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        folder = folder.parent
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("KLACK_CACHE", str(folder / "kept-results"))
+        yield folder / "kept-results"
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

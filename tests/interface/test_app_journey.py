@@ -19,7 +19,7 @@ sync_api = pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")
 pytestmark = pytest.mark.slow
 
-_LONG = 120_000  # [ms]: a loaded machine meshes, imports and compiles
+_LONG = 300_000  # [ms]: a loaded machine meshes, imports and compiles
 _LEAST = 100  # steps
 VALVE, COPY = "valve/case.yaml", "valve/case-2.yaml"
 

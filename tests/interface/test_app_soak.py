@@ -27,9 +27,11 @@ def soaked() -> Iterator[tuple[list[Memory], list[Memory]]]:
         found.open_sliders()
         for share in np.linspace(0.02, 0.98, 20):  # every reach once, all kinds of answers
             found.move(float(share))
+        found.move(0.5)  # both times the same answer: others have other parts in the page
         moves = [found.memory()]
         for number in range(100):
             found.move((0.618 * number) % 1.0)
+        found.move(0.5)
         moves.append(found.memory())
         pages = []
         for _ in range(2):
