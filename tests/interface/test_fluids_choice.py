@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 
+from klack.case.valve_reader import read_valve_case
 from klack.errors import ConvergenceError, InputError
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_choice import FluidChoice
@@ -171,3 +172,27 @@ def test_the_fluids_of_the_documentation_can_be_read():
     fluids = [read(YAML(typ="safe").load(text)["fluid"]).at(293.15) for text in texts]
     assert [fluid.name for fluid in fluids] == ["n-heptane", "ISO 4113", "ours", "ours"]
     assert float(fluids[3].sound_speed(5e6)) == pytest.approx(1240.0, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("fluid", "ambient", "place"),
+    [
+        ("water", "ambient: {temperature: 170 degC}", r"network\.ambient\.temperature: got 170"),
+        ("{name: generic mineral oil, viscosity_law: barus}", "", r"network\.fluid: got barus"),
+    ],
+)
+def test_a_fluid_that_does_not_fit_its_network_is_told_at_its_key(fluid, ambient, place):
+    text = f"""
+klack: 1
+title: A pipe
+network:
+  {ambient}
+  fluid: {fluid}
+  components:
+    needle: {{type: rigid-mass, mass: 3 g}}
+    spring: {{type: spring, stiffness: 1 N/mm, preload: 0 N}}
+  connections: [[needle.body, spring.end]]
+run: {{duration: 1 ms}}
+"""
+    with pytest.raises(InputError, match=place + r".*, of fluid '(water|generic mineral oil)'"):
+        read_valve_case(text, Path("case.yaml"))

@@ -13,6 +13,7 @@ from pydantic import (
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, one_of
 from klack.input.section import Name, Section, Text
 from klack.network.catalogue import (
@@ -182,6 +183,19 @@ class NetworkSection(Section):
         CaseProblem
             See :class:`klack.network.network.Network`.
         """
-        fluid = self.fluid.at(self.ambient.temperature) if self.fluid is not None else None
+        fluid = self._fluid_here() if self.fluid is not None else None
         gas = self.gas.gas() if self.gas is not None else None
         return Network(self.components, self.connections, self.ambient.ambient(), fluid, gas)
+
+    def _fluid_here(self) -> Any:
+        """Fluid at the temperature of the surroundings; what does not fit there, at its key."""
+        try:
+            return self.fluid.at(self.ambient.temperature)
+        except CaseProblem:
+            raise
+        except InputError as error:
+            fluid, _, about = error.where.partition(": ")
+            place = ("ambient", "temperature") if about == "temperature" else ("fluid",)
+            raise CaseProblem(
+                place, got=error.got, expected=f"{error.expected}, of {fluid}", hint=error.hint
+            ) from None

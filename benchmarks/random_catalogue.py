@@ -1,0 +1,121 @@
+"""Random valves out of the whole catalogue through the command line: how each of them ends.
+
+``uv run --group dev python benchmarks/random_catalogue.py --count 200`` draws valves in which every
+component type but the FMU occurs, runs ``klack stroke`` on each, once more with half the step, and
+``klack stroke --steady`` and ``klack linearise`` on every third; ``--seed`` begins elsewhere,
+``--only N`` prints one case.  It counts how they end: in an answer, in one with a note, in an error
+of the input (exit code 2), in a run that stopped (1).  A fault is an internal error, an energy
+residual above 1e-9 or a first impact that changes with the step without a note; each is printed.
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+from collections import Counter
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from drawn_catalogue import Drawn, draw
+
+from klack.cli.main import main as klack
+
+__all__ = ["ending", "main", "written"]
+
+_RESIDUAL = 1e-9  # of the energy throughput
+_TIME, _PEAK = 5e-8, 5e-4  # [s], [-]: what is promised of the first impact on a stop
+
+
+def written(drawn: Drawn, folder: Path) -> Path:
+    """Write a draw and its parts into a folder; the path of the case."""
+    for name, text in drawn.parts.items():
+        (folder / name).write_text(text)
+    case = folder / "case.yaml"
+    case.write_text(drawn.text)
+    return case
+
+
+def _told(command: str, case: Path, *words: str) -> tuple[int, dict[str, Any], str]:
+    """Exit code, JSON and messages of one command."""
+    found, said = case.with_name("found.json"), StringIO()
+    found.unlink(missing_ok=True)
+    fixed = ("--no-report", "--quiet", "--json", str(found), "--out", str(case.with_name("out")))
+    with redirect_stdout(StringIO()), redirect_stderr(said):
+        code = klack([command, str(case), *fixed, *words])
+    data = json.loads(found.read_text()) if found.exists() else {}
+    return code, data, said.getvalue().strip()
+
+
+def ending(case: Path, *, more: bool) -> tuple[str, str]:
+    """How a case ends: ``answer``, ``note``, ``error``, ``stopped`` or ``fault``, and its words.
+
+    Parameters
+    ----------
+    case : Path
+    more : bool
+        Operating point and linear model as well.
+    """
+    others = [_told("stroke", case, "--steady"), _told("linearise", case)] if more else []
+    code, found, said = _told("stroke", case)
+    for wrong, _, words in ((code, found, said), *others):
+        if wrong not in (0, 1, 2) or (wrong and "Try: " not in words and "expected" not in words):
+            return "fault", words[-500:]
+    if code:
+        return ("error" if code == 2 else "stopped"), said
+    step = f"{0.5e9 * found['step_s']:.12g} ns"
+    apart = _apart(found, _told("stroke", case, "--step", step)[1])
+    if not found["energy_residual"] <= _RESIDUAL and not said:
+        return "fault", f"energy residual {found['energy_residual']:.2g}"
+    if apart and not said:
+        return "fault", apart
+    return ("note" if said else "answer"), f"{said} {apart}".strip()
+
+
+def _apart(one: dict[str, Any], other: dict[str, Any]) -> str:
+    """First impacts on each stop that differ with half the step."""
+    first: dict[str, Any] = {}
+    for event in one["events"]:
+        first.setdefault(event["stop"], event)
+    words = []
+    for stop, event in first.items():
+        twin = next((e for e in other.get("events", ()) if e["stop"] == stop), None)
+        if twin is None:
+            words.append(f"{stop} is not touched with half the step")
+            continue
+        late = abs(event["time_s"] - twin["time_s"])
+        peak = abs(event["peak_force_N"] / (twin["peak_force_N"] or 1.0) - 1.0)
+        if late > _TIME or peak > _PEAK:
+            words.append(f"{stop} with half the step: {late:.1e} s later, peak {peak:.1e} off")
+    return "; ".join(words)
+
+
+def main() -> int:
+    """Run draws; 1 if one of them is a fault."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--only", type=int)
+    chosen = parser.parse_args()
+    seeds = range(chosen.seed, chosen.seed + chosen.count)
+    if chosen.only is not None:
+        sys.stdout.write(draw(chosen.only).text + "\n")
+        seeds = range(chosen.only, chosen.only + 1)
+    ends, types = Counter[str](), Counter[str]()
+    for seed in seeds:
+        with tempfile.TemporaryDirectory() as folder:
+            drawn = draw(seed)
+            types.update(set(drawn.types))
+            end, words = ending(written(drawn, Path(folder)), more=seed % 3 == 0)
+        ends[end] += 1
+        if end in ("fault", "stopped") or chosen.only is not None:
+            sys.stdout.write(f"{seed}: {end}: {' '.join(words.split())[:400]}\n")
+            sys.stdout.flush()
+    told = ", ".join(f"{count} {end}" for end, count in ends.most_common())
+    sys.stdout.write(f"{len(seeds)} valves of {len(types)} component types: {told}\n")
+    return int(ends["fault"] > 0)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,36 @@
+"""Truth: each random valve out of the whole catalogue ends in an answer or in words.
+
+The draws are those of ``benchmarks/random_catalogue.py``, which runs as many as wanted.
+"""
+
+import runpy
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from klack.network.catalogue import type_words
+
+ROOT = Path(__file__).parents[2]
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(ROOT / "benchmarks")
+    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_catalogue.py"))
+
+
+def test_every_component_type_is_drawn():
+    found = Counter(
+        word for seed in range(200) for word in set(DRAWS["draw"](seed, "damper.fmu").types)
+    )
+
+    assert {word: found[word] for word in type_words() if found[word] < 5} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("seed", range(0, 36, 3))
+def test_a_random_valve_ends_in_an_answer_or_in_words(seed, tmp_path):
+    case = DRAWS["written"](DRAWS["draw"](seed), tmp_path)
+
+    end, words = DRAWS["ending"](case, more=True)
+
+    assert end in ("answer", "note", "error"), words
