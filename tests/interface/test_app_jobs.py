@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import psutil
@@ -165,3 +166,18 @@ def test_a_run_that_misses_the_first_request_to_stop_is_asked_again(folder, monk
     os.utime(place / "cancelled", (0, 0))  # long ago
 
     assert ended(jobs).state == "cancelled"
+
+
+def test_a_double_click_starts_one_run(folder, sleeping):
+    jobs = Jobs(folder)
+
+    def start(_):
+        try:
+            return jobs.start("impact", "bad.yaml", "klack-results/bad")
+        except InputError:
+            return None
+
+    with ThreadPoolExecutor(4) as threads:
+        found = [job for job in threads.map(start, range(4)) if job is not None]
+
+    assert len(found) == len(sleeping) == 1

@@ -26,6 +26,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
+from threading import Lock
 from typing import Any, Literal
 
 import psutil
@@ -109,6 +110,7 @@ class Jobs:
         self._folder = folder
         self._place = folder.path / _HOME / "jobs"
         self._children: dict[str, subprocess.Popen[bytes]] = {}
+        self._starting = Lock()  # pages start runs in threads: a double click is two of them
 
     def start(
         self, command: str, case: str, out: str, options: Sequence[str] = (), study: str = ""
@@ -128,6 +130,13 @@ class Jobs:
         path = self._folder.absolute(case)
         if study:
             options = [*options, "--study", str(self._folder.absolute(study))]
+        with self._starting:
+            return self._started(command, case, path, out, options, study)
+
+    def _started(
+        self, command: str, case: str, path: Path, out: str, options: Sequence[str], study: str
+    ) -> Job:
+        """Start it, unless too much runs; the caller holds the lock."""
         running = [job for job in self.all() if job.state == "running"]
         if len(running) >= _MOST_RUNNING:
             raise _refused(f"{len(running)} runs at a time", f"at most {_MOST_RUNNING}")
