@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import psutil
@@ -142,3 +143,41 @@ def test_a_run_that_cannot_be_written_down_is_not_left_running(folder, sleeping,
         Jobs(folder).start("impact", "bad.yaml", "klack-results/bad")
     assert [child.poll() is not None for child in sleeping] == [True]
     assert list((folder.path / ".klack-app" / "jobs").iterdir()) == []
+
+
+def test_a_run_that_misses_the_first_request_to_stop_is_asked_again(folder, monkeypatch):
+    deaf = "import signal, time; n = signal.signal(signal.SIGTERM, lambda *_: signal.signal(signal"
+    deaf += ".SIGTERM, signal.SIG_DFL)); print(flush=True); time.sleep(60)"
+    real = subprocess.Popen
+    monkeypatch.setattr(
+        jobs_module.subprocess,
+        "Popen",
+        lambda arguments, **more: real([sys.executable, "-c", deaf], **more),
+    )
+    jobs = Jobs(folder)
+    name = jobs.start("impact", "bad.yaml", "klack-results/bad").name
+    place = folder.path / ".klack-app" / "jobs" / name
+    while not (place / "stdout").stat().st_size:  # its handler is set
+        time.sleep(0.01)
+
+    jobs.cancel(name)
+    (job,) = jobs.all()
+    assert (job.state, job.stage) == ("running", "stopping")
+    os.utime(place / "cancelled", (0, 0))  # long ago
+
+    assert ended(jobs).state == "cancelled"
+
+
+def test_a_double_click_starts_one_run(folder, sleeping):
+    jobs = Jobs(folder)
+
+    def start(_):
+        try:
+            return jobs.start("impact", "bad.yaml", "klack-results/bad")
+        except InputError:
+            return None
+
+    with ThreadPoolExecutor(4) as threads:
+        found = [job for job in threads.map(start, range(4)) if job is not None]
+
+    assert len(found) == len(sleeping) == 1

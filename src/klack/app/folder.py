@@ -223,7 +223,7 @@ class OpenFolder:
                 raise _failed(relative, error) from None
 
     def require_here(self) -> None:
-        """Refuse to go on in a folder that was renamed or removed meanwhile.
+        """Refuse to continue in a folder that was renamed or removed meanwhile.
 
         Raises
         ------
@@ -306,7 +306,7 @@ def _failed(relative: str, error: OSError) -> InputError:
         return _refused(relative, error.strerror or str(error))
     return InputError(
         f"file {relative[:200]!r}",
-        got=error.strerror,
+        got=error.strerror or str(error),
         expected="room on the disk, and the right to read and write there",
         hint="make room, or change the rights, then try again; keep the page open until then.",
     )

@@ -26,6 +26,7 @@ from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from shutil import rmtree
+from threading import Lock
 from typing import Any, Literal
 
 import psutil
@@ -50,6 +51,7 @@ LIVE = "live"
 _HOME = ".klack-app"
 _NAME = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{8}")
 _MOST_RUNNING = 4
+_AGAIN = 10.0  # [s] after which a run that was cancelled is asked again
 _TOLD = 4000  # last characters of what a command printed
 _STOPPED = (130, 143)
 _CANCELLED = "cancelled"  # file: a process that only begins has no exit code to tell
@@ -108,6 +110,7 @@ class Jobs:
         self._folder = folder
         self._place = folder.path / _HOME / "jobs"
         self._children: dict[str, subprocess.Popen[bytes]] = {}
+        self._starting = Lock()  # pages start runs in threads: a double click is two of them
 
     def start(
         self, command: str, case: str, out: str, options: Sequence[str] = (), study: str = ""
@@ -127,6 +130,13 @@ class Jobs:
         path = self._folder.absolute(case)
         if study:
             options = [*options, "--study", str(self._folder.absolute(study))]
+        with self._starting:
+            return self._started(command, case, path, out, options, study)
+
+    def _started(
+        self, command: str, case: str, path: Path, out: str, options: Sequence[str], study: str
+    ) -> Job:
+        """Start it, unless too much runs; the caller holds the lock."""
         running = [job for job in self.all() if job.state == "running"]
         if len(running) >= _MOST_RUNNING:
             raise _refused(f"{len(running)} runs at a time", f"at most {_MOST_RUNNING}")
@@ -194,9 +204,7 @@ class Jobs:
         """Ask a run to stop; it leaves nothing half written."""
         process = self._process(_require_name(name))
         if process is not None:
-            (self._place / name / _CANCELLED).touch()
-            with suppress(psutil.Error):
-                process.send_signal(signal.SIGTERM)
+            _ask_to_stop(self._place / name / _CANCELLED, process)
 
     def forget(self, name: str) -> None:
         """Remove what is known of a run that has ended; its result stays."""
@@ -211,7 +219,10 @@ class Jobs:
             return None
         if name in self._children and self._children[name].poll() is not None:
             del self._children[name]
-        is_running = self._process(name) is not None
+        process, cancelled = self._process(name), place / _CANCELLED
+        is_running, is_cancelled = process is not None, cancelled.exists()
+        if process is not None and is_cancelled and _seconds_since(cancelled) > _AGAIN:
+            _ask_to_stop(cancelled, process)  # a library may have dropped the first request
         ending = _read(place / "ending.json")  # after the look at the process
         progress = _read(place / "progress.json") or {}
         try:
@@ -220,8 +231,8 @@ class Jobs:
             return Job(
                 name=name,
                 **known,
-                state=_state(is_running, code, (place / _CANCELLED).exists()),
-                stage=str(progress.get("stage", "starting")),
+                state=_state(is_running, code, is_cancelled),
+                stage="stopping" if is_cancelled else str(progress.get("stage", "starting")),
                 fraction=float(progress.get("fraction", 0.0)),
                 code=code,
                 told=_tail(place / "stderr") if code else "",
@@ -243,6 +254,19 @@ class Jobs:
             return process if same and alive else None
         except (psutil.Error, KeyError, TypeError, ValueError):
             return None
+
+
+def _ask_to_stop(cancelled: Path, process: psutil.Process) -> None:
+    cancelled.touch()
+    with suppress(psutil.Error):
+        process.send_signal(signal.SIGTERM)
+
+
+def _seconds_since(file: Path) -> float:
+    try:
+        return time.time() - file.stat().st_mtime
+    except OSError:  # dismissed at this moment
+        return 0.0
 
 
 def _state(is_running: bool, code: int | None, is_cancelled: bool) -> State:

@@ -99,7 +99,7 @@ class Part:
         low, high = self.box
         size = " x ".join(f"{1e3 * x:.4g}" for x in high - low)
         solids = 1 if self.content is None else len(self.content.solids)
-        count = "" if solids == 1 else f"{solids} solids that are glued, "
+        count = "" if solids == 1 else f"{solids} solids, glued where they touch; "
         faces, solid_faces = self._faces("half"), self._faces("solid")
         shown = faces if self.profiles is not None else solid_faces
         if len(shown) > _MOST_FACES:

@@ -46,7 +46,7 @@ class Uploads:
                         raise _refused(f"more than {LARGEST_UPLOAD // 2**20} MiB")
                     file.write(part)
             if not head.lstrip().startswith(_START):
-                got = "an empty file" if not size else f"a file that begins with {head[:24]!r}"
+                got = "an empty file" if not size else f"a file that begins with {_words(head)}"
                 raise _refused(got)
             partial.rename(self._place / name)
         finally:
@@ -59,6 +59,12 @@ class Uploads:
         files = sorted(self._place.glob("*.step"), key=lambda file: file.stat().st_mtime_ns)
         for file in files[:-_MOST]:
             file.unlink(missing_ok=True)
+
+
+def _words(head: bytes) -> str:
+    """Beginning of a file that was no STEP file, to be recognised by who sent it."""
+    text = head[:24].decode("utf-8", errors="replace").split("\n")[0]
+    return repr(text) if text.isprintable() else "bytes that are no text"
 
 
 def _refused(got: str) -> InputError:

@@ -119,7 +119,7 @@ def read_step(path: Path) -> Any:
     if not start.startswith(b"ISO-10303-21"):
         raise InputError(
             str(path),
-            got=f"a file that starts with {start[:24]!r}",
+            got=f"a file that starts with {start[:24]!r}" if start else "an empty file",
             expected="a STEP file, which starts with 'ISO-10303-21;'",
             hint="export the part as STEP (AP214 or AP242) from the CAD program.",
         )
