@@ -563,9 +563,11 @@ class _Assembly:
         swept = np.zeros((nodes.nodes, self.width))
         for w in range(nodes.walls):
             swept[nodes.wall_node[w]] += nodes.wall_area[w] * self.speed[nodes.wall_port[w]]
-        for i in np.flatnonzero(~self.junction[: nodes.volumes]):
+        for i in range(nodes.volumes):
+            if self.junction[i]:
+                continue
             rho, slope = self.fluid[i, 0], self.fluid[i, 1]
-            self.rates[self.pressures[int(i)]] = (self.inflow[i] - rho * swept[i]) / (
+            self.rates[self.pressures[i]] = (self.inflow[i] - rho * swept[i]) / (
                 float(state.held[i]) * slope
             )
 
