@@ -18,7 +18,7 @@ __all__ = ["UnboundedTree", "bounded_yaml"]
 _MOST_VALUES = 200_000
 _DEEPEST = 40
 _LONGEST_NUMBER = 1000  # characters; the time of a conversion grows with their square
-_OF_NUMBERS = re.compile(r"[0-9A-Fa-fox_.:+-]*")
+_OF_NUMBERS = re.compile(r"[-+]?\.?[0-9][0-9A-Fa-fox_.:+-]*")
 
 
 class UnboundedTree(ComposerError):
