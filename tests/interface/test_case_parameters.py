@@ -329,3 +329,18 @@ def test_a_study_builds_bodies_again_where_they_follow_from_a_parameter(old, new
     groups = groups_of(SimpleNamespace(points=points, case=case, kind=STROKES), range(3))
 
     assert [group.places for group in groups] == ([(0,), (1, 2)] if builds else [(0, 1, 2)])
+
+
+def test_parameters_without_effect_are_named(tmp_path):
+    text = with_parameters(
+        'k: 10 N/mm, x0: 1.2 mm, twice: "= 2 * x0", spare: 3 mm, other: "= 2 * spare"',
+        "preload: 12 N",
+        'preload: "= k * twice / 2"',
+    )
+    case = tmp_path / "case.yaml"
+    case.write_text(text)
+
+    told = read_valve_case(text, case).parameter_notes
+    assert [note.partition(":")[0] for note in told] == ["parameters.spare", "parameters.other"]
+    assert klack.run_stroke(case).record.warnings[:2] == told
+    assert read_valve_case(PARAMETRIC, SMALL).parameter_notes == ()

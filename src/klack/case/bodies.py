@@ -495,6 +495,16 @@ class CaseFile(Section):
         return self._expanded.behind(key) if self._expanded is not None else (key,)
 
     @property
+    def parameter_notes(self) -> tuple[str, ...]:
+        """What tells that parameters of the case have no effect."""
+        unused = self._expanded.unused_parameters() if self._expanded is not None else ()
+        return tuple(
+            f"parameters.{name}: nothing in this case follows from it. "
+            f"Try: an expression where its value belongs, such as '= {name}'."
+            for name in unused
+        )
+
+    @property
     def own_components(self) -> Mapping[str, str]:
         """Components that are not part of klack, with a digest of their code: here none."""
         return {}

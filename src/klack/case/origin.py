@@ -104,3 +104,9 @@ class ExpandedCase:
             for place, item in self.expressions.items()
             if key in item.sources and place[0] not in _RANGES
         )
+
+    def unused_parameters(self) -> tuple[str, ...]:
+        """Parameters at the head of the case that no value of it follows from, nor any range."""
+        used = {key for item in self.expressions.values() for key in item.sources}
+        names = self.data.get("parameters") or {}
+        return tuple(name for name in names if ("parameters", name) not in used)
