@@ -136,6 +136,6 @@ def test_a_slider_page_that_is_reloaded_again_and_again_answers(page, server, fo
     found.open(page, server.base, folder)
 
     for _ in range(6):  # each left page may come back for some seconds, and holds its bodies
-        page.reload(wait_until="commit")
+        page.goto(page.url, wait_until="domcontentloaded")
 
     page.wait_for_selector(".k-slider input")

@@ -186,7 +186,7 @@ def run_network(
     R: int,
     origin: float,
     h: float,
-    passes: int,
+    allow_macro: bool,
     network: NetworkArrays,
     recording: Recording,
     scratch: Scratch,
@@ -195,9 +195,8 @@ def run_network(
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
     ``near`` fine steps are a macro step about a touch, ``R`` of them a sub-step while films are
-    smooth.  Macro steps take at least so many ``passes``, and there are none for 0.  ``clock``
-    counts: see :data:`CLOCK`; its time zero is at ``origin``.  ``report`` gets the row of a
-    failure, its status and its time.
+    smooth.  ``clock`` counts: see :data:`CLOCK`; its time zero is at ``origin``.  ``report`` gets
+    the row of a failure, its status and its time.
     """
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
@@ -205,7 +204,7 @@ def run_network(
     last_steps = _steps_of(last_level, M, near)
     in_record, record, record_time = 0, 0, 0.0
     for _macro in range(macros):
-        together = passes > 0
+        together = allow_macro
         flight = together and may_fly(contacts, origin + now * h, M * h)
         smooth, apart = R > 1, True
         done = 0
@@ -245,7 +244,7 @@ def run_network(
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
                 waves_incoming(loop.waves, step.H, loop.ends.c, loop.ends.Z)
-            status = _settle(step, sub, parts, flight, passes, loop, first(clock), first(report))
+            status = _settle(step, sub, parts, flight, loop, first(clock), first(report))
             if status > STATUS_DONE:
                 return status
             if status != STATUS_DONE:
@@ -354,14 +353,7 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
 
 @unfolded
 def _settle(
-    step: Step,
-    sub: Step,
-    parts: int,
-    flight: bool,
-    passes: int,
-    loop: Any,
-    clock: Any,
-    report: Any,
+    step: Step, sub: Step, parts: int, flight: bool, loop: Any, clock: Any, report: Any
 ) -> int:
     """One step up to what it would change: again and again, until its guess missed nothing.
 
@@ -392,9 +384,7 @@ def _settle(
         miss(bodies, G)
         left, work = cost_of_catching_up(contacts, bodies.at)
         late, rubbed = cost_of_late_sliders(loop.sliding, bodies.at)
-        if (fine or attempt + 1 >= passes) and not matters(
-            bodies, step.level, share, energy, left + late, work + rubbed
-        ):
+        if not matters(bodies, step.level, share, energy, left + late, work + rubbed):
             return STATUS_DONE
         if not finite(bodies):
             break

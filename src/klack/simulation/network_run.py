@@ -475,7 +475,7 @@ def _advance(
         grid.sizes.middle,
         0.0,
         grid.step,
-        int(grid.sizes.coarse > 1),
+        grid.sizes.coarse > 1,
         network.arrays,
         recording,
         scratch_of(network, recording),

@@ -80,7 +80,6 @@ _CHUNK = 32  # looks between two searches for touches
 _STRETCHED = 16  # looks before a touch in which the steps stretch
 _QUIET = 8  # looks before a touch in which they do not: the end of its approach
 _NOTICED = 0.02  # of the fastest touch: slower ones have no phase to keep
-_PASSES = 2  # at least, of a macro step: the first one leaves derivatives where the guess had them
 _WITHOUT_BOUND = 1e3  # of the longest displacement: bounces alone let derivatives grow to 1e2
 
 
@@ -528,7 +527,7 @@ class _Running:
             self.sizes.middle,
             self.origin,
             self.h,
-            _PASSES if self.sizes.coarse > 1 else 0,
+            self.sizes.coarse > 1,
             self.numbers,
             self.recording,
             self.scratch,

@@ -592,7 +592,7 @@ class _Moving:
                 sizes.middle,
                 0.0,
                 sizes.step,
-                int(sizes.coarse > 1),
+                sizes.coarse > 1,
                 self.arrays,
                 part,
                 run.scratch,

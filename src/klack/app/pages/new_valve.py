@@ -25,7 +25,6 @@ from klack.units import format_si
 
 __all__ = ["new_valve_page"]
 
-_READING = "Reading ... The first part takes longer: the CAD library is loaded."
 _WORDS = {"needle": "the moving body, above", "housing": "the body that it hits"}
 _GRADES = {"good": "good", "doubt": "fair", "error": "out"}
 _TITLES = {"good": "good", "doubt": "doubtful", "error": "error"}
@@ -51,15 +50,12 @@ class _Guide:
         self._state, self._plan = state, plan
         self._facts: dict[str, PartFacts | str] = {}
         self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
-        self._readings, self._is_reading = 0, False
 
     def build(self) -> None:
         """Make the page, then read the parts while it is shown already."""
         self._steps = ui.element("nav").classes("k-steps")
         self._steps.props["aria-label"] = "Steps of the guide"
         self._body = ui.element("div")
-        with self._body:
-            plain(_READING, "p").classes("k-soft").props("role=status")
         with ui.element("div").classes("k-head k-onward"):
             self._back = button("Back", partial(self._move, -1)).props("id=k-back")
             self._next = button("Next", partial(self._move, 1), main=True).props("id=k-next")
@@ -68,6 +64,8 @@ class _Guide:
             self._over = button("Start over", self._start_over)
         for found in (self._back, self._next, self._over):  # until there is a step to leave
             found.props["disabled"] = True
+        with self._body:
+            plain("Reading the parts ...", "p").classes("k-soft").props("role=status")
         ui.timer(0.05, self._opened, once=True)
 
     async def _opened(self) -> None:
@@ -109,18 +107,14 @@ class _Guide:
     async def _start_over(self) -> None:
         async with self._turn:
             await asyncio.to_thread(self._state.plans.forget)
-            self._plan, self._facts, self._is_reading = ValvePlan(), {}, False
+            self._plan, self._facts = ValvePlan(), {}
             await self._show()
 
     # ----------------------------------------------------------------------- the parts
 
-    def of_body(self, body: str) -> str:
-        """File or drawing that is chosen for a body, or nothing."""
-        return self._plan.of(body, "file" if self._plan.source == "step" else "table")
-
     def source(self, body: str) -> tuple[str, str] | None:
         """Where a body comes from, for the process that reads it; None where nothing is given."""
-        value = self.of_body(body)
+        value = self._plan.of(body, "file" if self._plan.source == "step" else "table")
         if not value.strip():
             return None
         if self._plan.source == "table":
@@ -133,19 +127,17 @@ class _Guide:
         return {body: source for body, source in found.items() if source is not None}
 
     async def _read_parts(self) -> None:
-        """Read both parts; what is read stays apart where others were chosen meanwhile."""
-        mine, found = self._readings, dict[str, PartFacts | str]()
+        facts: dict[str, PartFacts | str] = {}
         for body in BODIES:
             try:
                 source = self.source(body)
                 if source is not None:
                     if source[0] == "step":
                         self._require_small(self._plan.of(body, "file"))
-                    found[body] = await self._state.shapes.call("part", body, source)
+                    facts[body] = await self._state.shapes.call("part", body, source)
             except (KlackError, OSError) as error:
-                found[body] = str(error).replace(f"{self._state.folder.path}/", "")
-        if mine == self._readings:
-            self._facts, self._is_reading = found, False
+                facts[body] = str(error).replace(f"{self._state.folder.path}/", "")
+        self._facts = facts
 
     def _require_small(self, file: str) -> None:
         size = self._state.folder.absolute(file).stat().st_size
@@ -195,7 +187,6 @@ class _Guide:
         self._next.set_visibility(self._plan.step < _LAST)
         missing = ("choose two parts that can be read", "choose both contact faces and a held face")
         stuck = self._plan.step == furthest < 2
-        stuck = stuck and not self._is_reading
         self._why.set_text(f"To continue, {missing[furthest]}." if stuck else "")
 
     async def _show(self) -> None:
@@ -292,17 +283,9 @@ class _Guide:
 
     async def _with_parts(self, plan: ValvePlan) -> None:
         """Read other parts; faces that they do not have are chosen no more."""
-        self._readings += 1
-        mine = self._readings
         await self.keep(plan)  # at once: the page may be left while parts are read
         async with self._turn:
-            if mine != self._readings:  # a later choice has its turn
-                return
-            self._facts, self._is_reading = {}, True
-            await self._show()
             await self._read_parts()
-            if mine != self._readings:
-                return
             known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
             if all(self.facts(body) is not None for body in BODIES):
                 await self.keep(self._plan.with_faces(known))
@@ -344,8 +327,6 @@ class _Guide:
     def _show_facts(self, body: str) -> None:
         found = self._facts.get(body)
         if found is None:
-            if self._is_reading and self.of_body(body).strip():
-                plain(_READING, "p").classes("k-soft").props("role=status")
             return
         if isinstance(found, str):
             plain(found, "p").classes("k-error").props("role=alert")

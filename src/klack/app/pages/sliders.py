@@ -41,24 +41,21 @@ async def sliders_page(state: State, given: Mapping[str, str]) -> None:
     case = given.get("path", "")
     try:
         text = await asyncio.to_thread(state.folder.case_text, case)
-        worker = state.explorer()
     except KlackError as error:
         with frame(state, "Sliders"):
             plain(str(error), "p").classes("k-error")
         return
-    client = ui.context.client
-    client.on_connect(lambda: state.mark_left(worker, is_left=False))
-    client.on_disconnect(lambda: state.mark_left(worker, is_left=True))
-    client.on_delete(lambda: state.give_back(worker))
     with frame(state, "Sliders", case):
-        await _Sliders(state, worker, case).build(text)
+        await _Sliders(state, case).build(text)
 
 
 class _Sliders:
     """Sliders, the pinned design, and the answers as they come."""
 
-    def __init__(self, state: State, worker: Worker, case: str) -> None:
-        self._state, self._worker, self._case = state, worker, case
+    _worker: Worker
+
+    def __init__(self, state: State, case: str) -> None:
+        self._state, self._case = state, case
         self._values: dict[str, float] = {}
         self._moved = asyncio.Event()
         self._pinned: Answer | None = None
@@ -75,6 +72,7 @@ class _Sliders:
 
         async def opened() -> None:
             try:
+                self._take_process()  # here: the browser is connected, and is seen to leave
                 found: Opened = await self._worker.call("open", text, path)
             except KlackError as error:
                 self._waiting.set_text(str(error))
@@ -86,6 +84,14 @@ class _Sliders:
             await self._follow()
 
         ui.timer(0.05, opened, once=True)
+
+    def _take_process(self) -> None:
+        state, client = self._state, self._body.client
+        self._worker = worker = state.explorer()
+        client.on_connect(lambda: state.mark_left(worker, is_left=False))
+        client.on_disconnect(lambda: state.mark_left(worker, is_left=True))
+        client.on_delete(lambda: state.give_back(worker))
+        state.mark_left(worker, is_left=not client.has_socket_connection)
 
     # ----------------------------------------------------------------------- what is seen
 
