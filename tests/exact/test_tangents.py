@@ -388,9 +388,9 @@ def test_program_itself_is_differentiated(coarse):
         for channel in ("mass.body displacement", "mass.body velocity"):
             found = slopes(run, given, lambda r, c=channel: r.channels[c].values[1:])[name]
             plus, minus = (end.channels[channel].values[1:] for end in ends)
-            # macro steps of the run itself end after one pass, those with derivatives after two
-            least = (1e-8 if coarse else 3e-7) * np.abs(found).max()
-            np.testing.assert_allclose(found, (plus - minus) / (2 * h), rtol=1e-6, atol=least)
+            np.testing.assert_allclose(
+                found, (plus - minus) / (2 * h), rtol=1e-6, atol=1e-8 * np.abs(found).max()
+            )
 
 
 # --------------------------------------------------------------------------- hydraulic parts
