@@ -62,6 +62,7 @@ def open_guide(page: Any, server: Served) -> None:
     page.goto(f"{server.base}/new")
     page.wait_for_selector(".k-steps button")
     page.get_by_role("button", name="Start over").click()
+    page.wait_for_function("!document.querySelector('[inert]')")  # the fields of the new start
     page.get_by_label("The two bodies come from").wait_for()
 
 
@@ -207,6 +208,33 @@ def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser
     page.get_by_role("button", name="Write, open editor").press("Enter")
     page.wait_for_selector("text=valid impact, saved")
     assert (folder / "drawn" / "case.yaml").is_file()
+
+
+def test_what_is_done_while_parts_are_read_is_kept(page, server):
+    open_guide(page, server)
+    choose_step(page, "needle", "cad/needle.step")
+    choose_step(page, "housing", "cad/housing.step")  # at once, the needle is being read
+    page.wait_for_selector("text=Reading ...")
+    assert page.locator("#k-next").is_disabled()
+    read(page)
+    page.wait_for_selector("text=Both parts are turned")
+
+    page.get_by_label("The two bodies come from").select_option("table")
+    areas = {body: page.locator(f"textarea[aria-label*={body}]") for body in ("needle", "housing")}
+    areas["needle"].wait_for()
+    page.get_by_role("button", name="Fill in the example of the needle").click()
+    areas["housing"].press_sequentially("0, 0", delay=60)  # half a row, while the needle is read
+    read(page, 1)
+    assert areas["housing"].input_value() == "0, 0"
+    assert areas["housing"].evaluate("e => e === document.activeElement")
+    assert areas["needle"].input_value().strip() != ""
+
+    for leave in ("Start over", "1 Parts"):  # no field of a step that is being left takes a change
+        is_closed = page.get_by_role("button", name=leave).evaluate(
+            "e => { e.click(); return document.querySelector('#k-step > *').inert; }"
+        )
+        assert is_closed
+        page.wait_for_function("!document.querySelector('[inert]')")
 
 
 def test_files_that_cannot_be_used_are_told_in_words(page, server, folder):

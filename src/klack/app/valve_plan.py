@@ -81,6 +81,10 @@ class ValvePlan:
         """A choice for one body: ``file``, ``label``, ``table``, ``contact`` or ``material``."""
         return str(getattr(self, f"{body}_{what}"))
 
+    def given(self, body: str) -> str:
+        """File or drawing of a body; empty where nothing is given."""
+        return self.of(body, "file" if self.source == "step" else "table")
+
     def with_body(self, body: str, what: str, value: str) -> "ValvePlan":
         """The same with another choice for one body."""
         changed: dict[str, Any] = {f"{body}_{what}": value}

@@ -11,6 +11,7 @@ from klack.app.state import State
 
 __all__ = [
     "START_VALUE",
+    "Handler",
     "asking",
     "button",
     "differing",

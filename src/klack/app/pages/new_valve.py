@@ -4,19 +4,18 @@ import asyncio
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from pathlib import PurePosixPath
 from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
+from nicegui.elements.mixins.text_element import TextElement
 
 from klack.app.answers import Finding, PartFacts, Review
-from klack.app.drawing_table import EXAMPLES
 from klack.app.folder import LARGEST_FILE, result_names
-from klack.app.guard import LARGEST_UPLOAD
 from klack.app.pages.faces import FacesStep
 from klack.app.pages.fields import choice_field, text_field
-from klack.app.pages.frame import button, frame, heading, plain, show_error
+from klack.app.pages.frame import Handler, button, frame, heading, plain, show_error
+from klack.app.pages.parts import PartsStep
 from klack.app.state import State
 from klack.app.valve_plan import BODIES, STEPS, ValvePlan
 from klack.errors import InputError, KlackError
@@ -25,7 +24,6 @@ from klack.units import format_si
 
 __all__ = ["new_valve_page"]
 
-_WORDS = {"needle": "the moving body, above", "housing": "the body that it hits"}
 _GRADES = {"good": "good", "doubt": "fair", "error": "out"}
 _TITLES = {"good": "good", "doubt": "doubtful", "error": "error"}
 _LAST = len(STEPS) - 1
@@ -55,13 +53,13 @@ class _Guide:
         """Make the page, then read the parts while it is shown already."""
         self._steps = ui.element("nav").classes("k-steps")
         self._steps.props["aria-label"] = "Steps of the guide"
-        self._body = ui.element("div")
+        self._body = ui.element("div").props("id=k-step")
         with ui.element("div").classes("k-head k-onward"):
-            self._back = button("Back", partial(self._move, -1)).props("id=k-back")
-            self._next = button("Next", partial(self._move, 1), main=True).props("id=k-next")
+            self._back = _leaving("Back", partial(self._move, -1)).props("id=k-back")
+            self._next = _leaving("Next", partial(self._move, 1), main=True).props("id=k-next")
             self._why = plain("", "span").classes("k-soft").props("role=status")
             plain("").style("flex:1 1 auto")
-            self._over = button("Start over", self._start_over)
+            self._over = _leaving("Start over", self._start_over)
         for found in (self._back, self._next, self._over):  # until there is a step to leave
             found.props["disabled"] = True
         with self._body:
@@ -106,15 +104,18 @@ class _Guide:
 
     async def _start_over(self) -> None:
         async with self._turn:
-            await asyncio.to_thread(self._state.plans.forget)
-            self._plan, self._facts = ValvePlan(), {}
+            try:
+                await asyncio.to_thread(self._state.plans.forget)
+                self._plan, self._facts = ValvePlan(), {}
+            except OSError as error:
+                show_error(error)
             await self._show()
 
     # ----------------------------------------------------------------------- the parts
 
     def source(self, body: str) -> tuple[str, str] | None:
         """Where a body comes from, for the process that reads it; None where nothing is given."""
-        value = self._plan.of(body, "file" if self._plan.source == "step" else "table")
+        value = self._plan.given(body)
         if not value.strip():
             return None
         if self._plan.source == "table":
@@ -174,7 +175,7 @@ class _Guide:
         self._steps.clear()
         with self._steps:
             for number, name in enumerate(STEPS):
-                found = button(f"{number + 1} {name}", partial(self._go, partial(int, number)))
+                found = _leaving(f"{number + 1} {name}", partial(self._go, partial(int, number)))
                 found.props["aria-current"] = "step" if number == self._plan.step else "false"
                 if number > furthest:
                     found.props["disabled"] = True
@@ -202,161 +203,41 @@ class _Guide:
             self._show_case,
         )[self._plan.step]
         self._body.clear()
-        with self._body:
+        with self._body, ui.element("div"):
             heading(f"{self._plan.step + 1} {STEPS[self._plan.step]}").classes("k-sr")
             await shown()
 
     # ----------------------------------------------------------------------- 1 parts
 
     async def _show_parts(self) -> None:
-        with ui.element("div").classes("k-sheet k-pad k-stack"):
-            choice_field(
-                "The two bodies come from",
-                {"step": "STEP files", "table": "drawings of their half sections"},
-                self._plan.source,
-                partial(self._change_parts, "source"),
-            )
-            plain(
-                "Axis of motion is z, in both files; the needle is above. One body in each file: "
-                "several solids of one file are glued where they touch. An assembly of both bodies "
-                "is not split here: in the CAD program, hide or suppress all parts but one, save "
-                "that as STEP, and do the same with the other, both in the coordinates of the "
-                "assembly."
-                if self._plan.source == "step"
-                else "In mm. Each row: r, z, name of the surface that leads there; for an arc also "
-                "r and z of its centre. The first row is the start, and the outline closes itself.",
-                "p",
-            ).classes("k-soft")
-        with ui.element("div").classes("k-grid k-below"):
-            steps: tuple[str, ...] = ()
-            if self._plan.source == "step":
-                steps = (await asyncio.to_thread(self._state.folder.look)).steps
-            for body in BODIES:
-                with ui.element("section").classes("k-sheet k-pad k-stack"):
-                    heading(f"{body.capitalize()}: {_WORDS[body]}", 3)
-                    if self._plan.source == "step":
-                        self._show_files(body, steps)
-                    else:
-                        self._show_table(body)
-                    self._show_facts(body)
-        self._show_models()
-
-    def _show_files(self, body: str, steps: tuple[str, ...]) -> None:
-        now, label = self._plan.of(body, "file"), self._plan.of(body, "label")
-        names = {"": "choose ..."} | {name: name for name in steps}
-        if now and now not in names:
-            names[now] = f"{label or PurePosixPath(now).name} (from this computer)"
-        choice_field(
-            f"STEP file of the {body} in the folder",
-            names,
-            now,
-            lambda value: self._change_file(body, value, ""),
+        files = (await asyncio.to_thread(self._state.folder.look)).steps
+        self._parts = PartsStep(
+            lambda: self._plan, lambda: self._facts, self.keep, self._read_again, files
         )
-        with ui.element("label"):
-            plain(f"or from this computer, {LARGEST_UPLOAD // 2**20} MiB at most").classes("k-soft")
-            box = ui.element("input").props("type=file accept=.step,.stp,.STEP,.STP")
-            box.classes("k-input").props["aria-label"] = f"STEP file of the {body}, from here"
-            box.on(
-                "change",
-                lambda event: self._uploaded(body, event.args),
-                js_handler="async (e) => { const file = e.target.files[0]; if (file) emit(await "
-                f"window.klackUpload(file, {LARGEST_UPLOAD})); }}",
-            )
+        self._parts.build()
 
-    async def _uploaded(self, body: str, answer: Any) -> None:
-        if not isinstance(answer, dict):
-            return
-        if answer.get("error"):
-            async with self._turn:
-                self._facts[body] = str(answer["error"])[:2000]
-                await self._show()
-            return
-        await self._change_file(body, str(answer.get("file", "")), str(answer.get("name", "")))
-
-    async def _change_file(self, body: str, file: str, label: str) -> None:
-        plan = self._plan.with_body(body, "file", file).with_body(body, "label", label[:200])
-        await self._with_parts(plan)
-
-    async def _change_parts(self, what: str, value: str) -> None:
-        changed: dict[str, Any] = {what: value}
-        await self._with_parts(replace(self._plan, **changed))
-
-    async def _with_parts(self, plan: ValvePlan) -> None:
-        """Read other parts; faces that they do not have are chosen no more."""
-        await self.keep(plan)  # at once: the page may be left while parts are read
+    async def _read_again(self, bodies: tuple[str, ...]) -> None:
+        """Read the bodies of the plan; faces that they do not have are chosen no more."""
+        for body in bodies:
+            self._facts.pop(body, None)
+        self._show_steps()
+        self._parts.show_facts()
         async with self._turn:
             await self._read_parts()
             known = {body: tuple(face.name for face in self._faces_of(body)) for body in BODIES}
             if all(self.facts(body) is not None for body in BODIES):
                 await self.keep(self._plan.with_faces(known))
-            await self._show()
+            if self._plan.step:  # another step is shown by now, of what was read before
+                await self._show()
+            else:
+                self._show_steps()
+                self._parts.show_facts()
 
     def _faces_of(self, body: str) -> tuple[Any, ...]:
         facts = self.facts(body)
         if facts is None:
             return ()
         return facts.faces if self.model == "half" else facts.solid_faces
-
-    def _show_table(self, body: str) -> None:
-        area = plain(self._plan.of(body, "table"), "textarea").classes("k-input k-code")
-        area.props("rows=10 spellcheck=false autocomplete=off")
-        area.props["aria-label"] = f"drawing of the {body}: r, z, surface, centre r, centre z"
-        area.on(
-            "change",
-            lambda event: self._with_parts(self._plan.with_body(body, "table", str(event.args))),
-            js_handler="(e) => emit(e.target.value)",
-        )
-        with ui.element("div").classes("k-tools k-left"):
-            button(
-                "Fill in the example",
-                lambda: self._with_parts(self._plan.with_body(body, "table", EXAMPLES[body])),
-            ).props["aria-label"] = f"Fill in the example of the {body}"
-            with ui.element("label").classes("k-soft"):
-                plain("or a CSV file ")
-                box = ui.element("input").props("type=file accept=.csv,.txt,text/csv")
-                box.classes("k-input").props["aria-label"] = f"CSV file of the {body}"
-                box.on(
-                    "change",
-                    lambda event: self._with_parts(
-                        self._plan.with_body(body, "table", str(event.args or ""))
-                    ),
-                    js_handler="async (e) => { const file = e.target.files[0]; "
-                    "if (file) emit(await file.slice(0, 200000).text()); }",
-                )
-
-    def _show_facts(self, body: str) -> None:
-        found = self._facts.get(body)
-        if found is None:
-            return
-        if isinstance(found, str):
-            plain(found, "p").classes("k-error").props("role=alert")
-            return
-        turned = (
-            f"not turned around z: {found.not_turned}"
-            if found.not_turned
-            else "a body of revolution around z"
-        )
-        plain(f"{found.words}; {turned}", "p").classes("k-read").props("role=status")
-
-    def _show_models(self) -> None:
-        facts = [self.facts(body) for body in BODIES]
-        if self._plan.source != "step" or None in facts:
-            return
-        with ui.element("div").classes("k-sheet k-pad k-stack k-below"):
-            if any(f is not None and f.not_turned for f in facts):
-                plain(
-                    "Computed as solids, in minutes: not both parts are turned around z.", "p"
-                ).classes("k-soft")
-                return
-            choice_field(
-                "Both parts are turned. Compute",
-                {
-                    "half": "their half sections: seconds, fine elements at the contact",
-                    "solid": "solids: minutes, coarser elements at the contact",
-                },
-                self._plan.model,
-                partial(self._change_parts, "model"),
-            )
 
     # ----------------------------------------------------------------------- 2 faces
 
@@ -382,19 +263,21 @@ class _Guide:
             for body in BODIES:
                 with ui.element("section").classes("k-sheet k-pad k-stack"):
                     heading(body.capitalize(), 3)
-                    choice_field(
-                        f"Material of the {body}",
-                        {name: f"{name}: {entry.condition}" for name, entry in MATERIALS.items()},
-                        self._plan.of(body, "material"),
-                        partial(self._change_material, body),
-                    )
-                    _show_material(MATERIALS.get(self._plan.of(body, "material")))
+                    self._show_material(body)
 
-    async def _change_material(self, body: str, value: str) -> None:
-        if value in MATERIALS:
-            await self.keep(self._plan.with_body(body, "material", value))
-            async with self._turn:
-                await self._show()
+    def _show_material(self, body: str) -> None:
+        async def change(name: str) -> None:
+            await self.keep(self._plan.with_body(body, "material", name))
+            constants.clear()
+            with constants:
+                _show_constants(MATERIALS.get(name))
+
+        now = self._plan.of(body, "material")
+        words = {name: f"{name}: {entry.condition}" for name, entry in MATERIALS.items()}
+        choice_field(f"Material of the {body}", words, now, change)
+        constants = ui.element("div").classes("k-scroll")
+        with constants:
+            _show_constants(MATERIALS.get(now))
 
     # ----------------------------------------------------------------------- 4 motion
 
@@ -470,7 +353,8 @@ class _Guide:
                 if finding.advice:
                     plain(f"Try: {finding.advice}", "div")
             if finding.grade != "good":
-                button(f"To {STEPS[finding.step].lower()}", partial(self._go, lambda: finding.step))
+                where = f"To {STEPS[finding.step].lower()}"
+                _leaving(where, partial(self._go, lambda: finding.step))
 
     # ----------------------------------------------------------------------- 6 case
 
@@ -535,10 +419,17 @@ class _Guide:
         ui.navigate.to("/" if then == "run" else f"/{then}?{query}")
 
 
-def _show_material(entry: MaterialEntry | None) -> None:
+def _leaving(text: str, handler: Handler, *, main: bool = False) -> TextElement:
+    """A button that leads to another step; this one takes no more changes, they would be lost."""
+    found = button(text, handler, main=main)
+    found.on("click", js_handler="() => document.querySelector('#k-step > *').inert = true")
+    return found
+
+
+def _show_constants(entry: MaterialEntry | None) -> None:
     if entry is None:
         return
-    with ui.element("div").classes("k-scroll"), ui.element("table").classes("k-table k-sources"):
+    with ui.element("table").classes("k-table k-sources"):
         with ui.element("thead"), ui.element("tr"):
             for word in ("", "value", "source"):
                 plain(word, "th")
