@@ -14,7 +14,7 @@ with the axial weights *a* of the contact space.  For a free body the approach i
 of mass, as in a modal model with the rigid mode as one coordinate.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,7 +42,7 @@ __all__ = [
     "condensed_compliance",
     "contact_compliance",
     "extended_compliance",
-    "half_width_of",
+    "half_widths",
     "highest_load",
     "points_across",
     "ring_radius",
@@ -55,6 +55,9 @@ _CHUNK = 64
 
 COARSE = 1.5
 """Element size over half width of a contact that is too coarse to be judged."""
+
+_HALVES = 8
+"""Approaches below the first one that is asked for; at a 256th a contact has a few points."""
 
 _SECTORS = 6
 
@@ -372,7 +375,7 @@ class ContactLadder:
             pressures=pressures,
             area=active @ space.area,
             active_count=active.sum(axis=1),
-            half_width=np.array([half_width_of(space, lam) for lam in pressures]),
+            half_width=half_widths(space, pressures),
             compliance=self.compliance,
         )
 
@@ -384,7 +387,10 @@ class ContactLadder:
         require_positive("static contact: count", count, "states")
         highest, lowest = _approach_for(self, max_force), self.first_touch
         approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
-        pressures = np.array([self.pressures(delta) for delta in approach])
+        # from the last one down: a contact that shrinks loses the points that joined it last
+        widest = self.active  # for a ladder that goes on from here
+        pressures = np.array([self.pressures(delta) for delta in approach[::-1]])[::-1]
+        self.active = widest
         _require_within(self.space, approach, pressures)
         return approach, pressures
 
@@ -406,6 +412,10 @@ def _approach_for(ladder: ContactLadder, target: float) -> float:
     first = int(np.argmin(np.where(ladder.space.axial > 1e-6, ladder.space.gap, np.inf)))
     low, low_force = ladder.first_touch, 0.0
     high = low + target * float(ladder.solver.A[first, first]) * 0.1
+    # few rounds each from a contact that grows, many from a guess
+    if ladder.layer is None and ladder.active is None:
+        for halves in range(_HALVES, 0, -1):
+            ladder.pressures(low + (high - low) / 2.0**halves)
     for _ in range(60):
         high_force = ladder.force(high)
         if high_force >= target:
@@ -429,47 +439,67 @@ def _approach_for(ladder: ContactLadder, target: float) -> float:
     )
 
 
-def half_width_of(space: ContactSpace, lam: NDArray[np.float64]) -> float:
-    """Half width [m] of a contact from second moments of its pressure.
+def half_widths(
+    space: ContactSpace, pressures: Iterable[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """Half width [m] of each state of a contact from second moments of its pressures [N].
 
     Semi-elliptic over a strip of half width b: variance b^2/4.  Hertzian over a circle of radius
     a: mean square distance 2 a^2/5.  A single row of hats of elements of size h spreads its load
     with a variance of h^2/24, the floor.
     """
+    meridians = _meridians(space)
+    return np.array([_half_width(space, meridians, lam) for lam in pressures])
+
+
+def _half_width(
+    space: ContactSpace, meridians: list[NDArray[np.float64]], lam: NDArray[np.float64]
+) -> float:
     total = lam.sum()
     if not total > 0:
         return 0.0
     weight = lam / total
     floor = float(weight @ space.size) / np.sqrt(6.0)
-    spread, mean = _closest_ring(space, weight)
+    spread, mean = _closest_ring(weight, meridians)
     if spread < _RING * mean:
         return max(2.0 * spread, floor)
     centre = weight @ space.points
     if space.dimension == 2:
         centre[0] = 0.0
-    return max(float(np.sqrt(2.5 * weight @ np.sum((space.points - centre) ** 2, axis=1))), floor)
+    return max(float(np.sqrt(2.5 * weight @ _square(space.points - centre))), floor)
 
 
-def _closest_ring(space: ContactSpace, weight: NDArray[np.float64]) -> tuple[float, float]:
-    """Spread of the pressure [m] and its mean radius [m] about the axis that suits it best."""
-    return min(_about_axis(space, weight, axis) for axis in _axes(space))
+def _meridians(space: ContactSpace) -> list[NDArray[np.float64]]:
+    """Radius and height [m] of the points about each axis that a ring may have.
+
+    The axis of motion, and the middle of the candidates.
+    """
+    axes = [np.zeros(space.dimension - 1)]
+    if space.dimension == 3:
+        axes.append(np.average(space.points[:, :2], axis=0, weights=space.area))
+    height = space.points[:, -1]
+    return [
+        np.column_stack([np.linalg.norm(space.points[:, :-1] - axis, axis=1), height])
+        for axis in axes
+    ]
 
 
-def _axes(space: ContactSpace) -> list[NDArray[np.float64]]:
-    """Where a ring may be centred: the axis of motion, and the middle of the candidates."""
-    if space.dimension == 2:
-        return [np.zeros(1)]
-    return [np.zeros(2), np.average(space.points[:, :2], axis=0, weights=space.area)]
-
-
-def _about_axis(
-    space: ContactSpace, weight: NDArray[np.float64], axis: NDArray[np.float64]
+def _closest_ring(
+    weight: NDArray[np.float64], meridians: list[NDArray[np.float64]]
 ) -> tuple[float, float]:
+    """Spread of the pressure [m] and its mean radius [m] about the axis that suits it best."""
+    return min(_about_axis(weight, meridian) for meridian in meridians)
+
+
+def _about_axis(weight: NDArray[np.float64], meridian: NDArray[np.float64]) -> tuple[float, float]:
     """Spread of the pressure in the meridian plane [m] and its mean radius [m]."""
-    radius = np.linalg.norm(space.points[:, :-1] - axis, axis=1)
-    across = np.column_stack([radius, space.points[:, -1]])
-    mean = weight @ across
-    return float(np.sqrt(weight @ np.sum((across - mean) ** 2, axis=1))), float(mean[0])
+    mean = weight @ meridian
+    return float(np.sqrt(weight @ _square(meridian - mean))), float(mean[0])
+
+
+def _square(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Squared lengths of few components, which NumPy sums slowly along rows."""
+    return sum((column**2 for column in vectors.T[1:]), vectors[:, 0] ** 2)
 
 
 def check_rim(static: StaticContact) -> None:
@@ -582,7 +612,7 @@ def ring_radius(space: ContactSpace, lam: NDArray[np.float64]) -> float | None:
     space : ContactSpace
     lam : array, shape (nc,) [N]
     """
-    spread, mean = _closest_ring(space, lam / lam.sum())
+    spread, mean = _closest_ring(lam / lam.sum(), _meridians(space))
     return mean if spread < _RING * mean else None
 
 

@@ -26,7 +26,7 @@ from scipy.interpolate import PchipInterpolator
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.contact.pressure_limit import PressureLimit
-from klack.contact.statics import half_width_of
+from klack.contact.statics import half_widths
 from klack.errors import ConvergenceError
 from klack.plasticity.ladder import LoadingState, YieldingContact
 
@@ -237,7 +237,7 @@ def yielding_loops(
         states=tuple(states),
         openings=tuple(openings),
         taken=taken,
-        half_width=np.array([half_width_of(space, state.pressures) for state in states]),
+        half_width=half_widths(space, (state.pressures for state in states)),
         radius=space.points[:, 0],
         limit=limit,
     )
