@@ -189,7 +189,7 @@ def test_files_that_are_not_usable(step, tmp_path):
         mesh_step(tmp_path / "none.step", COARSE)
     other = tmp_path / "mesh.step"
     other.write_text("solid ascii stl\n")
-    with pytest.raises(InputError, match=r"(?s)starts with b'solid ascii stl.*ISO-10303-21"):
+    with pytest.raises(InputError, match=r"(?s)starts with 'solid ascii stl.*ISO-10303-21"):
         mesh_step(other, COARSE)
     other.write_text(step.read_text()[:4000])
     with pytest.raises(InputError, match="that OpenCASCADE cannot read"):

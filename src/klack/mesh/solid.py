@@ -115,8 +115,8 @@ def read_step(path: Path) -> Any:
             hint="check the path; it is relative to where you started the program.",
         )
     with path.open("rb") as file:
-        start = file.read(2048).lstrip()
-    if not start.startswith(b"ISO-10303-21"):
+        start = file.read(2048).lstrip().decode("latin-1")
+    if not start.startswith("ISO-10303-21"):
         raise InputError(
             str(path),
             got=f"a file that starts with {start[:24]!r}" if start else "an empty file",

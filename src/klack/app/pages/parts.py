@@ -116,6 +116,7 @@ class PartsStep:
 
         async def change(file: str) -> None:
             self._refused[body].set_text("")
+            box.client.run_javascript(f"document.getElementById('c{box.id}').value = ''")
             await self._change_file(body, file, label if file == now else "")
 
         choice_field(f"STEP file of the {body} in the folder", names, now, change)
