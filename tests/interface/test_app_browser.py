@@ -1,10 +1,14 @@
 """The pages in a browser: they answer, stay within the window, and load nothing from elsewhere."""
 
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
+from klack.analyses.catalogue import analysis_in
+from klack.app.folder import OpenFolder
+from klack.app.jobs import Jobs
 from klack.case.shipped import find_case
 
 pytest.importorskip("nicegui")
@@ -70,6 +74,63 @@ def test_form_and_text_follow_each_other_and_survive(page, server, folder):
     page.wait_for_selector("text=valid impact, saved")
     assert "0.35 m/s" in (folder / CASE).read_text()
     require_within(page)
+
+
+def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, folder):
+    file = folder / "valve" / "edited.yaml"
+    text = (folder / CASE).read_text("utf-8")
+    text = re.sub(r"(levels: )\[.*\]", r"\1[reduced]", text)
+    text = re.sub(r"(speed: )[0-9.]+ m/s", r"\g<1>0.3 m/s", text)
+    file.write_text(text, "utf-8")
+    jobs = Jobs(OpenFolder(folder))
+    page.goto(f"{server.base}/case?path=valve/edited.yaml")
+    page.wait_for_selector("text=valid impact, saved")
+    area, run = page.get_by_label("case file, YAML"), page.get_by_role("button", name="Run")
+
+    area.fill(text.replace("0.3 m/s", "0.3 kg"))
+    run.click()
+    page.get_by_role("button", name="Save and run").click()
+    page.wait_for_selector("text=Not run.")
+    area.fill(text.replace("0.3 m/s", "0.4 m/s"))
+    run.click()
+    page.wait_for_selector("text=the file does not have this text yet")
+    page.get_by_role("button", name="Cancel").click()
+    page.wait_for_selector(".q-dialog", state="detached")
+    file.write_text(text + "# theirs\n", "utf-8")
+    run.click()
+    page.get_by_role("button", name="Save and run").click()
+    page.wait_for_selector("text=The file was changed by another program")
+    assert jobs.all() == []  # nothing that is not seen was run
+    page.get_by_role("button", name="Discard changes").click()
+    page.wait_for_selector("text=valid impact, saved")
+    area.fill(text.replace("0.3 m/s", "0.4 m/s"))
+    run.click()
+    page.get_by_role("button", name="Save and run").click()
+
+    page.wait_for_selector("text=klack impact valve/edited.yaml")
+    assert page.url == f"{server.base}/"
+    page.wait_for_selector("text=done, ")
+    out = folder / "klack-results" / jobs.all()[0].out.rpartition("/")[2]
+    assert analysis_in(out).load(out).speed == 0.4
+    require_within(page)
+    shutil.rmtree(out)
+    file.unlink()
+
+
+def test_a_text_too_long_for_the_page_is_neither_saved_nor_run(page, server, folder):
+    before = (folder / CASE).read_text("utf-8")
+    page.goto(f"{server.base}/case?path={CASE}")
+    page.wait_for_selector("text=valid")
+    page.get_by_label("case file, YAML").fill(before + "#" * 960_000)
+    page.wait_for_selector("text=too long, not kept")
+    for name in ("Save", "Run"):
+        page.get_by_role("button", name=name, exact=True).click()
+        page.wait_for_selector(f"text=Not {'saved' if name == 'Save' else 'run'}. The text has")
+
+    assert (folder / CASE).read_text("utf-8") == before
+    assert page.locator(".k-badge").inner_text() == "too long, not kept"
+    page.get_by_role("button", name="Discard changes").click()
+    page.wait_for_selector("text=valid impact, saved")
 
 
 def test_text_typed_while_the_server_is_away_comes_back(folder, browser):

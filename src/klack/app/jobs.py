@@ -31,7 +31,7 @@ from typing import Any, Literal
 
 import psutil
 
-from klack.app.folder import OpenFolder
+from klack.app.folder import OpenFolder, result_names
 from klack.errors import InputError
 from klack.progress import PointCount
 from klack.terminal.progress import PROGRESS_FILE
@@ -132,6 +132,17 @@ class Jobs:
             options = [*options, "--study", str(self._folder.absolute(study))]
         with self._starting:
             return self._started(command, case, path, out, options, study)
+
+    def start_case(self, command: str, case: str) -> Job:
+        """Run a saved case; its result has the name of the case, in ``klack-results``.
+
+        Raises
+        ------
+        InputError
+            As :meth:`start`.
+        """
+        names = result_names({*self._folder.look().cases, case})
+        return self.start(command, case, f"klack-results/{names[case]}")
 
     def _started(
         self, command: str, case: str, path: Path, out: str, options: Sequence[str], study: str

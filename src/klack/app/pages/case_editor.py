@@ -10,7 +10,16 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, FormField
-from klack.app.pages.frame import START_VALUE, button, frame, heading, link, plain, show_error
+from klack.app.pages.frame import (
+    START_VALUE,
+    asking,
+    button,
+    frame,
+    heading,
+    link,
+    plain,
+    show_error,
+)
 from klack.app.pages.study_panel import StudyPanel
 from klack.app.state import State
 from klack.errors import KlackError
@@ -24,6 +33,10 @@ _REST = 0.4  # [s] without a key until the text is checked
 _OTHERS = (
     "Another page holds a text of this case that is not saved. Yours is kept in this page alone, "
     "until you save it."
+)
+_TOO_LONG = (
+    f"The text has more than {_LONGEST} characters, the most that this page takes. It is neither "
+    "checked nor kept: make it shorter, or edit the file itself."
 )
 _PAGE_ALONE = "What is not saved is kept in this page alone: do not close or reload it."
 
@@ -55,6 +68,7 @@ class _Editor:
         self._draft = draft = state.notes.draft(case)
         self._text = saved if draft is None else draft
         self._changes = 0
+        self._is_too_long = False  # what is seen is longer than the text that is known here
         self._given: dict[str, str] = {}
         self._open = {"case", "motion", "contact", "parameters", "objectives"}
 
@@ -73,6 +87,7 @@ class _Editor:
                 link("Show", f"/show?{urlencode({'path': self._case})}")
                 link("New study", f"/new-study?{urlencode({'path': self._case})}")
                 link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
+                button("Run", self._run)
             button("Save", self._save, main=True).props("id=k-save")
         self._message = plain("", "p").classes("k-error").props("role=alert")
         with ui.element("div").classes("k-editor"):
@@ -97,13 +112,11 @@ class _Editor:
 
     async def _typed(self, event: Any) -> None:
         self._changes += 1
-        if event.args is None:
+        self._is_too_long = event.args is None
+        if self._is_too_long:
             self._status.set_text("too long, not kept")
             self._status.classes(remove="good fair", add="out")
-            self._message.set_text(
-                f"The text has more than {_LONGEST} characters, the most that this page takes. It "
-                "is neither checked nor kept: make it shorter, or edit the file itself."
-            )
+            self._message.set_text(_TOO_LONG)
             return
         self._text = str(event.args)
         mine = self._changes
@@ -245,7 +258,7 @@ class _Editor:
         )
 
     def _set(self, text: str) -> None:
-        self._text = text
+        self._text, self._is_too_long = text, False
         self._changes += 1
         self._area.client.run_javascript(
             f"document.getElementById('k-yaml').value = {json.dumps(text)}"
@@ -253,9 +266,12 @@ class _Editor:
 
     # ----------------------------------------------------------------------- keeping it
 
-    async def _save(self) -> None:
+    async def _save(self) -> bool:
         """Replace the file as a whole; what another program wrote meanwhile is not overwritten."""
         text = self._text
+        if self._is_too_long:
+            self._message.set_text(f"Not saved. {_TOO_LONG}")
+            return False
         try:
             now = await asyncio.to_thread(self._state.folder.case_text, self._case)
             if now not in (self._saved, text):
@@ -263,14 +279,61 @@ class _Editor:
                     "The file was changed by another program since it was opened. Copy what you "
                     "need, then Discard changes."
                 )
-                return
+                return False
             await asyncio.to_thread(self._state.folder.write, self._case, text)
         except (KlackError, OSError) as error:
             self._message.set_text(f"Not saved. {error}")
             show_error(error)
-            return
+            return False
         self._saved = text
         await self._check()
+        return True
+
+    async def _run(self) -> None:
+        """Run the case if the file has what is seen; if not, offer to save it first."""
+        if self._is_too_long:
+            self._message.set_text(f"Not run. {_TOO_LONG}")
+            return
+        try:
+            saved = await asyncio.to_thread(self._state.folder.case_text, self._case)
+        except KlackError as error:
+            show_error(error)
+            return
+        if saved == self._text:
+            await self._start(saved)
+            return
+        with asking("Not saved") as dialog:
+            plain("A run takes the file, and the file does not have this text yet.", "p")
+
+            async def save_and_run() -> None:
+                dialog.close()
+                text = self._text
+                if await self._save():
+                    await self._start(text)
+
+            with ui.element("div").classes("k-tools"):
+                button("Cancel", dialog.close)
+                button("Save and run", save_and_run, main=True)
+        dialog.open()
+
+    async def _start(self, text: str) -> None:
+        """Start the run of a saved text that is a valid case, then show it in the overview."""
+        try:
+            found: Checked = await self._state.reader.call("check", text, self._path)
+            if found.error:
+                self._message.set_text(f"Not run.\n{found.error}")
+                return
+            if found.kind == "study":
+                self._message.set_text("Not run: this is a study, and its button is above.")
+                return
+            if text != self._text:  # typed on meanwhile
+                self._message.set_text("Not run: the text has changed meanwhile. Press Run again.")
+                return
+            await asyncio.to_thread(self._state.jobs.start_case, found.kind, self._case)
+        except (KlackError, OSError) as error:
+            show_error(error)
+            return
+        ui.navigate.to("/")
 
     async def _discard(self) -> None:
         try:

@@ -23,7 +23,7 @@ __all__ = [
     "show_error",
 ]
 
-Handler = Callable[..., Awaitable[None] | None]
+Handler = Callable[..., Awaitable[object] | None]
 
 
 @contextmanager

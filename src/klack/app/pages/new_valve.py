@@ -11,7 +11,7 @@ from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from klack.app.answers import Finding, PartFacts, Review
-from klack.app.folder import LARGEST_FILE, result_names
+from klack.app.folder import LARGEST_FILE
 from klack.app.pages.faces import FacesStep
 from klack.app.pages.fields import choice_field, text_field
 from klack.app.pages.frame import Handler, button, frame, heading, plain, show_error
@@ -408,10 +408,7 @@ class _Guide:
                 files[f"{body}.step"] = await asyncio.to_thread(self._state.folder.read, file)
             await asyncio.to_thread(self._state.folder.make_folder, name, files)
             if then == "run":
-                case = f"{name}/case.yaml"
-                known = (await asyncio.to_thread(self._state.folder.look)).cases
-                out = f"klack-results/{result_names({*known, case})[case]}"
-                await asyncio.to_thread(self._state.jobs.start, "impact", case, out)
+                await asyncio.to_thread(self._state.jobs.start_case, "impact", f"{name}/case.yaml")
         except (KlackError, OSError) as error:
             self._message.set_text(str(error))
             return

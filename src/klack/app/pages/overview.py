@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, ResultCard
-from klack.app.folder import RESULT_NAME, result_names
+from klack.app.folder import RESULT_NAME
 from klack.app.jobs import OF_STUDIES, Job
 from klack.app.pages.frame import (
     START_VALUE,
@@ -205,9 +205,7 @@ class _Overview:
             button("Note", partial(self._ask_note, case), of=case)
 
     async def _run(self, case: str, kind: str) -> None:
-        found = await asyncio.to_thread(self._state.folder.look)
-        out = f"klack-results/{result_names({*found.cases, case})[case]}"
-        await _telling(lambda: self._state.jobs.start(kind, case, out))
+        await _telling(lambda: self._state.jobs.start_case(kind, case))
         self._show_jobs()
 
     def _ask_new(self) -> None:
