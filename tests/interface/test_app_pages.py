@@ -131,6 +131,30 @@ def test_charts_are_told_with_their_main_numbers(page, server, folder):
     assert f"highest {peak}" in told
 
 
+@pytest.mark.parametrize(
+    ("address", "words"),
+    [
+        ("/case?path=gone.yaml", "file 'gone.yaml': got No such file"),
+        ("/case", "file '': got no .yaml file"),
+        ("/sliders?path=gone.yaml", "file 'gone.yaml': got No such file"),
+        ("/new-study?path=gone.yaml", "file 'gone.yaml': got No such file"),
+        ("/show?path=klack-results/gone", "file 'klack-results/gone': got nothing there"),
+        ("/compare?a=klack-results/impact&b=klack-results/gone", "got nothing there"),
+        ("/points?path=klack-results/gone", "result 'klack-results/gone': got no study"),
+        ("/points?path=klack-results/impact", "got a result of klack impact, expected one of"),
+    ],
+)
+def test_what_is_gone_is_told_once_with_the_way_back(page, server, address, words):
+    page.goto(server.base + address)
+    page.get_by_role("alert").get_by_text(words).wait_for()
+
+    body = page.locator("#k-body")
+    assert body.locator("button, input, select, textarea, audio").count() == 0
+    assert page.get_by_text(words).count() == 1
+    body.get_by_role("link", name="Back to cases and results").click()
+    page.wait_for_selector("text=Everything below the folder that klack app opened.")
+
+
 def test_a_slider_page_that_is_reloaded_again_and_again_answers(page, server, folder):
     found = next(place for place in PAGES if place.name == "sliders")
     found.open(page, server.base, folder)

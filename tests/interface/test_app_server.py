@@ -106,8 +106,11 @@ def test_what_is_not_there_is_told_so(client):
     assert client.get("/sound/none.wav").status_code == 404
     assert client.get("/static/../server.py").status_code == 404
     assert client.get("/static/klack.css").headers["content-type"].startswith("text/css")
-    for path in ("/docs", "/openapi.json", "/redoc"):
-        assert client.get(path).status_code == 404
+    for path in ("/docs", "/openapi.json", "/redoc", "/nowhere/<b>", "/report?path=a/report.html"):
+        answer = client.get(path)
+        assert answer.status_code == 404
+        assert "Back to cases and results" in answer.text
+        assert "<b>" not in answer.text
 
 
 def test_a_huge_body_is_refused(client, server):

@@ -28,6 +28,8 @@ LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
 _DEEPEST, _MOST = 5, 2000  # levels, and entries that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
+_CHOOSE = "choose one in the list of cases and results; what was there may be moved or removed."
+_RENAME = "take another name."
 _NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 _STEP_ENDINGS = (".step", ".stp")
 
@@ -158,7 +160,7 @@ class OpenFolder:
             with self._parent(parent) as (held, name):
                 held.make(name)
         if self.exists(relative):
-            raise _refused(relative, "a file that is there already")
+            raise _refused(relative, "a file that is there already", _RENAME)
         self.write(relative, text)
 
     def make_folder(self, name: str, files: Mapping[str, bytes]) -> None:
@@ -170,7 +172,7 @@ class OpenFolder:
             If there is something of that name already.
         """
         if self.exists(name):
-            raise _refused(name, "a file or folder that is there already")
+            raise _refused(name, "a file or folder that is there already", _RENAME)
         new = f".klack-{secrets.token_hex(8)}"
         with self._parent(name) as (held, last):
             held.make(new)
@@ -312,10 +314,10 @@ def _failed(relative: str, error: OSError) -> InputError:
     )
 
 
-def _refused(relative: str, got: str) -> InputError:
+def _refused(relative: str, got: str, hint: str = _CHOOSE) -> InputError:
     return InputError(
         f"file {relative[:200]!r}",
         got=got,
         expected="a file below the folder of the application",
-        hint="reload the page.",
+        hint=hint,
     )

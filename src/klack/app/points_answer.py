@@ -45,7 +45,7 @@ def points_source(state: State, out: str) -> PointsSource:
     Raises
     ------
     InputError
-        For a path that leads out of the folder, and one without a study.
+        For a path that leads out of the folder, one without a result, and a result that is gone.
     """
     job = state.jobs.of_result(out)
     places = [out]
@@ -66,6 +66,13 @@ def points_source(state: State, out: str) -> PointsSource:
             got="no study",
             expected="the folder of a study below that of the application",
             hint="choose a study in the list of results.",
+        )
+    if job.state == "done":
+        raise InputError(
+            f"result {out[:200]!r}",
+            got="nothing there any more",
+            expected="the result of a study that has ended",
+            hint="start the study again; the list of cases has it.",
         )
     return PointsSource(folder=None, job=job, is_live=True, mark="")
 

@@ -75,6 +75,23 @@ class Reader:
             has_points=isinstance(record, StudyRecord),
         )
 
+    def require_study(self, folder: str) -> None:
+        """Refuse a result that has no points.
+
+        Raises
+        ------
+        InputError
+            For one of another command.
+        """
+        form = analysis_in(Path(folder)).form
+        if form.kind is not StudyRecord:
+            raise InputError(
+                f"result {folder}",
+                got=f"a result of {form.command}",
+                expected="one of klack study or klack optimise, which have points",
+                hint="choose one with Points in the list of results.",
+            )
+
     def points(self, folder: str) -> bytes:
         """See :func:`klack.app.study_points.points_json`."""
         return points_json(self._points.record(folder))

@@ -10,14 +10,15 @@ from typing import Any
 import uvicorn
 from fastapi import FastAPI, Request
 from fastapi.responses import PlainTextResponse, Response
+from nicegui import Client, ui
 from nicegui import app as pages_app
-from nicegui import ui
 
 from klack.app.access import Access, access_for
 from klack.app.folder import OpenFolder
 from klack.app.guard import LARGEST_BODY, UPLOAD, Guard
 from klack.app.pages.case_editor import case_editor_page
 from klack.app.pages.comparing import comparing_page
+from klack.app.pages.frame import dead_end, frame
 from klack.app.pages.new_study import new_study_page
 from klack.app.pages.new_valve import new_valve_page
 from klack.app.pages.overview import overview_page
@@ -42,6 +43,8 @@ _REPORTS = {
     "report.pdf": "application/pdf",
 }
 _LONGEST_QUERY = 1024  # characters of a path
+_NOTHING = "Nothing to show"
+_OF_A_CASE = (case_editor_page, new_study_page, sliders_page)
 
 
 def build(state: State, access: Access) -> Guard:
@@ -50,6 +53,7 @@ def build(state: State, access: Access) -> Guard:
     _add_files(outer, state)
     _add_static(outer)
     _add_pages(state)
+    _add_refusal(state)
     ui.add_head_html(
         '<link rel="stylesheet" href="/static/klack.css"><script src="/static/klack.js"></script>',
         shared=True,
@@ -145,7 +149,37 @@ def _add_page(state: State, path: str, page: Callable[[State, dict[str, str]], A
     @ui.page(path, response_timeout=30.0)
     async def shown(request: Request) -> None:
         given = {key: value[:_LONGEST_QUERY] for key, value in request.query_params.items()}
-        await page(state, given)
+        try:
+            if page in _OF_A_CASE:
+                await asyncio.to_thread(state.folder.case_text, given.get("path", ""))
+            await page(state, given)
+        except KlackError as error:  # before the page has begun
+            with frame(state, _NOTHING):
+                dead_end(error)
+
+
+def _add_refusal(state: State) -> None:
+    """Show addresses without a page in the way of the others."""
+
+    @pages_app.exception_handler(404)
+    async def refused(request: Request, _: Exception) -> Response:
+        return _nothing(
+            state,
+            request,
+            InputError(
+                f"address {request.url.path[:200]!r}",
+                got="no page",
+                expected="one that this application links to",
+                hint="choose a case or a result in the list.",
+            ),
+        )
+
+
+def _nothing(state: State, request: Request, error: KlackError) -> Response:
+    """A page that tells why there is none."""
+    with Client(ui.page(""), request=request) as client, frame(state, _NOTHING):
+        dead_end(error)
+    return client.build_response(request, 404)
 
 
 def _add_static(outer: FastAPI) -> None:
@@ -172,15 +206,20 @@ def _add_static(outer: FastAPI) -> None:
 def _add_files(outer: FastAPI, state: State) -> None:
     """Reports of the folder, and sounds from memory."""
 
-    async def report(path: str = "") -> Response:
+    async def report(request: Request, path: str = "") -> Response:
         place = path[:_LONGEST_QUERY]
         kind = _REPORTS.get(place.rpartition("/")[2])
-        if kind is None:
-            return PlainTextResponse("no report\n", 404)
         try:
+            if kind is None:
+                raise InputError(
+                    f"report {place[:200]!r}",
+                    got="another file",
+                    expected=" or ".join(_REPORTS),
+                    hint="choose Report or PDF in the list of results.",
+                )
             content = await asyncio.to_thread(state.folder.read, place)
         except KlackError as error:
-            return PlainTextResponse(f"{error}\n", 404)
+            return _nothing(state, request, error)
         headers = {"content-security-policy": REPORT_POLICY, "cache-control": "no-store"}
         return Response(content, media_type=kind, headers=headers)
 

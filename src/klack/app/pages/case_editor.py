@@ -44,12 +44,7 @@ _PAGE_ALONE = "What is not saved is kept in this page alone: do not close or rel
 async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case."""
     case = given.get("path", "")
-    try:
-        text = await asyncio.to_thread(state.folder.case_text, case)
-    except KlackError as error:
-        with frame(state, "Case"):
-            plain(str(error), "p").classes("k-error")
-        return
+    text = await asyncio.to_thread(state.folder.case_text, case)
     with frame(state, "Study" if _begins_a_study(text) else "Case", case):
         _Editor(state, case, text).build()
 

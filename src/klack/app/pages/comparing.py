@@ -8,7 +8,7 @@ from nicegui import ui
 from klack.app.answers import Answer
 from klack.app.pages.charts import bands_figure, curves_figure
 from klack.app.pages.described_chart import DescribedChart
-from klack.app.pages.frame import differing, frame, heading, number_text, plain
+from klack.app.pages.frame import dead_end, differing, frame, heading, number_text, plain
 from klack.app.state import State
 from klack.errors import KlackError
 
@@ -30,8 +30,9 @@ async def comparing_page(state: State, given: Mapping[str, str]) -> None:
                 ]
                 ghost, now = await state.reader.call("compare", *places)
             except KlackError as error:
-                waiting.set_text(str(error))
-                waiting.classes("k-error")
+                waiting.delete()
+                with body:
+                    dead_end(error)
                 return
             waiting.delete()
             with body:

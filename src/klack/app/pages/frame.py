@@ -14,6 +14,7 @@ __all__ = [
     "Handler",
     "asking",
     "button",
+    "dead_end",
     "differing",
     "frame",
     "heading",
@@ -81,6 +82,13 @@ def link(text: str, target: str, *, new: bool = False, of: str = "") -> TextElem
     if new:
         found.props["target"], found.props["rel"] = "_blank", "noopener"
     return found
+
+
+def dead_end(error: Exception) -> None:
+    """Why a page has nothing to show, and the way back."""
+    plain(str(error), "p").classes("k-error").props("role=alert")
+    with ui.element("p"):
+        link("Back to cases and results", "/")
 
 
 START_VALUE = "^value"

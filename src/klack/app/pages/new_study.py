@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import MeasureOffer, Slider, StudyChoice, StudyOffer
-from klack.app.pages.frame import START_VALUE, button, frame, heading, plain
+from klack.app.pages.frame import START_VALUE, button, dead_end, frame, heading, plain
 from klack.app.state import State
 from klack.app.study_files import free_name
 from klack.errors import KlackError
@@ -37,8 +37,9 @@ async def new_study_page(state: State, given: Mapping[str, str]) -> None:
                 path = str(state.folder.path / case)
                 offer: StudyOffer = await state.reader.call("study_offer", text, path)
             except KlackError as error:
-                waiting.set_text(str(error))
-                waiting.classes("k-error")
+                waiting.delete()
+                with body:
+                    dead_end(error)
                 return
             waiting.set_text(offer.title)
             with body:

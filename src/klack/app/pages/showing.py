@@ -7,7 +7,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.folder import RESULT_NAME
-from klack.app.pages.frame import frame, link, plain
+from klack.app.pages.frame import dead_end, frame, link, plain
 from klack.app.pages.scene import Scene
 from klack.app.state import State
 from klack.errors import KlackError
@@ -18,14 +18,9 @@ __all__ = ["showing_page"]
 async def showing_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case, as it stands in the editor, or of one result."""
     path = given.get("path", "")
-    try:
-        is_result = await asyncio.to_thread(state.folder.exists, f"{path}/{RESULT_NAME}")
-        place = str(await asyncio.to_thread(state.folder.absolute, path))
-        text = "" if is_result else await asyncio.to_thread(state.folder.case_text, path)
-    except KlackError as error:
-        with frame(state, "Bodies"):
-            plain(str(error), "p").classes("k-error")
-        return
+    is_result = await asyncio.to_thread(state.folder.exists, f"{path}/{RESULT_NAME}")
+    place = str(await asyncio.to_thread(state.folder.absolute, path))
+    text = "" if is_result else await asyncio.to_thread(state.folder.case_text, path)
     draft = None if is_result else state.notes.draft(path)
     with frame(state, "Bodies", path):
         if not is_result:
@@ -34,7 +29,9 @@ async def showing_page(state: State, given: Mapping[str, str]) -> None:
                 link("Sliders", f"/sliders?{urlencode({'path': path})}")
                 if draft is not None:
                     plain("as edited, not saved", "span").classes("k-tag")
-        waiting = plain("Reading, and meshing what has no mesh yet ...", "p").props("role=status")
+        told = ui.element("div")
+        with told:
+            plain("Reading, and meshing what has no mesh yet ...", "p").props("role=status")
         body = ui.element("div").classes("k-sheet")
         body.set_visibility(False)
 
@@ -45,10 +42,11 @@ async def showing_page(state: State, given: Mapping[str, str]) -> None:
             else:
                 packed = await state.shapes.call("case_scene", draft or text, place)
         except KlackError as error:
-            waiting.set_text(str(error))
-            waiting.classes("k-error")
+            told.clear()
+            with told:
+                dead_end(error)
             return
-        waiting.delete()
+        told.clear()
         body.set_visibility(True)
         with body:
             Scene(state.scenes.add(packed))

@@ -27,12 +27,9 @@ async def study_points_page(state: State, given: Mapping[str, str]) -> None:
         '<link rel="stylesheet" href="/static/points.css">'
         '<script src="/static/points.js" defer></script>'
     )
-    try:
-        source = await asyncio.to_thread(points_source, state, out)
-    except KlackError as error:
-        with frame(state, "Points of a study"):
-            plain(str(error), "p").classes("k-error")
-        return
+    source = await asyncio.to_thread(points_source, state, out)
+    if source.job is None:  # where there is one, it was that of a study
+        await state.reader.call("require_study", str(source.folder))
     with frame(state, "Points of a study", out):
         _Page(state, out, source.job).build()
 
