@@ -140,6 +140,10 @@ def test_charts_are_told_with_their_main_numbers(page, server, folder):
         ("/new-study?path=gone.yaml", "file 'gone.yaml': got No such file"),
         ("/show?path=klack-results/gone", "file 'klack-results/gone': got nothing there"),
         ("/compare?a=klack-results/impact&b=klack-results/gone", "got nothing there"),
+        (
+            "/compare?a=klack-results/impact&b=klack-results/stroke",
+            "cannot be compared: got one of",
+        ),
         ("/points?path=klack-results/gone", "result 'klack-results/gone': got no study"),
         ("/points?path=klack-results/impact", "got a result of klack impact, expected one of"),
     ],
@@ -153,6 +157,18 @@ def test_what_is_gone_is_told_once_with_the_way_back(page, server, address, word
     assert page.get_by_text(words).count() == 1
     body.get_by_role("link", name="Back to cases and results").click()
     page.wait_for_selector("text=Everything below the folder that klack app opened.")
+
+
+def test_results_of_two_kinds_are_not_offered_for_comparison(page, server):
+    page.goto(f"{server.base}/")
+    for name in ("impact", "stroke"):
+        page.get_by_role("checkbox", name=f"compare klack-results/{name}").check()
+    told = page.get_by_role("link", name="Compare: two of one kind")
+    told.wait_for()
+
+    assert told.get_attribute("href") == "#"
+    page.goto(f"{server.base}/compare?a=klack-results/stroke&b=klack-results/impact")
+    page.wait_for_selector("text=got one of klack stroke and one of klack impact, expected two of")
 
 
 def test_a_slider_page_that_is_reloaded_again_and_again_answers(page, server, folder):

@@ -118,17 +118,27 @@ class Reader:
         return study_text(choice, case_text, case_path)
 
     def compare(self, first: str, second: str) -> tuple[Answer, Answer]:
-        """Two results of one kind, with their clicks to one full scale."""
-        records = [analysis_in(Path(f)).load(Path(f)) for f in (first, second)]
-        kinds = {type(record) for record in records}
+        """Two results of one kind, with their clicks to one full scale.
+
+        Raises
+        ------
+        InputError
+            For two that cannot be compared, told before they are read.
+        """
+        analyses = [analysis_in(Path(folder)) for folder in (first, second)]
+        kinds = {analysis.form.kind for analysis in analyses}
         if len(kinds) != 1 or not kinds <= {ImpactStudy, StrokeStudy}:
+            one, other = (analysis.form.command for analysis in analyses)
             raise InputError(
-                "compare",
-                got="results of two kinds",
-                expected="two impacts, or two strokes",
-                hint="choose two of one kind.",
+                "these two results cannot be compared",
+                got=f"one of {one} and one of {other}",
+                expected="two of klack impact, or two of klack stroke",
+                hint="tick compare at two of one kind in the list of results.",
             )
-        found = [_answer(record) for record in records]
+        found = [
+            _answer(analysis.load(Path(folder)))
+            for analysis, folder in zip(analyses, (first, second), strict=True)
+        ]
         pressures = [pressure for _, pressure in found]
         known = [pressure for pressure in pressures if pressure is not None]
         scale = full_scale_of(*known) if known else 1.0

@@ -54,6 +54,7 @@ class _Overview:
     def __init__(self, state: State) -> None:
         self._state = state
         self._chosen: list[str] = []
+        self._commands: dict[str, str] = {}  # of the results that can be compared
         self._seen: tuple[tuple[str, str], ...] = ()
         self._ended: set[str] | None = None
         self._progress: dict[str, Callable[[Job], None]] = {}
@@ -298,11 +299,13 @@ class _Overview:
             plain("None yet: run a case.", "p").classes("k-soft")
             return
         self._chosen = [name for name in self._chosen if name in results]
+        self._commands = {}
         with ui.element("div").classes("k-sheet"):
             rows = [(name, _reading(name)) for name in results]
 
         def chosen() -> None:
-            ready = len(self._chosen) == 2
+            kinds = {self._commands.get(name) for name in self._chosen}
+            ready = len(self._chosen) == 2 and len(kinds) == 1
             compare.props["href"] = (
                 f"/compare?{urlencode(dict(zip('ab', self._chosen, strict=True)))}"
                 if ready
@@ -311,7 +314,9 @@ class _Overview:
             compare.props["aria-disabled"] = "false" if ready else "true"
             compare.classes(add="k-main-btn" if ready else "", remove="" if ready else "k-main-btn")
             words = ("Compare two", "Compare: choose one more", "Compare", "Compare: two at most")
-            compare.set_text(words[min(len(self._chosen), 3)])
+            compare.set_text(
+                words[min(len(self._chosen), 3)] if len(kinds) < 2 else "Compare: two of one kind"
+            )
 
         for name, row in rows:
             card = await self._card(name)
@@ -366,6 +371,7 @@ class _Overview:
                 link("Points", f"/points?{urlencode({'path': name})}", of=name)
             if not isinstance(card, str) and card.compares:
                 link("Show", f"/show?{urlencode({'path': name})}", of=name)
+                self._commands[name] = card.command
                 self._show_choice(name, chosen)
             button("Note", partial(self._ask_note, name), of=name)
 
