@@ -58,7 +58,7 @@ def test_points_carry_front_bounds_doubts_and_failures():
     level = record.measures[2].values
     assert found["missed"] == [k for k in range(3, 200) if level[k] > 48.0]
     time, force = found["columns"][6:8]
-    assert (time["unit"], force["unit"], time["way"]) == ("µs", "kN", "minimise")
+    assert (time["unit"], force["unit"], time["way"]) == ("us", "kN", "minimise")
     assert time["values"][:3] == [None] * 3
     np.testing.assert_allclose(time["values"][3:], 1e6 * record.measures[0].values[3:], rtol=1e-6)
     # no point of the front is beaten, every other one is

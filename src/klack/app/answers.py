@@ -28,9 +28,23 @@ __all__ = [
     "Slider",
     "StudyChoice",
     "StudyOffer",
+    "typed",
 ]
 
 Floats = NDArray[np.float64]
+
+_TYPED = {"µ": "u", "²": "^2", "³": "^3", "°C": "degC"}
+
+
+def typed(words: str) -> str:
+    """Words with units as the commands print them, whatever a report makes of them.
+
+    >>> typed("45 µm, 3 mm², 20 °C")
+    '45 um, 3 mm^2, 20 degC'
+    """
+    for drawn, written in _TYPED.items():
+        words = words.replace(drawn, written)
+    return words
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -110,7 +110,7 @@ class Part:
                 hint="suppress small fillets and threads in the CAD program, or write the case.",
             )
         return PartFacts(
-            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm³, {len(shown)} named faces",
+            words=f"{count}{size} mm, {self.volume * 1e9:.5g} mm^3, {len(shown)} named faces",
             faces=faces if self.profiles is not None else (),
             solid_faces=solid_faces,
             not_turned=self.not_turned,
@@ -226,7 +226,7 @@ def _profile_faces(profiles: Mapping[str, Profile]) -> tuple[FaceFacts, ...]:
 def _step_face(part: StepPart) -> FaceFacts:
     count = "" if part.count == 1 else f"{part.count} faces, "
     z = _range(float(part.low[2]), float(part.high[2]))
-    return FaceFacts(name=part.name, words=f"{count}{part.size * 1e6:.4g} mm², z {z}")
+    return FaceFacts(name=part.name, words=f"{count}{part.size * 1e6:.4g} mm^2, z {z}")
 
 
 def _range(low: float, high: float) -> str:

@@ -338,7 +338,7 @@ def _overlap(plan: ValvePlan, parts: Mapping[str, Part], shift: float) -> str:
     if not volume > _LEAST_OVERLAP:
         return ""
     low, high = common.bounding_box
-    return f"{volume:.3g} mm³ in common, at z {low.z:.4g} to {high.z:.4g} mm"
+    return f"{volume:.3g} mm^3 in common, at z {low.z:.4g} to {high.z:.4g} mm"
 
 
 # --------------------------------------------------------------------------- what it takes

@@ -14,6 +14,7 @@ from nicegui import Client, ui
 from nicegui import app as pages_app
 
 from klack.app.access import Access, access_for
+from klack.app.answers import typed
 from klack.app.folder import OpenFolder
 from klack.app.guard import LARGEST_BODY, UPLOAD, Guard
 from klack.app.pages.case_editor import case_editor_page
@@ -193,6 +194,8 @@ def _add_static(outer: FastAPI) -> None:
     content = {name: files("klack.app").joinpath("static", name).read_bytes() for name in kinds}
     for name in ("scene.js", "three.min.js"):
         content[name] = files("klack.viewer").joinpath(name).read_bytes()
+        if name == "scene.js":
+            content[name] = typed(content[name].decode()).encode()
         kinds[name] = "text/javascript"
 
     async def static(name: str) -> Response:

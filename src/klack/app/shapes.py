@@ -3,12 +3,13 @@
 import gzip
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from klack import __version__
-from klack.app.answers import PartFacts, Review
+from klack.app.answers import PartFacts, Review, typed
 from klack.app.parts import Part, part_of_step, part_of_table
 from klack.app.plan_review import review
 from klack.app.valve_plan import ValvePlan
@@ -109,6 +110,12 @@ def packed_scene(view: View) -> bytes:
     InputError
         If it is larger than a browser should get.
     """
+    histories = tuple(
+        replace(line, x_unit=typed(line.x_unit), y_unit=typed(line.y_unit))
+        for line in view.histories
+    )
+    bodies = tuple(replace(body, about=typed(body.about)) for body in view.bodies)
+    view = replace(view, histories=histories, bodies=bodies)
     text = json.dumps(payload_of(view), separators=(",", ":"), allow_nan=False)
     if len(text) > LARGEST_SCENE:
         raise InputError(

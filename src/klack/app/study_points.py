@@ -17,6 +17,7 @@ from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.goals import Goals, goals_of
 from klack.analyses.study.record import NOT_YET, StudyColumn, StudyRecord
 from klack.analyses.study.wording import short_labels, shown_unit
+from klack.app.answers import typed
 from klack.case.reader import parse, validated
 from klack.case.study import StudyFile
 from klack.case.study_source import StudySource
@@ -249,7 +250,7 @@ def _column(
         "name": item.name,
         "label": label,
         "role": role,
-        "unit": unit,
+        "unit": typed(unit),
         "words": list(item.words),
         "varies": item.varies,
         "level": is_level(item.unit),

@@ -11,7 +11,7 @@ from klack import __version__
 from klack.analyses.study.goals import goals_of
 from klack.analyses.study.kinds import kind_of, measure_names
 from klack.analyses.study.run import asked_points
-from klack.app.answers import Checked, MeasureOffer, StudyChoice, StudyOffer
+from klack.app.answers import Checked, MeasureOffer, StudyChoice, StudyOffer, typed
 from klack.app.sliders import sliders_of
 from klack.case.case_tree import CaseTree, tree_of
 from klack.case.reader import parse, validated
@@ -131,7 +131,7 @@ def study_offer(text: str, path: str) -> StudyOffer:
             MeasureOffer(
                 name=item.name,
                 unit=item.measure.unit if item.measure.unit not in ("1", "-") else "",
-                definition=item.measure.definition,
+                definition=typed(item.measure.definition),
                 is_first=item.name in _FIRST[kind],
             )
             for item in chosen

@@ -55,7 +55,7 @@ def bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str
             curve = Curve(name=name, x=answer.bands, y=answer.levels)
             data.append(_line(curve, colour, name, dash=dash, shape="hvh"))
     top = max((float(a.levels.max()) for a in (now, ghost) if a.levels.size), default=0.0)
-    figure = _figure(data, "third octave [Hz]", "force level [dB re 1e-12 N²s]")
+    figure = _figure(data, "third octave [Hz]", "force level [dB re 1e-12 N^2 s]")
     ticks = np.arange(-15, 24, 3)
     figure["layout"]["xaxis"] |= {
         "type": "log",
