@@ -133,6 +133,34 @@ def test_a_text_too_long_for_the_page_is_neither_saved_nor_run(page, server, fol
     page.wait_for_selector("text=valid impact, saved")
 
 
+def test_a_long_note_is_folded_and_one_that_is_too_long_stays_in_its_dialog(page, server, folder):
+    mine = page.get_by_role("button", name=f"Note {CASE}", exact=True)
+    area = page.get_by_role("textbox", name=f"note on {CASE}")
+    words = "<img src=x onerror=alert(1)> softer seat\n" + "word " * 2000
+
+    mine.click()
+    area.fill("\N{BELL}" * 20_001)
+    page.get_by_role("button", name="Keep").click()
+    page.get_by_role("alert").get_by_text("more than 20000 characters").wait_for()
+    assert len(area.input_value()) == 20_001  # nothing is lost
+    area.fill(words)
+    page.get_by_role("button", name="Keep").click()
+    page.wait_for_selector(".q-dialog", state="detached")
+    summary = page.locator("summary", has_text="<img src=x onerror=alert(1)> softer seat ...")
+    summary.wait_for()
+    height = summary.locator("xpath=../..").evaluate("e => e.getBoundingClientRect().height")
+    assert height < 200  # [px]
+    assert page.locator("#k-body img").count() == 0
+    require_within(page)
+    summary.click()
+    assert page.locator("p.k-note").first.inner_text().strip() == words.strip()
+    require_within(page)
+    mine.click()
+    area.fill("")
+    page.get_by_role("button", name="Keep").click()
+    summary.wait_for(state="detached")
+
+
 def test_text_typed_while_the_server_is_away_comes_back(folder, browser):
     (folder / "valve" / "away.yaml").write_text((folder / CASE).read_text("utf-8"), "utf-8")
     query = "/case?path=valve/away.yaml"

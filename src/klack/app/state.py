@@ -17,14 +17,14 @@ from klack.app.worker import Worker
 from klack.errors import InputError
 from klack.whole_file import whole_file
 
-__all__ = ["Notes", "Sounds", "State"]
+__all__ = ["LONGEST_NOTE", "Notes", "Sounds", "State"]
 
 _EXPLORER, _READER = "klack.app.explorer:Explorer", "klack.app.reader:Reader"
 _LISTENER = "klack.app.listening:Listener"
 _SHAPES = "klack.app.shapes:Shapes"
 _MOST_SCENES = 6
 _MOST_EXPLORERS = 3
-_LONGEST_NOTE = 20_000  # characters
+LONGEST_NOTE = 20_000  # characters
 
 
 @dataclass
@@ -74,12 +74,12 @@ class Notes:
 
     def set_note(self, of: str, text: str) -> None:
         """Keep a note; an empty one is removed."""
-        if len(text) > _LONGEST_NOTE:
+        if len(text) > LONGEST_NOTE:
             raise InputError(
                 "note",
-                got=f"{len(text)} characters",
-                expected=f"at most {_LONGEST_NOTE}",
-                hint="write a file.",
+                got=f"more than {LONGEST_NOTE} characters",
+                expected=f"at most {LONGEST_NOTE}",
+                hint="make it shorter, or write a file beside the case.",
             )
         self._change("notes.json", of, text)
 

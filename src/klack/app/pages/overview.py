@@ -25,13 +25,14 @@ from klack.app.pages.frame import (
     show_error,
 )
 from klack.app.pages.study_panel import show_study_run
-from klack.app.state import State
+from klack.app.state import LONGEST_NOTE, State
 from klack.errors import InputError, KlackError
 from klack.whole_file import mark_of
 
 __all__ = ["overview_page"]
 
 _EVERY = 1.0  # [s] that runs are looked at
+_SHORT, _LINES = 400, 8  # characters and lines of a note that is shown whole
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
 _WORDS = {
     "running": "runs",
@@ -395,7 +396,14 @@ class _Overview:
 
     def _show_note(self, of: str) -> None:
         note = self._state.notes.note(of)
-        if note:
+        if not note:
+            return
+        first = note.strip().partition("\n")[0][:_SHORT]
+        if len(note) <= _SHORT and note.count("\n") < _LINES:
+            plain(note, "p").classes("k-note")
+            return
+        with ui.element("details"):  # a long one does not push the others away
+            plain(f"{first} ...", "summary").classes("k-soft")
             plain(note, "p").classes("k-note")
 
     def _ask_note(self, of: str) -> None:
@@ -406,11 +414,17 @@ class _Overview:
             area.on(
                 "input",
                 lambda event: text.update(now=str(event.args)),
-                js_handler="(e) => emit(e.target.value)",
+                # bounded: a message that is too large would be dropped without a word
+                js_handler=f"(e) => emit(e.target.value.slice(0, {2 * LONGEST_NOTE + 2}))",
             )
+            problem = plain("", "p").classes("k-error").props("role=alert")
 
             async def keep() -> None:
-                await _telling(lambda: self._state.notes.set_note(of, text["now"]))
+                try:
+                    await asyncio.to_thread(self._state.notes.set_note, of, text["now"])
+                except (KlackError, OSError) as error:  # the text stays in the dialog
+                    problem.set_text(str(error))
+                    return
                 dialog.close()
                 await self._fill()
 

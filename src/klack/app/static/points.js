@@ -36,6 +36,7 @@
       this.sorted = { name: "", down: false };
       this.page = 0;
       this.chosen = null;
+      this.hasAxes = false;          // chosen by hand
       this.frontOnly = false;
       this.nearFront = false;
       this.frames = new Set();
@@ -98,8 +99,10 @@
       const goals = measures.filter(column => column.way);
       const pick = [...goals, ...measures, ...study.columns];
       const known = name => study.columns.some(column => column.name === name);
-      if (first || !known(this.x)) this.x = (pick[0] || {}).name;
-      if (first || !known(this.y)) this.y = (pick.find(column => column.name !== this.x) || pick[0] || {}).name;
+      // measures come after the first points: the axes are theirs unless somebody works with the others
+      const free = first || !(this.hasAxes || this.brushes.size);
+      if (free || !known(this.x)) this.x = (pick[0] || {}).name;
+      if (free || !known(this.y)) this.y = (pick.find(column => column.name !== this.x) || pick[0] || {}).name;
       for (const name of [...this.brushes.keys()]) if (!known(name)) this.brushes.delete(name);
       this.offerAxes();
       this.select();
@@ -162,8 +165,8 @@
       this.best = make("p", { class: "k-note" });
       status.append(this.badge, this.progress, this.best, this.figures);
 
-      this.across = make("select", { class: "k-input", id: "kp-x", onchange: event => { this.x = event.target.value; this.draw(true); } });
-      this.up = make("select", { class: "k-input", id: "kp-y", onchange: event => { this.y = event.target.value; this.draw(true); } });
+      this.across = make("select", { class: "k-input", id: "kp-x", onchange: event => { this.x = event.target.value; this.hasAxes = true; this.draw(true); } });
+      this.up = make("select", { class: "k-input", id: "kp-y", onchange: event => { this.y = event.target.value; this.hasAxes = true; this.draw(true); } });
       this.chart = make("canvas", { tabindex: 0, role: "img", id: "kp-chart" });
       this.under = make("p", { class: "k-soft kp-under" });
       const near = make("input", { type: "checkbox", onchange: event => { this.nearFront = event.target.checked; this.draw(true); } });
