@@ -9,7 +9,7 @@ from browser_pages import watched
 from page_rules import WIDTHS
 from served_app import Served
 
-__all__ = ["LONG", "client", "page", "require_within", "server"]
+__all__ = ["LONG", "client", "page", "require_within", "server", "settle"]
 
 LONG = 300_000  # [ms]: a loaded machine meshes, imports and compiles
 
@@ -43,12 +43,31 @@ def page(browser: Any, server: Served) -> Iterator[Any]:
     assert said == []
 
 
+_SETTLED = """() => {
+  const seen = window.klackSeen ??= { before: "", same: 0 };
+  const now = [...document.querySelectorAll("body, section, canvas, .main-svg, .ks-tip")].map(e => {
+    const box = e.getBoundingClientRect();
+    return [box.x, box.y, box.width, box.height].map(Math.round).join();
+  }).join(" ");
+  seen.same = now === seen.before ? seen.same + 1 : 0;
+  seen.before = now;
+  if (seen.same < 6) return false;
+  delete window.klackSeen;
+  return true;
+}"""
+
+
+def settle(page: Any) -> None:
+    """Wait until no part of the page has moved in six looks, 50 ms or more apart."""
+    page.wait_for_function(_SETTLED, polling=50, timeout=LONG)
+
+
 def require_within(page: Any) -> None:
     """No page is wider than its window, on a telephone or a large screen."""
     before = page.viewport_size
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 900})
-        page.wait_for_timeout(300)  # charts are drawn again, in seconds on a loaded machine
+        settle(page)
         page.wait_for_function(
             "document.documentElement.scrollWidth <= document.documentElement.clientWidth",
             timeout=LONG,

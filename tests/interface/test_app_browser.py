@@ -45,7 +45,7 @@ def test_cases_are_listed_and_copied(page, folder):
     page.wait_for_selector("text=letters, digits")
     page.get_by_role("button", name="Cancel").click()
     (folder / "valve" / "case-2.yaml").unlink()
-    page.wait_for_timeout(500)
+    page.wait_for_selector(".q-dialog", state="detached")
     require_within(page)
 
 

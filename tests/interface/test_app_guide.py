@@ -13,7 +13,7 @@ from klack.case.valve_reader import load_any_case
 from klack.mesh.solid import write_step_revolved
 
 pytest.importorskip("nicegui")
-from app_browser import LONG, require_within, server
+from app_browser import LONG, require_within, server, settle
 from browser_pages import watched
 from served_app import Served
 
@@ -85,7 +85,10 @@ def name_under(page: Any, x: float, y: float) -> str:
     box = page.locator(".ks-view canvas").first.bounding_box()
     page.mouse.move(box["x"] + x * box["width"] - 2, box["y"] + y * box["height"])
     page.mouse.move(box["x"] + x * box["width"], box["y"] + y * box["height"])
-    page.wait_for_timeout(400)
+    page.evaluate(  # the label is drawn with the next picture, in seconds on a loaded machine
+        "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )
+    settle(page)  # nor does a label come later where there is none
     tip = page.locator(".ks-tip")
     return tip.inner_text() if tip.is_visible() else ""
 
@@ -105,7 +108,7 @@ def test_from_two_step_files_by_clicking_to_a_case(page, server, folder):
     page.wait_for_selector("text=Both parts are turned")
     require_within(page)
     onward(page, ".ks-view canvas")
-    page.wait_for_timeout(800)
+    settle(page)
     page.locator(".ks-view").first.scroll_into_view_if_needed()
     assert page.locator("#k-next").is_disabled()
     assert page.locator(".ks").get_attribute("class").split().count("ks-dark") == 1
@@ -183,8 +186,7 @@ def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser
         page.keyboard.press("Tab")
     page.wait_for_function("!document.getElementById('k-next').disabled")
     page.locator("#k-next").press("Enter")
-    page.wait_for_selector("text=Young's modulus")
-    page.wait_for_timeout(500)
+    page.wait_for_selector("text=Young's modulus")  # shown after it is kept
 
     page.reload()  # and another server: the step and all choices are there
     page.wait_for_selector("text=Young's modulus")

@@ -146,8 +146,15 @@ def test_a_run_that_cannot_be_written_down_is_not_left_running(folder, sleeping,
 
 
 def test_a_run_that_misses_the_first_request_to_stop_is_asked_again(folder, monkeypatch):
-    deaf = "import signal, time; n = signal.signal(signal.SIGTERM, lambda *_: signal.signal(signal"
-    deaf += ".SIGTERM, signal.SIG_DFL)); print(flush=True); time.sleep(60)"
+    deaf = """
+import signal, time
+def drop(*_):
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    print("dropped", flush=True)
+signal.signal(signal.SIGTERM, drop)
+print("listens", flush=True)
+time.sleep(60)
+"""
     real = subprocess.Popen
     monkeypatch.setattr(
         jobs_module.subprocess,
@@ -157,13 +164,17 @@ def test_a_run_that_misses_the_first_request_to_stop_is_asked_again(folder, monk
     jobs = Jobs(folder)
     name = jobs.start("impact", "bad.yaml", "klack-results/bad").name
     place = folder.path / ".klack-app" / "jobs" / name
-    while not (place / "stdout").stat().st_size:  # its handler is set
-        time.sleep(0.01)
 
+    def says(word):
+        while word not in (place / "stdout").read_text():
+            time.sleep(0.01)
+
+    says("listens")
     jobs.cancel(name)
     (job,) = jobs.all()
     assert (job.state, job.stage) == ("running", "stopping")
-    os.utime(place / "cancelled", (0, 0))  # long ago
+    says("dropped")  # two requests at once would be one
+    os.utime(place / "cancelled", (0, 0))  # asked long ago
 
     assert ended(jobs).state == "cancelled"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from app_browser import LONG, server
+from app_browser import LONG, server, settle
 from browser_pages import PAGES, Place, made_folder, watched
 from page_rules import (
     HAS_AXE,
@@ -58,13 +58,13 @@ def findings_everywhere(page: Any) -> tuple[dict[str, list[str]], list[str], int
         page.emulate_media(color_scheme=scheme)
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": 900})
-            page.wait_for_timeout(250)
+            settle(page)
             found = layout_findings(page) + (axe_findings(page) if HAS_AXE else [])
             for sentence in found:
                 said.setdefault(sentence, []).append(f"{width} px {scheme}")
 
     page.set_viewport_size({"width": 1000, "height": 900})
-    page.wait_for_timeout(250)
+    settle(page)
     count, unseen = focus_findings(page)
     return said, unseen, count
 
@@ -72,7 +72,7 @@ def findings_everywhere(page: Any) -> tuple[dict[str, list[str]], list[str], int
 @pytest.mark.parametrize("place", PAGES, ids=lambda place: place.name)
 def test_a_page_is_sound_at_every_width_in_light_and_dark(place: Place, page, server, folder):
     place.open(page, server.base, folder)
-    page.wait_for_timeout(300)
+    settle(page)
     said, unseen, count = findings_everywhere(page)
 
     assert said == {}
@@ -93,7 +93,7 @@ def test_the_page_that_asks_for_the_password_is_sound_and_says_what_was_wrong(br
         page.get_by_role("button", name="Open").click()
         page.get_by_role("alert").wait_for()
         assert findings_everywhere(page) == ({}, [], 2)
-        page.wait_for_timeout(1100)
+        page.wait_for_timeout(1100)  # the server takes none in the second after a wrong one
         page.get_by_label("Password").fill("several words of it")
         page.get_by_role("button", name="Open").click()
         page.wait_for_selector("text=Cases and results")

@@ -11,7 +11,7 @@ from made_study import made_study
 pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")
 
-from app_browser import LONG, page, require_within, server
+from app_browser import LONG, page, require_within, server, settle
 from served_app import Served
 
 from klack.analyses.study.analysis import STUDY
@@ -106,8 +106,9 @@ def test_a_study_is_made_started_stopped_and_resumed_without_its_server(
     page.get_by_text(re.compile("about .* left")).wait_for()
     page.get_by_role("button", name="Stop").click()
     page.wait_for_selector("text=stopped; the points so far are kept")
-    page.wait_for_timeout(1600)
-    before = told(page)["study"]
+    stopped = told(page)
+    page.wait_for_function("mark => window.klackPoints.mark === mark", arg=stopped["mark"])
+    before = stopped["study"]
     assert 0 < before["waiting"] < 8000
     page.get_by_role("button", name="Resume").click()
     page.wait_for_selector("text=study runs, ")
@@ -135,7 +136,7 @@ def test_a_brush_selects_in_all_views_and_thousands_are_paged(page, server):
     axis = page.evaluate("({x: klackPoints.axes.x(6), y: klackPoints.axes.height - 27})")
     page.locator("#kp-lines").scroll_into_view_if_needed()
     page.mouse.wheel(0, 200)
-    page.wait_for_timeout(300)
+    settle(page)
     box = page.locator("#kp-lines").bounding_box()
     page.mouse.move(box["x"] + axis["x"], box["y"] + axis["y"])
     page.mouse.down()
