@@ -162,6 +162,23 @@ def test_what_is_gone_is_told_once_with_the_way_back(page, server, address, word
     page.wait_for_selector("text=Everything below the folder that klack app opened.")
 
 
+def test_words_of_a_row_keep_room_beside_its_buttons(page, server):
+    """A page of 1280 px at a zoom of 200 %."""
+    page.set_viewport_size({"width": 640, "height": 450})
+    page.goto(f"{server.base}/")
+    page.get_by_text("2 notes on this result").wait_for()
+    page.get_by_role("button", name="Run", exact=False).first.wait_for()
+    settle(page)
+
+    widths = page.evaluate(
+        "[...document.querySelectorAll('.k-row > :first-child')]"
+        ".map(e => e.getBoundingClientRect().width)"
+    )
+    assert len(widths) >= 4
+    assert min(widths) >= 249.0  # [px]; one letter a line before
+    assert layout_findings(page) == []
+
+
 def test_results_of_two_kinds_are_not_offered_for_comparison(page, server):
     page.goto(f"{server.base}/")
     for name in ("impact", "stroke"):

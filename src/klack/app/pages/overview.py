@@ -33,6 +33,7 @@ __all__ = ["overview_page"]
 
 _EVERY = 1.0  # [s] that runs are looked at
 _SHORT, _LINES = 400, 8  # characters and lines of a note that is shown whole
+_HEAD = 120  # characters of one that is folded
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
 _WORDS = {
     "running": "runs",
@@ -398,7 +399,7 @@ class _Overview:
         note = self._state.notes.note(of)
         if not note:
             return
-        first = note.strip().partition("\n")[0][:_SHORT]
+        first = note.strip().partition("\n")[0][:_HEAD]
         if len(note) <= _SHORT and note.count("\n") < _LINES:
             plain(note, "p").classes("k-note")
             return
