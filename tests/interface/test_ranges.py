@@ -26,7 +26,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.mechanics.stop_law import LinearStopLaw
 from klack.network.network import Network
-from klack.network.ranges import limits_of
+from klack.network.ranges import limits_of, value_text
 from klack.network.rows import Ambient
 from klack.network.travel import Travel
 from klack.simulation.network_run import simulate_network
@@ -343,9 +343,17 @@ def test_a_line_far_from_its_pressure_says_both_speeds_and_the_error():
         simulate_network(line_between(400e5, 1e5, 1e5, gassy), duration=64e-6, step=20e-9)
 
     (text,) = [str(item.message) for item in caught if "'line'" in str(item.message)]
+    assert text.startswith("'line': at the start the pressure")
     slow, fast = (float(gassy.sound_speed(p)) for p in (1e5, 400e5))
     assert f"{slow:.4g} m/s, those at 400 bar at {fast:.4g} m/s" in text
     assert f"up to {100 * (1 - slow / fast):.2g} % off" in text
+
+
+def test_numbers_of_ranges_are_written_as_people_write_them():
+    assert value_text(6.483e-4, "kg/s") == "0.6483 g/s"
+    assert value_text(1.35e7, "Pa") == "135 bar"
+    assert value_text(2e-9, "m^3") == "2 mm^3"
+    assert value_text(4e-5, "m") == "40 um"
 
 
 def test_a_line_near_its_pressure_is_silent():

@@ -193,4 +193,6 @@ def value_text(value: float, unit: str) -> str:
         return f"{1e-5 * value:.5g} bar"
     if unit == "m^3":
         return f"{1e9 * value:.4g} mm^3"
+    if unit == "kg/s":
+        return f"{1e3 * value:.4g} g/s"
     return format_si(value, unit)

@@ -23,6 +23,7 @@ from klack.pneumatics.gas_step import (
     WORK_OF_CHAMBER,
     gas_step,
 )
+from klack.units import percent_text
 
 __all__ = ["GasNetwork", "close_gas"]
 
@@ -284,9 +285,10 @@ def _pressure_limit(name: str, gas: Gas) -> LimitRow:
         factor = gas.compressibility_at(value)
         if factor is None:
             return "There it may no longer be ideal."
+        off = f"{percent_text(abs(factor - 1.0))} {'more' if factor > 1.0 else 'less'}"
         return (
             f"Its compressibility factor there is {factor:.3g} at 20 degC: an ideal gas has "
-            f"{abs(factor - 1.0):.0%} {'more' if factor > 1.0 else 'less'} mass at this pressure, "
+            f"{off} mass at this pressure, "
             "and flows are wrong by about half of that."
         )
 
