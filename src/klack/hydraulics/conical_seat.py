@@ -402,7 +402,7 @@ class ConicalSeat(OpeningComponent):
                 if given
                 else f"no pressure-face with direction: opening at port {port}",
                 expected=f"a pressure-face with {name}: {1e3 * seal:.6g} mm, the sealing diameter, "
-                "at which this seat joins its own area over the lift",
+                "from which on this seat follows the lift itself",
                 hint=f"give the face that {name}, or leave tip_side out: then faces keep theirs; "
                 "another port at the tip is tip_side: "
                 f"{'a' if self.tip_side == 'b' else 'b'}.",
