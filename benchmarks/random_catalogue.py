@@ -4,25 +4,29 @@
 component type but the FMU occurs, runs ``klack stroke`` on each, once more with half the step, and
 ``klack stroke --steady`` and ``klack linearise`` on every third; ``--seed`` begins elsewhere,
 ``--only N`` prints one case.  It counts how they end: in an answer, in one with a note, in an error
-of the input (exit code 2), in a run that stopped (1).  A fault is an internal error, an energy
-residual above 1e-9 or a first impact that changes with the step without a note; each is printed.
+of the input (exit code 2), in a run that stopped (1).  A fault is an internal error, a stop that
+does not say at which component and when, an energy residual above 1e-9 or a first impact that
+changes with the step without a note; each is printed.
 """
 
 import argparse
 import json
+import re
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Iterable
 from contextlib import redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import yaml
 from drawn_catalogue import Drawn, draw
 
 from klack.cli.main import main as klack
 
-__all__ = ["ending", "main", "written"]
+__all__ = ["ending", "main", "tells_where_and_when", "written"]
 
 _RESIDUAL = 1e-9  # of the energy throughput
 _TIME, _PEAK = 5e-8, 5e-4  # [s], [-]: what is promised of the first impact on a stop
@@ -48,6 +52,14 @@ def _told(command: str, case: Path, *words: str) -> tuple[int, dict[str, Any], s
     return code, data, said.getvalue().strip()
 
 
+def tells_where_and_when(words: str, components: Iterable[str]) -> bool:
+    """Whether the message of a run that stopped names a component, a time, and what to try."""
+    message = words.partition("klack stroke: ")[2]
+    when = re.search(r"(at|after) -?[\d.]+ [num]?s\b|[\d.]+ [num]?s after|at the start", message)
+    where = any(re.search(rf"\b{re.escape(name)}\b", message) for name in components)
+    return where and when is not None and "Try: " in message
+
+
 def ending(case: Path, *, more: bool) -> tuple[str, str]:
     """How a case ends: ``answer``, ``note``, ``error``, ``stopped`` or ``fault``, and its words.
 
@@ -62,8 +74,12 @@ def ending(case: Path, *, more: bool) -> tuple[str, str]:
     for wrong, _, words in ((code, found, said), *others):
         if wrong not in (0, 1, 2) or (wrong and "Try: " not in words and "expected" not in words):
             return "fault", words[-500:]
+    if code == 1:
+        components = yaml.safe_load(case.read_text())["network"]["components"]
+        told = tells_where_and_when(said, components)
+        return "stopped" if told else "fault", said
     if code:
-        return ("error" if code == 2 else "stopped"), said
+        return "error", said
     step = f"{0.5e9 * found['step_s']:.12g} ns"
     apart = _apart(found, _told("stroke", case, "--step", step)[1])
     if not found["energy_residual"] <= _RESIDUAL and not said:

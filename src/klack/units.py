@@ -69,6 +69,7 @@ __all__ = [
     "is_level",
     "parse_quantity",
     "parse_temperature",
+    "percent_text",
     "powers_of_unit",
     "size_of_unit",
     "takes_prefix",
@@ -524,6 +525,18 @@ def takes_prefix(unit: str) -> bool:
 def is_level(unit: str) -> bool:
     """Whether a unit is that of a level, which is relative already: ``"dB"``, ``"dBA"``."""
     return unit.startswith("dB")
+
+
+def percent_text(share: float) -> str:
+    """Write a share as people read it: no powers of ten, and nothing exact that is huge.
+
+    >>> percent_text(0.0473), percent_text(0.9996), percent_text(2.8e5)
+    ('4.7 %', '100 %', 'more than 1000 %')
+    """
+    percent = 100.0 * share
+    if percent > 1000.0:
+        return "more than 1000 %"
+    return f"{percent:.0f} %" if percent >= 10.0 else f"{percent:.2g} %"
 
 
 def format_si(value: float, unit: str, digits: int = 4) -> str:

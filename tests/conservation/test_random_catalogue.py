@@ -25,6 +25,22 @@ def test_every_component_type_is_drawn():
     assert {word: found[word] for word in type_words() if found[word] < 5} == {}
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("coil: the gap is -17 um at 711.68 us, far outside its range.\nTry: a longer gap.", True),
+        ("before, at the start: the pressures find no steady flow.\nTry: state them.", True),
+        ("the forces at the ports did not converge at 711.68 us.\nTry: a smaller step.", False),
+        ("coil: the gap is -17 um, far outside its range.\nTry: a longer gap.", False),
+        ("coil: the gap is -17 um at 711.68 us.", False),
+    ],
+)
+def test_a_stopped_run_has_to_say_where_when_and_what_to_try(words, told):
+    tells = DRAWS["tells_where_and_when"]
+
+    assert tells(f"Note: before\nklack stroke: {words}", ("coil", "before")) is told
+
+
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("seed", range(0, 36, 3))
@@ -33,4 +49,4 @@ def test_a_random_valve_ends_in_an_answer_or_in_words(seed, tmp_path):
 
     end, words = DRAWS["ending"](case, more=True)
 
-    assert end in ("answer", "note", "error", "stopped"), words
+    assert end in ("answer", "note", "error", "stopped"), words  # "stopped" as told above

@@ -130,7 +130,7 @@ def test_a_table_that_jumps_between_two_gaps_is_refused():
     current, gap = [1.0, 2.0, 3.0], [1e-5, 2e-5, 3e-5, 4e-5, 5e-5]
     rise = np.array([[1.0, 1.0, 1.0, 1.0, 1.0], [5e-3, 5e-3, 1.0, 5e-3, 5e-3], [1.0] * 5])
 
-    with pytest.raises(InputError, match="so abruptly between the gaps 1e-05 m and 2e-05 m"):
+    with pytest.raises(InputError, match="so abruptly between the gaps 10 um and 20 um"):
         FluxMap.of(current=current, gap=gap, linkage=1e-3 * np.cumsum(rise, axis=0), force=None)
 
 

@@ -94,6 +94,17 @@ def test_a_closed_direct_injector_is_pressed_by_spring_and_pressure():
     )  # spring and seat share
 
 
+def test_a_note_of_a_point_keeps_its_remedy():
+    text = (VALVES / "direct_injector.yaml").read_text(encoding="utf-8")
+    line = "diameter: 2.5 mm, pressure: 100 bar"
+    assert line in text
+    record = points(written(text.replace(line, line.replace("100 bar", "1 bar"))))
+
+    (note,) = [note for note in record.warnings if note.startswith("'feed': at the start")]
+    assert " Try: give components.feed.pressure the working pressure" in note
+    assert not any(note.startswith("Try") for note in record.warnings)
+
+
 def test_a_held_direct_injector_passes_what_both_restrictions_pass():
     tree = read_case_tree(VALVES / "direct_injector.yaml")
     found = points(tree, base=Conditions(current={"": 8.0}))

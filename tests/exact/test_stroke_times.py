@@ -101,6 +101,34 @@ def test_the_first_whole_stroke_counts_not_a_bounce_before_it():
     assert times.closing.touch == 7e-3
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_every_time_lies_in_the_run_and_closing_follows_opening(seed):
+    """Truth: the order of events.  Random motions, most of them closed or open at an end."""
+    rng = np.random.default_rng(seed)
+    at = np.sort(rng.uniform(0.0, 10.0, 12))
+    lift = np.clip(rng.uniform(-60.0, 160.0, 12), 0.0, 100.0)
+    lift[0] = rng.choice([0.0, 100.0])
+    events = [
+        hit("seat" if x <= 0.0 else "stop", 1e-3 * t)
+        for t, x in zip(at, lift, strict=True)
+        if x in (0.0, 100.0)
+    ]
+    times = times_of(np.column_stack([at, lift]), events)
+    (_, first), (_, second) = times.in_order
+
+    known = [t for passage in (first, second) for t in moments(passage) if t is not None]
+    assert all(0.0 <= t <= TIME[-1] for t in known)
+    if first.touch is not None and second.touch is not None:
+        assert second.touch > first.touch
+
+
+def test_a_needle_that_stays_on_its_seat_has_no_closing_time():
+    events = (hit("seat", 1e-3), hit("seat", 2e-3))  # it chatters by nothing that counts
+    times = times_of([(0, 0), (1, 0.004), (2, 0), (10, 0)], events)
+
+    assert moments(times.opening) == moments(times.closing) == [None] * 4
+
+
 def test_without_an_opening_stop_the_lift_is_that_of_the_run():
     times = times_of([(1, 0), (2, 40), (3, 0)], ends=(0.0, np.inf))
 

@@ -8,6 +8,10 @@ import numpy as np
 import pytest
 
 import klack
+from klack.analyses.analysis import StoredAnalysis
+from klack.analyses.catalogue import analyses
+from klack.analyses.record import CaseRecord, case_fields, run_fields
+from klack.analyses.sensitivities.record import SensitivityRecord
 from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.strokes import STROKES
 from klack.case.calibration import CaseCalibration
@@ -17,9 +21,12 @@ from klack.case.points import points_of
 from klack.case.reader import read_case
 from klack.case.rewriting import rewritten, written_quantity
 from klack.case.valve_reader import read_valve_case
+from klack.cli.main import main
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
+from klack.progress import silent
 from klack.simulation.network_run import simulate_network
+from klack.stages import StageClock
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 TEXT = SMALL.read_text(encoding="utf-8")
@@ -52,6 +59,11 @@ PARAMETRIC = with_parameters(
     "time: [= t0, = t0 + 1 us, = 100 * t0, = 100 * t0 + 1 us]",
     "restitution: 0.5}",
     "restitution: = 2 / holes}",
+)
+SPARE = with_parameters(
+    'k: 10 N/mm, x0: 1.2 mm, twice: "= 2 * x0", spare: 3 mm, other: "= 2 * spare"',
+    "preload: 12 N",
+    'preload: "= k * twice / 2"',
 )
 
 
@@ -331,16 +343,37 @@ def test_a_study_builds_bodies_again_where_they_follow_from_a_parameter(old, new
     assert [group.places for group in groups] == ([(0,), (1, 2)] if builds else [(0, 1, 2)])
 
 
-def test_parameters_without_effect_are_named(tmp_path):
-    text = with_parameters(
-        'k: 10 N/mm, x0: 1.2 mm, twice: "= 2 * x0", spare: 3 mm, other: "= 2 * spare"',
-        "preload: 12 N",
-        'preload: "= k * twice / 2"',
-    )
-    case = tmp_path / "case.yaml"
-    case.write_text(text)
+def test_parameters_without_effect_are_named():
+    told = read_valve_case(SPARE, SMALL).parameter_notes
 
-    told = read_valve_case(text, case).parameter_notes
     assert [note.partition(":")[0] for note in told] == ["parameters.spare", "parameters.other"]
-    assert klack.run_stroke(case).record.warnings[:2] == told
     assert read_valve_case(PARAMETRIC, SMALL).parameter_notes == ()
+
+
+@pytest.mark.parametrize(
+    "command", [("stroke",), ("stroke", "--steady"), ("linearise",), ("advise", "--no-confirm")]
+)
+def test_every_command_names_parameters_without_effect(command, tmp_path, capsys):
+    case = tmp_path / "case.yaml"
+    case.write_text(SPARE, encoding="utf-8")
+    own = () if command[0] == "advise" else ("--no-report", "--out", str(tmp_path / "out"))
+
+    assert main([command[0], str(case), *command[1:], *own]) == 0
+
+    told = "".join(capsys.readouterr())
+    assert told.count("Note: parameters.spare: nothing in this case follows from it.") == 1
+    assert told.count("Note: parameters.other:") == 1
+
+
+def test_every_record_of_a_case_takes_its_notes():
+    case = read_valve_case(SPARE, SMALL)
+    kinds = [item.form.kind for item in analyses() if isinstance(item, StoredAnalysis)]
+    of_cases = [kind for kind in (*kinds, SensitivityRecord) if issubclass(kind, CaseRecord)]
+
+    made = CaseRecord(
+        **case_fields(case), **run_fields(0.0, StageClock(silent)), warnings=("other",)
+    )
+
+    assert made.warnings == ("other", *case.parameter_notes)
+    assert len(of_cases) > 10
+    assert all(kind.__post_init__ is CaseRecord.__post_init__ for kind in of_cases)

@@ -1,10 +1,11 @@
 """Every way in which a network cannot be a valve has one error, with its key and what to try."""
 
+from dataclasses import replace
 from typing import ClassVar
 
 import pytest
 
-from klack.errors import InputError
+from klack.errors import ConvergenceError, InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.mechanics.end_stop import EndStop
@@ -12,11 +13,13 @@ from klack.mechanics.force import ConstantForce
 from klack.mechanics.gravity import Gravity
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
 from klack.network.checks import LooseBodyWarning
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.port import COIL, COMPLIANCE, FLOW, MOTION, PRESSURE, VOLTAGE, Port, Role
 from klack.network.rows import AMBIENT, GROUND, Rows
+from klack.simulation.network_run import simulate_network
 
 
 class Part(Component):
@@ -231,6 +234,38 @@ def test_what_is_wrong_is_said_once_and_clearly(name):
     assert got in error.got
     assert hint in error.hint
     assert error.where.startswith(("connections", "component", "network"))
+
+
+class Unsettled(Spring):
+    """A spring that finds no start."""
+
+    def add_rows(self, rows: Rows) -> None:
+        raise ConvergenceError("the fluxes do not settle.\nTry: another loop.")
+
+
+def test_what_does_not_converge_at_the_start_names_its_component():
+    parts = {"coil": Unsettled(stiffness=1e3, preload=0.0), "m": RigidMass(mass=1.0)}
+    network = Network(parts, [["coil.end", "m.body"]])
+
+    with pytest.raises(ConvergenceError, match=r"^coil, at the start: the fluxes do not settle"):
+        network.rows()
+
+
+def test_forces_that_do_not_converge_name_body_port_and_time():
+    """Truth: a spring on a mass, explicitly coupled, is unstable where k h^2 is above 4 m."""
+    parts = {
+        "light": RigidMass(mass=1e-9),
+        "spring": Spring(stiffness=1e6, preload=0.0),
+        "stop": EndStop(gap=1e-6, law=LinearStopLaw(kind="linear", stiffness=1e8)),
+    }
+    joints = [["light.body", "spring.end", "stop.upper"], ["ground", "spring.base", "stop.lower"]]
+    rows = Network(parts, joints).rows()
+    rows.bodies[0] = replace(rows.bodies[0], speed=-1.0)
+
+    with pytest.raises(ConvergenceError, match=r"^light: the forces .* at \d+ n?s \('body'") as end:
+        simulate_network(rows, duration=1e-4, step=1e-7, start="free")
+
+    assert "Try: a smaller step; a stiffness at 'light'" in str(end.value)
 
 
 def test_an_interface_closed_at_the_start_is_refused():

@@ -5,6 +5,7 @@ Truth: lengths, areas and volumes by hand; the mass that a closed chamber holds.
 
 import re
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from klack.case.valve_reader import read_valve_case
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.controlled_pressure import ControlledPressure
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
@@ -24,7 +26,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.mechanics.stop_law import LinearStopLaw
 from klack.network.network import Network
-from klack.network.ranges import limits_of
+from klack.network.ranges import limits_of, value_text
 from klack.network.rows import Ambient
 from klack.network.travel import Travel
 from klack.simulation.network_run import simulate_network
@@ -227,6 +229,94 @@ def test_pressures_that_no_fluid_is_described_at_are_refused(old, new, said):
     assert str(caught.value).startswith(said)
 
 
+SUPPLIED = """
+klack: 1
+title: supplied
+network:
+  ambient: {temperature: 20 degC}
+  fluid: water
+  components:
+    m: {type: rigid-mass, mass: 1 kg, points: [p]}
+    s: {type: end-stop, gap: 0 um, law: {kind: linear, stiffness: 1e8 N/m}, restitution: 0.1}
+    k: {type: spring, stiffness: 1 N/mm, preload: 100 N}
+    supply: {type: pressure-source, pressure: 5 bar}
+    o: {type: orifice, diameter: 0.1 mm}
+    c: {type: chamber, volume: 10 mm^3, pressure: 5 bar}
+  connections:
+    - [supply.fluid, o.a]
+    - [o.b, c.fluid]
+    - [m.p, s.upper, k.end]
+    - [s.lower, ground]
+run: {duration: 0.1 ms, step: 20 ns, record: 1 us, variants: [wet]}
+"""
+SOURCE = "{type: pressure-source, pressure: 5 bar}"
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({SOURCE: "{type: pressure-source, pressure: 0.02 bar}"}, "components.supply: got a pres"),
+        (
+            {SOURCE: "{type: pressure-source, table: {time: [0 s, 1 s], pressure: [1 Pa, 1 bar]}}"},
+            "components.supply: got a pressure of 1e-05 bar at the start",
+        ),
+        (
+            {"supply.fluid": "ambient", f"    supply: {SOURCE}\n": "", "20 degC": "110 degC"},
+            "ambient: got a pressure of 1.0132 bar at the start",
+        ),
+    ],
+    ids=["constant", "begin of a table", "surroundings of hot water"],
+)
+def test_a_supply_of_vapour_is_refused(changes, said):
+    """Water boils at 0.02339 bar at 20 degC and 1.4338 bar at 110 degC (IAPWS)."""
+    rows_of(SUPPLIED)
+    text = SUPPLIED
+    for old, new in changes.items():
+        assert old in text
+        text = text.replace(old, new)
+    with pytest.raises(InputError, match=re.escape(said)) as caught:
+        rows_of(text)
+
+    boils = re.search(r"boils at ([\d.]+) bar at (\d+) degC", caught.value.expected)
+    assert float(boils[1]) == pytest.approx({"20": 0.02339, "110": 1.4338}[boils[2]], rel=2e-2)
+
+
+def test_surroundings_that_no_fluid_comes_from_may_be_below_its_vapour_pressure():
+    rows_of(SUPPLIED.replace("20 degC", "110 degC"))
+
+
+@pytest.mark.parametrize("pressure", ["-1 bar", "0 bar"])
+def test_a_table_of_pressures_that_do_not_exist_is_refused(pressure):
+    table = f"{{time: [0 ms, 1 ms], pressure: [5 bar, {pressure}]}}"
+    with pytest.raises(InputError, match=r"supply\.table\.pressure\[1\]: got '.* above 0"):
+        rows_of(SUPPLIED.replace(SOURCE, f"{{type: pressure-source, table: {table}}}"))
+
+
+def test_a_supply_that_falls_below_boiling_is_told_when_it_does():
+    """5 bar to 0.01 bar in 100 us: the last 0.7 us are below 0.0434 bar."""
+    falls = "{type: pressure-source, table: {time: [0 us, 100 us], pressure: [5 bar, 0.01 bar]}}"
+    rows = rows_of(SUPPLIED.replace(SOURCE, falls))
+    with pytest.warns(AccuracyWarning, match=r"'supply': at .* 'water' in 'supply'") as caught:
+        simulate_network(rows, duration=105e-6, step=20e-9, record=100e-9)
+
+    (text,) = [str(item.message) for item in caught if "'supply'" in str(item.message)]
+    assert float(re.search(r"at ([\d.]+) us", text)[1]) == pytest.approx(99.3, abs=1.0)  # a look
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", AccuracyWarning)
+        simulate_network(rows, duration=98e-6, step=20e-9, record=100e-9)
+
+
+def test_a_controller_that_asks_for_less_than_boiling_is_told_when_it_does():
+    supply = ControlledPressure(sample_time=10e-6, start=5e5).by(
+        lambda time, signals: 5e5 if time < 35e-6 else 500.0
+    )
+    valve = read_valve_case(SUPPLIED, Path("valve.yaml")).network.network()
+    rows = replace(valve, components={**valve.components, "supply": supply}).rows()
+
+    with pytest.warns(AccuracyWarning, match=r"^'supply': at 4[01][\d.]* us .* it is 0\.005 bar"):
+        simulate_network(rows, duration=100e-6, step=20e-9, record=100e-9)
+
+
 def line_between(first, second, pressure=None, fluid=HEPTANE):
     parts = {
         "m": RigidMass(mass=1.0),
@@ -253,9 +343,17 @@ def test_a_line_far_from_its_pressure_says_both_speeds_and_the_error():
         simulate_network(line_between(400e5, 1e5, 1e5, gassy), duration=64e-6, step=20e-9)
 
     (text,) = [str(item.message) for item in caught if "'line'" in str(item.message)]
+    assert text.startswith("'line': at the start the pressure")
     slow, fast = (float(gassy.sound_speed(p)) for p in (1e5, 400e5))
     assert f"{slow:.4g} m/s, those at 400 bar at {fast:.4g} m/s" in text
     assert f"up to {100 * (1 - slow / fast):.2g} % off" in text
+
+
+def test_numbers_of_ranges_are_written_as_people_write_them():
+    assert value_text(6.483e-4, "kg/s") == "0.6483 g/s"
+    assert value_text(1.35e7, "Pa") == "135 bar"
+    assert value_text(2e-9, "m^3") == "2 mm^3"
+    assert value_text(4e-5, "m") == "40 um"
 
 
 def test_a_line_near_its_pressure_is_silent():

@@ -5,7 +5,7 @@ A record is what an analysis leaves behind.  Its fields are stored under their o
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
@@ -67,11 +67,19 @@ class CaseRecord(Record):
         The file itself.
     own_components : mapping of str to str
         Components that are not part of klack: first digits of the SHA-256 of their code, by name.
+    case_notes : tuple of str
+        What the case by itself gives reason to say; added to the warnings.
     """
 
     case: str
     case_text: str
     own_components: Mapping[str, str] = field(default_factory=dict)
+    case_notes: InitVar[tuple[str, ...]] = ()
+
+    def __post_init__(self, case_notes: tuple[str, ...]) -> None:
+        """Add the notes of the case to the warnings, each once."""
+        new = tuple(note for note in case_notes if note not in self.warnings)
+        object.__setattr__(self, "warnings", (*self.warnings, *new))
 
 
 class _Head(Protocol):
@@ -121,6 +129,7 @@ class CaseFields(TypedDict):
     description: str
     case_text: str
     own_components: Mapping[str, str]
+    case_notes: tuple[str, ...]
 
 
 class _Case(Protocol):
@@ -134,6 +143,8 @@ class _Case(Protocol):
     def source(self) -> str: ...
     @property
     def own_components(self) -> Mapping[str, str]: ...
+    @property
+    def parameter_notes(self) -> tuple[str, ...]: ...
 
 
 _version = cache(version)
@@ -153,14 +164,16 @@ def run_fields(begin: float, clock: StageClock, *libraries: str) -> RunFields:
 
 def case_fields(case: _Case | CaseRecord, case_text: str | None = None) -> CaseFields:
     """Name, title and text of a case, or of the record that an analysis starts from."""
+    notes: tuple[str, ...]
     if isinstance(case, CaseRecord):
-        name, text = case.case, case.case_text
+        name, text, notes = case.case, case.case_text, ()
     else:
-        name, text = case.name, case.source
+        name, text, notes = case.name, case.source, case.parameter_notes
     return {
         "case": name,
         "title": case.title,
         "description": case.description.strip(),
         "case_text": text if case_text is None else case_text,
         "own_components": case.own_components,
+        "case_notes": notes,
     }

@@ -397,12 +397,12 @@ class ConicalSeat(OpeningComponent):
             name = "outer_diameter" if at_tip else "inner_diameter"
             told = " and ".join(f"{1e3 * edge:.6g} mm" for edge in given)
             raise InputError(
-                f"{rows.component}: tip_side",
+                f"components.{rows.component}.tip_side",
                 got=f"{name} {told} of the pressure faces at port {port}"
                 if given
                 else f"no pressure-face with direction: opening at port {port}",
                 expected=f"a pressure-face with {name}: {1e3 * seal:.6g} mm, the sealing diameter, "
-                "which this seat lets follow the lift",
+                "from which on this seat follows the lift itself",
                 hint=f"give the face that {name}, or leave tip_side out: then faces keep theirs; "
                 "another port at the tip is tip_side: "
                 f"{'a' if self.tip_side == 'b' else 'b'}.",

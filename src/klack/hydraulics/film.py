@@ -13,6 +13,7 @@ from klack.errors import InputError
 from klack.hydraulics.network_fluid import network_fluid
 from klack.input.problem import CaseProblem
 from klack.input.section import Section
+from klack.network.ranges import value_text
 from klack.network.rows import FilmRow, Rows
 from klack.units import Angle, Length, Pressure, format_si
 
@@ -181,7 +182,7 @@ class Film(Section):
         self, component: str, fluid: str, cavitation: float, around: float
     ) -> InputError:
         """Error of a film in surroundings below its cavitation pressure, at a key that is given."""
-        limit, words = format_si(cavitation, "Pa"), format_si(around, "Pa")
+        limit, words = value_text(cavitation, "Pa"), value_text(around, "Pa")
         film = f"the film of '{component}'"
         if self.cavitation_pressure is not None:
             return InputError(

@@ -20,7 +20,7 @@ from klack.network.component import Component
 from klack.network.port import FLOW
 from klack.network.protocols import NetworkFluid
 from klack.network.rows import LimitRow, Rows
-from klack.units import Length, Modulus, Pressure
+from klack.units import Length, Modulus, Pressure, percent_text
 
 __all__ = ["Line"]
 
@@ -283,7 +283,7 @@ class Line(Component):
             return (
                 f"Its waves run at {speeds[0]:.4g} m/s, those at {1e-5 * p:.4g} bar at "
                 f"{speeds[1]:.4g} m/s: echo times, pressures of a change "
-                f"of flow and the stored fluid are up to {100.0 * float(error(p)[0]):.2g} % off "
+                f"of flow and the stored fluid are up to {percent_text(float(error(p)[0]))} off "
                 "at such times."
             )
 

@@ -87,10 +87,11 @@ def laminar_doubts(
     times = 0.3164 * reynolds**0.75 / 64.0
     if reynolds <= LAMINAR or (drop is not None and (times - 1.0) * drop < _TOLD):
         return
+    number = f"{float(f'{reynolds:.3g}'):.0f}"
     shown = "" if drop is None else f", {1e-5 * drop:.2g} bar as computed,"
     yield (
         f"'{component}': the flow in this line, whose friction is laminar, reaches a Reynolds "
-        f"number of {reynolds:.3g} {format_si(time, 's', 4)} after the start; steady laminar flow "
+        f"number of {number} at {format_si(time, 's', 4)}; steady laminar flow "
         f"ends at {LAMINAR:g}. In the first milliseconds of a change it stays laminar above that, "
         f"later the pressure drop{shown} is about {times:.2g} times that of laminar friction.\n"
         f"Try: components.{component}.friction: turbulent."

@@ -1,6 +1,6 @@
 """A pressure over time, as sources of liquid and of gas are given it."""
 
-from typing import Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -24,7 +24,9 @@ class PressureTable(Section):
     """Pressure over time: straight between its points, constant beyond them."""
 
     time: tuple[Time, ...] = Field(description="Rising.")
-    pressure: tuple[Pressure, ...] = Field(description="Absolute, one per time.")
+    pressure: tuple[Annotated[Pressure, Field(gt=0)], ...] = Field(
+        description="Absolute, one per time."
+    )
 
     @model_validator(mode="after")
     def _usable(self) -> Self:

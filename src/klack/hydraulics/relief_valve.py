@@ -11,6 +11,7 @@ from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
 from klack.input.problem import CaseProblem
 from klack.network.port import FLOW, Port
+from klack.network.ranges import value_text
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function
 from klack.units import Area, Length, Pressure, Time, VolumeFlow
@@ -126,14 +127,16 @@ class ReliefValve(OpeningComponent):
         if self.rated_pressure <= self.set_pressure:
             raise CaseProblem(
                 ("rated_pressure",),
-                got=f"{self.rated_pressure:g} Pa at a set pressure of {self.set_pressure:g} Pa",
+                got=f"{value_text(self.rated_pressure, 'Pa')} at a set pressure of "
+                f"{value_text(self.set_pressure, 'Pa')}",
                 expected="more than the set pressure",
                 hint="take one point of the characteristic above the set pressure.",
             )
         if self.hysteresis >= self.set_pressure:
             raise CaseProblem(
                 ("hysteresis",),
-                got=f"{self.hysteresis:g} Pa at a set pressure of {self.set_pressure:g} Pa",
+                got=f"{value_text(self.hysteresis, 'Pa')} at a set pressure of "
+                f"{value_text(self.set_pressure, 'Pa')}",
                 expected="less than the set pressure",
                 hint="give the difference between opening and closing pressure.",
             )
@@ -155,11 +158,13 @@ class ReliefValve(OpeningComponent):
         slope = self.area_slope(float(fluid.density(rows.ambient.pressure)))
         rated = slope * (self.rated_pressure - self.set_pressure) / sqrt(self.rated_pressure)
         if rated > self.open_area:
+            pressure = value_text(self.rated_pressure, "Pa")
             raise CaseProblem(
                 ("components", rows.component, "rated_flow"),
-                got=f"{self.rated_flow:g} m^3/s at {self.rated_pressure:g} Pa, which takes "
-                f"{rated:.3g} m^2 with this fluid",
-                expected=f"a rated point below the area when fully open, {self.open_area:.3g} m^2",
+                got=f"{6e4 * self.rated_flow:.4g} l/min at {pressure}, "
+                f"which takes an area of {1e6 * rated:.3g} mm^2 with this fluid",
+                expected="a rated point that takes less than the area when fully open, "
+                f"{1e6 * self.open_area:.3g} mm^2",
                 hint="enlarge the area, or take a rated point with less flow.",
             )
         rows.branch(

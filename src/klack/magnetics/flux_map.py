@@ -229,11 +229,12 @@ class FluxMap:
         least = np.min(corners @ _HERMITE.T @ v.T, axis=(0, 3))
         if np.min(least) <= 0.0:
             k, j = np.unravel_index(int(np.argmin(least)), least.shape)
+            gaps = " and ".join(format_si(gap, "m") for gap in self.gap[j : j + 2])
             raise InputError(
                 "FluxMap",
-                got=f"a table that changes so abruptly between the gaps {self.gap[j]:.4g} m and "
-                f"{self.gap[j + 1]:.4g} m that the current falls as the linkage rises, "
-                f"near {self.linkage[k]:.3g} Wb",
+                got=f"a table that changes so abruptly between the gaps {gaps} that the current "
+                "falls as the linkage rises, "
+                f"near {format_si(self.linkage[k], 'Wb', 3)}",
                 expected="linkages that change smoothly with the gap",
                 hint="put more gaps into the table there, or smooth its noise.",
             )

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Self
 
+from klack.errors import ConvergenceError
 from klack.input.problem import CaseProblem
 from klack.network.checks import check_nodes, check_rows
 from klack.network.component import Component
@@ -122,7 +123,10 @@ class Network:
         for name in sorted(self.components, key=self._rank):  # stable: else in the given order
             rows.component = name
             rows.handles, rows.partners = handles[name], partners[name]
-            self.components[name].add_rows(rows)
+            try:
+                self.components[name].add_rows(rows)
+            except ConvergenceError as error:
+                raise ConvergenceError(f"{name}, at the start: {error}") from error
         for close in rows.closing.values():
             close(rows)
         check_rows(rows)

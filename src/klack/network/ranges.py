@@ -16,7 +16,7 @@ _ROUNDING = 1e-9  # of the start value: what sums of lengths leave
 
 def limits_of(rows: Rows) -> list[LimitRow]:
     """Every range of a network: those of its components, of its volumes, and of its fluid."""
-    return [*rows.limits, *_volumes(rows), *_pressures(rows)]
+    return [*rows.limits, *_volumes(rows), *_pressures(rows), *_supplies(rows)]
 
 
 def _volumes(rows: Rows) -> list[LimitRow]:
@@ -67,6 +67,37 @@ def _pressures(rows: Rows) -> list[LimitRow]:
         )
         for node, row in rows.nodes.items()
     ]
+
+
+def _supplies(rows: Rows) -> list[LimitRow]:
+    """Below boiling a supply would give vapour, and a pressure below zero does not exist."""
+    if rows.fluid is None:
+        return []
+    fluid = rows.fluid
+    boils = f"{1e-5 * fluid.vapour_pressure:.3g} bar at {fluid.temperature - 273.15:.4g} degC"
+    return [
+        LimitRow(
+            component=row.component,
+            quantity="pressure",
+            unit="Pa",
+            valid=(fluid.all_liquid_from, inf),
+            usable=(0.0, inf),
+            law=f"liquid '{fluid.name}' in '{row.component}'",
+            source=f"absolute; it boils at {boils}",
+            effect=lambda value: "What flows from there is vapour, in part or all.",
+            advice="pressures are absolute: add that of the surroundings, usually 1.013 bar, to "
+            "a gauge pressure; check the temperature of the fluid.",
+            node=node,
+        )
+        for node, row in rows.nodes.items()
+        if row.prescribed and (node != AMBIENT or _gives_fluid(rows))
+    ]
+
+
+def _gives_fluid(rows: Rows) -> bool:
+    """Whether anything can flow out of the surroundings."""
+    ends = [(row.a, row.b) for row in rows.branches] + [(row.a, row.b) for row in rows.lines]
+    return any(AMBIENT in both for both in ends)
 
 
 def check_ranges(rows: Rows) -> None:
@@ -125,17 +156,24 @@ def _way_text(rows: Rows, limit: LimitRow, way: float, stops: tuple[str, ...]) -
 
 def _check_pressure(rows: Rows, limit: LimitRow) -> None:
     assert limit.node is not None
-    highest = float(rows.nodes[limit.node].pressure.max())
-    if highest <= limit.usable[1]:
-        return
+    row = rows.nodes[limit.node]
+    start, highest = row.at_start, float(row.pressure.max())
     key = ("ambient",) if limit.node == AMBIENT else ("components", limit.component)
-    raise CaseProblem(
-        key,
-        got=f"a pressure of {value_text(highest, 'Pa')}",
-        expected=f"at most {value_text(limit.usable[1], 'Pa')}; {limit.law} is described "
-        f"{range_text(limit)}",
-        hint=limit.advice,
-    )
+    if highest > limit.usable[1]:
+        raise CaseProblem(
+            key,
+            got=f"a pressure of {value_text(highest, 'Pa')}",
+            expected=f"at most {value_text(limit.usable[1], 'Pa')}; {limit.law} is described "
+            f"{range_text(limit)}",
+            hint=limit.advice,
+        )
+    if row.prescribed and start < limit.valid[0]:
+        raise CaseProblem(
+            key,
+            got=f"a pressure of {value_text(start, 'Pa')} at the start",
+            expected=f"{limit.law}, {range_text(limit)}",
+            hint=limit.advice,
+        )
 
 
 def range_text(limit: LimitRow) -> str:
@@ -155,4 +193,6 @@ def value_text(value: float, unit: str) -> str:
         return f"{1e-5 * value:.5g} bar"
     if unit == "m^3":
         return f"{1e9 * value:.4g} mm^3"
+    if unit == "kg/s":
+        return f"{1e3 * value:.4g} g/s"
     return format_si(value, unit)

@@ -23,6 +23,7 @@ from klack.pneumatics.gas_step import (
     WORK_OF_CHAMBER,
     gas_step,
 )
+from klack.units import percent_text
 
 __all__ = ["GasNetwork", "close_gas"]
 
@@ -35,6 +36,7 @@ _FAILURES = {
     1: "the gas does not settle in this step",
     2: "a chamber has no volume left (V_0 + A y)",
 }
+_STATE_IT = "Try: state the 'pressure' of these chambers, and check their outlets."
 
 
 class GasNetwork:
@@ -138,15 +140,24 @@ class GasNetwork:
                 gas_step, par, state, [-h, h, *inputs], len(self.ports) + states + 3
             )
             if status != 0:
-                raise ConvergenceError(f"gas: {_FAILURES[status]}, on the way to steady flow.")
+                raise ConvergenceError(
+                    f"{_names(free)}, at the start: {_FAILURES[status]}, on the way to steady "
+                    f"flow.\n{_STATE_IT}"
+                )
             after = out[len(self.ports) :][:states]
             pressures = slice(2, OF_CHAMBER * n, OF_CHAMBER)
             left = float(np.max(np.abs(after[pressures] / state[pressures] - 1.0)))
             state, h = after, h * _LONGER
             state[4 : OF_CHAMBER * n : OF_CHAMBER] = 1e30  # fully implicit: nothing swings
         if left > _NEARLY:
-            raise ConvergenceError("gas: the pressures find no steady flow.")
+            raise ConvergenceError(
+                f"{_names(free)}, at the start: the pressures find no steady flow.\n{_STATE_IT}"
+            )
         return {handle: float(state[OF_CHAMBER * i + 2]) for i, handle in enumerate(free)}
+
+
+def _names(chambers: Mapping[int, GasChamberRow]) -> str:
+    return ", ".join(row.component for row in chambers.values())
 
 
 def _held(row: GasChamberRow) -> GasSourceRow:
@@ -195,7 +206,10 @@ def close_gas(rows: Rows) -> None:
                 )
                 for i, chamber in enumerate(found.chambers.values())
             ),
-            failures=_FAILURES,
+            failures={
+                code: f"{words} (chambers: {_names(found.chambers)})"
+                for code, words in _FAILURES.items()
+            },
             at_rest=net.start,
             at_steady=lambda y: net.start(y, steady=True),
         )
@@ -271,9 +285,10 @@ def _pressure_limit(name: str, gas: Gas) -> LimitRow:
         factor = gas.compressibility_at(value)
         if factor is None:
             return "There it may no longer be ideal."
+        off = f"{percent_text(abs(factor - 1.0))} {'more' if factor > 1.0 else 'less'}"
         return (
             f"Its compressibility factor there is {factor:.3g} at 20 degC: an ideal gas has "
-            f"{abs(factor - 1.0):.0%} {'more' if factor > 1.0 else 'less'} mass at this pressure, "
+            f"{off} mass at this pressure, "
             "and flows are wrong by about half of that."
         )
 

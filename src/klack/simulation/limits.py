@@ -111,18 +111,23 @@ def _warning(limit: LimitRow, values: Vector, time: Vector, first: int) -> str:
     beyond = np.maximum(low - values, values - high)
     worst = int(np.nanargmax(beyond))
     furthest = value_text(float(values[worst]), limit.unit)
-    if worst != first:
-        furthest = f"{value_text(float(values[first]), limit.unit)}, later {furthest}"
+    begins = value_text(float(values[first]), limit.unit)
+    if begins != furthest:
+        furthest = f"{begins}, later {furthest}"
     return (
-        f"'{limit.component}': at {format_si(float(time[first]), 's')} the {limit.quantity} leaves "
+        f"'{limit.component}': {_when(float(time[first]), 4)} the {limit.quantity} leaves "
         f"the range of {limit.law}, {range_text(limit)}: it is {furthest}. "
         f"{limit.effect(float(values[worst]))}\nTry: {limit.advice}"
     )
 
 
+def _when(time: float, digits: int) -> str:
+    return f"at {format_si(time, 's', digits)}" if time > 0.0 else "at the start"
+
+
 def _stop(limit: LimitRow, value: float, time: float) -> ConvergenceError:
     return ConvergenceError(
-        f"{limit.component}: the {limit.quantity} is {value_text(value, limit.unit)} at "
-        f"{format_si(time, 's', 6)}, far outside the range of {limit.law}, {range_text(limit)}.\n"
+        f"{limit.component}: the {limit.quantity} is {value_text(value, limit.unit)} "
+        f"{_when(time, 6)}, far outside the range of {limit.law}, {range_text(limit)}.\n"
         f"Try: {limit.advice}"
     )

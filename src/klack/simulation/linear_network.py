@@ -26,7 +26,7 @@ from klack.simulation.network_arrays import Y0, StepRows
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.static_contacts import contacts_at_rest
 from klack.simulation.static_rows import fluids_at
-from klack.units import format_si
+from klack.units import format_si, percent_text
 
 __all__ = ["LinearNetwork", "linear_network"]
 
@@ -135,9 +135,9 @@ class _Assembly:
         branch = isinstance(row, BranchRow)
         ends = [int(at.a[k]), int(at.b[k])] if branch else []
         kind = "branches" if branch else "elements"
-        changes = [
-            getattr(other, kind)[k].parameters - row.parameters for _, other in self.drives.values()
-        ]
+        driven = [getattr(other, kind)[k].parameters for _, other in self.drives.values()]
+        now = row.parameters  # may be infinite, the same in both
+        changes = [np.subtract(x, now, out=np.zeros_like(now), where=x != now) for x in driven]
         here = at.ports[at.port0[k] : at.port0[k + 1]]
         found = linear_row(
             RowPoint(
@@ -153,14 +153,14 @@ class _Assembly:
         )
         if found.kink > _KINK:
             self.doubts.append(
-                f"'{row.component}' is not smooth at this point: its answers to a small change "
-                f"to one and to the other side differ by {100.0 * found.kink:.3g} % (hysteresis, "
-                "an edge, or a valve about to open). The linear law is the mean of both."
+                f"'{row.component}' is not smooth at this point: its responses to a small change "
+                f"up and down differ by {percent_text(found.kink)} (hysteresis, an edge, or a "
+                "valve about to open). The linear law is the mean of both."
             )
         if found.doubt > _DOUBT:
             self.doubts.append(
-                f"the linear law of '{row.component}' changes by {100.0 * found.doubt:.3g} % "
-                "with the time step that it is taken from: something in it is faster than the run."
+                f"the linear law of '{row.component}' changes by {percent_text(found.doubt)} "
+                "with the time step that it is taken from: something in it is faster than the step."
             )
         return found
 

@@ -24,6 +24,7 @@ from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
 from klack.simulation.line_doubts import line_doubts
 from klack.simulation.network_arrays import (
+    AHEAD,
     EXCESS,
     PARTS,
     PORTS,
@@ -534,10 +535,13 @@ def _failure(network: CompiledNetwork, status: int, report: Vector) -> Convergen
             "Try: a smaller step; a volume that stays above 0 (V_0 + A y); some "
             "entrained gas."
         )
+    missed = np.abs(network.bodies.at[AHEAD : AHEAD + len(network.ports)])
+    port = network.ports[int(np.argmax(missed))]
+    moved = format_si(float(missed.max()), "m", 2)
     return ConvergenceError(
-        f"the forces at the ports did not converge {when} (ports still move by {report[0]:.2g} "
-        f"m).\nState: interface gaps {_numbers(network.interface_state.gap)} m.\n"
-        "Try: a smaller step; look for a stiffness far above 1e10 N/m."
+        f"{port.component}: the forces at its ports did not converge {when} ('{port.port}' still "
+        f"moves by {moved}).\nState: interface gaps {_numbers(network.interface_state.gap)} m.\n"
+        f"Try: a smaller step; a stiffness at '{port.component}' may be too large for its mass."
     )
 
 

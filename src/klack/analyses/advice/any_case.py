@@ -1,5 +1,6 @@
 """Advice for a case of either kind."""
 
+from dataclasses import replace
 from typing import cast
 
 from klack.analyses.advice.advice import Advice
@@ -30,6 +31,20 @@ def advise_case(
     Parameters are those of :func:`klack.analyses.advice.impact.advise_impact`; a stroke is judged
     by its first impacts, without a band and without levels.
     """
+    advice = _advice(case, error, level_error, up_to, level, confirm, progress, threads)
+    return replace(advice, notes=(*advice.notes, *case.parameter_notes))
+
+
+def _advice(
+    case: Case | ValveCase,
+    error: float,
+    level_error: float,
+    up_to: float | None,
+    level: str | None,
+    confirm: bool,
+    progress: Progress,
+    threads: int | None,
+) -> Advice:
     if isinstance(case, Case):
         return advise_impact(
             case,

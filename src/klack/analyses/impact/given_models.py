@@ -86,7 +86,6 @@ def run_given_impact(
         deviations=compared,
         warnings=(
             *failure_notes(attempts.texts),
-            *case.parameter_notes,
             *notes,
             *trust_notes(results, reference, compared),
         ),

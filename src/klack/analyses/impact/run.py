@@ -418,7 +418,6 @@ def _study(
         pictures=pictures,
         warnings=(
             *missing,
-            *case.parameter_notes,
             *dict.fromkeys([*bodies.notes, *notes]),
             *trust_notes(results, reference, compared),
         ),

@@ -174,12 +174,18 @@ def run_sources(
     if isinstance(case, ValveCase):
         variants = tuple(names) or case.run.variants[:1]
         stroke = run_stroke(case, variants=variants, progress=progress, threads=threads)
-        return stroke_sources(stroke, tuple(names))
+        return _with_notes(stroke_sources(stroke, tuple(names)), case)
     levels = case.require_levels(tuple(names) or ("reduced",))
     # transfer functions are not asked for here, and take longer than all the rest
     case = case.model_copy(update={"run": case.run.model_copy(update={"transfer": None})})
     impact = run_impact(case, levels=levels, certify=False, progress=progress, threads=threads)
-    return impact_sources(impact, tuple(names))
+    return _with_notes(impact_sources(impact, tuple(names)), case)
+
+
+def _with_notes(sources: Sequence[NoiseSource], case: Case | ValveCase) -> tuple[NoiseSource, ...]:
+    return tuple(
+        replace(source, notes=(*source.notes, *case.parameter_notes)) for source in sources
+    )
 
 
 # --------------------------------------------------------------------------- impacts

@@ -161,7 +161,7 @@ def run_operating_points(
         drive = drive or dict(now.currents)
         found.append(measures)
         failures.append("")
-        doubts.append("\n".join(now.notes))
+        doubts.append("\n".join(" ".join(note.split()) for note in now.notes))
     if not any(found) and all(isinstance(error, InputError) for error in errors):
         raise errors[0]  # what is asked for fits no point of this case
     if not any(found):

@@ -427,7 +427,7 @@ _DEFINITIONS: tuple[tuple[str, str], ...] = (
     ),
     (
         "opening time, closing time",
-        "From the start of the run to the first touch of the opening stop and of the seat, in the "
+        "From time zero to the first touch of the opening stop and of the seat, in the "
         "first stroke that passes 90 % of the lift (else in the longest). A stroke begins and ends "
         "at 10 % of the lift from where the needle was at rest; a valve that starts open closes "
         "first. 'Not reached' is given where the run ends earlier or a film cushions the body "

@@ -142,7 +142,9 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         key="opening_time",
         symbol="t_o",
         unit="s",
-        definition="From the start of the run to the first touch of the opening stop.",
+        definition="From time zero (that of the first run, if this one continues it) to the first "
+        "touch of the opening stop in the first whole stroke, else in the longest. None where it "
+        "is not touched; never negative.",
         read=lambda variant: variant.needle_times.opening.touch,
         column=Column("ms", 1000.0, ".4f", "opens"),
         page=True,
@@ -153,7 +155,9 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         key="closing_time",
         symbol="t_c",
         unit="s",
-        definition="From the start of the run to the first touch of the seat.",
+        definition="From time zero, as the opening time, to the first touch of the seat after the "
+        "largest lift of that stroke; of a valve that starts open, of its first closing. None "
+        "where the needle stays closed or the run ends before; never negative.",
         read=lambda variant: variant.needle_times.closing.touch,
         column=Column("ms", 1000.0, ".4f", "closes"),
         page=True,

@@ -185,10 +185,11 @@ class StrokeVariant:
     modes : int
         Degrees of freedom of all bodies.
     opening_time : float or None [s]
-        From the start of the run to the first touch of the opening stop in the stroke of
-        ``times``; None if it is not touched.
+        From time zero to the first touch of the opening stop in the stroke of ``times``; None if
+        it is not touched.
     closing_time : float or None [s]
-        The same for the seat.  A valve that starts open closes before it opens.
+        The same for the seat, after the largest lift of that stroke.  A valve that starts open
+        closes before it opens.  Neither is ever negative.
     times : tuple of LiftTimes
         Of the needle first, then of every other body between stops: passing 10, 50 and 90 % of the
         lift, and the touches.

@@ -119,7 +119,6 @@ def run_stroke(
         stops=stops,
         warnings=(
             *missing,
-            *case.parameter_notes,
             *controller_notes(case),
             *notes,
             *begun,

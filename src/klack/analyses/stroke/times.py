@@ -27,7 +27,8 @@ class Passage:
     Parameters
     ----------
     at_10, at_50, at_90 : float or None [s]
-        From the start of the run, at these shares of the lift: 0 closed, 1 open.
+        From time zero, which is that of the first run where one continues it, at these shares of
+        the lift: 0 closed, 1 open.
     stop : str
         End stop at which the way ends; empty if there is none.
     touch : float or None [s]

@@ -70,14 +70,16 @@ RESULTS: tuple[Measure[Row], ...] = described_in(
         key="opening_time",
         symbol="t_o",
         unit="s",
-        definition="From the start of the run to the first touch of the opening stop.",
+        definition="From time zero to the first touch of the opening stop in the first whole "
+        "stroke, else in the longest; none where it is not touched.",
         digits=5,
     ),
     Measure(
         key="closing_time",
         symbol="t_c",
         unit="s",
-        definition="From the start of the run to the first touch of the seat.",
+        definition="From time zero to the first touch of the seat after the largest lift of that "
+        "stroke; none where the needle stays closed or the run ends before.",
         digits=5,
     ),
     Measure(
