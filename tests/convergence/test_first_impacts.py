@@ -61,15 +61,22 @@ def test_default_steps_resolve_a_stop_of_any_restitution(restitution):
 
 @pytest.mark.parametrize(
     ("restitution", "film", "step"),
-    [(0.05, None, 100e-9), (None, THICK, 200e-9), (None, STEEP, 20e-9), (None, STEEP, 100e-9)],
-    ids=["low restitution", "thick film", "film at touch", "film at touch, coarse"],
+    [
+        (0.05, None, 100e-9),
+        (None, None, 200e-9),
+        (None, THICK, 200e-9),
+        (None, STEEP, 20e-9),
+        (None, STEEP, 100e-9),
+    ],
+    ids=["low restitution", "elastic", "thick film", "film at touch", "film at touch, coarse"],
 )
 def test_a_peak_that_the_steps_miss_is_told_with_its_size(restitution, film, step):
     result, doubts = impact(rows(restitution, film), step)
     finer, _ = impact(rows(restitution, film), step / 20.0)
 
     missing = finer.events[0].peak_force / result.events[0].peak_force - 1.0
-    share, _, _ = missing_peak(result.interfaces["seat"], result.events[0].peak_time)
+    first = result.events[0]
+    share, _, _ = missing_peak(result.interfaces["seat"], first.peak_time, first.restitution)
     assert missing > 6e-4
     assert len(doubts) == 1
     assert "first impact on 'seat'" in doubts[0]

@@ -11,7 +11,7 @@ A peak force is the largest mean of a step.  Two things make it too low:
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import exp, floor, log, log10, sqrt
+from math import exp, floor, isfinite, log, log10, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,9 @@ def impact_doubts(
         if event.stop in seen:
             continue
         seen.add(event.stop)
-        share, at_touch, length = missing_peak(interfaces[event.stop], event.peak_time)
+        share, at_touch, length = missing_peak(
+            interfaces[event.stop], event.peak_time, event.restitution
+        )
         if not share > _PEAK:
             continue
         aim = _AIM * _PEAK / share
@@ -57,7 +59,9 @@ def impact_doubts(
         )
 
 
-def missing_peak(record: InterfaceRecord, peak_time: float) -> tuple[float, bool, float]:
+def missing_peak(
+    record: InterfaceRecord, peak_time: float, restitution: float = 0.0
+) -> tuple[float, bool, float]:
     """How much the largest mean of a step misses of a peak.
 
     Parameters
@@ -65,6 +69,8 @@ def missing_peak(record: InterfaceRecord, peak_time: float) -> tuple[float, bool
     record : InterfaceRecord
     peak_time : float [s]
         Middle of the step with the peak.
+    restitution : float [-]
+        Of the impact; nan where it is not over.
 
     Returns
     -------
@@ -87,7 +93,8 @@ def missing_peak(record: InterfaceRecord, peak_time: float) -> tuple[float, bool
         share, at_touch = _at_touch(record, force, closing) / float(force[k]) - 1.0, True
     elif whole:
         near = slice(k - 1, k + 2)
-        share = _highest(h[near], force[near]) / float(force[k]) - 1.0
+        returned = min(restitution, 1.0) ** 2 if isfinite(restitution) else 0.0
+        share = _highest(h[near], force[near], returned) / float(force[k]) - 1.0
     return max(share, 0.0), at_touch, float(h[k])
 
 
@@ -112,8 +119,11 @@ def _at_touch(record: InterfaceRecord, force: Vector, k: int) -> float:
     return float(force[k - 1] * exp(growth * (0.5 * h[k - 1] + share * h[k])))
 
 
-def _highest(h: Vector, mean: Vector) -> float:
-    """Highest point of the parabola with these means over three steps; the middle mean if none."""
+def _highest(h: Vector, mean: Vector, returned: float) -> float:
+    """Highest force about three steps with these means [N]; the middle mean where none is higher.
+
+    ``returned`` is the share of the energy that comes back [-].
+    """
     begin = 0.5 * h[1]  # time counts from the middle of the middle step
     edges = np.array([-begin - h[0], -begin, begin, begin + h[2]])
     moments = np.column_stack([np.diff(edges ** (n + 1)) / ((n + 1) * h) for n in range(3)])
@@ -121,7 +131,7 @@ def _highest(h: Vector, mean: Vector) -> float:
     if not c < 0.0:
         return float(mean[1])
     place = min(max(-0.5 * b / c, edges[0]), edges[3])
-    return float(a + b * place + c * place**2)
+    return float(a + b * place + c * place**2 - returned * c * h[1] ** 2 / 6.0)
 
 
 def _rounded_down(step: float) -> float:
