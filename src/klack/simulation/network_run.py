@@ -20,6 +20,7 @@ from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.first_record import values_now
+from klack.simulation.impact_doubts import impact_doubts
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
 from klack.simulation.line_doubts import line_doubts
@@ -153,7 +154,8 @@ def simulate_network(
     -----
     AccuracyWarning
         When the energy balance does not close to 1e-6 of :attr:`EnergyBooks.scale`
-        (:mod:`klack.energy_balance`).
+        (:mod:`klack.energy_balance`), and when the steps do not resolve the peak force of the
+        first impact on a stop to 0.05 % (:mod:`klack.simulation.impact_doubts`).
     """
     for name, value in (("duration", duration), ("step", step), ("record", record)):
         if value is not None:
@@ -260,6 +262,9 @@ def simulate_network(
             )
     for doubt in line_doubts(network, step * first_step):
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
+    if network.moving is None:
+        for doubt in impact_doubts(result.events, result.interfaces, step):
+            warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure
     scale = books.scale or 1.0

@@ -1,7 +1,7 @@
 """Sizes of the steps of a network, from the accuracy that is wanted and what its parts allow."""
 
 from dataclasses import dataclass
-from math import inf
+from math import inf, sqrt
 
 from klack.errors import InputError
 from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
@@ -119,7 +119,8 @@ def _middle(rows: Rows, h: float, near: int) -> int:
     for row in rows.interfaces:
         if row.law is not None:
             bodies = (owner.get(row.upper), owner.get(row.lower))
-            shortest = min(shortest, bounce_time(row, bodies))
+            sharper = sqrt(1.0 + 2.0 * row.law.flat().dissipation)  # in time, of a damped peak
+            shortest = min(shortest, bounce_time(row, bodies) / sharper)
     most = min(_MIDDLE, near // 2, int(_OF_BOUNCE * min(shortest, 1.0) / h))
     return largest_divisor(near, max(1, most))
 

@@ -1,0 +1,140 @@
+r"""What a finished run says of its steps: peaks of first impacts that they do not resolve.
+
+A peak force is the largest mean of a step.  Two things make it too low:
+
+- *A narrow peak*: of a stop of low restitution, a stiff one, a film that closes fast.  The impulse
+  up to the ends of the step and of its two neighbours lies on a cubic, whose slope is a parabola;
+  its highest point is better by two orders in the step.
+- *A film that is hardest at the moment of touch*, where the model ends it.  Its force rises
+  like a power of the gap up to there, from one step to the next by the same factor; the step that
+  closes the contact tells how far away the touch is.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import exp, floor, isfinite, log, log10, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.simulation.network_result import ImpactEvent, InterfaceRecord
+from klack.units import format_si
+
+__all__ = ["impact_doubts", "missing_peak"]
+
+Vector = NDArray[np.float64]
+
+_PEAK = 5e-4  # of a peak force: what is promised of a first impact
+_AIM = 0.7  # of that, for the step that is advised
+_SHORTEST = 1e-9  # [s] shorter ones take too long
+
+
+def impact_doubts(
+    events: Sequence[ImpactEvent], interfaces: Mapping[str, InterfaceRecord], step: float
+) -> Iterator[str]:
+    """Sentences on the first complete impact on each stop, where the peak misses 0.05 % or more."""
+    seen = set[str]()
+    for event in events:
+        if event.stop in seen:
+            continue
+        seen.add(event.stop)
+        share, at_touch, length = missing_peak(
+            interfaces[event.stop], event.peak_time, event.restitution
+        )
+        if not share > _PEAK:
+            continue
+        aim = _AIM * _PEAK / share
+        shorter = max(_rounded_down(step * (aim if at_touch else sqrt(aim))), _SHORTEST)
+        shorter = min(shorter, step)
+        cause = (
+            "the film presses hardest at the moment of touch"
+            if at_touch
+            else "the force rises and falls within a few steps"
+        )
+        yield (
+            f"the peak force of the first impact on '{event.stop}', "
+            f"{format_si(event.peak_force, 'N', 4)} at {format_si(event.peak_time, 's', 5)}, is "
+            f"too low by about {100.0 * share:.2g} %: {cause}, in steps of "
+            f"{format_si(length, 's', 3)}. Try: run.step: {format_si(shorter, 's', 3)}; or count "
+            f"with about {format_si(event.peak_force * (1.0 + share), 'N', 4)}."
+        )
+
+
+def missing_peak(
+    record: InterfaceRecord, peak_time: float, restitution: float = 0.0
+) -> tuple[float, bool, float]:
+    """How much the largest mean of a step misses of a peak.
+
+    Parameters
+    ----------
+    record : InterfaceRecord
+    peak_time : float [s]
+        Middle of the step with the peak.
+    restitution : float [-]
+        Of the impact; nan where it is not over.
+
+    Returns
+    -------
+    share : float [-]
+        Over the peak; 0 where the record does not tell.
+    at_touch : bool
+        Whether a film is hardest at the moment of touch.
+    step : float [s]
+        Length of the step with the peak.
+    """
+    middle = record.time + 0.5 * record.step
+    k = int(np.searchsorted(middle, peak_time - 1e-3 * float(np.min(record.step, initial=1.0))))
+    if not 0 < k < len(middle) - 1:
+        return 0.0, False, 0.0
+    h, force = record.step, record.contact_force + record.film_force
+    whole = _adjacent(record, k) and force[k] > 0.0
+    share, at_touch = 0.0, False
+    closing = k if record.contact_force[k] > 0.0 else k + 1
+    if whole and closing > 1 and _closes(record, closing):
+        share, at_touch = _at_touch(record, force, closing) / float(force[k]) - 1.0, True
+    elif whole:
+        near = slice(k - 1, k + 2)
+        returned = min(restitution, 1.0) ** 2 if isfinite(restitution) else 0.0
+        share = _highest(h[near], force[near], returned) / float(force[k]) - 1.0
+    return max(share, 0.0), at_touch, float(h[k])
+
+
+def _adjacent(record: InterfaceRecord, k: int) -> bool:
+    """Whether nothing is missing between this step and its neighbours."""
+    t, h = record.time[k - 1 : k + 2], record.step[k - 1 : k + 2]
+    return bool(np.all(np.abs(t[1:] - t[:-1] - h[:-1]) <= 0.01 * h[:-1]))
+
+
+def _closes(record: InterfaceRecord, k: int) -> bool:
+    """Whether a contact closes in this step out of a film that rises up to it."""
+    contact, film = record.contact_force, record.film_force
+    touches = contact[k - 1] == 0.0 and contact[k] > 0.0 and record.gap[k - 1] > record.gap[k]
+    return bool(touches and contact[k - 2] == 0.0 and film[k - 1] > film[k - 2] > 0.0)
+
+
+def _at_touch(record: InterfaceRecord, force: Vector, k: int) -> float:
+    """Force of a film at the moment of touch within this step [N]."""
+    before, after, h = float(record.gap[k - 1]), float(record.gap[k]), record.step
+    share = min(max(before / (before - after), 0.0), 1.0)
+    growth = 2.0 * log(force[k - 1] / force[k - 2]) / (h[k - 2] + h[k - 1])
+    return float(force[k - 1] * exp(growth * (0.5 * h[k - 1] + share * h[k])))
+
+
+def _highest(h: Vector, mean: Vector, returned: float) -> float:
+    """Highest force about three steps with these means [N]; the middle mean where none is higher.
+
+    ``returned`` is the share of the energy that comes back [-].
+    """
+    begin = 0.5 * h[1]  # time counts from the middle of the middle step
+    edges = np.array([-begin - h[0], -begin, begin, begin + h[2]])
+    moments = np.column_stack([np.diff(edges ** (n + 1)) / ((n + 1) * h) for n in range(3)])
+    a, b, c = np.linalg.solve(moments, mean)
+    if not c < 0.0:
+        return float(mean[1])
+    place = min(max(-0.5 * b / c, edges[0]), edges[3])
+    return float(a + b * place + c * place**2 - returned * c * h[1] ** 2 / 6.0)
+
+
+def _rounded_down(step: float) -> float:
+    """Next shorter one of 1, 2 and 5 times a power of ten."""
+    decade = 10.0 ** floor(log10(step))
+    return max(n for n in (1.0, 2.0, 5.0) if n <= step / decade * (1.0 + 1e-9)) * decade
