@@ -5,7 +5,7 @@ import signal
 from pathlib import Path
 
 import pytest
-from app_browser import client, server
+from app_browser import LONG, client, server
 from served_app import Served
 
 httpx = pytest.importorskip("httpx")
@@ -133,4 +133,4 @@ def test_it_ends_when_it_is_interrupted(tmp_path):
     with Served(tmp_path) as own:
         own.process.send_signal(signal.SIGINT)
 
-        assert own.process.wait(20) in (0, 130)
+        assert own.process.wait(LONG / 1e3) in (0, 130)

@@ -27,6 +27,13 @@ __all__ = ["new_valve_page"]
 _GRADES = {"good": "good", "doubt": "fair", "error": "out"}
 _TITLES = {"good": "good", "doubt": "doubtful", "error": "error"}
 _LAST = len(STEPS) - 1
+_CLOSE = """() => {
+  const step = document.querySelector("#k-step > *");
+  if (!step) return;
+  step.inert = true;
+  setTimeout(() => { step.inert = false; }, 10000);
+}"""
+"""A step takes no more changes; it does again should no other one come."""
 
 
 async def new_valve_page(state: State, given: Mapping[str, str]) -> None:
@@ -51,8 +58,12 @@ class _Guide:
 
     def build(self) -> None:
         """Make the page, then read the parts while it is shown already."""
-        self._steps = ui.element("nav").classes("k-steps")
-        self._steps.props["aria-label"] = "Steps of the guide"
+        with ui.element("nav").classes("k-steps") as steps:
+            steps.props["aria-label"] = "Steps of the guide"
+            self._steps = [
+                _leaving(f"{number + 1} {name}", partial(self._go, partial(int, number)))
+                for number, name in enumerate(STEPS)
+            ]
         self._body = ui.element("div").props("id=k-step")
         with ui.element("div").classes("k-head k-onward"):
             self._back = _leaving("Back", partial(self._move, -1)).props("id=k-back")
@@ -60,7 +71,8 @@ class _Guide:
             self._why = plain("", "span").classes("k-soft").props("role=status")
             plain("").style("flex:1 1 auto")
             self._over = _leaving("Start over", self._start_over)
-        for found in (self._back, self._next, self._over):  # until there is a step to leave
+        # until there is a step to leave
+        for found in (*self._steps, self._back, self._next, self._over):
             found.props["disabled"] = True
         with self._body:
             plain("Reading the parts ...", "p").classes("k-soft").props("role=status")
@@ -172,14 +184,10 @@ class _Guide:
 
     def _show_steps(self) -> None:
         furthest = self._furthest()
-        self._steps.clear()
-        with self._steps:
-            for number, name in enumerate(STEPS):
-                found = _leaving(f"{number + 1} {name}", partial(self._go, partial(int, number)))
-                found.props["aria-current"] = "step" if number == self._plan.step else "false"
-                if number > furthest:
-                    found.props["disabled"] = True
+        for number, found in enumerate(self._steps):
+            found.props["aria-current"] = "step" if number == self._plan.step else "false"
         for found, is_off in (
+            *((found, number > furthest) for number, found in enumerate(self._steps)),
             (self._back, self._plan.step == 0),
             (self._next, self._plan.step >= min(furthest, _LAST)),
         ):
@@ -419,7 +427,7 @@ class _Guide:
 def _leaving(text: str, handler: Handler, *, main: bool = False) -> TextElement:
     """A button that leads to another step; this one takes no more changes, they would be lost."""
     found = button(text, handler, main=main)
-    found.on("click", js_handler="() => document.querySelector('#k-step > *').inert = true")
+    found.on("click", js_handler=_CLOSE)
     return found
 
 

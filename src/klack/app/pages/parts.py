@@ -39,7 +39,7 @@ _READING = "Reading ... The first part takes longer: the CAD library is loaded."
 class PartsStep:
     """Where both bodies come from, beside what was read in them.
 
-    What was read is shown in place: fields that somebody types in meanwhile stay.
+    What was read is shown in place: fields that are being typed in stay.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ class PartsStep:
     async def _with(
         self, plan: ValvePlan, bodies: tuple[str, ...], fields: tuple[str, ...] = ()
     ) -> None:
-        """Go on with a plan that changes some bodies; some fields show what was not typed there."""
+        """Continue with a plan that changes bodies; fields show what was not typed into them."""
         await self._keep(plan)  # at once: the page may be left while parts are read
         if not self._models.is_deleted:
             self._show_fields(fields)
