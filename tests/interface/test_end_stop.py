@@ -142,5 +142,5 @@ def test_film_needs_a_fluid():
 
 def test_cavitation_pressure_is_absolute():
     film = {**RING, "cavitation_pressure": 2e5}
-    with pytest.raises(InputError, match=r"seat.film.cavitation_pressure: got 200 kPa"):
+    with pytest.raises(InputError, match=r"seat.film.cavitation_pressure: got 2 bar absolute"):
         EndStop(gap=0.0, law=LINEAR, film=film).add_rows(rows())

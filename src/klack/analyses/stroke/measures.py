@@ -143,8 +143,8 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         symbol="t_o",
         unit="s",
         definition="From time zero (that of the first run, if this one continues it) to the first "
-        "touch of the opening stop in the first whole stroke, else in the longest. None where it "
-        "is not touched; never negative.",
+        "touch of the opening stop in the first whole stroke, else in the longest. No value where "
+        "it is not touched; never negative.",
         read=lambda variant: variant.needle_times.opening.touch,
         column=Column("ms", 1000.0, ".4f", "opens"),
         page=True,
@@ -156,7 +156,7 @@ VARIANT_MEASURES: tuple[Measure[StrokeVariant], ...] = described_in(
         symbol="t_c",
         unit="s",
         definition="From time zero, as the opening time, to the first touch of the seat after the "
-        "largest lift of that stroke; of a valve that starts open, of its first closing. None "
+        "largest lift of that stroke; of a valve that starts open, of its first closing. No value "
         "where the needle stays closed or the run ends before; never negative.",
         read=lambda variant: variant.needle_times.closing.touch,
         column=Column("ms", 1000.0, ".4f", "closes"),
