@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.laws import LinearLaw
+from klack.errors import AccuracyWarning
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.flow_source import FlowSource, FlowStep
 from klack.hydraulics.fluid_library import library_fluid
@@ -88,15 +89,17 @@ def _run(
     with catch_warnings():  # some bodies fly freely, on purpose
         simplefilter("ignore", LooseBodyWarning)
         rows = network.rows()
-    return simulate_network(
-        rows,
-        duration=duration,
-        step=step,
-        coarse=coarse,
-        record=record,
-        start="free" if free else "rest",
-        state=state,
-    )
+    with catch_warnings():  # peaks are too low in steps that are coarse on purpose
+        simplefilter("ignore", AccuracyWarning)
+        return simulate_network(
+            rows,
+            duration=duration,
+            step=step,
+            coarse=coarse,
+            record=record,
+            start="free" if free else "rest",
+            state=state,
+        )
 
 
 def _values(result: NetworkResult, name: str) -> Vector:
