@@ -88,10 +88,12 @@ def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, fol
     area, run = page.get_by_label("case file, YAML"), page.get_by_role("button", name="Run")
 
     area.fill(text.replace("0.3 m/s", "0.3 kg"))
+    page.wait_for_selector("text=not valid, not saved")  # its words move the buttons
     run.click()
     page.get_by_role("button", name="Save and run").click()
     page.wait_for_selector("text=Not run.")
     area.fill(text.replace("0.3 m/s", "0.4 m/s"))
+    page.wait_for_selector("text=valid impact, not saved")
     run.click()
     page.wait_for_selector("text=the file does not have this text yet")
     page.get_by_role("button", name="Cancel").click()
@@ -104,6 +106,7 @@ def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, fol
     page.get_by_role("button", name="Discard changes").click()
     page.wait_for_selector("text=valid impact, saved")
     area.fill(text.replace("0.3 m/s", "0.4 m/s"))
+    page.wait_for_selector("text=valid impact, not saved")
     run.click()
     page.get_by_role("button", name="Save and run").click()
 

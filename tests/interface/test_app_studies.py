@@ -133,10 +133,10 @@ def test_a_brush_selects_in_all_views_and_thousands_are_paged(page, server):
     assert rows.count() == 20
     page.wait_for_selector("text=20 points without measures")
 
-    axis = page.evaluate("({x: klackPoints.axes.x(6), y: klackPoints.axes.height - 27})")
     page.locator("#kp-lines").scroll_into_view_if_needed()
     page.evaluate("window.scrollBy(0, 200)")
     settle(page)
+    axis = page.evaluate("({x: klackPoints.axes.x(6), y: klackPoints.axes.height - 27})")
     box = page.locator("#kp-lines").bounding_box()
     page.mouse.move(box["x"] + axis["x"], box["y"] + axis["y"])
     page.mouse.down()
