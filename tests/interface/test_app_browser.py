@@ -78,9 +78,9 @@ def test_form_and_text_follow_each_other_and_survive(page, server, folder):
 
 def test_a_run_from_the_editor_is_that_of_the_text_on_the_page(page, server, folder):
     file = folder / "valve" / "edited.yaml"
-    text = (folder / CASE).read_text("utf-8")
+    text = find_case("demo-valve-axisymmetric").read_text("utf-8")
     text = re.sub(r"(levels: )\[.*\]", r"\1[reduced]", text)
-    text = re.sub(r"(speed: )[0-9.]+ m/s", r"\g<1>0.3 m/s", text)
+    assert "0.3 m/s" in text
     file.write_text(text, "utf-8")
     jobs = Jobs(OpenFolder(folder))
     page.goto(f"{server.base}/case?path=valve/edited.yaml")
