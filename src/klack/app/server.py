@@ -45,7 +45,6 @@ _REPORTS = {
 }
 _LONGEST_QUERY = 1024  # characters of a path
 _NOTHING = "Nothing to show"
-_OF_A_CASE = (case_editor_page, new_study_page, sliders_page)
 
 
 def build(state: State, access: Access) -> Guard:
@@ -151,8 +150,6 @@ def _add_page(state: State, path: str, page: Callable[[State, dict[str, str]], A
     async def shown(request: Request) -> None:
         given = {key: value[:_LONGEST_QUERY] for key, value in request.query_params.items()}
         try:
-            if page in _OF_A_CASE:
-                await asyncio.to_thread(state.folder.case_text, given.get("path", ""))
             await page(state, given)
         except KlackError as error:  # before the page has begun
             with frame(state, _NOTHING):

@@ -26,6 +26,7 @@ _FIRST_POINTS = 64
 async def new_study_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case."""
     case = given.get("path", "")
+    text = await asyncio.to_thread(state.folder.case_text, case)
     ui.add_head_html('<link rel="stylesheet" href="/static/points.css">')
     with frame(state, "New study", f"of {case}"):
         waiting = plain("Reading the case ...", "p").props("role=status")
@@ -33,7 +34,6 @@ async def new_study_page(state: State, given: Mapping[str, str]) -> None:
 
         async def fill() -> None:
             try:
-                text = await asyncio.to_thread(state.folder.case_text, case)
                 path = str(state.folder.path / case)
                 offer: StudyOffer = await state.reader.call("study_offer", text, path)
             except KlackError as error:

@@ -39,12 +39,7 @@ _NAMES = ("now", "pinned")
 async def sliders_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case."""
     case = given.get("path", "")
-    try:
-        text = await asyncio.to_thread(state.folder.case_text, case)
-    except KlackError as error:
-        with frame(state, "Sliders"):
-            plain(str(error), "p").classes("k-error")
-        return
+    text = await asyncio.to_thread(state.folder.case_text, case)
     with frame(state, "Sliders", case):
         await _Sliders(state, case).build(text)
 
