@@ -31,22 +31,8 @@ def advise_case(
     Parameters are those of :func:`klack.analyses.advice.impact.advise_impact`; a stroke is judged
     by its first impacts, without a band and without levels.
     """
-    advice = _advice(case, error, level_error, up_to, level, confirm, progress, threads)
-    return replace(advice, notes=(*advice.notes, *case.parameter_notes))
-
-
-def _advice(
-    case: Case | ValveCase,
-    error: float,
-    level_error: float,
-    up_to: float | None,
-    level: str | None,
-    confirm: bool,
-    progress: Progress,
-    threads: int | None,
-) -> Advice:
     if isinstance(case, Case):
-        return advise_impact(
+        advice = advise_impact(
             case,
             error=error,
             level_error=level_error,
@@ -56,10 +42,17 @@ def _advice(
             progress=progress,
             threads=threads,
         )
-    for option, value in (
-        ("--up-to", up_to and format_si(up_to, "Hz", 3)),
-        ("--level", level),
-    ):
+    else:
+        _refuse_options(("--up-to", up_to and format_si(up_to, "Hz", 3)), ("--level", level))
+        advice = advise_stroke(
+            case, error=error, confirm=confirm, progress=progress, threads=threads
+        )
+    return replace(advice, notes=(*advice.notes, *case.parameter_notes))
+
+
+def _refuse_options(*given: tuple[str, object]) -> None:
+    """Refuse options that a stroke does not have."""
+    for option, value in given:
         if value is not None:
             raise InputError(
                 option,
@@ -67,4 +60,3 @@ def _advice(
                 expected="no such option: a stroke is judged by its first impacts",
                 hint="use it for a case of two bodies, e.g. klack advise demo-valve-axisymmetric.",
             )
-    return advise_stroke(case, error=error, confirm=confirm, progress=progress, threads=threads)
