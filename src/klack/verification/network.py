@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from math import exp, pi, sqrt
 from typing import ClassVar
-from warnings import catch_warnings, simplefilter
+from warnings import catch_warnings, filterwarnings, simplefilter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +90,7 @@ def _run(
         simplefilter("ignore", LooseBodyWarning)
         rows = network.rows()
     with catch_warnings():  # peaks are too low in steps that are coarse on purpose
-        simplefilter("ignore", AccuracyWarning)
+        filterwarnings("ignore", "the peak force of the first impact", AccuracyWarning)
         return simulate_network(
             rows,
             duration=duration,
