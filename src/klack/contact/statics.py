@@ -388,7 +388,7 @@ class ContactLadder:
         highest, lowest = _approach_for(self, max_force), self.first_touch
         approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
         # from the last one down: a contact that shrinks loses the points that joined it last
-        widest = self.active  # for a ladder that goes on from here
+        widest = self.active  # for a ladder that continues from here
         pressures = np.array([self.pressures(delta) for delta in approach[::-1]])[::-1]
         self.active = widest
         _require_within(self.space, approach, pressures)
