@@ -4,7 +4,7 @@ A peak force is the largest mean of a step.  Two things make it too low:
 
 - *A narrow peak*: of a stop of low restitution, a stiff one, a film that closes fast.  The impulse
   up to the ends of the step and of its two neighbours lies on a cubic, whose slope is a parabola;
-  its highest point is better by two orders in the step.
+  its highest point is better by two orders in the step, where little is missing.
 - *A film that is hardest at the moment of touch*, where the model ends it.  Its force rises
   like a power of the gap up to there, from one step to the next by the same factor; the step that
   closes the contact tells how far away the touch is.
@@ -26,6 +26,9 @@ Vector = NDArray[np.float64]
 _PEAK = 5e-4  # of a peak force: what is promised of a first impact
 _AIM = 0.7  # of that, for the step that is advised
 _SHORTEST = 1e-9  # [s] shorter ones take too long
+_FEWEST = 8  # steps of a contact; in fewer there is no peak to speak of
+_RESOLVED = 100  # steps of a contact that is as short as those tell
+_TRUSTED = 0.02  # of a narrow peak; where more is missing, three steps do not tell how much
 
 
 def impact_doubts(
@@ -37,9 +40,11 @@ def impact_doubts(
         if event.stop in seen:
             continue
         seen.add(event.stop)
-        share, at_touch, length = missing_peak(
-            interfaces[event.stop], event.peak_time, event.restitution
-        )
+        record = interfaces[event.stop]
+        if event.contact_time < _FEWEST * _step_at(record, event.peak_time):
+            yield _unresolved(event, _step_at(record, event.peak_time))
+            continue
+        share, at_touch, length = missing_peak(record, event.peak_time, event.restitution)
         if not share > _PEAK:
             continue
         aim = _AIM * _PEAK / share
@@ -50,13 +55,37 @@ def impact_doubts(
             if at_touch
             else "the force rises and falls within a few steps"
         )
+        better = f"; or count with about {format_si(event.peak_force * (1.0 + share), 'N', 4)}"
+        is_known = at_touch or share <= _TRUSTED
         yield (
-            f"the peak force of the first impact on '{event.stop}', "
-            f"{format_si(event.peak_force, 'N', 4)} at {format_si(event.peak_time, 's', 5)}, is "
-            f"too low by about {100.0 * share:.2g} %: {cause}, in steps of "
-            f"{format_si(length, 's', 3)}. Try: run.step: {format_si(shorter, 's', 3)}; or count "
-            f"with about {format_si(event.peak_force * (1.0 + share), 'N', 4)}."
+            f"{_named(event)} is too low by {'about ' if is_known else ''}{100.0 * share:.2g} %"
+            f"{'' if is_known else ' or more'}: {cause}, in steps of "
+            f"{format_si(length, 's', 3)}. Try: run.step: {format_si(shorter, 's', 3)}"
+            f"{better if is_known else ''}."
         )
+
+
+def _unresolved(event: ImpactEvent, step: float) -> str:
+    shorter = max(_rounded_down(event.contact_time / _RESOLVED), _SHORTEST)
+    return (
+        f"{_named(event)} is not resolved: its contact lasts {event.contact_time / step:.0f} "
+        f"{'step' if round(event.contact_time / step) == 1 else 'steps'} of "
+        f"{format_si(step, 's', 3)}. Try: run.step: {format_si(shorter, 's', 3)}."
+    )
+
+
+def _named(event: ImpactEvent) -> str:
+    return (
+        f"the peak force of the first impact on '{event.stop}', "
+        f"{format_si(event.peak_force, 'N', 4)} at {format_si(event.peak_time, 's', 5)},"
+    )
+
+
+def _step_at(record: InterfaceRecord, time: float) -> float:
+    """Length of the recorded step with this time [s]; 0 where none has it."""
+    k = int(np.searchsorted(record.time, time, side="right")) - 1
+    inside = k >= 0 and time <= record.time[k] + record.step[k]
+    return float(record.step[k]) if inside and record.contact_force[k] > 0.0 else 0.0
 
 
 def missing_peak(
