@@ -5,6 +5,9 @@ Run it in the folder of the project::
     klack verify --json verify.json
     python docs/conformance_page.py verify.json
 
+With ``--check`` nothing is written: it fails where the page lists other checks than the run has,
+another tolerance or another source.
+
 Deviations have one digit, and those that are round-off only a bound, so that the page changes where
 klack changes and not with the processor.
 """
@@ -22,6 +25,7 @@ from klack.verification import COVERS, LARGEST_HEADROOM
 PAGE = Path(__file__).parent / "reference" / "conformance.md"
 
 _ROUND_OFF, _LEAST = 1e-10, 1e-14
+_OPTIONAL = re.compile("^exchange: |: direct solver ")
 _HEAD = """# What klack is checked against
 
 Made by `docs/conformance_page.py` from a run of `klack verify`; do not edit. {summary}
@@ -129,12 +133,54 @@ def _headroom(check: Mapping[str, Any]) -> str:
     return f"> {floor(room * (1.0 + 1e-9))}" if room > 1.0 - 1e-9 else "round-off"
 
 
+def differences(text: str, run: Mapping[str, Any]) -> list[str]:
+    """What the page says of the checks otherwise than a run: names, tolerances, sources.
+
+    Checks of programs that are not installed here may stand on the page alone.
+    """
+    there, made = listed(text), listed(page(run))
+    return [
+        *(f"not on the page: {name}" for name in made if name not in there),
+        *(
+            f"only on the page: {name}"
+            for name in there
+            if name not in made and not _OPTIONAL.search(name)
+        ),
+        *(
+            f"{name}: the page has {there[name]}, the run {said}"
+            for name, said in made.items()
+            if there.get(name, said) != said
+        ),
+    ]
+
+
+def listed(text: str) -> dict[str, tuple[str, str]]:
+    """Tolerance and source of every row of a page, by ``group: name``."""
+    found = {}
+    for section in re.split(r"^## ", text, flags=re.M)[1:]:
+        group, _, table = section.partition("\n")
+        rows = [line for line in table.splitlines() if line.startswith("| ")]
+        for line in rows[1:]:
+            cells = re.split(r"(?<!\\) \| ", line[2:-2])
+            found[f"{group}: {cells[0]}"] = cells[4], cells[6]
+    return found
+
+
 def main() -> None:
-    """Write the page from the file that is named on the command line."""
-    if len(sys.argv) != 2:
-        sys.exit("usage: python docs/conformance_page.py FILE   (of klack verify --json FILE)")
-    run = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
-    PAGE.write_text(page(run), encoding="utf-8")
+    """Write the page from the file that is named on the command line, or compare it with it."""
+    match sys.argv[1:]:
+        case [file]:
+            PAGE.write_text(page(_run(file)), encoding="utf-8")
+        case ["--check", file]:
+            found = differences(PAGE.read_text(encoding="utf-8"), _run(file))
+            if found:
+                sys.exit("\n".join([*found, "Try: python docs/conformance_page.py FILE"]))
+        case _:
+            sys.exit("usage: conformance_page.py [--check] FILE   (of klack verify --json FILE)")
+
+
+def _run(file: str) -> Any:
+    return json.loads(Path(file).read_text(encoding="utf-8"))
 
 
 if __name__ == "__main__":
