@@ -84,6 +84,7 @@ def test_faces_and_guide_rub_at_once(blocks):
     assert result.energy.friction > 0.0
 
 
+@pytest.mark.slow
 def test_two_stops_with_different_friction():
     bodies, contacts = block_between_plates(2e-6)
     names = {body.name: body for body in bodies}

@@ -37,7 +37,10 @@ def stroke(
     return move(needle.rows(joints), valve, duration, **more)
 
 
-@pytest.mark.parametrize(("step", "coarse"), [(40e-9, 1), (40e-9, None), (20e-9, None)])
+@pytest.mark.parametrize(
+    ("step", "coarse"),
+    [(40e-9, 1), pytest.param(40e-9, None, marks=pytest.mark.slow), (20e-9, None)],
+)
 def test_energy_of_a_stroke_off_its_axis_closes(step, coarse):
     run = stroke(330e-6, step=step, coarse=coarse)
 

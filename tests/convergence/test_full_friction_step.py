@@ -1,6 +1,7 @@
 """Refinement of the time step in full-order impacts with friction."""
 
 import numpy as np
+import pytest
 
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
@@ -11,6 +12,7 @@ from klack.verification.impacts import needle_over_seat
 STEPS = np.array([400e-9, 200e-9, 100e-9, 50e-9])
 
 
+@pytest.mark.slow
 def test_what_friction_takes_settles_with_the_step():
     """11 % of the energy of a needle on its seat; first order: slip counts from the step's start.
 

@@ -114,6 +114,7 @@ def study(request, tmp_path_factory):
     return run_impact(case, levels=LEVELS, certify=False)
 
 
+@pytest.mark.slow
 def test_energy_of_the_layer_comes_back(study):
     for level in study.levels.values():
         assert abs(level.energy_residual) < 1e-10
@@ -122,6 +123,7 @@ def test_energy_of_the_layer_comes_back(study):
     assert abs(full.energies["contact dissipation"]) < 1e-6 * full.energies["initial kinetic"]
 
 
+@pytest.mark.slow
 def test_the_ledger_closes_while_the_layer_is_pressed(tmp_path):
     case = rods(tmp_path, SOFT, speed="0.2 m/s")
     short = case.model_copy(update={"run": case.run.model_copy(update={"duration": 10e-6})})
@@ -135,6 +137,7 @@ def test_the_ledger_closes_while_the_layer_is_pressed(tmp_path):
     assert held[0] == pytest.approx(held[1], rel=0.2)
 
 
+@pytest.mark.slow
 def test_rough_rods_are_the_same_at_all_levels(study):
     """Within 2 % of the full order in plateau, length and rise; the interface level in 0.3 %."""
     reduced, interface, full = (pulse(study.levels[name].history) for name in LEVELS)
@@ -153,6 +156,7 @@ def pulse(history):
     return plateau, end - half, high - low
 
 
+@pytest.mark.slow
 def test_a_rough_needle_is_the_same_at_all_levels(tmp_path):
     """Ring on a cone: the layer takes 7 % of the peak; all levels within 0.2 % of each other."""
     names = ("reduced", "interface", "full")

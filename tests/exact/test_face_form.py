@@ -166,6 +166,7 @@ def test_gaps_of_a_placed_body_have_the_form(tmp_path):
     assert gaps == pytest.approx(problem.space.gap, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_interface_level_and_full_order_have_the_same_crown(tmp_path):
     """Flat faces return at once; a crown of 10 um takes its time, at both levels alike."""
     levels = run_impact(

@@ -50,6 +50,7 @@ def test_unequal_bodies_share_the_speed():
     assert front_pressure(3.0, STEEL, soft) == pytest.approx(3.0 * z[0] * z[1] / sum(z), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_front_is_the_force_of_the_full_order(flat):
     """Poisson's ratio 0: the plateau of the rods is the front, rho c A v / 2 = 255 N."""
     case, study = flat
@@ -62,6 +63,7 @@ def test_the_front_is_the_force_of_the_full_order(flat):
     assert area * front_pressure(1.0, STEEL, STEEL) == pytest.approx(plateau, rel=0.005)
 
 
+@pytest.mark.slow
 def test_flat_faces_are_told_of_at_levels_of_modes(flat):
     """One note, with the keys of a real face; the full order is not meant."""
     _, study = flat
@@ -79,6 +81,7 @@ def test_the_error_estimate_does_not_hide_them(tmp_path):
     assert said(study)
 
 
+@pytest.mark.slow
 def test_a_form_that_the_modes_follow_is_not_told_of(tmp_path):
     """6 um close in 30 us at 0.2 m/s, forty shortest periods; 0.05 um in 0.25 us, a third."""
     deep = run_impact(

@@ -86,6 +86,7 @@ def test_warm_start_over_a_sequence(seed, n, jump):
         check(A, q, lam, gap, rtol=1e-7)
 
 
+@pytest.mark.slow
 def test_hundreds_of_points_closing_and_opening():
     """A stamp that presses, tilts and lifts; several hundred single changes of the inverse."""
     n = 300

@@ -39,6 +39,7 @@ def echo(level) -> float:
     return float(np.sum(gauge.exact[back] ** 2) / np.sum(gauge.exact[gone] ** 2))
 
 
+@pytest.mark.slow
 def test_a_wave_in_a_bar_leaves_through_the_end():
     closed, open_end = full(LONG.replace("    non_reflecting: far\n", "")), full(LONG)
 
@@ -53,6 +54,7 @@ def test_a_wave_in_a_bar_leaves_through_the_end():
     assert closed.history.ledger.radiated == 0.0
 
 
+@pytest.mark.slow
 def test_with_lateral_strain_a_long_pulse_leaves():
     """Pulse of 80 mm in a bar of 4 mm: its length over the radius is 40."""
     assert echo(full(LONG.replace("poisson: 0.0", "poisson: 0.3"))) < 1e-3

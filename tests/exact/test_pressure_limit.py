@@ -162,6 +162,7 @@ def test_a_limit_that_is_not_reached_changes_no_bit():
     assert len(runs[1].worn) == 0
 
 
+@pytest.mark.slow
 def test_points_take_what_the_loops_take():
     """Reference: loss of the static loops, 6 %, and their force, 1 %, from 4 times first yield on.
 

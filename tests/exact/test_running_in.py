@@ -90,6 +90,7 @@ def _fails_above(monkeypatch, force):
     monkeypatch.setattr(YieldingContact, "load", limited)
 
 
+@pytest.mark.slow
 def test_loops_that_end_below_the_impact_say_how_far_they_go(monkeypatch):
     """Bad input: one warning with force, share of the speed and what to try; elastic otherwise."""
     _fails_above(monkeypatch, 0.1)

@@ -62,6 +62,7 @@ def test_an_elastic_impact_on_the_written_case_is_the_run_in_one(level):
     assert not any("yields" in warning for warning in study.warnings)
 
 
+@pytest.mark.slow
 def test_a_mesh_twice_as_fine_reads_the_same_faces():
     """Convergence: the set between the contact points is a straight line; 2 %."""
     found, text = _run_in()
@@ -113,6 +114,7 @@ def test_a_profile_that_is_none_is_refused(worn, message):
         read_case(text, CASES / "case.yaml")
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_case_that_it_reads_again(tmp_path):
     """Exact: the file of one command is that of the next; nothing is written without running-in."""
     spheres = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"

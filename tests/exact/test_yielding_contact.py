@@ -52,6 +52,7 @@ def test_first_yield_is_below_the_surface_of_a_sphere(loops):
     assert loops.first_yield == pytest.approx(FORCE, rel=0.15)
 
 
+@pytest.mark.slow
 def test_force_over_approach_is_that_of_a_sphere(loops):
     """Reference: fit of Jackson & Green, 3 %, and as much for a contact of few elements."""
     for state in loops.states:
@@ -61,6 +62,7 @@ def test_force_over_approach_is_that_of_a_sphere(loops):
     assert loops.states[-1].force > 10 * FORCE
 
 
+@pytest.mark.slow
 def test_set_is_that_of_a_sphere(loops):
     """Reference: Etsion, Kligerman & Kadin 2005, residual over largest approach within 0.03."""
     for state, opening in zip(loops.states, loops.openings, strict=True):
@@ -70,6 +72,7 @@ def test_set_is_that_of_a_sphere(loops):
             assert opening.set / state.approach == pytest.approx(fit, abs=0.035)
 
 
+@pytest.mark.slow
 def test_loss_is_the_plastic_work_and_a_little_that_stays_inside(loops):
     """Conservation: what is lost over a loop, less the plastic work, is elastic energy inside."""
     locked = loops.loss - np.array([state.plastic_work for state in loops.states])
@@ -78,6 +81,7 @@ def test_loss_is_the_plastic_work_and_a_little_that_stays_inside(loops):
     assert np.all(np.diff(loops.loss) >= 0.0)
 
 
+@pytest.mark.slow
 def test_opening_begins_where_closing_ended(loops):
     """Exact: the same complementarity problem."""
     for state, opening in zip(loops.states, loops.openings, strict=True):
@@ -93,6 +97,7 @@ def test_bodies_that_do_not_yield_have_no_states():
     assert problem.yielding(lambda *_: None) is None
 
 
+@pytest.mark.slow
 def test_no_step_needs_to_be_halved(loops):
     """Exact: Newton's method with its line search, to 70 times first yield."""
     assert loops.force[-1] > 60.0 * loops.first_yield
@@ -108,6 +113,7 @@ def _contact(problem, radius):
     return YieldingContact(problem.space, problem.static.compliance, bodies)
 
 
+@pytest.mark.slow
 def test_a_zone_that_is_widened_on_the_way_keeps_what_has_yielded(problem, loops):
     """Exact: the rest is elastic at every state of both; 1e-6 for what Newton's method leaves."""
     narrow, wide = _contact(problem, 1.2e-5), _contact(problem, 1e-4)

@@ -72,6 +72,7 @@ def test_first_impact_is_that_of_the_impact():
     assert study.variants["dry"].result.books.relative_residual < 1e-10
 
 
+@pytest.mark.slow
 def test_what_yield_has_left_is_told():
     """Conservation: the loss of the stop; the set in terminal, report and JSON."""
     study = _study()

@@ -40,6 +40,7 @@ def recording(path: Path, result: Path, factor: float = -1.5, unit: str = "um/m"
     return path
 
 
+@pytest.mark.slow
 def test_the_same_pulse_is_found_again(result, tmp_path, capsys):
     files = [str(recording(tmp_path / f"{k}.csv", result, -1.5 - 0.1 * k)) for k in range(2)]
     table = tmp_path / "numbers.json"
@@ -70,6 +71,7 @@ def test_a_known_speed_keeps_the_factor(result, tmp_path, capsys):
     assert "No factor was fitted" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.slow
 def test_outputs_are_in_files_reports_and_json(result, tmp_path):
     assert main(["export", str(result), "--to", "csv", "--out", str(tmp_path), "--quiet"]) == 0
     text = "".join(path.read_text() for path in tmp_path.rglob("*.csv"))

@@ -183,6 +183,7 @@ def test_points_of_the_same_bodies_build_them_once(ball, tmp_path, monkeypatch):
     assert [group.places for group in groups_of(asked, range(6))] == [(0, 1, 2), (3, 4, 5)]
 
 
+@pytest.mark.slow
 def test_doubts_of_an_impact_are_notes_of_its_point(ball, tmp_path):
     """A run that ends in contact, and a mesh that is too coarse."""
     text = """
@@ -239,6 +240,7 @@ def test_a_point_that_fails_is_a_row(ball, tmp_path):
     assert "first touch at" in record.failures[1]
 
 
+@pytest.mark.slow
 def test_noise_is_that_of_the_impact_of_the_changed_case(ball, tmp_path):
     text = """
   parameters: {motion.speed: {values: [0.4 m/s, 0.5 m/s]}}
@@ -254,6 +256,7 @@ def test_noise_is_that_of_the_impact_of_the_changed_case(ball, tmp_path):
         assert np.isfinite(columns(record)[name]).all()
 
 
+@pytest.mark.slow
 def test_it_resumes_and_more_points_use_what_is_there(ball, tmp_path):
     out = tmp_path / "out"
     first = klack.run_study(ball, write(tmp_path, STUDY), folder=out).record
@@ -368,6 +371,7 @@ def test_the_section_of_the_case_serves_as_well(ball, tmp_path):
 class TestDerivatives:
     """By differences; truth: dimensional analysis of elastic bodies, and impacts on both sides."""
 
+    @pytest.mark.slow
     def test_stiffer_bodies_hit_as_dimensions_say(self, ball):
         """F / (E L^2) and t c / L depend on v / c alone, c^2 = E / rho, without forces."""
         record = klack.sensitivities(

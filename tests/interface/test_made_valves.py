@@ -141,6 +141,7 @@ def found(tmp_path_factory):
 
 
 class TestRobustSearch:
+    @pytest.mark.slow
     def test_values_are_those_of_the_valves_of_each_design(self, found):
         """Truth: mean and deviation by numpy of strokes computed apart."""
         file, result = found
@@ -154,6 +155,7 @@ class TestRobustSearch:
             expected = made[name].mean() + 2.0 * made[name].std(ddof=1)
             assert own[f"{name} (mean + 2 sd)"][point] == pytest.approx(expected, rel=1e-12)
 
+    @pytest.mark.slow
     def test_today_has_its_made_valves_too(self, found):
         file, result = found
         made = columns(klack.run_study(SMALL, file, made=8).record)["opening_time"]
@@ -161,12 +163,14 @@ class TestRobustSearch:
         expected = made.mean() + 2.0 * made.std(ddof=1)
         assert today["opening_time (mean + 2 sd)"] == pytest.approx(expected, rel=1e-12)
 
+    @pytest.mark.slow
     def test_what_is_shown_names_the_robust_values(self, found):
         told = found[1].record.optimum
         assert told.objectives == ("opening.peak_force (mean + 2 sd)",)
         assert told.bounds == ("opening_time (mean + 2 sd) at most 165 us",)
         assert "8 valves made after each design" in told.algorithm
 
+    @pytest.mark.slow
     def test_a_design_with_a_valve_that_fails_has_no_value(self, tmp_path):
         wide = ROBUST.replace("lift: 2 um", "lift: 80 um")
         record = klack.optimise(SMALL, write(tmp_path, STUDY + wide)).record

@@ -56,6 +56,7 @@ def test_a_size_that_is_too_coarse_is_named_with_one_that_does():
     mesher(MeshSizing(size=size))
 
 
+@pytest.mark.slow
 def test_a_thin_walled_tube_of_a_step_file(tmp_path: Path):
     """Wall of 0.2 mm, radius 3 mm: curved elements of 1 mm turn inside out."""
     tube = Profile(

@@ -160,6 +160,7 @@ def test_points_at_the_border_are_marked():
     assert space.area.sum() == pytest.approx(pair.section.area.sum() - pair.section.area[5] / 8)
 
 
+@pytest.mark.slow
 def test_a_touch_away_from_the_finest_mesh_is_told(tmp_path):
     study = interface(case_of(tmp_path, eccentricity="25 um"))
     assert any("away from its finest mesh" in text for text in study.warnings)

@@ -322,6 +322,7 @@ def test_the_schematic_is_shown_if_the_result_has_one(study: StrokeStudy, given:
     assert ("Schematic" in titles) is bool(given)
 
 
+@pytest.mark.slow
 def test_the_paper_has_pages(study: StrokeStudy):
     pdf = render_pdf(stroke_content(replace(study, title=HOSTILE)))
 
@@ -551,6 +552,7 @@ def in_space(study: StrokeStudy, impacts: int | None) -> StrokeStudy:
     return replace(study, variants={"wet": replace(wet, result=result)})
 
 
+@pytest.mark.slow
 def test_impacts_round_the_ring_have_their_figures(study: StrokeStudy):
     content = stroke_content(in_space(study, 2))
     rings, films = (

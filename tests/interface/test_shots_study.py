@@ -86,6 +86,7 @@ def changed(case, values):
     return case.checked
 
 
+@pytest.mark.slow
 def test_every_point_has_the_bits_of_klack_shots(needle, tmp_path):
     """Two designs of the same bodies; the second one finds them used."""
     rows = [

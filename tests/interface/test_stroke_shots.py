@@ -55,6 +55,7 @@ def same(columns, outcomes, numbers) -> None:
         np.testing.assert_array_equal(found, [numbers(one)[item.name] for one in outcomes])
 
 
+@pytest.mark.slow
 def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     """Truth: the valve run by itself with the placement that its case would give."""
     start, outcome = starts.drawn(1), alone[2]
@@ -87,6 +88,7 @@ def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     assert found == pytest.approx([x, y], abs=2e-9)
 
 
+@pytest.mark.slow
 def test_placements_decide_where_the_needle_touches(alone):
     centred, *others = alone
     for stop in ("seat", "opening"):
@@ -101,6 +103,7 @@ def test_placements_decide_where_the_needle_touches(alone):
     assert others[1].stops["opening"]["peak_force"] != centred.stops["opening"]["peak_force"]
 
 
+@pytest.mark.slow
 def test_strokes_keep_the_energy_balance(alone):
     for outcome in alone:
         assert abs(outcome.stroke["energy_residual"]) < 1e-9
@@ -174,6 +177,7 @@ def test_the_rebound_height_is_that_of_a_throw():
     assert np.isnan(rebound_height([rest], event(first), still, 1.0))
 
 
+@pytest.mark.slow
 def test_a_log_keeps_every_bit(tmp_path, alone):
     mark = strokes_mark(CASE, 1, None)
     with STROKE_LOG.open(tmp_path, mark) as log:
@@ -191,6 +195,7 @@ def test_a_log_keeps_every_bit(tmp_path, alone):
     assert strokes_mark(changed, 1, None) != mark
 
 
+@pytest.mark.slow
 def test_a_row_starts_where_it_has_ended(setup, starts):
     """Truth: the end of each stroke, and the draw that independent ones would have."""
     case = valve_case("shots: {count: 3, carry: true}")

@@ -34,9 +34,9 @@ def test_the_study_of_the_page_is_the_file_beside_it():
     ("place", "command", "design"),
     [
         (0, "study", "sobol"),
-        (1, "study", "saltelli"),
+        pytest.param(1, "study", "saltelli", marks=pytest.mark.slow),
         pytest.param(3, "sensitivities", "sobol", marks=pytest.mark.slow),
-        (4, "optimise", "sobol"),
+        pytest.param(4, "optimise", "sobol", marks=pytest.mark.slow),
     ],
 )
 def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place, command, design):

@@ -451,6 +451,7 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
         assert [group.places for group in groups_of(asked, range(2))] == [(0, 1)]
         assert asked.kind.makes_bodies(asked.case, ("noise", "surfaces"))
 
+    @pytest.mark.slow
     def test_clicks_of_a_front_are_those_of_their_strokes(self, tmp_path):
         """Truth: the sound of klack noise for the case of the point."""
         case = tmp_path / "rod.yaml"
@@ -628,6 +629,7 @@ class TestOptimum:
             if f <= most:  # within 1 %, no point of a grid is better than all of the front
                 assert ((time[found.front] <= 1.01 * t) & (force[found.front] <= 1.01 * f)).any()
 
+    @pytest.mark.slow
     def test_one_objective_finds_the_corner(self, tmp_path, capsys, monkeypatch):
         """A strong spring opens late: the latest opening is at the highest preload and lift."""
         text = OPTIMUM.replace("opening.peak_force: minimise}", "}").replace(
@@ -656,6 +658,7 @@ class TestOptimum:
         assert main(["export", str(out), "--to", "case", "--point", "9999"]) == 2
         assert "--point" in capsys.readouterr().err
 
+    @pytest.mark.slow
     def test_the_best_so_far_is_a_page_while_it_runs(self, tmp_path, capsys, monkeypatch):
         pages = []
 

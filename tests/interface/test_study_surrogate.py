@@ -48,6 +48,7 @@ def record(tmp_path_factory):
     return klack.run_study(SMALL, write(tmp_path_factory.mktemp("study"))).record
 
 
+@pytest.mark.slow
 def test_leave_one_out_errors_are_those_of_fresh_strokes(record, tmp_path):
     """Truth: 40 other points; the surrogate that is judged is rebuilt from the record."""
     from klack.studies.spread import Normal, Range
@@ -74,6 +75,7 @@ def test_leave_one_out_errors_are_those_of_fresh_strokes(record, tmp_path):
         assert found.predictivity > 0.999
 
 
+@pytest.mark.slow
 def test_shares_are_those_of_saltelli_with_fewer_points(record, tmp_path):
     text = STUDY.replace("kind: sobol, points: 40", "kind: saltelli, points: 32")
     text = text.replace("  surrogate: {kind: polynomial-chaos}\n", "")

@@ -33,6 +33,7 @@ with WorkerPool(2, bytes(1_000_000)) as pool:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 @pytest.mark.parametrize("seconds", [0.0, 0.1, 1.0])
+@pytest.mark.slow
 def test_a_worker_that_dies_at_any_time_is_an_error(seconds: float, tmp_path: Path):
     """Truth = what killed it: at its first moment, while it imports, and at work.
 

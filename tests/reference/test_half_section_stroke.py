@@ -69,6 +69,7 @@ def drop(case, moving, other, contact, end):
     return head + "bodies:\n" + body(moving) + body(other) + contact + modes + end
 
 
+@pytest.mark.slow
 def test_a_centred_needle_makes_the_axial_stroke():
     centred = HALF.replace("placement: {seed: 3}\n", "").replace("400 us,", "190 us,")
     centred = centred.replace("angles: 24", "angles: 8")
@@ -83,6 +84,7 @@ def test_a_centred_needle_makes_the_axial_stroke():
     assert ours.restitution == pytest.approx(theirs.restitution, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_first_impact_is_that_of_the_interface_level():
     network = """network:
   components:

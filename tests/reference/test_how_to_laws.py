@@ -78,6 +78,7 @@ def test_damping_lowers_the_restitution_as_the_page_says(tmp_path):
     assert found.restitution == pytest.approx(written, abs=2e-4)  # versions of the mesher
 
 
+@pytest.mark.slow
 def test_rough_rods_give_the_forces_that_the_page_says(tmp_path):
     page = "flat-faces.md"
     yaml = YAML(typ="safe")

@@ -33,6 +33,7 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Film]:
     }
 
 
+@pytest.mark.slow
 def test_both_bodies_are_there_at_every_instant(films: dict[str, Film]):
     for film in films.values():
         assert list(film) == ["needle", "housing"]

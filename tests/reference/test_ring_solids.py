@@ -49,6 +49,7 @@ def coarse_case(folder, model, friction=0.0, eccentricity="0.5 um", tilt="0.02 d
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
+@pytest.mark.slow
 def test_an_off_axis_impact_is_that_of_the_swept_solid(tmp_path, friction):
     """The solid tends to the rings with its layers.
 

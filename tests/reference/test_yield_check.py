@@ -21,6 +21,7 @@ def _problem(path, old, new):
     return build_problem(read_case(text.replace(old, new), path), lambda *_: None)
 
 
+@pytest.mark.slow
 def test_seat_yields_where_the_elastic_stress_reaches_it():
     """Reference: von Mises stress of the whole bodies by finite elements, 15 %.
 
