@@ -162,6 +162,18 @@ def test_what_is_gone_is_told_once_with_the_way_back(page, server, address, word
     page.wait_for_selector("text=Everything below the folder that klack app opened.")
 
 
+def test_sliders_that_cannot_open_tell_why_with_the_way_back(page, server, folder):
+    broken = folder / "broken.yaml"
+    broken.write_text("klack: 1\n")
+    page.goto(f"{server.base}/sliders?path=broken.yaml")
+    page.get_by_role("alert").get_by_text("bodies").wait_for()
+
+    assert page.locator("#k-body [role=status]").count() == 0
+    page.locator("#k-body").get_by_role("link", name="Back to cases and results").click()
+    page.wait_for_selector("text=Everything below the folder that klack app opened.")
+    broken.unlink()
+
+
 def test_words_of_a_row_keep_room_beside_its_buttons(page, server):
     """A page of 1280 px at a zoom of 200 %."""
     page.set_viewport_size({"width": 640, "height": 450})

@@ -629,6 +629,15 @@ class TestOptimum:
             if f <= most:  # within 1 %, no point of a grid is better than all of the front
                 assert ((time[found.front] <= 1.01 * t) & (force[found.front] <= 1.01 * f)).any()
 
+    def test_without_pymoo_nothing_is_computed_or_written(self, tmp_path, capsys, monkeypatch):
+        monkeypatch.setitem(sys.modules, "pymoo.config", None)
+        out = tmp_path / "out"
+        file = write(tmp_path, OPTIMUM)
+
+        assert main(["optimise", str(SMALL), "--study", str(file), "--out", str(out)]) == 2
+        assert "--extra optimise" in capsys.readouterr().err
+        assert not out.exists()
+
     @pytest.mark.slow
     def test_one_objective_finds_the_corner(self, tmp_path, capsys, monkeypatch):
         """A strong spring opens late: the latest opening is at the highest preload and lift."""

@@ -15,7 +15,7 @@ from klack.studies.batches import Batches, highest, points_in_cube
 from klack.studies.counts import require_count
 from klack.studies.values import PointValues
 
-__all__ = ["Search", "SearchSettings"]
+__all__ = ["Search", "SearchSettings", "require_pymoo"]
 
 _WORST_VIOLATION = 1e200
 """Largest violation of a point that did not fail."""
@@ -189,14 +189,27 @@ def _own_warnings() -> Iterator[None]:
         yield
 
 
-def _algorithm(settings: SearchSettings) -> Any:
-    """Algorithm of pymoo, set up, with nothing shared with another one."""
+def require_pymoo() -> None:
+    """Refuse a search before anything is computed for it.
+
+    Raises
+    ------
+    MissingExtraError
+        Without pymoo.
+    """
     try:
-        from pymoo.config import Config
-        from pymoo.core.problem import Problem
-        from pymoo.core.termination import NoTermination
+        import pymoo.config  # noqa: F401
     except ImportError as error:
         raise MissingExtraError("pymoo", "A search for optima", "optimise") from error
+
+
+def _algorithm(settings: SearchSettings) -> Any:
+    """Algorithm of pymoo, set up, with nothing shared with another one."""
+    require_pymoo()
+    from pymoo.config import Config
+    from pymoo.core.problem import Problem
+    from pymoo.core.termination import NoTermination
+
     Config.warnings["not_compiled"] = False  # would be printed among results
     problem = Problem(
         n_var=settings.parameters,

@@ -41,7 +41,7 @@ from klack.studies.batches import Batches
 from klack.studies.fronts import compromise, find_front, spread_over
 from klack.studies.polish import NoValue, polish
 from klack.studies.refinement import Refinement, RefinementSettings
-from klack.studies.search import Search, SearchSettings
+from klack.studies.search import Search, SearchSettings, require_pymoo
 from klack.studies.spread import Range
 
 __all__ = ["run_optimisation"]
@@ -97,6 +97,7 @@ def run_optimisation(
         Without pymoo.
     """
     begin = perf_counter()
+    require_pymoo()
     space = space_of(case, source)
     require_varied(source, space.varied)
     _require_same_draws(source)

@@ -16,6 +16,7 @@ from klack.app.pages.frame import (
     START_VALUE,
     asking,
     button,
+    dead_end,
     differing,
     frame,
     heading,
@@ -70,8 +71,9 @@ class _Sliders:
                 self._take_process()  # here: the browser is connected, and is seen to leave
                 found: Opened = await self._worker.call("open", text, path)
             except KlackError as error:
-                self._waiting.set_text(str(error))
-                self._waiting.classes("k-error")
+                self._waiting.delete()
+                with self._body:
+                    dead_end(error)
                 return
             self._waiting.delete()
             with self._body:
