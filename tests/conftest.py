@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,7 +13,10 @@ from zlib import crc32
 import pytest
 from threadpoolctl import threadpool_limits
 
-os.environ["KLACK_CACHE"] = "off"  # every test computes; those of the cache take a folder of theirs
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    # meshes, modes and contact laws are kept as for a user: of one run, in a store of its own that
+    # all workers share
+    os.environ["KLACK_CACHE"] = tempfile.mkdtemp(prefix="klack-tests-")
 if "PYTEST_XDIST_WORKER" in os.environ:
     # workers share the cores: threads of one would wait for those of the other, up to 15 times
     # as long; plugins load NumPy before this file, everything else comes after it
@@ -39,19 +43,21 @@ collect_ignore_glob = [
 ]
 
 
-@pytest.fixture(scope="module")
-def kept_results(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """Keep meshes, modes and contact laws as for a user, in one empty store for this test run.
+STORE = None if "PYTEST_XDIST_WORKER" in os.environ else os.environ["KLACK_CACHE"]
 
-    For tests of pages and commands whose bodies are only the material.  All workers share it.  Not
-    for tests that compute something twice to compare it, or that replace a function of klack.
-    """
-    folder = tmp_path_factory.getbasetemp()
-    if "PYTEST_XDIST_WORKER" in os.environ:
-        folder = folder.parent
+
+@pytest.fixture(scope="module")
+def computes() -> Iterator[None]:
+    """Keep nothing and take nothing kept: for tests that replace or count what klack computes."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("KLACK_CACHE", str(folder / "kept-results"))
-        yield folder / "kept-results"
+        patch.setenv("KLACK_CACHE", "off")
+        yield
+
+
+def pytest_unconfigure() -> None:
+    """Remove the store of this run, which its first process made."""
+    if STORE is not None:
+        shutil.rmtree(STORE, ignore_errors=True)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

@@ -15,8 +15,6 @@ from klack.exchange.modal_model import _without_memory
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.compile import propose_step
 
-pytestmark = pytest.mark.usefixtures("kept_results")  # loops of the same spheres, again and again
-
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 YIELD = ", yield: 280 MPa, hardening: {isotropic: 1 GPa}"
 

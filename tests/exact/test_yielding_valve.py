@@ -16,8 +16,6 @@ from klack.case.reader import read_case
 from klack.case.valve_reader import read_valve_case
 from klack.errors import AccuracyWarning, InputError
 
-pytestmark = pytest.mark.usefixtures("kept_results")  # loops of the same spheres, again and again
-
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 VALVE = """
 stops:

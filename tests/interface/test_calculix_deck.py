@@ -34,8 +34,6 @@ from klack.progress import silent
 from klack.verification.impacts import needle_over_seat
 from klack.verification.lattice import lattice_mesh
 
-pytestmark = pytest.mark.usefixtures("kept_results")  # the demo valve is meshed once
-
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=105e9, poisson=0.34, density=8400.0)
 SETTINGS = CalculixSettings(step=50e-9, duration=2e-6, penalty=1e17)

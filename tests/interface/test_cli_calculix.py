@@ -18,8 +18,6 @@ from klack.cli.main import app, main
 from klack.errors import ConvergenceError, InputError
 from klack.exchange.calculix_run import run_calculix
 
-pytestmark = pytest.mark.usefixtures("kept_results")  # the demo valve is meshed once
-
 BARS = Path(__file__).parents[1] / "data" / "calculix_bars.dat"
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to" / "check-with-calculix.md"
 MASS = 1.5667291666666663e-05  # kg, of the bar in that file

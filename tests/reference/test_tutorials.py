@@ -201,7 +201,6 @@ class TestStairs(Tutorial):
     name = "stairs"
 
 
-@pytest.mark.usefixtures("kept_results")  # as a reader's: it reduces the same bodies three times
 class TestClassicalChain(Tutorial):
     name = "classical-chain"
 
