@@ -273,10 +273,10 @@ def test_pressures_guessed_so_high_that_the_search_fails_are_left_with_a_word():
 
 @pytest.mark.slow
 def test_many_random_valves_end_in_a_right_point_or_in_words():
-    found = tally(range(1000, 1400))
+    found = tally(range(1000, 1150))
 
-    assert found.get("point", 0) >= 200, found
-    assert found.get("not found", 0) <= 8, found
+    assert found.get("point", 0) >= 75, found
+    assert found.get("not found", 0) <= 3, found
 
 
 @pytest.mark.slow
