@@ -478,6 +478,8 @@ class LimitRow:
         Handle of a mechanical port, and its factor.
     node : int, optional
     channel : str
+    at_start : bool
+        Whether it is looked at where a run begins alone.
     """
 
     component: str
@@ -495,6 +497,7 @@ class LimitRow:
     ports: tuple[tuple[int, float], ...] = ()
     node: int | None = None
     channel: str = ""
+    at_start: bool = False
 
 
 @dataclass(eq=False)
