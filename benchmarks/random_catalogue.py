@@ -5,8 +5,8 @@ component type but the FMU occurs, runs ``klack stroke`` on each, once more with
 ``klack stroke --steady`` and ``klack linearise`` on every third; ``--seed`` begins elsewhere,
 ``--only N`` prints one case.  It counts how they end: in an answer, in one with a note, in an error
 of the input (exit code 2), in a run that stopped (1).  A fault is an internal error, a stop that
-does not say at which component and when, an energy residual above 1e-9 or a first impact that
-changes with the step without a note; each is printed.
+does not say at which component and when, an energy residual above 1e-9 or a first impact on a stop
+that changes with the step without a note on it; each is printed.
 """
 
 import argparse
@@ -84,27 +84,27 @@ def ending(case: Path, *, more: bool) -> tuple[str, str]:
     apart = _apart(found, _told("stroke", case, "--step", step)[1])
     if not found["energy_residual"] <= _RESIDUAL and not said:
         return "fault", f"energy residual {found['energy_residual']:.2g}"
-    if apart and not said:
-        return "fault", apart
-    return ("note" if said else "answer"), f"{said} {apart}".strip()
+    if any(f"first impact on '{stop}'" not in said for stop in apart):
+        return "fault", "; ".join(apart.values())
+    return ("note" if said else "answer"), " ".join([said, *apart.values()]).strip()
 
 
-def _apart(one: dict[str, Any], other: dict[str, Any]) -> str:
-    """First impacts on each stop that differ with half the step."""
+def _apart(one: dict[str, Any], other: dict[str, Any]) -> dict[str, str]:
+    """How the first impact on a stop differs with half the step, by stops where it does."""
     first: dict[str, Any] = {}
     for event in one["events"]:
         first.setdefault(event["stop"], event)
-    words = []
+    words: dict[str, str] = {}
     for stop, event in first.items():
         twin = next((e for e in other.get("events", ()) if e["stop"] == stop), None)
         if twin is None:
-            words.append(f"{stop} is not touched with half the step")
+            words[stop] = f"{stop} is not touched with half the step"
             continue
         late = abs(event["time_s"] - twin["time_s"])
         peak = abs(event["peak_force_N"] / (twin["peak_force_N"] or 1.0) - 1.0)
         if late > _TIME or peak > _PEAK:
-            words.append(f"{stop} with half the step: {late:.1e} s later, peak {peak:.1e} off")
-    return "; ".join(words)
+            words[stop] = f"{stop} with half the step: {late:.1e} s later, peak {peak:.1e} off"
+    return words
 
 
 def main() -> int:

@@ -8,6 +8,7 @@ from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.static import static_state
+from klack.magnetics.two_point import TwoPoint
 from klack.magnetics.voltage_step import VoltageStep
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.rigid_mass import RigidMass
@@ -134,3 +135,26 @@ def test_two_gaps_in_parallel_share_a_flux_without_ringing():
     gap = 1e-4 - lift[1:] + 3e-5
     np.testing.assert_allclose(run.flux[1:], mmf * 4e-7 * np.pi * 2e-5 / gap, rtol=1e-9)
     assert run.residual < 1e-13
+
+
+def test_a_band_too_narrow_for_a_macro_step_is_held_in_fine_steps():
+    """0.06 A/us within 1 mA: some 80 switchings in a macro step of 1.28 us, 1 in one of 20 ns."""
+    parts = {
+        "needle": RigidMass(mass=3e-3, points=("tip",)),
+        "spring": Spring(stiffness=1e4, preload=50.0),
+        "seat": EndStop(gap=0.0, law={"kind": "linear", "stiffness": 1e9}, restitution=0.5),
+        "coil": Solenoid(gap=110e-6, poles=[POLE], turns=20, resistance=1.0, residual_gap=35e-6),
+        "driver": TwoPoint(voltage=24.0, upper=2.0005, lower=1.9995, freewheel=24.0),
+    }
+    nodes = [
+        ["needle.tip", "spring.end", "seat.upper", "coil.armature"],
+        ["ground", "seat.lower"],
+        ["driver.terminals", "coil.terminals"],
+    ]
+
+    run = simulate_network(Network(parts, nodes).rows(), duration=60e-6)
+
+    held = run.channels["coil current"].values[run.time > 40e-6]
+    assert np.all((1.9995 - 1e-9 <= held) & (held <= 2.0005 + 1e-9))
+    assert run.steps.flight > 0
+    assert abs(run.books.relative_residual) < 1e-12

@@ -12,11 +12,13 @@ import pytest
 
 from klack.errors import AccuracyWarning
 from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ForceOverTime
 from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.spring import Spring
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import FilmRow, Rows
-from klack.simulation.impact_doubts import impact_doubts, missing_peak
+from klack.simulation.impact_doubts import impact_doubts, late_by_swinging, missing_peak
 from klack.simulation.network_result import InterfaceRecord, NetworkResult
 from klack.simulation.network_run import simulate_network
 
@@ -140,4 +142,43 @@ def test_impacts_without_a_record_are_not_doubted():
         time=none, step=none, contact_force=none, film_force=none, gap=none, complete=False
     )
 
-    assert list(impact_doubts(result.events, {"seat": empty}, 100e-9)) == []
+    assert list(impact_doubts(result.events, {"seat": empty}, 100e-9, 400e-9)) == []
+
+
+def loaded(restitution: float | None) -> Rows:
+    """A needle of 0.13 g pressed by 3.5 N; 13 N more push it in 1 us, and go in 20 us."""
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=1.3e-4, points=("tip",)),
+        "spring": Spring(stiffness=2e4, preload=3.5),
+        "seat": EndStop(
+            gap=0.0, law={"kind": "linear", "stiffness": 1.4e7}, restitution=restitution
+        ),
+        "load": ForceOverTime(time=(1e-4, 1.01e-4, 5e-4, 5.2e-4), force=(0.0, -13.0, -13.0, 0.0)),
+    }
+    nodes = [["needle.tip", "spring.end", "seat.upper", "load.end"], ["seat.lower", "ground"]]
+    return Network(parts, nodes).rows()
+
+
+def stroke(of: Rows, **steps: float) -> tuple[NetworkResult, list[str]]:
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always", AccuracyWarning)
+        result = simulate_network(of, duration=7e-4, **steps)
+    return result, [str(item.message) for item in said]
+
+
+def test_a_stop_that_was_swung_on_is_told_with_the_shift_of_its_first_impact():
+    """Truth: fine steps of everything together, which follow each swing."""
+    result, (doubt,) = stroke(loaded(None))
+    finer, silent = stroke(loaded(None), coarse=1, step=10e-9)
+
+    assert not silent
+    late = abs(result.events[0].time - finer.events[0].time)
+    assert late > 5e-8
+    told = late_by_swinging(result.interfaces["seat"], result.events[0].time, 32 * 20e-9)
+    assert told[0] == pytest.approx(late, rel=0.7)
+    assert f"swung on it {told[1]} times, each" in doubt
+    assert "Try: run.coarse: 1" in doubt
+
+
+def test_a_stop_that_damps_the_swing_is_not():
+    assert not stroke(loaded(0.5))[1]

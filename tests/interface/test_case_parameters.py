@@ -351,12 +351,20 @@ def test_parameters_without_effect_are_named():
 
 
 @pytest.mark.parametrize(
-    "command", [("stroke",), ("stroke", "--steady"), ("linearise",), ("advise", "--no-confirm")]
+    "command",
+    [
+        ("stroke",),
+        ("stroke", "--steady"),
+        ("linearise",),
+        ("advise", "--no-confirm"),
+        ("export", "--to", "netcdf"),
+    ],
 )
 def test_every_command_names_parameters_without_effect(command, tmp_path, capsys):
     case = tmp_path / "case.yaml"
     case.write_text(SPARE, encoding="utf-8")
-    own = () if command[0] == "advise" else ("--no-report", "--out", str(tmp_path / "out"))
+    report = () if command[0] == "export" else ("--no-report",)
+    own = () if command[0] == "advise" else (*report, "--out", str(tmp_path / "out"))
 
     assert main([command[0], str(case), *command[1:], *own]) == 0
 

@@ -219,7 +219,7 @@ WRONG = {
     "two start pressures": (
         {**VALVE, "a": Chamber(volume=1e-9, pressure=1e5), "b": Chamber(volume=1e-9, pressure=2e5)},
         [*JOINED, ["a.fluid", "b.fluid"]],
-        "200000 Pa at the start where 'a' has 100000 Pa",
+        "2 bar at the start where 'a' has 1 bar",
         "orifice",
     ),
 }

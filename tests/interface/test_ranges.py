@@ -6,6 +6,7 @@ Truth: lengths, areas and volumes by hand; the mass that a closed chamber holds.
 import re
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.controlled_pressure import ControlledPressure
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.junction import Junction
 from klack.hydraulics.line import Line
 from klack.hydraulics.liquid import Murnaghan, TabulatedLiquid, Tait
 from klack.hydraulics.pressure_face import PressureFace
@@ -317,11 +319,11 @@ def test_a_controller_that_asks_for_less_than_boiling_is_told_when_it_does():
         simulate_network(rows, duration=100e-6, step=20e-9, record=100e-9)
 
 
-def line_between(first, second, pressure=None, fluid=HEPTANE):
+def line_between(first, second, pressure=None, fluid=HEPTANE, begin=PressureSource):
     parts = {
         "m": RigidMass(mass=1.0),
         "k": Spring(stiffness=1e3, preload=0.0),
-        "source": PressureSource(pressure=first),
+        "source": begin(pressure=first),
         "line": Line(length=0.1, diameter=2e-3, pressure=pressure, friction="none"),
         "room": Chamber(volume=1e-7, pressure=second),
     }
@@ -335,6 +337,50 @@ def test_a_line_without_a_pressure_takes_the_higher_one_of_its_ends():
     assert taken.lines[0].delay == given.lines[0].delay
     assert taken.lines[0].impedance == given.lines[0].impedance
     assert taken.lines[0].delay == 0.1 / float(HEPTANE.sound_speed(2e7))
+
+
+@pytest.mark.parametrize(
+    "begin", [Junction, partial(Chamber, volume=1e-7)], ids=["junction", "volume"]
+)
+def test_what_begins_below_boiling_is_told(begin):
+    """n-heptane of the library boils at 0.0472 bar, and the model is all liquid 0.02 bar above."""
+    liquid = HEPTANE.vapour_pressure + 2e3
+    with pytest.warns(AccuracyWarning, match="at the start") as caught:
+        simulate_network(line_between(0.999 * liquid, 5e5, begin=begin), duration=2e-6, step=20e-9)
+
+    (text,) = [str(item.message) for item in caught if "begins with vapour" in str(item.message)]
+    assert text.startswith("'source': at the start the pressure leaves the range of liquid")
+    assert "it boils at 0.0472 bar at 20 degC" in text
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".*begins with vapour", AccuracyWarning)
+        simulate_network(line_between(1.001 * liquid, 5e5, begin=begin), duration=2e-6, step=20e-9)
+
+
+def test_a_volume_that_boils_later_is_no_doubt():
+    """1 mm^3/ms out of 1 mm^3 of a bulk modulus of some GPa: 1 bar is gone within 1 us."""
+    text = CLOSED.replace("[q.a, ambient]", "[q.b, ambient]").replace(
+        "[q.b, c.fluid]", "[q.a, c.fluid]"
+    )
+    text = text.replace("volume: 1 mm^3", "volume: 1 mm^3, pressure: 1 bar")
+    rows = rows_of(text.replace("1 l/min", "0.06 l/min"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", AccuracyWarning)
+        result = simulate_network(rows, duration=50e-6, step=20e-9)
+
+    assert result.channels["c pressure"].values[-1] < HEPTANE.all_liquid_from
+
+
+@pytest.mark.parametrize(
+    ("given", "key"),
+    [(3e3, "components.line.pressure: got 0.03 bar, "), (None, "components.line:")],
+)
+def test_waves_of_a_line_in_vapour_are_refused(given, key):
+    """Its ends begin at 0.03 bar, where n-heptane is vapour (0.0472 bar)."""
+    with pytest.raises(InputError, match="has no vapour left") as caught:
+        line_between(3e3, 3e3, given, begin=Junction)
+
+    assert str(caught.value).startswith(key)
+    line_between(3e3, 3e3, 7e3, begin=Junction)
 
 
 def test_a_line_far_from_its_pressure_says_both_speeds_and_the_error():

@@ -16,6 +16,7 @@ from klack.assembling.spatial_rings import build_spatial_rings
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
 from klack.cache.setting import result_cache
+from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_roles import FLEXIBLE_BODY, find_roles
@@ -82,6 +83,7 @@ class Valve:
     spatial: SpatialValve | None = None
 
 
+@tells_place
 def build_valve(
     case: ValveCase, progress: Progress = silent, *, threads: int | None = None
 ) -> Valve:

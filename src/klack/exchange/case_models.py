@@ -12,6 +12,7 @@ from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.assembling.valve import build_valve
+from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
@@ -57,6 +58,7 @@ class CaseModels:
         )
 
 
+@tells_place
 def case_models(
     case: Case | ValveCase, progress: Progress = silent, *, threads: int | None = None
 ) -> CaseModels:

@@ -19,6 +19,7 @@ from klack.input.section import Count
 from klack.network.component import Component
 from klack.network.port import FLOW
 from klack.network.protocols import NetworkFluid
+from klack.network.ranges import value_text
 from klack.network.rows import LimitRow, Rows
 from klack.units import Length, Modulus, Pressure, percent_text
 
@@ -199,6 +200,7 @@ class Line(Component):
             rows.waves.append(self._local().row(rows, self._speeds))
             return
         pressure = self.working_pressure(rows)
+        self._require_liquid(rows, fluid, pressure)
         rho = float(fluid.density(pressure))
         # the network counts P = rho_ref g and q = mdot / rho_ref, with rho_ref at ambient pressure
         scale = (float(fluid.density(rows.ambient.pressure)) / rho) ** 2
@@ -226,6 +228,20 @@ class Line(Component):
                 laminar_flow=self._laminar_flow(rows, fluid, viscosity),
             )
         rows.limits += self._limits(rows, fluid, pressure)
+
+    def _require_liquid(self, rows: Rows, fluid: NetworkFluid, pressure: float) -> None:
+        """Linear waves run in liquid; below boiling they would have the speed in vapour."""
+        if pressure >= fluid.all_liquid_from:
+            return
+        found = "" if self.pressure is not None else ", the higher start pressure of its ends"
+        raise CaseProblem(
+            ("components", rows.component, *(["pressure"] if self.pressure is not None else [])),
+            got=f"{value_text(pressure, 'Pa')}{found}",
+            expected=f"at least {value_text(fluid.all_liquid_from, 'Pa')}, where '{fluid.name}' "
+            f"of {fluid.temperature - 273.15:.4g} degC has no vapour left",
+            hint=f"give components.{rows.component}.pressure the working pressure of the relevant "
+            "waves; pressures are absolute.",
+        )
 
     def _laminar_flow(self, rows: Rows, fluid: NetworkFluid, viscosity: float) -> float:
         """Flow of Re = 2300 as the network counts it; infinite without laminar friction."""

@@ -16,7 +16,7 @@ _ROUNDING = 1e-9  # of the start value: what sums of lengths leave
 
 def limits_of(rows: Rows) -> list[LimitRow]:
     """Every range of a network: those of its components, of its volumes, and of its fluid."""
-    return [*rows.limits, *_volumes(rows), *_pressures(rows), *_supplies(rows)]
+    return [*rows.limits, *_volumes(rows), *_pressures(rows), *_liquids(rows)]
 
 
 def _volumes(rows: Rows) -> list[LimitRow]:
@@ -69,8 +69,8 @@ def _pressures(rows: Rows) -> list[LimitRow]:
     ]
 
 
-def _supplies(rows: Rows) -> list[LimitRow]:
-    """Below boiling a supply would give vapour, and a pressure below zero does not exist."""
+def _liquids(rows: Rows) -> list[LimitRow]:
+    """Supplies are liquid, volumes and junctions begin so; what boils later is computed."""
     if rows.fluid is None:
         return []
     fluid = rows.fluid
@@ -81,17 +81,26 @@ def _supplies(rows: Rows) -> list[LimitRow]:
             quantity="pressure",
             unit="Pa",
             valid=(fluid.all_liquid_from, inf),
-            usable=(0.0, inf),
+            usable=(0.0 if row.prescribed else -inf, inf),
             law=f"liquid '{fluid.name}' in '{row.component}'",
             source=f"absolute; it boils at {boils}",
-            effect=lambda value: "What flows from there is vapour, in part or all.",
+            effect=_flows_out if row.prescribed else _begins,
             advice="pressures are absolute: add that of the surroundings, usually 1.013 bar, to "
             "a gauge pressure; check the temperature of the fluid.",
             node=node,
+            at_start=not row.prescribed,
         )
         for node, row in rows.nodes.items()
-        if row.prescribed and (node != AMBIENT or _gives_fluid(rows))
+        if node > AMBIENT or (node == AMBIENT and _gives_fluid(rows))  # below: inside of lines
     ]
+
+
+def _flows_out(pressure: float) -> str:
+    return "What flows from there is vapour, in part or all."
+
+
+def _begins(pressure: float) -> str:
+    return "It begins with vapour, in part or all."
 
 
 def _gives_fluid(rows: Rows) -> bool:

@@ -478,6 +478,8 @@ class LimitRow:
         Handle of a mechanical port, and its factor.
     node : int, optional
     channel : str
+    at_start : bool
+        Whether it is looked at where a run begins alone.
     """
 
     component: str
@@ -495,6 +497,7 @@ class LimitRow:
     ports: tuple[tuple[int, float], ...] = ()
     node: int | None = None
     channel: str = ""
+    at_start: bool = False
 
 
 @dataclass(eq=False)
@@ -661,12 +664,12 @@ class Rows:
         if before is not None and before.junction:
             raise self._two_kinds(self.component, before.component)
         if before is not None and before.stated:
-            pressure = before.pressure[0] if pressure is None else pressure
-        if before is not None and before.stated and before.pressure[0] != pressure:
+            pressure = before.at_start if pressure is None else pressure
+        if before is not None and before.stated and before.at_start != pressure:
             raise InputError(
                 f"components.{self.component}",
-                got=f"{pressure:g} Pa at the start where '{before.component}' has"
-                f" {before.pressure[0]:g} Pa",
+                got=f"{1e-5 * (pressure or 0.0):.5g} bar at the start where '{before.component}'"
+                f" has {1e-5 * before.at_start:.5g} bar",
                 expected="one start pressure at one node",
                 hint="give both the same, or put an orifice between them.",
             )

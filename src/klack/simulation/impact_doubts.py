@@ -8,10 +8,14 @@ A peak force is the largest mean of a step.  Two things make it too low:
 - *A film that is hardest at the moment of touch*, where the model ends it.  Its force rises
   like a power of the gap up to there, from one step to the next by the same factor; the step that
   closes the contact tells how far away the touch is.
+
+A stop on which the needle swings without leaving it, until a load is taken away, has its first
+impact by the phase of that swing.  Macro steps of length ``H`` follow a period ``T`` late by
+``(2 pi H / T)^2 / 12`` of it, each time anew; of small swings little of that is seen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import exp, floor, isfinite, log, log10, sqrt
+from math import exp, floor, isfinite, log, log10, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +23,7 @@ from numpy.typing import NDArray
 from klack.simulation.network_result import ImpactEvent, InterfaceRecord
 from klack.units import format_si
 
-__all__ = ["impact_doubts", "missing_peak"]
+__all__ = ["impact_doubts", "late_by_swinging", "missing_peak"]
 
 Vector = NDArray[np.float64]
 
@@ -28,19 +32,36 @@ _AIM = 0.7  # of that, for the step that is advised
 _SHORTEST = 1e-9  # [s] shorter ones take too long
 _FEWEST = 8  # steps of a contact; in fewer there is no peak to speak of
 _RESOLVED = 100  # steps of a contact that is as short as those tell
+_LATE = 5e-8  # [s] what is promised of the time of a first impact
 _TRUSTED = 0.02  # of a narrow peak; where more is missing, three steps do not tell how much
 
 
 def impact_doubts(
-    events: Sequence[ImpactEvent], interfaces: Mapping[str, InterfaceRecord], step: float
+    events: Sequence[ImpactEvent],
+    interfaces: Mapping[str, InterfaceRecord],
+    step: float,
+    near: float,
 ) -> Iterator[str]:
-    """Sentences on the first complete impact on each stop, where the peak misses 0.05 % or more."""
+    """Sentences on the first complete impact on each stop, where the peak misses 0.05 % or more.
+
+    Also where it begins late or early by 0.05 us or more, because the stop swung before; ``near``
+    is a macro step about a touch [s].
+    """
     seen = set[str]()
     for event in events:
         if event.stop in seen:
             continue
         seen.add(event.stop)
         record = interfaces[event.stop]
+        late, times, period = late_by_swinging(record, event.time, near, _last(events, event.time))
+        if late > _LATE:
+            way = "run.coarse: 1" if near > 1.5 * step else "a shorter run.step"
+            yield (
+                f"{_named(event)} hangs on the steps: before it left the stop the needle swung on "
+                f"it {times} times, each {format_si(period, 's', 2)} long, which steps of "
+                f"{format_si(near, 's', 2)} shift by about {format_si(late, 's', 1)} in all. "
+                f"Try: {way}; or the restitution of the stop, which damps it."
+            )
         if event.contact_time < _FEWEST * _step_at(record, event.peak_time):
             yield _unresolved(event, _step_at(record, event.peak_time))
             continue
@@ -72,6 +93,11 @@ def _unresolved(event: ImpactEvent, step: float) -> str:
         f"{'step' if round(event.contact_time / step) == 1 else 'steps'} of "
         f"{format_si(step, 's', 3)}. Try: run.step: {format_si(shorter, 's', 3)}."
     )
+
+
+def _last(events: Sequence[ImpactEvent], time: float) -> float:
+    """When a stop was touched last before some time [s]."""
+    return max((event.time for event in events if event.time < time), default=0.0)
 
 
 def _named(event: ImpactEvent) -> str:
@@ -125,6 +151,49 @@ def missing_peak(
         returned = min(restitution, 1.0) ** 2 if isfinite(restitution) else 0.0
         share = _highest(h[near], force[near], returned) / float(force[k]) - 1.0
     return max(share, 0.0), at_touch, float(h[k])
+
+
+def late_by_swinging(
+    record: InterfaceRecord, time: float, near: float, since: float = 0.0
+) -> tuple[float, int, float]:
+    """By how much the swings of the last contact before some time are late, how many, and how long.
+
+    None where it had ended before ``since`` [s], when a stop was touched.
+
+    Parameters
+    ----------
+    record : InterfaceRecord
+    time : float [s]
+        Of a first touch.
+    near : float [s]
+        Macro step about a touch.
+
+    Returns
+    -------
+    late : float [s]
+    swings : int
+        Within that contact, as many as are like the one that counts most.
+    period : float [s]
+        Of that one.
+    """
+    force = record.contact_force[record.time + record.step <= time + 1e-3 * near]
+    closed = np.flatnonzero(force > 0.0)
+    if not closed.size or record.time[closed[-1]] < since:
+        return 0.0, 0, 0.0
+    last = int(closed[-1])
+    opened = np.flatnonzero(force[:last] <= 0.0)
+    part = slice(int(opened[-1]) + 1 if opened.size else 0, last + 1)
+    force, middle = force[part], (record.time + 0.5 * record.step)[part]
+    turns = np.sign(np.diff(force))
+    ends = np.flatnonzero(turns[1:] * turns[:-1] < 0.0) + 1
+    if len(ends) < 2:
+        return 0.0, 0, 0.0
+    share = np.abs(np.diff(force[ends])) / (force[ends[1:]] + force[ends[:-1]])
+    periods = 2.0 * np.diff(middle[ends])
+    each = 0.5 * share * periods * (2.0 * pi * near / periods) ** 2 / 12.0
+    k = int(np.argmax(each))
+    late = float(each.sum())
+    return late, round(0.5 * late / float(each[k] or 1.0)), float(periods[k])
 
 
 def _adjacent(record: InterfaceRecord, k: int) -> bool:

@@ -99,6 +99,8 @@ class Limits:
         """
         for watched in self._watched:
             limit, values = watched.limit, watched.values(points)
+            if limit.at_start and time[0] > 0.0:
+                continue
             low, high = limit.valid[0] - limit.slack, limit.valid[1] + limit.slack
             out = np.flatnonzero((values < low) | (values > high))
             if out.size and limit.law not in self._told:

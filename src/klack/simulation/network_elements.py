@@ -5,7 +5,7 @@ from typing import Any
 from klack.network.step_function import shift
 from klack.simulation.network_arrays import ANSWER, SEEN, STORE, Y1, Step
 from klack.simulation.phase import phase
-from klack.simulation.row_calls import ask_element, push_ports, take_states
+from klack.simulation.row_calls import ask_element, failed_at, push_ports, take_states
 from klack.simulation.step_status import STATUS_DONE, STATUS_ELEMENT
 
 __all__ = ["end_elements", "push_by_elements"]
@@ -19,7 +19,7 @@ def push_by_elements(elements: Any, S: Any, step: Step, report: Any) -> int:
         status = ask_element(elements, k, step.t, step.H, seen, end)
         if status != 0:
             report[0], report[1], report[2] = k, status, step.t
-            return STATUS_ELEMENT
+            return failed_at(step.level, status, STATUS_ELEMENT)
         push_ports(elements, k, force)
     return STATUS_DONE
 

@@ -17,7 +17,14 @@ from klack.simulation.network_gas import (
     pressure_of_mixture,
 )
 from klack.simulation.phase import phase
-from klack.simulation.row_calls import ask_again, ask_branch, push_ports, push_walls, take_states
+from klack.simulation.row_calls import (
+    ask_again,
+    ask_branch,
+    failed_at,
+    push_ports,
+    push_walls,
+    take_states,
+)
 from klack.simulation.step_status import (
     STATUS_BRANCH,
     STATUS_DONE,
@@ -138,7 +145,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
         failed, code = _add_up_branches(fluid, S, step)
         if code != 0:
             report[0], report[1], report[2] = failed, code, step.t
-            return STATUS_BRANCH
+            return failed_at(step.level, code, STATUS_BRANCH)
         _add_up_ends(fluid, step.H)
         _compare_storage(fluid)
         if nodes.volumes == 1:
@@ -170,7 +177,7 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
     failed, code = _finish_flows(fluid)
     if code != 0:
         report[0], report[1], report[2] = failed, code, step.t
-        return STATUS_BRANCH
+        return failed_at(step.level, code, STATUS_BRANCH)
     for i in range(nodes.volumes):
         trial.V[i] = trial.V_used[i] + gamma[i] * (p[i] - trial.p_used[i])
     return STATUS_DONE

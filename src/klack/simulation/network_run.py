@@ -155,7 +155,8 @@ def simulate_network(
     AccuracyWarning
         When the energy balance does not close to 1e-6 of :attr:`EnergyBooks.scale`
         (:mod:`klack.energy_balance`), and when the steps do not resolve the peak force of the
-        first impact on a stop to 0.05 % (:mod:`klack.simulation.impact_doubts`).
+        first impact on a stop to 0.05 %, or its time to 0.05 us
+        (:mod:`klack.simulation.impact_doubts`).
     """
     for name, value in (("duration", duration), ("step", step), ("record", record)):
         if value is not None:
@@ -263,7 +264,7 @@ def simulate_network(
     for doubt in line_doubts(network, step * first_step):
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if network.moving is None:
-        for doubt in impact_doubts(result.events, result.interfaces, step):
+        for doubt in impact_doubts(result.events, result.interfaces, step, sizes.near * step):
             warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure

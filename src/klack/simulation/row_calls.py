@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import njit
 from klack.network.step_function import call, first, pointers, shift
-from klack.simulation.network_arrays import StepRows
+from klack.simulation.network_arrays import FINE, StepRows
 from klack.simulation.phase import phase
+from klack.simulation.step_status import STATUS_REFUSED
 
 __all__ = [
     "SHARE_OF_STEP",
@@ -16,6 +17,7 @@ __all__ = [
     "ask_branch",
     "ask_element",
     "call_rows",
+    "failed_at",
     "push_ports",
     "push_walls",
     "take_states",
@@ -71,6 +73,15 @@ def ask_branch(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any, p: Any, 
     rows.inputs[i0 + 5] = rho[b]
     _tell_ports(rows, k, i0 + 6, y0, y1)
     return ask_again(rows, k)
+
+
+@phase
+def failed_at(level: int, status: int, failure: int) -> int:
+    """What the failure of a row means: of a macro step, that fine steps may do.
+
+    One with an exception, whose status is negative, is not asked again: an FMU does not go back.
+    """
+    return STATUS_REFUSED if level != FINE and status > 0 else failure
 
 
 @phase

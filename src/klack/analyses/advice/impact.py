@@ -43,6 +43,7 @@ from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
+from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
@@ -120,6 +121,7 @@ class _Log:
     runs: int = 0
 
 
+@tells_place
 def advise_impact(
     case: Case,
     *,

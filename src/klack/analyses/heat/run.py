@@ -17,6 +17,7 @@ from klack.analyses.heat.warm_valve import Aspect, aspects_of, hot_windings
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
+from klack.case.placed_errors import tells_place
 from klack.case.thermal import CaseThermal
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
@@ -72,6 +73,7 @@ class _Strokes:
         return found
 
 
+@tells_place
 def run_heat(
     case: ValveCase,
     *,

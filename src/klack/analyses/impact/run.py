@@ -83,6 +83,7 @@ from klack.assembling.structures import impact_structures
 from klack.cache.setting import result_cache
 from klack.case.impact_sections import SubmodelLocalLaw
 from klack.case.levels import Level
+from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.closing import Closing
 from klack.contact.history import ImpactHistory
@@ -119,6 +120,7 @@ _CORRECTIONS: Mapping[str, Correction] = {
 }
 
 
+@tells_place
 def run_impact(
     case: Case,
     *,

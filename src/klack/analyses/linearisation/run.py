@@ -26,6 +26,7 @@ from klack.analyses.stroke.run import variant_network
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
 from klack.case.case_tree import CaseTree
+from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.case.variants import Variant
@@ -100,6 +101,7 @@ def usual_band(system: LinearSystem) -> float:
     return min(_BAND, _FEW_STATES * PIECE / (2.0 * np.pi * ORDER * total))
 
 
+@tells_place
 def run_linearisation(
     case: ValveCase,
     *,

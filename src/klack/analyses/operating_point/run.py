@@ -26,6 +26,7 @@ from klack.analyses.study.strokes import STROKES
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.cache.setting import result_cache
 from klack.case.case_tree import CaseTree
+from klack.case.placed_errors import tells_place
 from klack.case.points import case_at
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
@@ -88,6 +89,7 @@ class PointFound:
     notes: tuple[str, ...]
 
 
+@tells_place
 def run_operating_points(
     case: ValveCase,
     tree: CaseTree,

@@ -19,6 +19,7 @@ from klack.assembling.given_pair import build_given_pair
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
+from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.progress import Progress, silent
 from klack.reduction.reduced_body import ReducedBody
@@ -85,6 +86,7 @@ def _write_table(item: TransferComparison, path: Path) -> None:
         writer.writerows([f"{value:.9g}" for value in row] for row in table)
 
 
+@tells_place
 def run_reduce(
     case: Case, *, progress: Progress = silent, threads: int | None = None
 ) -> ReductionStudy:

@@ -20,6 +20,7 @@ from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.study.chosen_measures import ChosenMeasure
 from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
 from klack.case.case_tree import CaseTree
+from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
@@ -41,6 +42,7 @@ _RESOLVED = 1e-3  # of a measure that is no time: what the steps of a run resolv
 _RESOLVED_LEVEL = 0.01  # [dB]: the same of a force
 
 
+@tells_place
 def run_sensitivities(
     case: ValveCase,
     tree: CaseTree,

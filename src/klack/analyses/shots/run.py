@@ -36,6 +36,7 @@ from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.analyses.workers import answer, unwrapped
 from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
+from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.cores import available_cores
 from klack.errors import ConvergenceError, require_positive
@@ -60,6 +61,7 @@ _RULE_HOLDS = 0.01
 _LARGE_RESIDUAL = 1e-3
 
 
+@tells_place
 def run_shots(
     case: Case,
     *,

@@ -26,6 +26,7 @@ from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
+from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
@@ -59,6 +60,7 @@ __all__ = [
 ]
 
 
+@tells_place
 def run_stroke(
     case: ValveCase,
     *,

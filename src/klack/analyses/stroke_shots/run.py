@@ -25,6 +25,7 @@ from klack.analyses.stroke_shots.record import StrokeColumns, StrokeShotsStudy, 
 from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
+from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
@@ -42,6 +43,7 @@ _SLOW = 0.2
 """Share of the median speed below which an impact is of another kind than the others."""
 
 
+@tells_place
 def run_stroke_shots(
     case: ValveCase,
     *,

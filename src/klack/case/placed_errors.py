@@ -1,0 +1,62 @@
+"""Mistakes that show when a case is computed, at file, line and key as the checks of the case."""
+
+import re
+from collections.abc import Callable
+from functools import wraps
+from typing import Concatenate, ParamSpec, TypeVar
+
+from klack.case.bodies import CaseFile
+from klack.errors import InputError
+from klack.input.problem import CaseProblem, Key
+
+__all__ = ["tells_place"]
+
+C = TypeVar("C", bound=CaseFile)
+P = ParamSpec("P")
+R = TypeVar("R")
+
+_KEY = re.compile(r"(?P<key>[\w-]+(?:\.[\w-]+|\[\d+\])*)(?P<rest>(?:: .*)?)", re.DOTALL)
+
+
+def tells_place(
+    compute: Callable[Concatenate[C, P], R],
+) -> Callable[Concatenate[C, P], R]:
+    """Decorate what computes a case: an error that names a key of it gets the place in the file.
+
+    Connections of a variant (dry, lumped) are others than those of the file, which are checked
+    when it is read: of them only the section is named.
+    """
+
+    @wraps(compute)
+    def told(case: C, /, *args: P.args, **more: P.kwargs) -> R:
+        try:
+            return compute(case, *args, **more)
+        except InputError as error:
+            where = _place(case, error)
+            if where is None:
+                raise
+            raise InputError(
+                where, got=error.got, expected=error.expected, hint=error.hint
+            ) from error
+
+    return told
+
+
+def _place(case: CaseFile, error: InputError) -> str | None:
+    """File, line and key; None where the error names none, or the case comes from no file."""
+    found = _KEY.fullmatch(error.where)
+    if case.expanded is None or found is None:
+        return None
+    key: Key = tuple(
+        int(part) if part.isdigit() else part for part in re.findall(r"[\w-]+", found["key"])
+    )
+    data, on_key = case.expanded.data, False
+    if isinstance(error, CaseProblem):
+        key, on_key = error.key, error.on_key
+    if key[:1] and key[0] in (data.get("network") or {}):
+        key = ("network", *key)
+    if key[:2] == ("network", "connections"):
+        key = key[:2]
+    if not key or key[0] not in data:
+        return None
+    return case.expanded.origin(key).where(on_key=on_key) + found["rest"]
