@@ -11,6 +11,7 @@ from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import impact_sources
+from klack.app.curves import drawn
 from klack.app.explorer import Explorer
 from klack.app.form import checked_text, exchanged_text
 from klack.app.sliders import sliders_of
@@ -87,6 +88,20 @@ def test_motion_and_bands_belong_to_the_force(explorer):
     turning = lift.x[np.argmin(lift.y)]
     assert turning == pytest.approx(force.x[np.argmax(force.y)], abs=2.0)
     assert answer.levels.shape == answer.bands.shape
+
+
+def test_a_drawn_curve_keeps_its_ends_and_extremes():
+    """Definition: only points of the curve are drawn, those told in words among them."""
+    x = np.linspace(0.0, 5.0, 5003)
+    y = np.cos(3.0 * x)
+    y[1234], y[4321] = 2.0, -2.0  # between two steps
+    shown_x, shown_y = drawn(x, y)
+
+    assert x.size / 8 < shown_x.size < x.size / 7
+    assert np.all(np.diff(shown_x) > 0)
+    assert set(zip(shown_x, shown_y, strict=True)) <= set(zip(x, y, strict=True))
+    assert (shown_x[0], shown_x[-1], shown_y.max(), shown_y.min()) == (0.0, 5.0, 2.0, -2.0)
+    assert drawn(x[:50], y[:50])[1].size == 50
 
 
 def test_both_clicks_have_one_scale(explorer):

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from klack.contact import complementarity
 from klack.contact.complementarity import ComplementaritySolver, solve_lcp
 from klack.errors import ConvergenceError, InputError
 
@@ -100,3 +101,25 @@ def test_an_indefinite_matrix_is_refused():
 def test_nan_is_refused():
     with pytest.raises(InputError, match="finite"):
         solve_lcp(np.array([[np.nan]]), np.array([1.0]))
+
+
+def test_a_contact_that_shrinks_loses_the_points_that_joined_last(monkeypatch):
+    """Points of a diagonal compliance carry where they are below, and join all at once.
+
+    The shallowest stand last in the factor: without them, what is left of it is kept.
+    """
+    depth = np.random.default_rng(4).permutation(40) / 40.0
+    solver, added = ComplementaritySolver(np.eye(40)), []
+    bordered = complementarity._bordered
+
+    def counting(known, beside, corner):
+        added.append(len(corner))
+        return bordered(known, beside, corner)
+
+    monkeypatch.setattr(complementarity, "_bordered", counting)
+    active = None
+    for approach in (0.9, 0.6, 0.3):
+        forces, active, _ = solver.solve(depth - approach, active)
+        np.testing.assert_allclose(forces, np.maximum(approach - depth, 0.0), atol=1e-15)
+
+    assert added == [36, 0, 0]

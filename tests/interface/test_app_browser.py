@@ -193,13 +193,44 @@ def test_text_typed_while_the_server_is_away_comes_back(folder, browser):
     (folder / "valve" / "away.yaml").unlink()
 
 
+def _ranges(page, number: int) -> list[float]:
+    """Ends of both axes of a chart, as Plotly has drawn it."""
+    return page.evaluate(
+        "n => (({xaxis, yaxis}) => [...xaxis.range, ...yaxis.range])"
+        "(document.querySelectorAll('.k-plot')[n]._fullLayout)",
+        number,
+    )
+
+
+def _zoom(page, number: int) -> list[float]:
+    """Drag a rectangle in a chart; return the ranges of its axes then."""
+    before = _ranges(page, number)
+    area = page.locator(".k-plot .nsewdrag").nth(number)
+    area.scroll_into_view_if_needed()
+    box = area.bounding_box()
+    corners = [
+        (box["x"] + share * box["width"], box["y"] + share * box["height"]) for share in (0.3, 0.7)
+    ]
+    page.mouse.move(*corners[0])
+    page.mouse.down()
+    page.mouse.move(*corners[1], steps=3)
+    page.mouse.up()
+    page.wait_for_function(
+        "([n, was]) => document.querySelectorAll('.k-plot')[n]._fullLayout.yaxis.range[0] != was",
+        arg=[number, before[2]],
+    )
+    return _ranges(page, number)
+
+
 def test_sliders_answer_by_keyboard(page, server):
+    """A zoom stays while sliders move, also that of the bands, whose range follows their top."""
     page.goto(f"{server.base}/sliders?path={CASE}")
     speed = page.get_by_label("speed")
     speed.wait_for()
     page.wait_for_selector(".k-badge.good")
     force = page.locator(".k-figure").first
     before = force.inner_text()
+    zoomed = [_zoom(page, number) for number in range(3)]
 
     speed.focus()
     for _ in range(5):
@@ -210,6 +241,7 @@ def test_sliders_answer_by_keyboard(page, server):
     assert float(speed.input_value()) > 0.3 * 1.01  # drawing does not put it back
     assert "+" in force.inner_text()
     assert "%" in force.inner_text()
+    assert [_ranges(page, number) for number in range(3)] == zoomed
     page.wait_for_selector(".k-badge.good")
     wav = page.evaluate(
         "fetch(document.querySelectorAll('audio')[1].src).then(r => r.arrayBuffer())"

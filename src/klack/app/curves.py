@@ -11,13 +11,14 @@ from klack.signals import TimeSeries
 
 __all__ = ["drawn", "enveloped", "impact_numbers", "stroke_numbers", "travelled"]
 
-_DRAWN = 700  # points of a curve
+_DRAWN = 700  # points of a curve; a chart is up to 800 pixels wide
 
 
 def drawn(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Every k-th point of a smooth curve."""
-    every = max(1, x.size // _DRAWN)
-    return x[::every], y[::every]
+    """Points of a smooth curve in equal steps, with its ends and its highest and lowest point."""
+    steps = np.linspace(0, x.size - 1, min(x.size, _DRAWN)).round().astype(int)
+    shown = np.union1d(steps, [y.argmin(), y.argmax()])
+    return x[shown], y[shown]
 
 
 def travelled(history: ImpactHistory) -> tuple[Floats, Floats]:

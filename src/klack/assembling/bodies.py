@@ -23,13 +23,13 @@ from klack.case.schema import Case
 from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import contact_space, touching_shift
-from klack.contact.pairing import axial_distance
+from klack.contact.pairing import CurvedFaces, axial_distance, curved_faces
 from klack.contact.surface_edges import SurfaceEdges, surface_edges, turned_away
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
 from klack.gauges.gauge import Gauge
 from klack.mesh.files.mesh_file import read_mesh_file
-from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.mesh import Mesh, Surface, solid_at
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.progress import Progress
@@ -83,6 +83,22 @@ class BodyPair:
     def shift(self) -> float:
         """Translation of the upper body along z from where it was drawn [m]."""
         return float(self.pose.shift[2])
+
+    @cached_property
+    def solids(self) -> tuple[str, str]:
+        """Solids that the upper and the lower surface belong to."""
+        return (
+            solid_at(self.upper.mesh, self.upper_surface),
+            solid_at(self.lower.mesh, self.lower_surface),
+        )
+
+    @cached_property
+    def faces(self) -> tuple[CurvedFaces, CurvedFaces]:
+        """Faces of the upper and of the lower surface, ready to be cut by lines."""
+        return (
+            curved_faces(self.upper.mesh, self.upper_surface),
+            curved_faces(self.lower.mesh, self.lower_surface),
+        )
 
     @cached_property
     def edges(self) -> tuple[SurfaceEdges, SurfaceEdges]:

@@ -129,10 +129,8 @@ class Candidates:
         if known is None or not known.grade >= grade >= self._first_grade():
             known = self._condensed(space, grade)
         at = np.searchsorted(known.nodes, space.nodes)
-        rows = np.ix_(at, at)
-        return CondensedSpace(
-            space=opened_by(space, worn), upper=known.upper[rows], lower=known.lower[rows]
-        )
+        upper, lower = (whole.take(at, 0).take(at, 1) for whole in (known.upper, known.lower))
+        return CondensedSpace(space=opened_by(space, worn), upper=upper, lower=lower)
 
     def _condensed(self, space: ContactSpace, grade: int) -> _Kept:
         groups = _groups(space, self._first_grade(), grade)

@@ -52,7 +52,7 @@ class ComplementaritySolver:
                 expected="a square matrix of finite numbers",
                 hint="check the contact compliance; a body without support has no static one.",
             )
-        self.A = np.array(A, order="F")
+        self.A = np.array(A.T, order="F")  # the same matrix; most come in rows
         self.round_limit = 200 + 10 * len(A)
         self._scale = float(np.mean(np.diag(A))) if len(A) else 1.0
         self._set = np.zeros(len(A), dtype=bool)
@@ -118,17 +118,17 @@ class ComplementaritySolver:
     def _forces(self, q: NDArray[np.float64], active: NDArray[np.bool_]) -> NDArray[np.float64]:
         """Return the forces that close the active gaps, in the order of the active points."""
         if not np.array_equal(active, self._set):
-            self._factorise(active)
+            self._factorise(q, active)
         if not len(self._active):
             return np.empty(0)
         forces, _ = dpotrs(self._factor, -q[self._active], lower=1)
         return forces
 
-    def _factorise(self, active: NDArray[np.bool_]) -> None:
+    def _factorise(self, q: NDArray[np.float64], active: NDArray[np.bool_]) -> None:
         """Factorise the active block; points stand in the order in which they became active.
 
-        What precedes the first point that left is kept: a contact that grows or shrinks costs the
-        points at its border.
+        Of those that become so at once the deepest comes first.  What precedes the first point
+        that left is kept: a contact that grows or shrinks costs the points at its border.
         """
         order, columns = self._active, self._columns
         left = np.flatnonzero(~active[order])
@@ -136,6 +136,7 @@ class ComplementaritySolver:
         fresh = active.copy()
         fresh[kept] = False
         new = np.flatnonzero(fresh)
+        new = new[np.argsort(q[new], kind="stable")]
         count, size = len(kept), len(kept) + len(new)
         columns[:, count:size] = self.A[:, new]
         known = np.asfortranarray(self._factor[:count, :count])

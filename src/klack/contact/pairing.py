@@ -36,6 +36,7 @@ __all__ = [
     "face_geometry",
     "face_lattice",
     "face_thickness",
+    "gaps_to",
     "project_to_surface",
 ]
 
@@ -185,15 +186,11 @@ def project_to_surface(
         Deepest penetration that counts as one; a tenth of the extent of the master surface unless
         given, since a line that starts beside a ring-shaped seat may meet its far side backwards.
     """
-    d = points.shape[1]
-    faces = curved_faces(mesh, surface)
-    face, xi, gap = cut_nearest(
-        *(_in_space(points), _in_space(normals), *faces.arrays),
-        *(INSIDE, OPPOSED, faces.deepest if deepest is None else deepest),
-    )
+    face, xi, gap = _nearest(points, normals, curved_faces(mesh, surface), deepest)
     start = np.cumsum([0, *(len(block.connectivity) for block in surface.blocks)])
     block = np.where(face >= 0, np.searchsorted(start, face, side="right") - 1, -1)
-    return Projection(block, np.where(face >= 0, face - start[block], -1), xi[:, : d - 1], gap)
+    local = xi[:, : points.shape[1] - 1]
+    return Projection(block, np.where(face >= 0, face - start[block], -1), local, gap)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -241,6 +238,27 @@ def curved_faces(mesh: Mesh, surface: Surface) -> CurvedFaces:
         triangle=triangle,
         deepest=_DEPTH * extent,
     )
+
+
+def gaps_to(
+    points: NDArray[np.float64], normals: NDArray[np.float64], faces: CurvedFaces
+) -> NDArray[np.float64]:
+    """Gaps of :func:`project_to_surface` to faces that are prepared [m]; nan where none is met."""
+    return _nearest(points, normals, faces)[2]
+
+
+def _nearest(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    faces: CurvedFaces,
+    deepest: float | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+    """Number of the face that each line cuts first, place on it, and gap."""
+    found: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]] = cut_nearest(
+        *(_in_space(points), _in_space(normals), *faces.arrays),
+        *(INSIDE, OPPOSED, faces.deepest if deepest is None else deepest),
+    )
+    return found
 
 
 def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:

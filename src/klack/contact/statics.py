@@ -361,7 +361,12 @@ class ContactLadder:
         self.start = min(space.clearance, space.touch)
         self.first_touch = space.touch - self.start
         self.solver = ComplementaritySolver(C)
-        self.active: NDArray[np.bool_] | None = None
+        self._solved: dict[float, NDArray[np.bool_]] = {}  # points that carry at an approach
+
+    @property
+    def is_begun(self) -> bool:
+        """Whether the points that carry are known at some approach."""
+        return bool(self._solved)
 
     def contact(self, max_force: float, count: int = 24) -> StaticContact:
         """Contact states up to an axial force [N], with their areas and widths."""
@@ -388,9 +393,7 @@ class ContactLadder:
         highest, lowest = _approach_for(self, max_force), self.first_touch
         approach = lowest + (highest - lowest) * (np.arange(1, count + 1) / count) ** 2
         # from the last one down: a contact that shrinks loses the points that joined it last
-        widest = self.active  # for a ladder that continues from here
         pressures = np.array([self.pressures(delta) for delta in approach[::-1]])[::-1]
-        self.active = widest
         _require_within(self.space, approach, pressures)
         return approach, pressures
 
@@ -399,7 +402,9 @@ class ContactLadder:
         q = self.space.gap - (self.start + approach) * self.space.axial
         if self.layer is not None:
             return press(self.layer, self.space.area, self.solver.A, q)[0]
-        lam, self.active, _ = self.solver.solve(q, self.active)
+        nearest = min(self._solved, key=lambda solved: abs(solved - approach), default=None)
+        guess = None if nearest is None else self._solved[nearest]
+        lam, self._solved[approach], _ = self.solver.solve(q, guess)
         return lam
 
     def force(self, approach: float) -> float:
@@ -413,7 +418,7 @@ def _approach_for(ladder: ContactLadder, target: float) -> float:
     low, low_force = ladder.first_touch, 0.0
     high = low + target * float(ladder.solver.A[first, first]) * 0.1
     # few rounds each from a contact that grows, many from a guess
-    if ladder.layer is None and ladder.active is None:
+    if ladder.layer is None and not ladder.is_begun:
         for halves in range(_HALVES, 0, -1):
             ladder.pressures(low + (high - low) / 2.0**halves)
     for _ in range(60):

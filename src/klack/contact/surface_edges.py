@@ -61,11 +61,14 @@ class SurfaceEdges:
         outside = np.array([name is not None for name in self.neighbour], dtype=bool)
         return outside & ~self.corners
 
-    def distance(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Distance of points, shape (p, d), to every edge: shape (m, p) [m]."""
-        result = np.full((len(self.line), len(points)), np.inf)
+    def distance(
+        self, points: NDArray[np.float64], chosen: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Distance of points, shape (p, d), to some of the edges: shape (c, p) [m]."""
+        line = self.line[chosen]
+        result = np.full((len(line), len(points)), np.inf)
         for i in (0, 1):
-            start, way = self.line[:, None, i], self.line[:, None, i + 1] - self.line[:, None, i]
+            start, way = line[:, None, i], line[:, None, i + 1] - line[:, None, i]
             length = np.maximum(np.sum(way**2, axis=2), 1e-300)
             share = np.clip(np.sum((points - start) * way, axis=2) / length, 0.0, 1.0)
             gap = np.linalg.norm(points - start - share[..., None] * way, axis=2)

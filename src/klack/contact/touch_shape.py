@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.mortar import ContactSpace
-from klack.contact.pairing import face_geometry, face_lattice, project_to_surface
+from klack.contact.pairing import CurvedFaces, face_geometry, face_lattice, gaps_to
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = ["relative_curvatures"]
@@ -24,7 +24,7 @@ _LEAST_SHARE = 0.3  # of the samples that have to face the other surface
 def relative_curvatures(
     space: ContactSpace,
     pressures: NDArray[np.float64],
-    sides: tuple[tuple[Mesh, Surface], tuple[Mesh, Surface]],
+    sides: tuple[tuple[Mesh, Surface, CurvedFaces], tuple[Mesh, Surface, CurvedFaces]],
 ) -> NDArray[np.float64]:
     """Principal relative curvatures [1/m] at the most loaded contact point, the largest first.
 
@@ -33,7 +33,7 @@ def relative_curvatures(
     space : ContactSpace
     pressures : array, shape (nc,) [N]
         Forces of the contact points.
-    sides : pairs of mesh and surface
+    sides : triples of mesh, surface and its faces
         Of body a and of body b, as they touch.
 
     Returns
@@ -43,18 +43,19 @@ def relative_curvatures(
         little of the faces around that point has something to face.
     """
     slave, master = sides if space.slave == "a" else (sides[1], sides[0])
-    mesh, surface = slave
+    (mesh, surface, _), (*_, faces) = slave, master
     node = int(space.nodes[np.argmax(pressures)])
     positions, normals = _samples(mesh, surface, node)
-    met = project_to_surface(positions, normals, *master)
+    gap = gaps_to(positions, normals, faces)
+    met = np.isfinite(gap)
     columns = 1 if mesh.dimension == 2 else 2
-    if np.sum(met.met) < max(_LEAST_SHARE * len(positions), 6 * columns):
+    if np.sum(met) < max(_LEAST_SHARE * len(positions), 6 * columns):
         return np.full(columns, np.nan)
     normal = normals.mean(axis=0)
     frame = _tangents(normal / np.linalg.norm(normal))
-    x = (positions[met.met] - mesh.points[node]) @ frame.T
+    x = (positions[met] - mesh.points[node]) @ frame.T
     scale = float(np.abs(x).max())
-    x, gap = x / scale, met.gap[met.met]
+    x, gap = x / scale, gap[met]
     if columns == 1:
         terms = np.column_stack([np.ones(len(x)), x, x**2])
         coefficient, *_ = np.linalg.lstsq(terms, gap)

@@ -33,7 +33,7 @@ from klack.contact.surface_edges import SurfaceEdges
 from klack.contact.touch_shape import relative_curvatures
 from klack.elasticity.body import ElasticBody
 from klack.errors import AccuracyWarning
-from klack.mesh.mesh import Surface, solid_at
+from klack.mesh.mesh import Surface
 from klack.stages import warnings_of
 from klack.units import format_si
 
@@ -256,7 +256,11 @@ def expected_half_width(
     """
     space, lam = static.space, static.pattern_at(force) * force
     modulus = _modulus(case, pair)
-    sides = ((pair.upper.mesh, pair.upper_surface), (pair.lower.mesh, pair.lower_surface))
+    upper, lower = pair.faces
+    sides = (
+        (pair.upper.mesh, pair.upper_surface, upper),
+        (pair.lower.mesh, pair.lower_surface, lower),
+    )
     curvature = relative_curvatures(space, lam, sides)
     if not (isfinite(modulus) and curvature[0] > 0.0):
         return nan
@@ -287,11 +291,10 @@ def _within(pair: BodyPair, width: float) -> float:
 def _modulus(case: CaseFile, pair: BodyPair) -> float:
     """E* of the two materials that touch [Pa]; nan where a body has none of its own."""
     inverse = 0.0
-    for body, surface in ((pair.upper, pair.upper_surface), (pair.lower, pair.lower_surface)):
+    for body, solid in zip((pair.upper, pair.lower), pair.solids, strict=True):
         if case.bodies[body.name].material is None:
             return nan
         materials = case.materials_of(body.name, body.mesh.solids)
-        solid = solid_at(body.mesh, surface)
         inverse += 1.0 / materials[solid].plane_strain_modulus
     return 1.0 / inverse
 
@@ -315,11 +318,11 @@ def _corner(
         sharp = np.flatnonzero(facing)
         if not len(sharp):
             continue
-        near = (edges.distance(space.points)[sharp] <= space.size).any(axis=0)
+        near = (edges.distance(space.points, sharp) <= space.size).any(axis=0)
         if lam[near].sum() < 0.5 * lam.sum():
             continue
         loaded = space.points[[np.argmax(lam)]]
-        nearest = sharp[np.argmin(edges.distance(loaded)[sharp, 0])]
+        nearest = sharp[np.argmin(edges.distance(loaded, sharp))]
         angle = 180.0 - np.degrees(float(edges.angle[nearest]))
         return (
             f"contact: more than half of the force acts on a sharp edge of '{body.name}' "
@@ -343,13 +346,14 @@ def _tell_ends(
     carries = lam > _CARRIES * float(np.max(lam))
     told = False
     for body, surface, edges in sides:
-        if not np.any(edges.ends) or not np.any(carries):
+        ends = np.flatnonzero(edges.ends)
+        if not len(ends) or not np.any(carries):
             continue
-        distance = edges.distance(points[carries])
-        reached = edges.ends & (distance <= _MARGIN * size[carries]).any(axis=1)
-        names = [edges.neighbour[k] or "" for k in np.flatnonzero(reached)]
+        distance = edges.distance(points[carries], ends)
+        reached = ends[(distance <= _MARGIN * size[carries]).any(axis=1)]
+        names = [edges.neighbour[k] or "" for k in reached]
         for name in dict.fromkeys(names):
-            first = np.flatnonzero(reached)[names.index(name)]
+            first = reached[names.index(name)]
             _warn(_end(body, surface, name, _at(edges, first), surfaces))
             told = True
     return told

@@ -16,7 +16,6 @@ from klack.contact.face_front import area_at_once, front_pressure
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.materials import Material
-from klack.mesh.mesh import Surface, solid_at
 from klack.units import format_si
 
 __all__ = ["doubt_modal_levels", "flat_for_modes", "flat_for_reduced"]
@@ -42,8 +41,8 @@ def flat_for_modes(problem: ContactProblem, modes: Iterable[Modes]) -> str:
 
 def _doubt(problem: ContactProblem, highest: Iterable[float]) -> str:
     pair, speed = problem.pair, problem.case.motion.speed
-    sides = ((pair.upper, pair.upper_surface), (pair.lower, pair.lower_surface))
-    materials = [_material(problem, *side) for side in sides]
+    bodies = (pair.upper, pair.lower)
+    materials = [_material(problem, *one) for one in zip(bodies, pair.solids, strict=True)]
     period = max((1.0 / one for one in highest if one > 0.0), default=0.0)
     if None in materials or period == 0.0:
         return ""
@@ -80,8 +79,8 @@ def doubt_modal_levels(
     }
 
 
-def _material(problem: ContactProblem, body: ElasticBody, surface: Surface) -> Material | None:
+def _material(problem: ContactProblem, body: ElasticBody, solid: str) -> Material | None:
     """Material at a face; None where it is only in matrices."""
     if problem.case.bodies[body.name].material is None:
         return None
-    return problem.case.materials_of(body.name, body.mesh.solids)[solid_at(body.mesh, surface)]
+    return problem.case.materials_of(body.name, body.mesh.solids)[solid]

@@ -16,7 +16,6 @@ from klack.assembling.bodies import BodyPair
 from klack.case.bodies import CaseFile
 from klack.contact.statics import StaticContact, highest_load, ring_radius
 from klack.errors import AccuracyWarning
-from klack.mesh.mesh import solid_at
 from klack.units import format_si
 
 __all__ = ["YieldCheck", "check_yield"]
@@ -77,10 +76,10 @@ def check_yield(
     pressure, is_line = _pressure(static, force)
     needed, told = nan, []
     doubtful: dict[str, str] = {}
-    for body, surface in ((pair.upper, pair.upper_surface), (pair.lower, pair.lower_surface)):
+    for body, solid in zip((pair.upper, pair.lower), pair.solids, strict=True):
         if case.bodies[body.name].material is None:
             continue
-        material = case.materials_of(body.name, body.mesh.solids)[solid_at(body.mesh, surface)]
+        material = case.materials_of(body.name, body.mesh.solids)[solid]
         factor = _LINE if is_line else 1.295 * exp(0.736 * material.poisson)
         needed = float(np.fmax(needed, pressure / factor))
         if material.hardening is None:

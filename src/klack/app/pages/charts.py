@@ -62,7 +62,10 @@ def bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str
         "tickvals": [float(1000.0 * 10 ** (k / 10)) for k in ticks][::2],
         "ticktext": [nominal_label(int(k)).replace(" Hz", "") for k in ticks][::2],
     }
-    figure["layout"]["yaxis"] |= {"range": [top - 62.0, top + 4.0]}
+    low, high = top - 62.0, top + 4.0
+    figure["layout"]["yaxis"] |= {  # a range that is given would end a zoom at each move
+        "autorangeoptions": {"include": [low, high], "clipmin": low, "clipmax": high}
+    }
     return figure
 
 
@@ -114,13 +117,20 @@ def _plain(values: Floats) -> list[float]:
 
 
 def _figure(data: list[dict[str, Any]], x: str, y: str) -> dict[str, Any]:
-    axis = {"zeroline": False, "automargin": True, "ticks": "", "fixedrange": False}
+    axis = {
+        "zeroline": False,
+        "automargin": True,  # for labels of a zoom: others fit into the margins, which stay
+        "ticklabeloverflow": "allow",  # else the box of every label is measured at each drawing
+        "ticks": "",
+        "fixedrange": False,
+    }
     return {
+        "__v_skip": True,  # Vue would wrap every array, and Plotly read each number through it
         "data": data,
         "layout": {
             "xaxis": axis | {"title": {"text": x, "standoff": 8}},
             "yaxis": axis | {"title": {"text": y, "standoff": 8}},
-            "margin": {"l": 52, "r": 10, "t": 26, "b": 40},
+            "margin": {"l": 62, "r": 18, "t": 26, "b": 44},
             "font": {"size": 12},
             "paper_bgcolor": "rgba(0,0,0,0)",
             "plot_bgcolor": "rgba(0,0,0,0)",

@@ -160,6 +160,7 @@ class _Sliders:
             plain(f"{opened.title}: {opened.kind}, {opened.run}").classes("k-soft")
         self._doubts = plain("", "p").classes("k-error")
         self._figures = ui.element("div").classes("k-figures")
+        self._numbers: dict[str, tuple[ui.element, TextElement, TextElement]] = {}
         with ui.element("div").classes("k-grid"):
             self._force = DescribedChart("Contact force", EMPTY)
             self._lift = DescribedChart("Motion", EMPTY)
@@ -244,7 +245,7 @@ class _Sliders:
         with self._body:
             self._spectrogram.update_figure(spectrogram_figure(heard.spectrogram))
             self._play("pattern", heard.pattern_wav)
-            self._add_number(heard.number, heard.number if self._is_pinned else heard.pinned)
+            self._show_number(heard.number, heard.number if self._is_pinned else heard.pinned)
 
     def _refuse(self, error: KlackError) -> None:
         with self._body:
@@ -272,18 +273,22 @@ class _Sliders:
 
     def _show_numbers(self, answer: Answer, ghost: Answer) -> None:
         then = {number.key: number for number in ghost.numbers}
-        self._figures.clear()
-        with self._figures:
-            for number in answer.numbers:
-                self._add_number(number, then.get(number.key, number))
+        for key in self._numbers.keys() - {number.key for number in answer.numbers}:
+            self._numbers.pop(key)[0].delete()
+        for number in answer.numbers:
+            self._show_number(number, then.get(number.key, number))
 
-    def _add_number(self, number: Number, then: Number) -> None:
-        with self._figures, ui.element("div").classes("k-figure"):
-            plain(number.name, "div").classes("k-soft")
-            with ui.element("b"):
-                plain(f"{number_text(number)} ")
-                plain(number.unit, "small")
-            plain(differing(number, then))
+    def _show_number(self, number: Number, then: Number) -> None:
+        if number.key not in self._numbers:
+            with self._figures, ui.element("div").classes("k-figure") as figure:
+                plain(number.name, "div").classes("k-soft")
+                with ui.element("b"):
+                    value = plain("")
+                    plain(number.unit, "small")
+                self._numbers[number.key] = figure, value, plain("")
+        _, value, change = self._numbers[number.key]
+        value.set_text(f"{number_text(number)} ")
+        change.set_text(differing(number, then))
 
     def _play(self, name: str, wav: bytes) -> None:
         player, save = self._players[name]
