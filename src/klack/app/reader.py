@@ -156,7 +156,7 @@ def _with_sound(answer: Answer, wav: bytes, ghost: bytes, scale: str) -> Answer:
 
 def _numbers(record: Any) -> tuple[Number, ...]:
     if isinstance(record, ImpactStudy):
-        return impact_numbers(record.levels[record.reference].measures)
+        return impact_numbers(record.levels[record.reference])
     if isinstance(record, StrokeStudy):
         return stroke_numbers(record.reference, record.channels)
     if isinstance(record, StudyRecord):
