@@ -1,5 +1,6 @@
 """What sliders show is the run of the case with these values; forms write what is typed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,14 +8,17 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from klack.acoustics.signal_statistics import sound_statistics
+from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
-from klack.analyses.noise.source import impact_sources
+from klack.analyses.noise.source import impact_sources, sources_of
 from klack.analyses.stroke.run import run_stroke
 from klack.app.curves import stroke_numbers
 from klack.app.explorer import Explorer
 from klack.app.form import checked_text, exchanged_text
+from klack.app.reader import Reader
 from klack.app.sliders import sliders_of
 from klack.case.case_tree import tree_of
 from klack.case.reader import read_case
@@ -69,6 +73,34 @@ def test_an_impact_that_is_cut_off_has_no_numbers_but_a_doubt():
     assert [number.value for number in first.numbers[:3]] == [None, None, None]
     assert "cut off" in first.numbers[0].name
     assert any("ends before separation" in doubt for doubt in first.doubts)
+
+
+def test_what_speaks_against_a_level_goes_with_its_sound_and_into_comparisons(tmp_path):
+    """A force that ends at its highest value has the spectrum of a step, 28 dB(A) too loud here."""
+    case = read_case(TEXT.replace("duration: 55 us", "duration: 20 us"), PATH)
+    study = run_impact(case, levels=("reduced", "lumped"), certify=False)
+    assert study.reference == "reduced"
+    whole = replace(study, reference="lumped")
+    for name, record in (("cut", study), ("whole", whole)):
+        IMPACT.save(record, tmp_path / name)
+    (source,) = sources_of(study)
+    ghost, now = Reader().compare(str(tmp_path / "whole"), str(tmp_path / "cut"))
+
+    assert any("so are spectrum and sound" in note for note in source.notes)
+    assert any("so are spectrum and sound" in doubt for doubt in now.doubts)
+    assert (ghost.run, now.run) == ("level lumped", "level reduced")
+
+
+def test_a_contact_in_doubt_is_in_doubt_on_every_page(tmp_path):
+    """As in the text of the command."""
+    case = read_case(TEXT.replace("duration: 55 us", "duration: 20 us"), PATH)
+    study = run_impact(case, levels=("lumped",), certify=False)
+    doubtful = replace(study, contact=replace(study.contact, doubts=("its mesh is too coarse",)))
+    IMPACT.save(doubtful, tmp_path)
+    words = contact_doubt(doubtful.contact)
+
+    assert words in Reader().card(str(tmp_path)).doubts
+    assert words in Reader().compare(str(tmp_path), str(tmp_path))[0].doubts
 
 
 @pytest.mark.parametrize(
