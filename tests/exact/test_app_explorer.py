@@ -10,17 +10,19 @@ from threadpoolctl import threadpool_limits
 from klack.acoustics.signal_statistics import sound_statistics
 from klack.analyses.contact_doubts import contact_doubt
 from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import impact_sources, sources_of
+from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
 from klack.app.curves import stroke_numbers
 from klack.app.explorer import Explorer
 from klack.app.form import checked_text, exchanged_text
 from klack.app.reader import Reader
 from klack.app.sliders import sliders_of
-from klack.case.case_tree import tree_of
+from klack.case.case_tree import read_case_tree, tree_of
 from klack.case.reader import read_case
 from klack.case.shipped import find_case
 from klack.errors import InputError
@@ -84,6 +86,8 @@ def test_what_speaks_against_a_level_goes_with_its_sound_and_into_comparisons(tm
     for name, record in (("cut", study), ("whole", whole)):
         IMPACT.save(record, tmp_path / name)
     (source,) = sources_of(study)
+    steps = [step.command for step in report_content(study).next_steps]
+    assert "klack advise CASE" not in steps  # which refuses an impact that is cut off
     ghost, now = Reader().compare(str(tmp_path / "whole"), str(tmp_path / "cut"))
 
     assert any("so are spectrum and sound" in note for note in source.notes)
@@ -126,6 +130,18 @@ def test_a_stroke_tells_what_the_command_tells(name, values, words):
     assert {number.key: number.value for number in answer.numbers} == {
         number.key: number.value for number in stroke_numbers(study.reference, study.channels)
     }
+
+
+def test_a_report_proposes_the_sound_only_where_something_hits_a_stop():
+    """Klack noise refuses a network without stops."""
+    offered = {
+        name: [step.command for step in stroke_content(run_stroke(case)).next_steps]
+        for name in ("line_tee", "small_valve")
+        if (case := read_case_tree(Path(f"docs/how-to/{name}.yaml")).case())
+    }
+
+    assert "klack noise RESULT" in offered["small_valve"]
+    assert "klack noise RESULT" not in offered["line_tee"]
 
 
 def test_a_text_without_moves_is_that_of_the_file():
