@@ -1,5 +1,6 @@
 """What sliders show is the run of the case with these values; forms write what is typed."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,18 +8,25 @@ import pytest
 from threadpoolctl import threadpool_limits
 
 from klack.acoustics.signal_statistics import sound_statistics
+from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
-from klack.analyses.noise.source import impact_sources
-from klack.app.curves import drawn
+from klack.analyses.noise.source import impact_sources, sources_of
+from klack.analyses.stroke.content import stroke_content
+from klack.analyses.stroke.run import run_stroke
+from klack.app.curves import drawn, stroke_numbers
 from klack.app.explorer import Explorer
 from klack.app.form import checked_text, exchanged_text
+from klack.app.reader import Reader
 from klack.app.sliders import sliders_of
-from klack.case.case_tree import tree_of
+from klack.case.case_tree import read_case_tree, tree_of
 from klack.case.reader import read_case
 from klack.case.shipped import find_case
 from klack.errors import InputError
+from klack.stages import collected_warnings
 
 PATH = find_case("demo-valve-axisymmetric")
 TEXT = PATH.read_text("utf-8")
@@ -44,9 +52,105 @@ def test_a_move_is_the_impact_of_the_case_with_these_values(explorer):
     numbers = {number.key: number.value for number in answer.numbers}
 
     # bit for bit: the compliance of this reach is part of that for the upper ends of the sliders
-    assert numbers["peak"] == measures.peak_force
-    assert numbers["contact"] == 1e6 * measures.contact_time
+    assert numbers["peak_force"] == measures.peak_force
+    assert numbers["contact_time"] == 1e6 * measures.contact_time
     assert numbers["restitution"] == measures.restitution
+
+
+def test_what_is_computed_is_what_is_read(explorer):
+    """A position between two numbers that the page shows is that of the number it shows."""
+    shown = explorer.move({"motion.speed": 0.45})
+
+    assert explorer.move({"motion.speed": 0.450049}).numbers == shown.numbers
+    assert explorer.text_at({"motion.speed": 0.450049}) == explorer.text_at({"motion.speed": 0.45})
+
+
+def test_an_impact_that_is_cut_off_has_no_numbers_but_a_doubt():
+    """As in the JSON of the command: no peak force, no contact time, no restitution."""
+    found = Explorer()
+    short = TEXT.replace("duration: 55 us", "duration: 20 us")
+    assert short != TEXT
+    first = found.open(short, str(PATH)).first
+
+    assert [number.value for number in first.numbers[:3]] == [None, None, None]
+    assert "cut off" in first.numbers[0].name
+    assert any("ends before separation" in doubt for doubt in first.doubts)
+
+
+def test_what_speaks_against_a_level_goes_with_its_sound_and_into_comparisons(tmp_path):
+    """A force that ends at its highest value has the spectrum of a step, 28 dB(A) too loud here."""
+    case = read_case(TEXT.replace("duration: 55 us", "duration: 20 us"), PATH)
+    study = run_impact(case, levels=("reduced", "lumped"), certify=False)
+    assert study.reference == "reduced"
+    whole = replace(study, reference="lumped")
+    for name, record in (("cut", study), ("whole", whole)):
+        IMPACT.save(record, tmp_path / name)
+    (source,) = sources_of(study)
+    steps = [step.command for step in report_content(study).next_steps]
+    assert "klack advise CASE" not in steps  # which refuses an impact that is cut off
+    ghost, now = Reader().compare(str(tmp_path / "whole"), str(tmp_path / "cut"))
+
+    assert any("so are spectrum and sound" in note for note in source.notes)
+    assert any("so are spectrum and sound" in doubt for doubt in now.doubts)
+    assert (ghost.run, now.run) == ("level lumped", "level reduced")
+
+
+def test_a_contact_in_doubt_is_in_doubt_on_every_page(tmp_path):
+    """As in the text of the command."""
+    case = read_case(TEXT.replace("duration: 55 us", "duration: 20 us"), PATH)
+    study = run_impact(case, levels=("lumped",), certify=False)
+    doubtful = replace(study, contact=replace(study.contact, doubts=("its mesh is too coarse",)))
+    IMPACT.save(doubtful, tmp_path)
+    words = contact_doubt(doubtful.contact)
+
+    assert words in Reader().card(str(tmp_path)).doubts
+    assert words in Reader().compare(str(tmp_path), str(tmp_path))[0].doubts
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "words"),
+    [
+        ("small_valve", {"magnet.force.1": 5.0, "magnet.force.2": 5.0}, "never left its seat"),
+        ("magnet_from_a_map", {"coil.map.force_factor": 0.5}, "force map"),
+    ],
+)
+def test_a_stroke_tells_what_the_command_tells(name, values, words):
+    """Notes of rest, of the start and of reading the case: those of klack stroke, all of them."""
+    values = {f"network.components.{key}": value for key, value in values.items()}
+    path = Path(f"docs/how-to/{name}.yaml")
+    found = Explorer()
+    found.open(path.read_text("utf-8"), str(path))
+    answer = found.move(values)
+    with collected_warnings() as read:
+        case = tree_of(found.text_at(values), path).any_case()
+    study = run_stroke(case, variants=case.run.variants[:1])
+
+    assert any(words in doubt for doubt in answer.doubts)
+    assert set(answer.doubts) == {*read, *study.warnings}
+    assert {number.key: number.value for number in answer.numbers} == {
+        number.key: number.value for number in stroke_numbers(study.reference, study.channels)
+    }
+
+
+def test_a_report_proposes_the_sound_only_where_something_hits_a_stop():
+    """Klack noise refuses a network without stops."""
+    offered = {
+        name: [step.command for step in stroke_content(run_stroke(case)).next_steps]
+        for name in ("line_tee", "small_valve")
+        if (case := read_case_tree(Path(f"docs/how-to/{name}.yaml")).case())
+    }
+
+    assert "klack noise RESULT" in offered["small_valve"]
+    assert "klack noise RESULT" not in offered["line_tee"]
+
+
+def test_a_text_without_moves_is_that_of_the_file():
+    """Parts that it includes stay in their files."""
+    path = Path("docs/how-to/four_injectors.yaml")
+    found = Explorer()
+    found.open(path.read_text("utf-8"), str(path))
+
+    assert found.text_at({}) == path.read_text("utf-8")
 
 
 def test_the_sound_hardly_depends_on_earlier_moves(explorer):

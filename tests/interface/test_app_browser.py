@@ -248,9 +248,35 @@ def test_sliders_answer_by_keyboard(page, server):
         ".then(b => b.byteLength)"
     )
     assert wav > 10_000
+    page.get_by_role("button", name="Pin this").click()
+    page.locator(".k-figure", has_text="loudness").get_by_text("as pinned").wait_for()
     page.get_by_role("button", name="Back to the case").click()
-    page.wait_for_function("document.querySelector('.k-figure').innerText.includes('0.00 %')")
+    page.wait_for_function("document.querySelector('.k-figure').innerText.includes('−')")
     require_within(page)
+
+
+def test_nothing_of_an_earlier_position_stays_beside_an_error(page, server, folder):
+    """The magnet would fall before it rises, which the checker of cases refuses."""
+    shutil.copy("docs/how-to/small_valve.yaml", folder / "refused.yaml")
+    page.goto(f"{server.base}/sliders?path=refused.yaml")
+    page.locator(".k-side summary").first.click()
+    page.get_by_label("magnet time 1").focus()
+    plots = "[...document.querySelectorAll('.js-plotly-plot')]"
+    names = f"{plots}.flatMap(plot => (plot.data || []).map(line => line.name))"
+    page.keyboard.press("ArrowRight")
+    page.wait_for_function(f"{names}.some(name => name.includes('now'))")
+    page.keyboard.press("Home")
+    page.wait_for_selector("text=not possible")
+    page.wait_for_selector("text=got times that do not increase")
+
+    page.wait_for_function(f"!{names}.some(name => name.includes('now'))")
+    assert page.locator(".k-figure").count() == 0
+    assert page.evaluate(f"{names}.some(name => name.includes('pinned'))")
+    page.keyboard.press("ArrowRight")  # one step is 1 us: still refused
+    page.get_by_role("button", name="Back to the case").click()
+    page.wait_for_function(f"{names}.some(name => name.includes('now'))")
+    assert "+0.00 us" in page.locator(".k-figure").first.inner_text()
+    (folder / "refused.yaml").unlink()
 
 
 def test_a_run_goes_on_without_the_server_and_its_results_compare(page, server, folder, browser):

@@ -103,6 +103,8 @@ class Answer:
         Why the numbers are doubtful; shown at once.
     seconds : float
         That it took.
+    run : str
+        Level or variant of a result.
     """
 
     force: tuple[Curve, ...]
@@ -116,6 +118,7 @@ class Answer:
     scale: str = ""
     doubts: tuple[str, ...] = ()
     seconds: float = 0.0
+    run: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,11 +2,13 @@
 
 import numpy as np
 
+from klack.analyses.impact.measures import CONTACT_TIME, PEAK_FORCE, RESTITUTION
+from klack.analyses.impact.record import LevelResult
+from klack.analyses.measures import json_of
 from klack.analyses.stroke.record import StrokeChannels, StrokeVariant
 from klack.analyses.stroke.summary import first_impact
 from klack.app.answers import Floats, Number
 from klack.contact.history import ImpactHistory
-from klack.contact.restitution import ImpactMeasures
 from klack.signals import TimeSeries
 
 __all__ = ["drawn", "enveloped", "impact_numbers", "stroke_numbers", "travelled"]
@@ -39,24 +41,22 @@ def enveloped(force: TimeSeries) -> tuple[Floats, Floats]:
     return np.repeat(at, 2), np.column_stack([padded.min(axis=1), padded.max(axis=1)]).ravel()
 
 
-def impact_numbers(measures: ImpactMeasures) -> tuple[Number, ...]:
-    """Of an impact."""
-    return (
-        Number(key="peak", name="peak force", unit="N", value=measures.peak_force),
+def impact_numbers(level: LevelResult) -> tuple[Number, ...]:
+    """Of an impact; what a run that is cut off in contact does not have has no value."""
+    return tuple(
         Number(
-            key="contact",
-            name="contact time",
-            unit="us",
-            value=1e6 * measures.contact_time,
-            difference="us",
-        ),
-        Number(
-            key="restitution",
-            name="restitution",
-            unit="",
-            value=measures.restitution,
-            difference="1",
-        ),
+            key=measure.key,
+            name=measure.name + measure.remark(level),
+            unit=unit,
+            value=None if value is None else scale * value,
+            difference=difference,
+        )
+        for measure, unit, scale, difference in (
+            (PEAK_FORCE, "N", 1.0, "%"),
+            (CONTACT_TIME, "us", 1e6, "us"),
+            (RESTITUTION, "", 1.0, "1"),
+        )
+        for value in json_of([measure], level).values()
     )
 
 

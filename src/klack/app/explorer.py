@@ -28,10 +28,13 @@ from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bod
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import NoiseSource, impact_sources, stroke_sources
+from klack.analyses.stroke.missing import missing_notes
+from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.stroke.run import (
     body_summaries,
     one_variant,
     stop_summaries,
+    stroke_notes,
     study_of_run,
 )
 from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number, Opened, Slider
@@ -110,6 +113,7 @@ class Explorer:
     """The object behind a slider page, in a process of its own."""
 
     def __init__(self) -> None:
+        self._text = ""
         self._tree: CaseTree | None = None
         self._case: AnyCase | None = None
         self._design: _Design | None = None
@@ -130,14 +134,15 @@ class Explorer:
         if self._design is not None:
             self._design.close()
             self._design = None
-        self._tree = tree_of(text, Path(path))
-        self._case = case = self._tree.any_case()
-        found = sliders_of(case, self._tree)
-        self._sliders = {slider.key: slider for slider in found}
-        if isinstance(case, ValveCase):
-            self._design = _Strokes(case)
-        else:
-            self._design = _Impacts(case, self._hardest(found))
+        self._text, self._tree = text, tree_of(text, Path(path))
+        with collected_warnings():  # the first position tells them again
+            self._case = case = self._tree.any_case()
+            found = sliders_of(case, self._tree)
+            self._sliders = {slider.key: slider for slider in found}
+            if isinstance(case, ValveCase):
+                self._design = _Strokes(case)
+            else:
+                self._design = _Impacts(case, self._hardest(found))
         self._pinned = self._last = None
         self._pools = ThreadpoolController()  # with libraries that came since
         first = self.move({}, pin=True)
@@ -186,7 +191,7 @@ class Explorer:
     def judge(self, values: Values) -> Judgement:
         """Estimate of the error at a position of the sliders: once they rest."""
         design = self._require_open()
-        with self._one_thread():
+        with self._one_thread(), collected_warnings():  # the move has told them
             grade, words = design.judged(self._case_at(values))
         return Judgement(grade=grade, words=words)
 
@@ -218,12 +223,15 @@ class Explorer:
             self._sliders[key].place: self._sliders[key].text(value)
             for key, value in values.items()
         }
-        return with_values(self._tree, places) if places else self._tree.text
+        return with_values(self._tree, places) if places else self._text
 
     def _computed(self, values: Values) -> _Computed:
         """A position; the last one is kept, since what follows asks for it again."""
         if self._last is None or self._last[0] != values:
-            self._last = dict(values), self._require_open().at(self._case_at(values))
+            with collected_warnings() as notes:  # of reading it, too
+                found = self._require_open().at(self._case_at(values))
+            doubts = tuple(filter(None, dict.fromkeys((*notes, *found.doubts))))
+            self._last = dict(values), replace(found, doubts=doubts)
         return self._last[1]
 
     def _one_thread(self) -> Any:
@@ -283,7 +291,7 @@ class _Impacts:
             )
         self._bodies: ImpactBodies = impact_bodies(case, levels=(self.run,), certify=True)
         if hardest is not None:
-            with suppress(KlackError), collected_warnings():  # moves tell what is wrong there
+            with suppress(KlackError):  # moves tell what is wrong there
                 contact_problem(hardest, self._bodies.placed, silent)
         self._bodies.placed.keep_no_more()
         self._transfers = Transfers()
@@ -306,8 +314,8 @@ class _Impacts:
             pressure=click_sound(source, self._transfers, bands),
             force=(Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),),
             lift=(Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),),
-            numbers=impact_numbers(level.measures),
-            doubts=tuple(filter(None, (*study.warnings, contact_doubt(study.contact)))),
+            numbers=impact_numbers(level),
+            doubts=(*study.warnings, contact_doubt(study.contact), *source.notes),
         )
 
     def judged(self, case: Case) -> tuple[str, str]:
@@ -337,9 +345,9 @@ class _Strokes:
     def __init__(self, case: ValveCase) -> None:
         with collected_warnings() as notes:
             self._valve: Valve = build_valve(case, silent, threads=1)
+            self._bodies, self._stops = body_summaries(self._valve), stop_summaries(self._valve)
         self.run = str(case.one_variant(None))
-        self._bodies, self._stops = body_summaries(self._valve), stop_summaries(self._valve)
-        self._notes = (*notes, *map(contact_doubt, self._stops))
+        self._notes = notes
         self._transfers = Transfers()
 
     def close(self) -> None:
@@ -362,8 +370,9 @@ class _Strokes:
             if channel is None
             else (Curve.scaled("lift", *drawn(time, channel.values), 1e3, 1e6),)
         )
-        failure = () if run.failure is None else (str(run.failure),)
         bands = tuple(force_bands(stop.force) for stop in source.stops)
+        of_run: dict[str, StrokeVariant] = {variant: found}
+        warned = tuple(dict.fromkeys((*self._notes, *caught)))
         return _Computed(
             source=source,
             bands=bands,
@@ -373,8 +382,12 @@ class _Strokes:
             ),
             lift=lift,
             numbers=stroke_numbers(found, study.channels),
-            doubts=tuple(
-                filter(None, dict.fromkeys((*failure, *self._notes, *caught, *source.notes)))
+            doubts=(
+                *missing_notes(of_run, (), run.failure),
+                *stroke_notes(case, of_run, roles.seat, warned),
+                *study.warnings,  # of the text of the case
+                *map(contact_doubt, self._stops),
+                *source.notes,
             ),
         )
 

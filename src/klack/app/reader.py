@@ -1,5 +1,6 @@
 """What the pages read of cases and results, in a process of its own."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ from klack.acoustics.signal_statistics import sound_statistics
 from klack.acoustics.third_octave import ENERGY_REFERENCE
 from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
 from klack.analyses.catalogue import analysis_in
+from klack.analyses.contact_doubts import MeshedContact, contact_doubt
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
@@ -70,7 +72,7 @@ class Reader:
             case=getattr(record, "case", ""),
             created=str(getattr(record, "created", "")),
             numbers=_numbers(record)[:_MOST_NUMBERS],
-            doubts=tuple(getattr(record, "warnings", ())),
+            doubts=_doubts(record),
             compares=isinstance(record, ImpactStudy | StrokeStudy),
             has_points=isinstance(record, StudyRecord),
         )
@@ -154,9 +156,19 @@ def _with_sound(answer: Answer, wav: bytes, ghost: bytes, scale: str) -> Answer:
     return replace(answer, wav=wav, ghost_wav=ghost, scale=scale)
 
 
+def _doubts(record: Any) -> tuple[str, ...]:
+    """Warnings of a record, and what speaks against its contacts."""
+    contacts: Sequence[MeshedContact] = ()
+    if isinstance(record, ImpactStudy):
+        contacts = (record.contact,)
+    elif isinstance(record, StrokeStudy):
+        contacts = record.stops
+    return (*getattr(record, "warnings", ()), *filter(None, map(contact_doubt, contacts)))
+
+
 def _numbers(record: Any) -> tuple[Number, ...]:
     if isinstance(record, ImpactStudy):
-        return impact_numbers(record.levels[record.reference].measures)
+        return impact_numbers(record.levels[record.reference])
     if isinstance(record, StrokeStudy):
         return stroke_numbers(record.reference, record.channels)
     if isinstance(record, StudyRecord):
@@ -169,7 +181,7 @@ def _numbers(record: Any) -> tuple[Number, ...]:
 
 def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | None]:
     """Curves, numbers and click of the answer of a result."""
-    doubts = list(record.warnings)
+    doubts = list(_doubts(record))
     pressure, bands, levels = None, np.zeros(0), np.zeros(0)
     try:
         source = sources_of(record)[0]
@@ -187,9 +199,10 @@ def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | Non
         history = record.levels[record.reference].history
         force = (Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),)
         lift = (Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),)
-        unit = "us"
+        unit, run = "us", f"level {record.reference}"
     else:
         variant = record.reference
+        run = f"variant {variant.name}"
         force = tuple(
             Curve.scaled(stop.name, *enveloped(stop.force), 1e3, 1.0)
             for stop in (source.stops if source is not None else ())
@@ -222,5 +235,6 @@ def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | Non
         levels=levels,
         numbers=(*_numbers(record), *level),
         doubts=tuple(doubts),
+        run=run,
     )
     return answer, pressure

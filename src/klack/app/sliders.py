@@ -82,10 +82,11 @@ def _from_zero(place: Key, label: str, unit: str, high: float) -> Slider:
 
 
 def written(slider: Slider, value: float) -> str | float:
-    """A value as the case file would have it."""
+    """A value as the page shows it and the case file gets it: what is computed is what is read."""
     if not isfinite(value):
         raise InputError(slider.key, got=str(value), expected="a number", hint="move the slider.")
-    return f"{value!r} {slider.unit}" if slider.unit else value
+    text = slider.text(value)
+    return text if slider.unit else float(text)
 
 
 def _slider(place: Key, kind: Kind, value: float, needs_mesh: bool) -> Slider:

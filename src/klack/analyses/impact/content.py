@@ -109,7 +109,7 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
                 command="klack impact CASE --level reduced,full",
             )
         )
-    if meshed:
+    if meshed and not study.levels[study.reference].measures.cut_off:
         steps.append(
             NextStep(
                 purpose="Error of the mesh, the modes and the step, and better sizes for them.",

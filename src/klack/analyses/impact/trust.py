@@ -156,8 +156,8 @@ def doubts_of_history(
     if measures.cut_off:
         return (
             "the run ends before separation: peak force, contact time and impulse are "
-            "cut off, and there is no restitution. Try: a longer run.duration, two to three times "
-            "the contact time.",
+            "cut off, so are spectrum and sound, and there is no restitution. Try: a longer "
+            "run.duration, two to three times the contact time.",
         )
     shortest = _shortest_contact(history, measures)
     if shortest < _STEPS_PER_CONTACT * step:

@@ -232,6 +232,7 @@ def impact_sources(
                 materials=materials,
                 notes=(
                     *failed,
+                    *(f"level '{name}': {doubt}" for doubt in result.doubts),
                     *_yield_notes(result),
                     *_contact_notes([study.contact] if name != "lumped" else ()),
                 ),

@@ -87,7 +87,7 @@ def stroke_content(study: StrokeStudy) -> Content:
         sections=sections,
         definitions=_DEFINITIONS,
         limits=_limits(study),
-        next_steps=NEXT_STEPS,
+        next_steps=_next_steps(study),
     )
 
 
@@ -405,8 +405,17 @@ def _energy(value: float | None, books: EnergyBooks) -> str:
 # --------------------------------------------------------------------------- words
 
 
+def _next_steps(study: StrokeStudy) -> tuple[NextStep, ...]:
+    """Commands that work with this result: without stops there is no sound."""
+    sounds = bool(study.reference.result.interfaces)
+    return tuple(step for step in NEXT_STEPS if sounds or step is not _SOUND)
+
+
+_SOUND = NextStep(
+    purpose="The sound of these impacts, with WAV files.", command="klack noise RESULT"
+)
 NEXT_STEPS = (
-    NextStep(purpose="The sound of these impacts, with WAV files.", command="klack noise RESULT"),
+    _SOUND,
     NextStep(
         purpose="How much the steps in time matter: the same with finer ones.",
         command="klack stroke CASE --accuracy fine --out finer",

@@ -53,6 +53,7 @@ __all__ = [
     "run_stroke",
     "run_variant",
     "stop_summaries",
+    "stroke_notes",
     "stroke_study",
     "study_of_run",
     "variant_network",
@@ -103,14 +104,6 @@ def run_stroke(
         runs = {name: _without_path(run) for name, run in computed.items()}
         stops = stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
-    told = [rest_note(name, item.result, roles.seat) for name, item in results.items()]
-    starts = {name: item.result.start for name, item in results.items()}
-    begun = [
-        f"'{name}': {note}"
-        for name, at in starts.items()
-        for note in (at.notes if at else ())
-        if not any(note in other for other in notes)  # a warning already
-    ]
     missing = missing_notes(results, [name for name in wanted if name not in results], failure)
     study = stroke_study(
         valve,
@@ -119,18 +112,26 @@ def run_stroke(
         run_fields(begin, clock),
         bodies=body_summaries(valve),
         stops=stops,
-        warnings=(
-            *missing,
-            *controller_notes(case),
-            *notes,
-            *begun,
-            *(note for note in told if note),
-        ),
+        warnings=(*missing, *stroke_notes(case, results, roles.seat, notes)),
         schematic=schematic_svg(case.network.network()),
     )
     if failure is not None:
         raise IncompleteStrokeError(str(failure), study) from failure
     return study
+
+
+def stroke_notes(
+    case: ValveCase, variants: Mapping[str, StrokeVariant], seat: str, warned: Sequence[str]
+) -> tuple[str, ...]:
+    """What has to be known of variants that were computed, and was warned of on the way."""
+    begun = [
+        f"'{name}': {note}"
+        for name, variant in variants.items()
+        for note in (variant.result.start.notes if variant.result.start else ())
+        if not any(note in other for other in warned)  # a warning already
+    ]
+    at_rest = [rest_note(name, variant.result, seat) for name, variant in variants.items()]
+    return (*controller_notes(case), *warned, *begun, *filter(None, at_rest))
 
 
 def variant_network(valve: Valve, variant: Variant) -> Network:

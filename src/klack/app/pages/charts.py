@@ -32,7 +32,7 @@ def curves_figure(
     now: Sequence[Curve], ghost: Sequence[Curve], x: str, y: str, names: tuple[str, str]
 ) -> dict[str, Any]:
     """Lines over time, those of the pinned design dashed and grey behind."""
-    several = len(now) > 1
+    several = len(now) > 1 or len(ghost) > 1
     data = [
         _line(curve, _GHOST, f"{curve.name}, {names[1]}" if several else names[1], dash="dash")
         for curve in ghost

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Mapping
+from dataclasses import replace
 
 from nicegui import ui
 
@@ -76,17 +77,25 @@ def _show(state: State, now: Answer, ghost: Answer, names: tuple[str, str]) -> N
 
 
 def _show_numbers(now: Answer, ghost: Answer, names: tuple[str, str]) -> None:
+    ours = {number.key: number for number in now.numbers}
     then = {number.key: number for number in ghost.numbers}
     with ui.element("table").classes("k-table"):
         with ui.element("thead"), ui.element("tr"):
             for word in ("", names[1], names[0], "difference"):
                 plain(word, "th").props("scope=col")
         with ui.element("tbody"):
-            for number in now.numbers:
-                other = then.get(number.key)
+            for known in (ours | then).values():
+                number, other = (
+                    side.get(known.key, replace(known, value=None)) for side in (ours, then)
+                )
                 with ui.element("tr"):
-                    unit = f" [{number.unit}]" if number.unit else ""
-                    plain(f"{number.name}{unit}", "td")
-                    plain("–" if other is None else number_text(other), "td")
+                    unit = f" [{known.unit}]" if known.unit else ""
+                    plain(f"{known.name}{unit}", "td")
+                    plain(number_text(other), "td")
                     plain(number_text(number), "td")
-                    plain("–" if other is None else differing(number, other), "td")
+                    plain(differing(number, other), "td")
+            with ui.element("tr"):
+                plain("level or variant", "td")
+                plain(ghost.run, "td")
+                plain(now.run, "td")
+                plain("the same" if now.run == ghost.run else "not the same", "td")

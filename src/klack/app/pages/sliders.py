@@ -2,10 +2,12 @@
 
 import asyncio
 from collections.abc import Mapping
+from dataclasses import replace
 from time import perf_counter
 from typing import Any
 from urllib.parse import urlencode
 
+import numpy as np
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
@@ -35,6 +37,9 @@ __all__ = ["sliders_page"]
 _AT_FIRST = 10  # sliders that are seen without "more"
 _REST = 0.6  # [s] without a move until what takes longer is computed
 _NAMES = ("now", "pinned")
+_NOTHING = Answer(
+    force=(), lift=(), time_unit="", bands=np.zeros(0), levels=np.zeros(0), numbers=()
+)
 
 
 async def sliders_page(state: State, given: Mapping[str, str]) -> None:
@@ -55,7 +60,7 @@ class _Sliders:
         self._values: dict[str, float] = {}
         self._moved = asyncio.Event()
         self._pinned: Answer | None = None
-        self._is_pinned = True
+        self._is_pinned, self._pins = True, False
 
     async def build(self, text: str) -> None:
         """Open the case while the page is shown already."""
@@ -160,7 +165,7 @@ class _Sliders:
             plain(f"{opened.title}: {opened.kind}, {opened.run}").classes("k-soft")
         self._doubts = plain("", "p").classes("k-error")
         self._figures = ui.element("div").classes("k-figures")
-        self._numbers: dict[str, tuple[ui.element, TextElement, TextElement]] = {}
+        self._numbers: dict[str, tuple[ui.element, TextElement, TextElement, TextElement]] = {}
         with ui.element("div").classes("k-grid"):
             self._force = DescribedChart("Contact force", EMPTY)
             self._lift = DescribedChart("Motion", EMPTY)
@@ -199,13 +204,15 @@ class _Sliders:
             self._moved.clear()
             judged = False
             begin = perf_counter()
+            pins, self._pins = self._pins, False
             try:
-                answer: Answer = await self._worker.call("move", dict(self._values))
+                answer: Answer = await self._worker.call("move", dict(self._values), pins)
             except KlackError as error:
                 self._refuse(error)
                 continue
+            if pins:
+                self._pinned = answer
             with self._body:
-                self._badge.classes(remove="good fair").set_text("estimate follows")
                 self._draw(answer)
                 answers += 1
                 self._took.props["data-answers"] = str(answers)  # the words may stay the same
@@ -217,15 +224,21 @@ class _Sliders:
 
     async def _judge(self) -> None:
         """Two requests, so that a move waits for one of them at most."""
+        if self._is_refused:
+            return  # the move has told it
         values = dict(self._values)
         try:
             found: Judgement = await self._worker.call("judge", values)
-            if values != self._values:
-                return
-            self._show_judgement(found)
+        except KlackError as error:
+            found = Judgement(grade="none", words=str(error))
+        if values != self._values:
+            return
+        self._show_judgement(found)
+        try:
             heard: Hearing | None = await self._worker.call("listen", values)
-        except KlackError:
-            return  # the move has told it
+        except KlackError as error:
+            heard = None
+            self._words.set_text(f"{found.words}\n{error}")
         if values == self._values and heard is not None:
             self._show_hearing(heard)
 
@@ -248,16 +261,23 @@ class _Sliders:
             self._show_number(heard.number, heard.number if self._is_pinned else heard.pinned)
 
     def _refuse(self, error: KlackError) -> None:
+        """Only the error and the pinned design: nothing of an earlier position stays beside it."""
         with self._body:
+            self._draw(replace(_NOTHING, doubts=(str(error),)))
+            self._is_refused = True
             self._badge.set_text("not possible")
-            self._badge.classes(remove="good fair", add="out")
-            self._doubts.set_text(str(error))
+            self._badge.classes(add="out")
+            self._took.set_text("")
 
     def _draw(self, answer: Answer) -> None:
+        self._is_refused = False
+        self._badge.classes(remove="good fair out").set_text("estimate follows")
+        self._badge.props["title"] = ""
+        self._words.set_text("")
         ghost = self._pinned or answer
         self._is_pinned = ghost is answer
         self._doubts.set_text("\n".join(answer.doubts))
-        unit = answer.time_unit
+        unit = ghost.time_unit
         self._force.update_figure(
             curves_figure(answer.force, ghost.force, f"time [{unit}]", "force [N]", _NAMES)
         )
@@ -266,10 +286,15 @@ class _Sliders:
         )
         self._bands.update_figure(bands_figure(answer, ghost, _NAMES))
         self._show_numbers(answer, ghost)
+        self._sound.set_visibility(bool(answer.wav))
+        self._scale.set_text(
+            f"All clicks to one scale: {answer.scale}." if answer.wav else "Nothing radiates."
+        )
         if answer.wav:
             self._play("now", answer.wav)
             self._play("pinned", answer.ghost_wav)
-            self._scale.set_text(f"All clicks to one scale: {answer.scale}.")
+        else:  # no spectrogram follows
+            self._spectrogram.update_figure(EMPTY)
 
     def _show_numbers(self, answer: Answer, ghost: Answer) -> None:
         then = {number.key: number for number in ghost.numbers}
@@ -281,12 +306,13 @@ class _Sliders:
     def _show_number(self, number: Number, then: Number) -> None:
         if number.key not in self._numbers:
             with self._figures, ui.element("div").classes("k-figure") as figure:
-                plain(number.name, "div").classes("k-soft")
+                name = plain("", "div").classes("k-soft")
                 with ui.element("b"):
                     value = plain("")
                     plain(number.unit, "small")
-                self._numbers[number.key] = figure, value, plain("")
-        _, value, change = self._numbers[number.key]
+                self._numbers[number.key] = figure, name, value, plain("")
+        _, name, value, change = self._numbers[number.key]
+        name.set_text(number.name)
         value.set_text(f"{number_text(number)} ")
         change.set_text(differing(number, then))
 
@@ -300,14 +326,10 @@ class _Sliders:
 
     # ----------------------------------------------------------------------- what is asked
 
-    async def _pin(self) -> None:
-        try:
-            self._pinned = await self._worker.call("move", dict(self._values), True)
-        except KlackError as error:
-            show_error(error)
-            return
-        assert self._pinned is not None
-        self._draw(self._pinned)
+    def _pin(self) -> None:
+        """The answer that follows is the pinned one, with all that is computed after it."""
+        self._pins = True
+        self._moved.set()
 
     def _reset(self) -> None:
         sliders = {slider.key: slider for slider in self._opened.sliders}
