@@ -57,8 +57,8 @@ def impact_doubts(
         if late > _LATE:
             way = "run.coarse: 1" if near > 1.5 * step else "a shorter run.step"
             yield (
-                f"{_named(event)} depends on the steps: before it left the stop the needle swung on "
-                f"it {times} times, each {format_si(period, 's', 2)} long, which steps of "
+                f"{_named(event)} depends on the steps: before it left the stop the needle swung "
+                f"on it {times} times, each {format_si(period, 's', 2)} long, which steps of "
                 f"{format_si(near, 's', 2)} shift by about {format_si(late, 's', 1)} in all. "
                 f"Try: {way}; or the restitution of the stop, which damps it."
             )
