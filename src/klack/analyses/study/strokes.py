@@ -25,6 +25,7 @@ from klack.analyses.threads import Stopped, never_stopped
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
+from klack.case.placed_errors import tells_place
 from klack.case.points import PointKey, PointValue, case_at, checked_parts
 from klack.case.study import CaseStudy
 from klack.case.valve import ValveCase
@@ -259,14 +260,22 @@ def _point_run(
 ) -> tuple[StrokeOfPoint, ValveRoles]:
     """Stroke of a point."""
     valve = _valve_at(asked, built, i)
-    roles = find_roles(valve.case, valve.network)
-    variant = valve.case.one_variant(asked.variant)
+    return _stroke_of(valve.case, valve, asked.variant, built, check)
+
+
+@tells_place
+def _stroke_of(
+    case: ValveCase, valve: Valve, wanted: str, built: _Built, check: Callable[[], None]
+) -> tuple[StrokeOfPoint, ValveRoles]:
+    """Stroke of a valve of this case, in one variant."""
+    roles = find_roles(case, valve.network)
+    variant = case.one_variant(wanted)
     run = one_variant(valve, roles, variant, None, lambda stage, fraction: check())
     if run.failure is not None:
         raise run.failure
 
     def source() -> NoiseSource:
         study = study_of_run(valve, roles, variant, run, built.bodies, built.stops)
-        return stroke_sources(study, case=valve.case)[0]
+        return stroke_sources(study, case=case)[0]
 
     return StrokeOfPoint(run.variant, PointNoise(source, built.transfers)), roles
