@@ -166,7 +166,7 @@ def test_sliders_that_cannot_open_tell_why_with_the_way_back(page, server, folde
     broken = folder / "broken.yaml"
     broken.write_text("klack: 1\n")
     page.goto(f"{server.base}/sliders?path=broken.yaml")
-    page.get_by_role("alert").get_by_text("bodies").wait_for()
+    page.get_by_role("alert").get_by_text("got no key 'title'").wait_for()
 
     assert page.locator("#k-body [role=status]").count() == 0
     page.locator("#k-body").get_by_role("link", name="Back to cases and results").click()
