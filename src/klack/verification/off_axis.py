@@ -309,7 +309,7 @@ def _rest() -> Check:
         "needle at rest, pressed 0.3 mm from the axis: tilt [rad]",
         expected=push * arm / bed,
         computed=float(found.channels["needle tilt x"].values[-1]),
-        tolerance=1e-11,
+        tolerance=1e-10,  # round-off, which depends on the order of the points in the factor
         source="M/(k r^2/2): ring of springs, all of them closed",
     )
 
