@@ -60,13 +60,18 @@ def bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str
     figure["layout"]["xaxis"] |= {
         "type": "log",
         "tickvals": [float(1000.0 * 10 ** (k / 10)) for k in ticks][::2],
-        "ticktext": [nominal_label(int(k)).replace(" Hz", "") for k in ticks][::2],
+        "ticktext": [_short(nominal_label(int(k))) for k in ticks][::2],
     }
     low, high = top - 62.0, top + 4.0
     figure["layout"]["yaxis"] |= {  # a range that is given would end a zoom at each move
         "autorangeoptions": {"include": [low, high], "clipmin": low, "clipmax": high}
     }
     return figure
+
+
+def _short(label: str) -> str:
+    """As narrow as a telephone has room for: 500, 2k, 31.5k; the axis has the unit."""
+    return label.replace(" kHz", "k").replace(" Hz", "")
 
 
 def spectrogram_figure(found: tuple[Floats, Floats, Floats]) -> dict[str, Any]:
