@@ -118,6 +118,21 @@ def test_report_is_written_again_from_the_store(asked, quick_report, capsys):
 
 
 @pytest.mark.slow
+def test_the_answer_is_told_before_its_report_is_made(asked, quick_report, monkeypatch, capsys):
+    said = []
+
+    def written(content, path):
+        said.append(capsys.readouterr().out)
+        path.write_text("page")
+
+    monkeypatch.setattr("klack.report.html.write_report", written)
+    assert main(["impact", str(DRAWN), "--out", "r"]) == 0
+
+    assert "peak force" in said[0]
+    assert capsys.readouterr().out == "Results in r: result.zarr, report.html, report.pdf\n"
+
+
+@pytest.mark.slow
 def test_ctrl_c_while_the_report_is_written_keeps_the_result(
     asked, quick_report, monkeypatch, capsys
 ):

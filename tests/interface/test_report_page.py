@@ -3,11 +3,14 @@
 import re
 import shlex
 import zlib
+from collections import Counter
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import typst
+from matplotlib.axes import Axes
 
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
@@ -117,3 +120,21 @@ _EMPTY = Content(
     case_text="",
     versions="",
 )
+
+
+def test_a_figure_is_drawn_once_and_the_pages_are_set_once(monkeypatch):
+    """``savefig`` would draw a figure twice: one with a layout first for its layout alone."""
+    calls = Counter()
+
+    def counted(function, name):
+        def call(*args, **kwargs):
+            calls[name] += 1
+            return function(*args, **kwargs)
+
+        return call
+
+    monkeypatch.setattr(Axes, "draw", counted(Axes.draw, "drawn"))
+    monkeypatch.setattr(typst, "compile", counted(typst.compile, "set"))
+    render_pdf(one_chart_each(3, panels=2))
+
+    assert calls == {"drawn": 6, "set": 1}

@@ -1,12 +1,13 @@
 """How every command ends that asks for an analysis: result, report, tables, JSON, exit."""
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from klack.analyses.result_folder import REPORTS, write_result
+from klack.analyses.result_folder import REPORTS, add_report, write_result
 from klack.progress import Progress
 from klack.terminal.output import require_folder
 from klack.terminal.progress import show_progress
@@ -76,7 +77,7 @@ class Ending(Shown):
         unfinished: "LogForm[Any, Any] | None" = None,
         incomplete: Exception | None = None,
     ) -> int:
-        """Write and print a record; return the exit code.
+        """Write and print a record, then make its report; return the exit code.
 
         Parameters
         ----------
@@ -101,18 +102,23 @@ class Ending(Shown):
         def page() -> "Content":
             return analysis.content(record, result=str(self.folder), case=self.case)
 
-        with show_progress(self.quiet) as progress:
-            failure = write_result(
-                self.folder,
-                save,
-                page=page if self.report else None,
-                progress=progress,
-                unfinished=unfinished,
-            )
-        self.show(analysis.told(record))
-        self.note(record.warnings)
-        if cached := stages_with_cached(record.stage_times):
-            self.say(f"With cached results (klack cache): {', '.join(cached)}")
+        failure = None
+        try:
+            with show_progress(self.quiet) as progress:
+                mark = write_result(self.folder, save, progress=progress, unfinished=unfinished)
+            self.show(analysis.told(record))
+            self.note(record.warnings)
+            if cached := stages_with_cached(record.stage_times):
+                self.say(f"With cached results (klack cache): {', '.join(cached)}")
+            if self.report:
+                sys.stdout.flush()  # the answer does not wait for its report
+                with show_progress(self.quiet) as progress:
+                    progress("report", 0.0)
+                    failure = add_report(page, self.folder, mark)
+        except KeyboardInterrupt as stop:
+            again = f"; klack report {self.folder} writes its report" if self.report else ""
+            stop.add_note(f"the result is in {self.folder}{again}.")
+            raise
         made = ["result.zarr", *names, *(REPORTS if self.report and failure is None else ())]
         self.say(f"Results in {self.folder}: {', '.join(made)}")
         self.write(lambda: analysis.to_json(record))

@@ -15,7 +15,14 @@ if TYPE_CHECKING:
     from klack.progress import Progress
     from klack.report.page import Content
 
-__all__ = ["REPORTS", "beside_result", "is_result", "write_reports", "write_result"]
+__all__ = [
+    "REPORTS",
+    "add_report",
+    "beside_result",
+    "is_result",
+    "write_reports",
+    "write_result",
+]
 
 REPORTS = ("report.html", "report.pdf")
 _RESULT = "result.zarr"
@@ -40,54 +47,49 @@ def write_result(
     folder: Path,
     save: Callable[[Path], None],
     *,
-    page: "Callable[[], Content] | None",
     progress: "Progress",
     unfinished: "LogForm[Any, Any] | None" = None,
-) -> Exception | None:
-    """Write a result to a folder, and its report if requested.
-
-    Whatever happens to the report costs no calculation: the result stands, with no report of an
-    earlier one beside it.  An internal error in a picture is returned; Ctrl-C is raised again
-    with a note on what is kept.
+) -> Mark | None:
+    """Write a result to a folder, with no report of an earlier one beside it.
 
     Parameters
     ----------
     folder : Path
     save : callable
         Writes the result into a folder.
-    page : callable, optional
-        Makes its report.
     progress : callable
     unfinished : LogForm, optional
         Finished parts that are not needed any more once the result stands.
+
+    Returns
+    -------
+    mark
+        For :func:`add_report`.
     """
     progress("result", 0.0)
-    try:
-        with uninterrupted():
-            with staged_folder(folder) as stage:
-                save(stage)
-                outdated(stage, REPORTS)
-                mark = mark_of(stage / _RESULT)
-            if unfinished is not None:
-                unfinished.remove(folder)
-        if page is None:
-            return None
-        progress("report", 0.0)
-        return _report(page, folder, mark)
-    except KeyboardInterrupt as stop:
-        again = f"; klack report {folder} writes its report" if page else ""
-        stop.add_note(f"the result is in {folder}{again}.")
-        raise
+    with uninterrupted():
+        with staged_folder(folder) as stage:
+            save(stage)
+            outdated(stage, REPORTS)
+            mark = mark_of(stage / _RESULT)
+        if unfinished is not None:
+            unfinished.remove(folder)
+    return mark
 
 
-def beside_result(folder: Path) -> dict[str, Mark]:
-    """Result in a folder, to which its report may be added while it is unchanged."""
-    mark = mark_of(folder / _RESULT)
-    return {} if mark is None else {_RESULT: mark}
+def add_report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> Exception | None:
+    """Write the report of a result, if the folder still has this one at the end.
 
+    Whatever happens to the report costs no calculation: an internal error in a picture is returned.
 
-def _report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> Exception | None:
-    """Write the report, if the folder still has this result at the end."""
+    Parameters
+    ----------
+    page : callable
+        Makes the report.
+    folder : Path
+    mark : mark
+        Of the result, from :func:`write_result`.
+    """
     try:
         with staged_folder(folder, {} if mark is None else {_RESULT: mark}) as stage:
             write_reports(page(), stage)
@@ -97,6 +99,12 @@ def _report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> E
     except Exception as error:  # of whatever kind: the result stands, the command ends with it
         return error
     return None
+
+
+def beside_result(folder: Path) -> dict[str, Mark]:
+    """Result in a folder, to which its report may be added while it is unchanged."""
+    mark = mark_of(folder / _RESULT)
+    return {} if mark is None else {_RESULT: mark}
 
 
 def _no_report(folder: Path, error: OSError) -> InputError:

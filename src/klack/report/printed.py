@@ -64,10 +64,13 @@ def plain(text: str) -> str:
 
 
 def svg(figure: Figure, *, dpi: float = 200.0) -> bytes:
-    """Write a figure as SVG; rasterised parts with ``dpi`` dots per inch."""
-    FigureCanvasSVG(figure)
+    """Write a figure as SVG; rasterised parts with ``dpi`` dots per inch.
+
+    Drawn once: ``savefig`` draws a figure with a layout twice, the first time for its layout alone.
+    """
+    figure.dpi = dpi
     stream = BytesIO()
-    figure.savefig(stream, format="svg", dpi=dpi, metadata={"Date": None, "Creator": "klack"})
+    FigureCanvasSVG(figure).print_svg(stream, metadata={"Date": None, "Creator": "klack"})
     return stream.getvalue()
 
 
