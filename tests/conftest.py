@@ -28,21 +28,6 @@ sys.path.append(str(Path(__file__).parent))  # worker processes look there as we
 from c_compiler import untested
 from energy_ledger import as_for_a_user  # noqa: F401  (every run keeps its energy balance)
 
-# the search for examples in docstrings would run these modules a second time, under another name
-collect_ignore_glob = [
-    "c_compiler.py",
-    "energy_ledger.py",
-    "json_schema_check.py",
-    "mutated_cases.py",
-    "property_profiles.py",
-    "quoted_output.py",
-    "rigid_valve.py",
-    "rod_valve.py",
-    "viewer_case.py",
-    "data/*.py",
-]
-
-
 STORE = None if "PYTEST_XDIST_WORKER" in os.environ else os.environ["KLACK_CACHE"]
 
 
@@ -52,6 +37,12 @@ def computes() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("KLACK_CACHE", "off")
         yield
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out files without a slow test where only those run: importing them takes as long."""
+    file = collection_path.name.startswith("test_") and config.option.markexpr == "slow"
+    return True if file and "mark.slow" not in collection_path.read_text("utf-8") else None
 
 
 def pytest_unconfigure() -> None:
