@@ -8,6 +8,7 @@ from decimal import Decimal, localcontext
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
 from klack.simulation.contact_step import law_potential, mean_force, solve_step
@@ -23,9 +24,9 @@ LAWS = {
 RATIOS = [9e-1, 2e-1, 2.1e-2, 1.9e-2, 1.2e-2, 9.9e-3, 5e-3, 1e-3, 1e-5, 1e-8]
 
 
-@pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize("change", RATIOS)
-@pytest.mark.parametrize("exponent", ["1", "1.1", "1.5", "2.5", "3"])
+@each("sign", [1, -1])
+@each("change", RATIOS)
+@each("exponent", ["1", "1.1", "1.5", "2.5", "3"])
 def test_mean_of_a_power_law_keeps_its_digits(exponent, change, sign):
     """``[V(d1) - V(d0)]/(d1 - d0)``, on both sides of 1 % between the ends and their mean."""
     law = HertzLaw(7.5e9, exponent=float(exponent)).flat()
@@ -56,9 +57,9 @@ def test_mean_shear_of_a_film_keeps_its_digits(share):
     )
 
 
-@pytest.mark.parametrize("G", [1e-12, 1e-10, 1e-8])  # [m/N]
-@pytest.mark.parametrize("chi_over_h", [1e5, 3e6, 1e8])  # [1/m]
-@pytest.mark.parametrize("name", list(LAWS))
+@each("G", [1e-12, 1e-10, 1e-8])  # [m/N]
+@each("chi_over_h", [1e5, 3e6, 1e8])  # [1/m]
+@each("name", list(LAWS))
 def test_a_damped_step_books_what_the_store_does_not_get(name, chi_over_h, G):
     """``F (d1 - d0) = V(d1) - V(d0) + loss``, clipped or not, and no loss is negative.
 

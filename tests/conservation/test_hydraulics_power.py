@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.hydraulics.annulus import Annulus
 from klack.hydraulics.check_valve import CheckValve
@@ -131,8 +132,8 @@ def balance(part, fluid, rng, count=300):
     return np.array(lost), np.array(scale)
 
 
-@pytest.mark.parametrize("fluid", FLUIDS)
-@pytest.mark.parametrize("name", PARTS)
+@each("fluid", FLUIDS)
+@each("name", PARTS)
 def test_loss_is_never_negative(name, fluid):
     lost, scale = balance(PARTS[name], FLUIDS[fluid], np.random.default_rng(7))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.simulation.delay_line import (
     LineState,
@@ -27,10 +28,10 @@ def rough_line(steps, segments, vapour):
     )
 
 
-@pytest.mark.parametrize("coarse", [1, 2, 16])
-@pytest.mark.parametrize("segments", [1, 2, 5])
-@pytest.mark.parametrize("steps", [80.0, 97.0, 130.37])
-@pytest.mark.parametrize("vapour", [-1e9, -1e5])
+@each("coarse", [1, 2, 16])
+@each("segments", [1, 2, 5])
+@each("steps", [80.0, 97.0, 130.37])
+@each("vapour", [-1e9, -1e5])
 def test_energy_and_volume_balance(coarse, segments, steps, vapour):
     rng = np.random.default_rng(11)
     lengths = np.where(rng.random(3000) < 0.5, 1, coarse)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 from numpy.typing import NDArray
 
 from klack.mechanics.force import ConstantForce, ForceOverTime
@@ -93,8 +94,8 @@ def balance(
     return np.array(residual), np.array(losses), largest
 
 
-@pytest.mark.parametrize("name", PARTS)
-@pytest.mark.parametrize("ways", ["long", "short"])
+@each("name", PARTS)
+@each("ways", ["long", "short"])
 def test_books_balance_to_round_off_on_any_way(name, ways):
     rng = np.random.default_rng(7)
     size = 60e-6 if ways == "long" else 1e-9  # [m] per step; a stroke, and a step of 20 ns

@@ -6,6 +6,7 @@ pressures, moving faces, and steps from nanoseconds to a second.
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.network.gas_rows import (
     GasBranchRow,
@@ -66,7 +67,7 @@ def _network(rng):
     return GasNetwork(rows, gas, AMBIENT)
 
 
-@pytest.mark.parametrize("seed", range(100))
+@each("seed", range(100))
 def test_mass_and_energy_of_random_networks(seed):
     rng = np.random.default_rng(seed)
     net = _network(rng)

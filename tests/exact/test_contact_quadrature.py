@@ -6,6 +6,7 @@ alone, which the patch test sends through them, do not tell one weight from anot
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.contact.mortar import contact_space, hat_quadrature
 from klack.verification.lattice import lattice_mesh
@@ -64,8 +65,8 @@ def test_areas_and_gaps_are_the_same_integrals(hats):
     np.testing.assert_allclose(space.gap, 0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize(("i", "j"), [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)])
+@each("family", FAMILIES)
+@each(("i", "j"), [(1, 0), (0, 1), (2, 0), (1, 1), (0, 2)])
 def test_mean_gap_over_a_curved_face(family, i, j):
     """The volume between a flat slave and a paraboloid, which an 8-node face follows exactly."""
     depth = 2e-5 / SIZE ** (i + j)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from draws import each
 
 from klack.analyses.stroke.run import run_stroke
 from klack.case.valve_reader import load_valve_case
@@ -83,10 +84,8 @@ def joined(magnet, first, second, body=STILL):
     )
 
 
-@pytest.mark.parametrize(
-    ("first", "second"), [(BOOST, PEAK), (PEAK, BOOST), (BOOST, BOOST), (CHOPPED, PEAK)]
-)
-@pytest.mark.parametrize(
+@each(("first", "second"), [(BOOST, PEAK), (PEAK, BOOST), (BOOST, BOOST), (CHOPPED, PEAK)])
+@each(
     "change",
     [
         {},
@@ -104,7 +103,6 @@ def joined(magnet, first, second, body=STILL):
             }
         },
     ],
-    ids=["plain", "opposed", "eddy", "hysteresis", "magnet"],
 )
 def test_two_drivers_balance_at_any_step(first, second, change):
     magnet = MagneticNetwork.model_validate(changed(**change))

@@ -5,6 +5,7 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
+from draws import each
 from scipy.integrate import quad
 
 from klack.hydraulics.guide_film import (
@@ -37,9 +38,9 @@ def by_quadrature(eps, rate, whirl, ruptured):
 MOTIONS = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0), (1.0, 2.0), (-1.0, 0.5), (-0.3, -2.0)]
 
 
-@pytest.mark.parametrize("ruptured", [False, True], ids=["whole", "ruptured"])
-@pytest.mark.parametrize("eps", [0.01, 0.4, 0.9, 0.99])
-@pytest.mark.parametrize(("rate", "whirl"), MOTIONS)
+@each("ruptured", [False, True])
+@each("eps", [0.01, 0.4, 0.9, 0.99])
+@each(("rate", "whirl"), MOTIONS)
 def test_forces_are_the_integrals_of_the_short_bearing(eps, rate, whirl, ruptured):
     expected = by_quadrature(eps, rate, whirl, ruptured)
 

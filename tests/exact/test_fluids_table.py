@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 from scipy.integrate import quad
 
 from klack.hydraulics.fluid_choice import FluidChoice
@@ -27,10 +28,8 @@ def look_up(table, pressures) -> np.ndarray:
     return np.array(rows).T
 
 
-@pytest.mark.parametrize(
-    "fluid",
-    [*(f.at(293.15, gas_fraction=a) for f in FLUIDS.values() for a in (0.0, 2e-3)), USER],
-    ids=lambda fluid: f"{fluid.name} {fluid.gas.fraction:g}",
+@each(
+    "fluid", [*(f.at(293.15, gas_fraction=a) for f in FLUIDS.values() for a in (0.0, 2e-3)), USER]
 )
 def test_table_is_the_fluid(fluid):
     table = fluid_table(fluid, AMBIENT)

@@ -4,6 +4,7 @@ from math import cos, hypot, log, pi, sin, sqrt, tanh
 
 import numpy as np
 import pytest
+from draws import each
 from scipy.integrate import quad
 
 from klack.hydraulics.annulus import Annulus, annulus_step, eccentricity_factor
@@ -95,9 +96,9 @@ def test_hyperbolic_tangent_is_that_of_the_library():
     assert _tanh(0.0) == (0.0, 1.0)
 
 
-@pytest.mark.parametrize("contraction", [None, 0.62])
-@pytest.mark.parametrize("p_b", [BAR, 0.4 * BAR, 5.0e3, 4.0e3])
-@pytest.mark.parametrize("p_a", [4.1e3, 5.2e3, 0.3 * BAR, 1.001 * BAR, 6 * BAR])
+@each("contraction", [None, 0.62])
+@each("p_b", [BAR, 0.4 * BAR, 5.0e3, 4.0e3])
+@each("p_a", [4.1e3, 5.2e3, 0.3 * BAR, 1.001 * BAR, 6 * BAR])
 def test_orifice_slopes_are_derivatives_and_have_their_signs(p_a, p_b, contraction):
     numbers = {"cavitation": contraction, "mu": 0.04}
     out = orifice(p_a, p_b, 684.0, 686.0, **numbers)
@@ -164,8 +165,8 @@ def test_limit_joins_its_rounded_foot_and_ends_at_the_vapour_pressure():
 # ---- gap and edge in series -------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("drop", [-5e5, -1e-3, 0.0, 1e-12, 1.0, 5e5, 1e8])
-@pytest.mark.parametrize(("a", "b"), [(1.0, 1.0), (1e12, 1e17), (1e9, 1e20), (1e16, 1e12)])
+@each("drop", [-5e5, -1e-3, 0.0, 1e-12, 1.0, 5e5, 1e8])
+@each(("a", "b"), [(1.0, 1.0), (1e12, 1e17), (1e9, 1e20), (1e16, 1e12)])
 def test_gap_law_inverts_its_pressure_drop(drop, a, b):
     Q, slope = gap_flow(drop, a, b)
 

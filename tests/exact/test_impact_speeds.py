@@ -8,6 +8,7 @@ from math import cos, exp, pi
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.lever import Lever
@@ -58,7 +59,7 @@ def event(rows, body, phase, share=1.0):
     return found
 
 
-@pytest.mark.parametrize("phase", range(0, LOOK, 7))
+@each("phase", range(0, LOOK, 7))
 def test_speeds_do_not_depend_on_where_the_records_lie(phase):
     parts = {"needle": RigidMass(mass=MASS), "stop": STOP}
     rows = Network(parts, [["needle.body", "stop.upper"], ["stop.lower", "ground"]]).rows()

@@ -4,6 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.contact.laws import (
     HertzLaw,
@@ -80,8 +81,8 @@ def test_softening_table_still_rises_beyond_its_end():
     assert float(law.force(5e-6)) > float(law.force(4e-6)) > 200.0
 
 
-@pytest.mark.parametrize("pair", PAIRS)
-@pytest.mark.parametrize("law", LAWS, ids=IDS)
+@each("pair", PAIRS)
+@each("law", LAWS)
 def test_kernel_mean_force_is_the_discrete_gradient(law, pair):
     d0, d1 = pair
     flat = law.flat()
@@ -106,9 +107,9 @@ def test_kernel_potential_is_the_law_potential(law):
         assert ours == pytest.approx(float(law.potential(d)), rel=1e-13)
 
 
-@pytest.mark.parametrize("G", [1e-14, 1e-11, 1e-8])  # [m/N], soft against the step and stiff
-@pytest.mark.parametrize("pair", PAIRS[1:])
-@pytest.mark.parametrize("law", LAWS, ids=IDS)
+@each("G", [1e-14, 1e-11, 1e-8])  # [m/N], soft against the step and stiff
+@each("pair", PAIRS[1:])
+@each("law", LAWS)
 def test_kernel_step_satisfies_its_equation(law, pair, G):
     d0, d_free = pair
     flat = law.flat()

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from draws import each
 
 from klack.analyses.stroke.run import run_stroke
 from klack.case.valve_reader import load_valve_case
@@ -307,7 +308,7 @@ def _random_part(rng: np.random.Generator) -> Component:
     )
 
 
-@pytest.mark.parametrize("seed", range(5))
+@each("seed", range(5))
 def test_random_networks_keep_their_energy(seed):
     rng = np.random.default_rng(seed)
     worst, ended = 0.0, 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.errors import InputError, KlackError
 from klack.mesh.families import FAMILIES
@@ -39,8 +40,8 @@ def ideal(name: str, stretch: float = 1.0) -> Mesh:
     return Mesh(points=points, blocks=(block,))
 
 
-@pytest.mark.parametrize("name", VOLUME_FAMILIES)
-@pytest.mark.parametrize("stretch", [1.0, 1e-5])
+@each("name", VOLUME_FAMILIES)
+@each("stretch", [1.0, 1e-5])
 def test_ideal_element_has_quality_one(name, stretch):
     mesh = ideal(name, stretch)
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 from ruamel.yaml import YAML
 
 from klack.case.valve_reader import load_valve_case, read_valve_case
@@ -41,8 +42,8 @@ def result(case):
     return simulate_network(case.network.network().rows(), duration=case.run.duration, record=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(20, 32))
-@pytest.mark.parametrize("step", [1e-7, 1.28e-6, 10e-6])
+@each("seed", range(20, 32))
+@each("step", [1e-7, 1.28e-6, 10e-6])
 def test_random_stages_balance_at_any_step(seed, step):
     plant = injector() if seed % 2 else linear_coil()
     time = step * np.arange(round(0.9e-3 / step) + 1)

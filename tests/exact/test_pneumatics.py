@@ -4,6 +4,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.errors import InputError
 from klack.hydraulics.chamber import Chamber
@@ -31,8 +32,8 @@ def _network(parts, connections, **more):
     return Network({**BODY, **parts}, [JOINED, *connections], gas=AIR, **more)
 
 
-@pytest.mark.parametrize("b", [0.0, 0.2, 0.528, 1.0 - LAMINAR, 1.0])
-@pytest.mark.parametrize("crack", [0.0, 3e4, 6e5, 7e5])
+@each("b", [0.0, 0.2, 0.528, 1.0 - LAMINAR, 1.0])
+@each("crack", [0.0, 3e4, 6e5, 7e5])
 def test_the_flow_falls_with_the_pressure_behind_and_joins_everywhere(b, crack):
     behind = np.linspace(0.0, 6e5, 40001)
     flow = np.array([restriction_flow(6e5, p, 300.0, 1.0, b, 0.5, crack)[0] for p in behind])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.analyses.impact.run import run_impact
 from klack.assembling.pressure_limit import meridian_case
@@ -66,7 +67,7 @@ def drawn(rng):
     return C, limit, area, rng.uniform(-1.0, 1.0, n) * 10.0 ** rng.uniform(-8, -5)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@each("seed", range(40))
 def test_random_points_keep_the_law_as_they_are_pressed_and_let_go(seed):
     """Exact: complementarity, pressure at most at the limit, and there where the set has grown."""
     rng = np.random.default_rng(seed)
@@ -240,7 +241,7 @@ def test_the_meridian_case_of_solids():
     assert meridian_case(case, 20e-6, 1.02).motion.speed == case.motion.speed
 
 
-@pytest.mark.parametrize("seed", range(12))
+@each("seed", range(12))
 def test_random_bodies_that_tilt_on_points_that_yield_keep_the_energy(seed):
     """Conservation: three impacts of a rigid body off its axis, each on the faces of the last."""
     rng = np.random.default_rng(seed)

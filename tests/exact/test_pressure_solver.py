@@ -7,7 +7,7 @@ storage is below the round-off of what the channels let through.
 from fractions import Fraction
 
 import numpy as np
-import pytest
+from draws import each
 from numba import njit
 
 from klack.network.step_function import first
@@ -42,7 +42,7 @@ def exactly(storage, channels, r):
     return [float(value) for value in x]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@each("seed", range(20))
 def test_storage_below_the_round_off_of_the_flow_is_not_lost(seed):
     rng = np.random.default_rng(seed)
     n = int(rng.integers(2, 6))

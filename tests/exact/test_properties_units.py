@@ -4,6 +4,7 @@ from math import exp, log
 
 import numpy as np
 import pytest
+from draws import each
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from property_profiles import examples
@@ -63,7 +64,7 @@ def test_a_prefix_is_a_power_of_ten_in_tables_of_units_as_well(data, unit):
     assert parse_quantity(f"{value!r} {unit}", kind) == pytest.approx(value * factor, rel=1e-14)
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+@each("kind", KINDS)
 def test_beyond_the_sizes_that_there_are_it_is_asked(kind):
     for value in (0.5 * kind.smallest, -0.5 * kind.smallest, 2.0 * kind.largest):
         with pytest.raises(InputError, match="of a size between"):

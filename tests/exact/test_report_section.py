@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.analyses.impact.record import SectionPicture
 from klack.analyses.impact.section import section_picture
@@ -78,9 +79,9 @@ def length(picture: SectionPicture) -> float:
     return float(np.linalg.norm(b - a, axis=1).sum())
 
 
-@pytest.mark.parametrize("family", ["tet4", "tet10", "hex8", "hex20", "wedge6", "wedge15"])
-@pytest.mark.parametrize("left", [-1.0, -1.3, 0.25], ids=["node at x=0", "cut at x=0", "hollow"])
-@pytest.mark.parametrize("front", [-1.0, -0.7], ids=["side in the plane", "plane inside"])
+@each("family", ["tet4", "tet10", "hex8", "hex20", "wedge6", "wedge15"])
+@each("left", [-1.0, -1.3, 0.25])
+@each("front", [-1.0, -0.7])
 def test_area_of_a_box(family: str, left: float, front: float) -> None:
     picture = _section(box(family, (left, front, 0), (2, 1, 1)))
 

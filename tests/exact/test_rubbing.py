@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.transient.active_set import solve_active
 from klack.transient.interface_arrays import ActiveSet, Closed
@@ -71,8 +72,8 @@ def problem(seed, ways, coefficient=None, most=20, own=1.0):
     return A, rng.normal(size=len(G)), mu
 
 
-@pytest.mark.parametrize("ways", [1, 2])
-@pytest.mark.parametrize("seed", range(40))
+@each("ways", [1, 2])
+@each("seed", range(40))
 def test_forces_obey_the_law(seed, ways):
     A, q, mu = problem(seed, ways)
     lam, w, doing, _ = solved(A, q, mu)
@@ -92,8 +93,8 @@ def test_forces_obey_the_law(seed, ways):
     np.testing.assert_allclose(across[:, rubbing], -(mu * normal)[rubbing] * way, atol=1e-7)
 
 
-@pytest.mark.parametrize("ways", [1, 2])
-@pytest.mark.parametrize("seed", range(10))
+@each("ways", [1, 2])
+@each("seed", range(10))
 def test_taking_turns_gives_the_same(seed, ways):
     A, q, mu = problem(seed, ways)
     np.testing.assert_allclose(solved(A, q, mu)[0], in_turn(A, q, mu), atol=1e-8)

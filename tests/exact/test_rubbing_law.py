@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import InputError
@@ -65,7 +66,7 @@ def work_along(law, path):
     return work, stored, np.array(lost)
 
 
-@pytest.mark.parametrize("row", cones(), ids=lambda row: f"{row['half_angle_deg']:g}-{row['mu']:g}")
+@each("row", cones())
 def test_a_needle_on_a_frictional_cone(row):
     alpha, mu = np.radians(row["half_angle_deg"]), row["mu"]
     law = cone_law(alpha, mu, row["kt_over_kn"])
@@ -107,7 +108,7 @@ def test_forces_along_a_path_are_those_of_the_steps():
         assert still == pytest.approx(force, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("seed", range(5))
+@each("seed", range(5))
 def test_no_path_gains_energy(seed):
     """Work is what is stored and what each stretch loses; no stretch loses less than 0."""
     rng = np.random.default_rng(seed)

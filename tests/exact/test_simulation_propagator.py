@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 from scipy.linalg import expm
 
 from klack.errors import InputError
@@ -12,9 +13,9 @@ ZETA = [0.0, 1e-3, 0.02, 0.9, 1.0 - 1e-9, 1.0, 1.0 + 1e-9, 1.5, 20.0]
 STEP = [5e-9, 2e-8, 3e-7, 1e-5]  # [s]
 
 
-@pytest.mark.parametrize("step", STEP)
-@pytest.mark.parametrize("zeta", ZETA)
-@pytest.mark.parametrize("omega", OMEGA)
+@each("step", STEP)
+@each("zeta", ZETA)
+@each("omega", OMEGA)
 def test_step_is_the_matrix_exponential(omega, zeta, step):
     P = modal_propagator(np.array([omega]), np.array([zeta]), step)
     x = omega * step  # state (q, q'/omega, f/omega^2): every entry of order one

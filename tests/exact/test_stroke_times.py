@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.analyses.stroke.times import all_lift_times, lift_times
 from klack.case.valve_reader import read_valve_case
@@ -101,7 +102,7 @@ def test_the_first_whole_stroke_counts_not_a_bounce_before_it():
     assert times.closing.touch == 7e-3
 
 
-@pytest.mark.parametrize("seed", range(40))
+@each("seed", range(40))
 def test_every_time_lies_in_the_run_and_closing_follows_opening(seed):
     """Truth: the order of events.  Random motions, most of them closed or open at an end."""
     rng = np.random.default_rng(seed)

@@ -4,6 +4,7 @@ from math import inf
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.network.travel import StopBound, Travel
 
@@ -20,7 +21,7 @@ def drawn(rng: np.random.Generator) -> list[StopBound]:
     ]
 
 
-@pytest.mark.parametrize("seed", range(100))
+@each("seed", range(100))
 def test_the_nearest_stop_is_the_answer_of_the_programme(seed: int):
     rng = np.random.default_rng(seed)
     travel = Travel(drawn(rng))

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-import pytest
+from draws import each
 from ruamel.yaml import YAML
 
 from klack.case import case_schema, read_case
@@ -93,7 +93,7 @@ KEYS = sorted(
 )
 
 
-@pytest.mark.parametrize(("section", "key"), KEYS)
+@each(("section", "key"), KEYS)
 def test_each_key_is_described(section, key):
     node = (SCHEMA if section == "Case" else SCHEMA["$defs"][section])["properties"][key]
     pages = ROOT / "docs" / "reference"

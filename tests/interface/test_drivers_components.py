@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 from pydantic import ValidationError
 
 from klack.errors import InputError
@@ -47,7 +48,7 @@ PEAK_HOLD = {
 }
 
 
-@pytest.mark.parametrize(
+@each(
     ("make", "words"),
     [
         (

@@ -3,6 +3,7 @@
 import warnings
 
 import pytest
+from draws import each
 
 from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.accumulator import Accumulator
@@ -26,7 +27,7 @@ CHECK = {"cracking_pressure": 5e4, "open_pressure": 2e5, "diameter": 5e-3}
 RELIEF = {"set_pressure": 1e7, "rated_pressure": 1.1e7, "rated_flow": 3e-4, "diameter": 5e-3}
 
 
-@pytest.mark.parametrize(
+@each(
     ("build", "text"),
     [
         (lambda: CheckValve(**{**CHECK, "open_pressure": 5e4}), "more than the cracking pressure"),

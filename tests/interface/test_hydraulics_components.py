@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.errors import InputError
 from klack.hydraulics.annulus import Annulus
@@ -23,7 +24,7 @@ CONE = {"shape": "cone", "diameter": 1.5e-3, "half_angle": 0.8}
 HEPTANE = library_fluid("n-heptane").at(293.15)
 
 
-@pytest.mark.parametrize(
+@each(
     ("build", "text"),
     [
         (lambda: Orifice(), "exactly one of diameter, area"),

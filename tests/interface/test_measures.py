@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from draws import each
 
 from klack.analyses.catalogue import ANALYSES, analyses
 from klack.analyses.json_results import result_schema
@@ -15,7 +16,7 @@ MEASURES = {of: found for a in analyses() for of, found in a.measures.items()}
 EVERY = [(of, item) for of, measures in MEASURES.items() for item in measures]
 
 
-@pytest.mark.parametrize(("of", "measure"), EVERY, ids=lambda x: getattr(x, "key", str(x)))
+@each(("of", "measure"), EVERY)
 def test_a_measure_is_described_whole(of: str, measure: Measure):
     assert re.fullmatch(r"[a-z0-9_]+", measure.key)
     assert measure.definition.endswith(".")

@@ -1,6 +1,7 @@
 """Faulty Abaqus files: the error names file and line, what came, what was expected."""
 
 import pytest
+from draws import each
 
 from klack.errors import InputError
 from klack.mesh.files.abaqus.reader import read_abaqus
@@ -153,7 +154,7 @@ FAULTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("text", "message"), FAULTS.values(), ids=FAULTS.keys())
+@each(("text", "message"), FAULTS.values())
 def test_fault_is_located(tmp_path, text, message):
     (tmp_path / "x.inp").write_text(text)
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import ClassVar
 
 import pytest
+from draws import each
 
 from klack.errors import ConvergenceError, InputError
 from klack.hydraulics.chamber import Chamber
@@ -225,7 +226,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("name", WRONG)
+@each("name", WRONG)
 def test_what_is_wrong_is_said_once_and_clearly(name):
     parts, connections, got, hint = WRONG[name]
 

@@ -11,6 +11,7 @@ from pkgutil import iter_modules
 from typing import Any
 
 import pytest
+from draws import each
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 
@@ -181,7 +182,7 @@ def test_components_made_in_python_pass_through():
     assert read_component(spring) is spring
 
 
-@pytest.mark.parametrize("word", type_words())
+@each("word", type_words())
 def test_every_registered_type_is_documented(word):
     found = component_class(word)
 

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from draws import each
 
 from klack import units
 from klack.errors import InputError
@@ -41,7 +42,7 @@ GOOD = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "text", "expected"), GOOD, ids=[f"{k} {t}" for k, t, _ in GOOD])
+@each(("kind", "text", "expected"), GOOD)
 def test_quantity_becomes_si(kind, text, expected):
     assert parse_quantity(text, getattr(units, kind)) == pytest.approx(expected, rel=1e-14)
 
@@ -88,7 +89,7 @@ BAD = [
 ]
 
 
-@pytest.mark.parametrize(("kind", "value", "words"), BAD, ids=[f"{k} {v}" for k, v, _ in BAD])
+@each(("kind", "value", "words"), BAD)
 def test_what_is_no_such_quantity_is_refused(kind, value, words):
     with pytest.raises(InputError) as caught:
         parse_quantity(value, getattr(units, kind), "gap")

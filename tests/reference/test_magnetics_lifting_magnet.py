@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.magnetics.lifting_magnet import lifting_magnet
 from klack.magnetics.static import static_state
@@ -23,7 +24,7 @@ def test_table_is_whole():
     assert published.FORCE[0] == pytest.approx(-85.8619)
 
 
-@pytest.mark.parametrize("point", range(20))
+@each("point", range(20))
 def test_force_and_inductance(states, point):
     _, state = states[point]
 
@@ -32,7 +33,7 @@ def test_force_and_inductance(states, point):
     assert state.inductance == pytest.approx(published.INDUCTANCE[point], rel=0.06)
 
 
-@pytest.mark.parametrize("point", range(20))
+@each("point", range(20))
 def test_armature_flux(states, point):
     circuit, state = states[point]
     armature = [circuit.branch_index(f"core {k}") for k in (4, 5)]

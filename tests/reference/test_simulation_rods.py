@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.contact.laws import HertzLaw, LinearLaw
 from klack.contact.restitution import measure_impact
@@ -40,7 +41,7 @@ MODAL = [row for row in rows("modal_convergence_rod_impact.csv") if row[2] != "s
 MODAL = [row for row in MODAL if row[2] != "resid1"]
 
 
-@pytest.mark.parametrize("row", MODAL, ids=lambda row: "-".join(row[:3]))
+@each("row", MODAL)
 def test_truncated_rod_on_a_spring(row):
     kappa, modes, basis = float(row[0]), int(row[1]), row[2]
     restitution, peak, separation = float(row[3]), float(row[5]), float(row[7])

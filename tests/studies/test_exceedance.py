@@ -4,6 +4,7 @@ from math import comb, fsum
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.errors import InputError
 from klack.studies.exceedance import count_exceedance, exceedance_of
@@ -82,8 +83,8 @@ def test_intervals_hold_the_true_probability_as_often_as_stated(probability, run
     assert binomial(exact, runs, probability) >= 0.95
 
 
-@pytest.mark.parametrize("probability", [0.06, 0.5, 0.91, 0.99])
-@pytest.mark.parametrize("runs", [1, 5, 59, 60, 150])
+@each("probability", [0.06, 0.5, 0.91, 0.99])
+@each("runs", [1, 5, 59, 60, 150])
 def test_ranks_of_a_quantile_are_the_narrowest_that_binomials_allow(probability, runs):
     found = sample_quantile(np.arange(1.0, runs + 1.0), probability, confidence=0.9)
     lower = max(

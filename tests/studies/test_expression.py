@@ -5,6 +5,7 @@ import pickle
 import warnings
 
 import pytest
+from draws import each
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
@@ -14,7 +15,7 @@ from klack.expressions.expression import Expression, ordered
 VALUES = {"a": 2.0, "b": 5.0, "c": 0.25}
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "expected"),
     [
         ("2 * a", 4.0),
@@ -98,7 +99,7 @@ def test_an_expression_goes_to_another_process():
     assert copy.value(VALUES) == 4.0
 
 
-@pytest.mark.parametrize(
+@each(
     "text",
     [
         "",
@@ -271,7 +272,7 @@ UNITS = {
 }
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "unit"),
     [
         ("2 * r", "m"),

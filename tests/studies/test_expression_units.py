@@ -6,6 +6,7 @@ import time
 from fractions import Fraction
 
 import pytest
+from draws import each
 
 from klack.errors import InputError
 from klack.expressions.dimension import dimension_of
@@ -99,7 +100,7 @@ def test_thousands_of_valid_expressions_have_their_exact_value_and_dimension():
     assert seen > 3000
 
 
-@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+@each("kind", KINDS)
 def test_a_literal_is_the_quantity_of_a_case_to_the_bit(kind):
     rng = random.Random(3)
     for unit in kind.common:
@@ -114,7 +115,7 @@ def test_a_literal_is_the_quantity_of_a_case_to_the_bit(kind):
             assert found.unit({}).fits(kind.unit), text
 
 
-@pytest.mark.parametrize(
+@each(
     ("text", "value", "unit"),
     [
         ("2 * 0.3 mm + 10 um", 6.1e-4, "m"),
@@ -272,7 +273,7 @@ def _computed(text: str) -> float:
     return found.value({})
 
 
-@pytest.mark.parametrize("text", HOSTILE, ids=range(len(HOSTILE)))
+@each("text", HOSTILE)
 def test_hostile_text_is_one_error_at_once(text):
     begin = time.process_time()
     with pytest.raises(InputError) as caught:

@@ -9,6 +9,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from draws import each
 
 from klack.errors import InputError
 from klack.studies.screening import elementary_effects, morris_design
@@ -34,8 +35,8 @@ def morris_function(x, seed):
     return y
 
 
-@pytest.mark.parametrize("seed", range(5))
-@pytest.mark.parametrize("candidates", [None, 100])
+@each("seed", range(5))
+@each("candidates", [None, 100])
 def test_groups_of_the_function_of_morris_are_found(seed, candidates):
     points = morris_design(20, 10, seed, candidates=candidates)
     found = elementary_effects(points, morris_function(points, seed))

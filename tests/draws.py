@@ -1,0 +1,35 @@
+"""One test for many draws: as many truths, one thing to collect."""
+
+import inspect
+from collections.abc import Callable, Iterable
+from functools import wraps
+from typing import Any
+
+Test = Callable[..., None]
+
+
+def each(names: str | tuple[str, ...], values: Iterable[Any]) -> Callable[[Test], Test]:
+    """Repeat a test for all values of an argument, or of several; a failure names the values.
+
+    For calculations of milliseconds, where ``pytest.mark.parametrize`` costs as much as the test;
+    all values share the fixtures of the one test.
+    """
+    keys = (names,) if isinstance(names, str) else names
+    draws = [dict(zip(keys, (x,) if isinstance(names, str) else x, strict=True)) for x in values]
+
+    def of(test: Test) -> Test:
+        @wraps(test)
+        def for_each(**given: Any) -> None:
+            for draw in draws:
+                try:
+                    test(**given, **draw)
+                except BaseException as error:
+                    error.add_note(f"with {draw}")
+                    raise
+
+        own = inspect.signature(test)
+        left = [given for name, given in own.parameters.items() if name not in keys]
+        for_each.__signature__ = own.replace(parameters=left)  # type: ignore[attr-defined]
+        return for_each
+
+    return of
