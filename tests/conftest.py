@@ -1,6 +1,7 @@
 """A small FMU that the tests of several folders need."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -39,10 +40,17 @@ def computes() -> Iterator[None]:
         yield
 
 
+ALL_SLOW = re.compile(r"^pytestmark = (?:\[[^]]*)?pytest\.mark\.slow", re.MULTILINE)
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out files without a slow test where only those run: importing them takes as long."""
-    file = collection_path.name.startswith("test_") and config.option.markexpr == "slow"
-    return True if file and "mark.slow" not in collection_path.read_text("utf-8") else None
+    """Leave out files without a test of this tier: importing them takes as long as many tests."""
+    tier = config.option.markexpr
+    if tier not in ("slow", "not slow") or not collection_path.name.startswith("test_"):
+        return None
+    text = collection_path.read_text("utf-8")
+    empty = "mark.slow" not in text if tier == "slow" else ALL_SLOW.search(text)
+    return True if empty else None
 
 
 def pytest_unconfigure() -> None:

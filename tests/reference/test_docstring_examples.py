@@ -6,6 +6,7 @@ when their turn comes: klack has ten times as many.
 
 import doctest
 import importlib
+import re
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ SOURCE = Path(__file__).parents[2] / "src"
 MODULES = [
     ".".join(path.relative_to(SOURCE).with_suffix("").parts)
     for path in sorted((SOURCE / "klack").rglob("*.py"))
-    if any(line.lstrip().startswith(">>>") for line in path.read_text("utf-8").splitlines())
+    if re.search(r"^ *>>> ", path.read_text("utf-8"), re.MULTILINE)
 ]
 
 

@@ -38,11 +38,12 @@ def test_the_page_is_fresh(name):
 
 
 @pytest.mark.parametrize(
-    ("name", "schema"), [("case-keys", case_schema()), ("valve-keys", valve_case_schema())]
+    ("name", "make"), [("case-keys", case_schema), ("valve-keys", valve_case_schema)]
 )
-def test_every_key_of_every_section_has_its_row(name, schema):
+def test_every_key_of_every_section_has_its_row(name, make):
     text = (DOCS / "reference" / f"{name}.md").read_text(encoding="utf-8")
     rows = re.findall(r"^\| `([^`]+)` \|", text, re.MULTILINE)
+    schema = make()
     sections = [schema, *schema["$defs"].values()]
 
     assert len(rows) >= sum(len(section["properties"]) for section in sections)
