@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from klack.analyses.impact.content import report_content
-from klack.analyses.impact.friction_figure import friction_views
+from klack.analyses.impact.pressure_view import friction_views
 from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
 from klack.errors import InputError

@@ -122,8 +122,10 @@ _EMPTY = Content(
 )
 
 
-def test_a_figure_is_drawn_once_and_the_pages_are_set_once(monkeypatch):
-    """``savefig`` would draw a figure twice: one with a layout first for its layout alone."""
+@pytest.mark.parametrize("store", ["off", "new"])
+def test_a_figure_is_drawn_once_and_the_pages_are_set_once(store: str, tmp_path, monkeypatch):
+    """``savefig`` would draw one with a layout twice; the cache gives it back bit by bit."""
+    monkeypatch.setenv("KLACK_CACHE", "off" if store == "off" else str(tmp_path / store))
     calls = Counter()
 
     def counted(function, name):
@@ -135,6 +137,10 @@ def test_a_figure_is_drawn_once_and_the_pages_are_set_once(monkeypatch):
 
     monkeypatch.setattr(Axes, "draw", counted(Axes.draw, "drawn"))
     monkeypatch.setattr(typst, "compile", counted(typst.compile, "set"))
-    render_pdf(one_chart_each(3, panels=2))
+    first = render_pdf(one_chart_each(1, panels=3))
+    assert calls == {"drawn": 3, "set": 1}
 
-    assert calls == {"drawn": 6, "set": 1}
+    assert render_pdf(one_chart_each(1, panels=3)) == first
+    assert calls == {"drawn": 6 if store == "off" else 3, "set": 2}
+    render_pdf(one_chart_each(1, panels=2))  # another one
+    assert calls["drawn"] == (8 if store == "off" else 5)

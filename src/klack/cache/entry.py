@@ -32,7 +32,14 @@ from numpy.typing import NDArray
 
 from klack.own_file import SAFELY, caller
 
-__all__ = ["DamagedEntry", "Entry", "read_entry", "write_entry"]
+__all__ = [
+    "DamagedEntry",
+    "Entry",
+    "bytes_of_entry",
+    "entry_of_bytes",
+    "read_entry",
+    "write_entry",
+]
 
 _MAGIC = b"klack cache 1\n  "
 _TYPES = ("<f8", "<f4", "<i8", "<i4", "<c16", "|b1", "|u1")
@@ -57,6 +64,16 @@ class Entry:
 
     arrays: Mapping[str, NDArray[Any]]
     text: str = ""
+
+
+def entry_of_bytes(content: bytes) -> Entry:
+    """Entry of a file or text that is no array."""
+    return Entry(arrays={"bytes": np.frombuffer(content, dtype=np.uint8)})
+
+
+def bytes_of_entry(entry: Entry) -> bytes:
+    """Content of :func:`entry_of_bytes`."""
+    return entry.arrays["bytes"].tobytes()
 
 
 def write_entry(file: IO[bytes], key: str, entry: Entry) -> None:

@@ -9,10 +9,14 @@ import gzip
 from base64 import b64encode
 from functools import cache
 from pathlib import Path
+from zlib import ZLIB_RUNTIME_VERSION
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
+from klack.cache.entry import bytes_of_entry, entry_of_bytes
+from klack.cache.remember import remembered
+from klack.cache.setting import result_cache
 from klack.report.interactive import figure_of
 from klack.report.page import Content
 from klack.report.spoken import spoken
@@ -46,5 +50,13 @@ def render_html(content: Content) -> str:
 @cache
 def _plotly() -> dict[str, str]:
     """Version and packed text of the library; the same bytes every time."""
-    packed = gzip.compress(get_plotlyjs().encode(), mtime=0)
-    return {"version": get_plotlyjs_version(), "packed": b64encode(packed).decode()}
+    version = get_plotlyjs_version()
+    packed = remembered(
+        result_cache(),
+        "plotly",
+        (version, ZLIB_RUNTIME_VERSION),
+        lambda: gzip.compress(get_plotlyjs().encode(), mtime=0),
+        pack=entry_of_bytes,
+        unpack=bytes_of_entry,
+    )
+    return {"version": version, "packed": b64encode(packed).decode()}

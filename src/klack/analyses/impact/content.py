@@ -1,7 +1,8 @@
 """Content of an impact report before its layout: the same texts for screen and paper.
 
 Everything here is plain text; each renderer escapes it in its own way, because titles, names and
-the text of the case come from the user.
+the text of the case come from the user.  Pictures are imported where there are any: matplotlib
+takes half a second.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,15 +16,11 @@ from klack.analyses.impact.estimate_wording import (
     estimate_sentence,
 )
 from klack.analyses.impact.figures import charts
-from klack.analyses.impact.friction_figure import friction_figure, friction_views
 from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
-from klack.analyses.impact.pressure_figure import pressure_figure
-from klack.analyses.impact.pressure_view import study_views
+from klack.analyses.impact.pressure_view import friction_views, study_views
 from klack.analyses.impact.pressure_wording import pressure_rows
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.running_in import running_in_columns, running_in_rows
-from klack.analyses.impact.section_figure import section_figure
-from klack.analyses.impact.solid_figure import in_space, solid_figure
 from klack.analyses.impact.summary import GAUGE_COLUMNS, gauge_rows, no_estimate
 from klack.analyses.impact.wording import answer, leaves_axis
 from klack.analyses.measures import Measure, glossary
@@ -129,9 +126,11 @@ def _next_steps(study: ImpactStudy) -> list[NextStep]:
 def _bodies_in_space(study: ImpactStudy) -> Section:
     """Picture of solids; without what it shows, why there is none; empty for others."""
     title = "The bodies in space"
-    if not in_space(study):
+    if not any(body.model == "3-D" and body.elements for body in study.bodies):
         return Section(title=title)
     if study.pictures:
+        from klack.analyses.impact.solid_figure import solid_figure
+
         return Section(title=title, picture=solid_figure(study))
     text = (
         "No picture: this result holds no surfaces of the bodies. Those of earlier versions have "
@@ -144,6 +143,8 @@ def _bodies_at_peak(study: ImpactStudy) -> Section:
     """Picture of the full order; without it, why there is none."""
     title = "The bodies at peak force"
     if study.sections:
+        from klack.analyses.impact.section_figure import section_figure
+
         return Section(title=title, picture=section_figure(study))
     text = "No picture: the displacement of the whole bodies is only available at level 'full', "
     if "full" in study.failures:
@@ -258,6 +259,8 @@ def _pressure(study: ImpactStudy) -> Section:
     views = study_views(study)
     if not views:
         return Section(title=title)
+    from klack.analyses.impact.pressure_figure import pressure_figure
+
     columns = ("", *(view.title for view in views))
     return Section(
         title=title,
@@ -271,6 +274,8 @@ def _friction(study: ImpactStudy) -> Section:
     views = friction_views(study)
     if not views:
         return Section(title=title)
+    from klack.analyses.impact.friction_figure import friction_figure
+
     rubbing = [r for r in study.ordered if r.energies.get("friction")]
     rows = [
         (

@@ -7,7 +7,6 @@ axis, and round the axis.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from textwrap import fill
 from typing import Any
 
@@ -19,16 +18,14 @@ from numpy.typing import NDArray
 from klack.analyses.impact.contact_map import cell_edges, line_load_weights
 from klack.analyses.impact.pressure_figure import PressureFigure
 from klack.analyses.impact.pressure_view import (
-    PressureView,
+    FrictionView,
     across_window,
     common_cells,
-    pressure_view,
     record_edges,
 )
-from klack.analyses.impact.record import FrictionRecord, ImpactStudy
 from klack.report.printed import STYLE, plain, svg
 
-__all__ = ["FrictionView", "friction_figure", "friction_views"]
+__all__ = ["friction_figure"]
 
 Floats = NDArray[np.float64]
 
@@ -40,24 +37,6 @@ _NOTE = (
     "Friction on the moving body over the most that the pressed points can hold. Dark red: they "
     "slip and friction pushes it {first}; dark blue: {second}; pale: they stick. White: no contact."
 )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class FrictionView:
-    """One run: its pressure and its friction."""
-
-    pressure: PressureView
-    friction: FrictionRecord
-
-
-def friction_views(study: ImpactStudy) -> tuple[FrictionView, ...]:
-    """All levels that resolve friction point by point, as far as they look alike."""
-    found = []
-    for result in study.ordered:
-        view = pressure_view(result.label, result.pressure, result.measures.first_touch)
-        if view is not None and result.pressure is not None and result.pressure.friction:
-            found.append(FrictionView(pressure=view, friction=result.pressure.friction))
-    return tuple(v for v in found if v.pressure.places.shape == found[0].pressure.places.shape)
 
 
 def friction_figure(views: Sequence[FrictionView]) -> PressureFigure:

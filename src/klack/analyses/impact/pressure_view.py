@@ -15,12 +15,14 @@ from klack.analyses.impact.contact_map import (
     line_load_weights,
     map_cells,
 )
-from klack.analyses.impact.record import ImpactStudy, PressureRecord
+from klack.analyses.impact.record import FrictionRecord, ImpactStudy, PressureRecord
 
 __all__ = [
+    "FrictionView",
     "PressureView",
     "across_window",
     "common_cells",
+    "friction_views",
     "line_load",
     "peak_pressure",
     "pressure_view",
@@ -152,3 +154,21 @@ def peak_pressure(view: PressureView, cells: Cells) -> Floats:
     """
     single = np.append(view.force[view.peak] / view.area, 0.0)[cells.owner]
     return np.where(closed(single > 0, cells), averaged(single, cells), 0.0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FrictionView:
+    """One run: its pressure and its friction."""
+
+    pressure: PressureView
+    friction: FrictionRecord
+
+
+def friction_views(study: ImpactStudy) -> tuple[FrictionView, ...]:
+    """All levels that resolve friction point by point, as far as they look alike."""
+    found = []
+    for result in study.ordered:
+        view = pressure_view(result.label, result.pressure, result.measures.first_touch)
+        if view is not None and result.pressure is not None and result.pressure.friction:
+            found.append(FrictionView(pressure=view, friction=result.pressure.friction))
+    return tuple(v for v in found if v.pressure.places.shape == found[0].pressure.places.shape)

@@ -25,7 +25,7 @@ from klack.mesh.skin import Skin
 from klack.report.depth_image import Camera, Quarter, Seen, Window, outlines, seen_of
 from klack.report.printed import STYLE, plain, svg
 
-__all__ = ["SolidFigure", "in_space", "solid_figure"]
+__all__ = ["SolidFigure", "solid_figure"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -64,11 +64,6 @@ class SolidFigure:
 
     image: bytes
     note: str
-
-
-def in_space(study: ImpactStudy) -> bool:
-    """Whether the bodies are solids; axisymmetric ones have their section."""
-    return any(body.model == "3-D" and body.elements for body in study.bodies)
 
 
 def solid_figure(study: ImpactStudy) -> SolidFigure:

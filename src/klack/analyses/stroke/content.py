@@ -26,7 +26,6 @@ from klack.analyses.stroke.loop_figure import loop_chart
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
-from klack.analyses.stroke.ring_figure import line_load_picture
 from klack.analyses.stroke.summary import (
     AXIS_COLUMNS,
     TIME_COLUMNS,
@@ -171,6 +170,8 @@ def _ring_sections(study: StrokeStudy) -> list[Section]:
                 Section(title=f"Line load round the ring, {variant.name}", paragraphs=(text,))
             )
             continue
+        from klack.analyses.stroke.ring_figure import line_load_picture
+
         sections += [
             Section(
                 title=f"Line load round the ring, {variant.name}",

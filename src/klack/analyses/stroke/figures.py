@@ -494,7 +494,8 @@ def mechanical_energy_bars(study: StrokeStudy) -> BarChart | None:
 
     def flows(books: EnergyBooks) -> dict[str, float]:
         everything = _flows(books)
-        circuit = {key for key in everything if key.startswith(coils)}
+        # a list, since the order of a set, and so the last bit of a sum, is another in each process
+        circuit = [key for key in everything if key.startswith(coils)]
         work = sum(everything[key] for key in circuit)
         grouped = {"work of the magnet": work}
         for key, value in everything.items():
