@@ -64,6 +64,7 @@ from klack.elasticity.factorization import Backend, Precision
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.finite import require_finite
 from klack.transient.body_damping import BodyDamping
+from klack.transient.free_flight import KnownBody, open_gaps
 from klack.transient.full_body import FullBody, Scheme
 from klack.transient.result import (
     EnergyRecord,
@@ -96,6 +97,9 @@ _LEARN_STEPS = 60
 _RIM_RESERVE = 1.1
 """Points of a vibrating body travel slightly farther than its centre of mass."""
 
+_LOOK_STEPS = 8
+"""Steps between looks whether bodies that do not touch have parted for good."""
+
 _REVIEW_STEPS = 32
 """Steps between reviews of the watched points."""
 
@@ -125,6 +129,7 @@ def simulate_full_order(
     layer: AsperityLayer | None = None,
     sideways: tuple[float, float] = (0.0, 0.0),
     stop_after_separation: float | None = None,
+    known: Sequence[KnownBody] | None = None,
     energy_interval: int = 10,
     longest_period: float = 0.0,
     backend: Backend = "auto",
@@ -168,6 +173,12 @@ def simulate_full_order(
         Velocity of a along x and y at the start, in addition to ``speed``; of solids only.
     stop_after_separation : float, optional [s]
         End the run early when no point has carried a force for this long after a contact.
+    known : sequence of KnownBody, optional
+        Of body a and, unless it is a rigid wall, body b: with it the steps end where these bodies
+        have parted for good (:mod:`klack.transient.free_flight`), and the rest of the record is
+        their free flight: no force, constant velocities of the centres of mass, gaps without what
+        the known modes leave.  Not with damping, spring, axial force, friction, snapshots or the
+        massless scheme: there every step is taken.
     energy_interval : int
         Steps between entries of the energy record.
     longest_period : float [s]
@@ -252,7 +263,10 @@ def simulate_full_order(
         # products of contact size: more threads only wait for each other, at twice the time
         with threadpool_limits(limits=1, user_api="blas"):
             show = None if snapshots is None else _Show(run, start, snapshots)
-            record = _march(run, steps, stop_after_separation, energy_interval, progress, show)
+            free = known if run.is_free and show is None else None
+            record = _march(
+                run, steps, stop_after_separation, free, energy_interval, progress, show
+            )
         loop_time = perf_counter() - begin - set_up_time
         result = _result(run, record, start, retraction, longest_period, (set_up_time, loop_time))
     history = result.history
@@ -376,6 +390,14 @@ class _Run:
     def margin(self) -> float:
         """Gap [m] below which a point is watched."""
         return _WATCH_STEPS * self.reach_per_step
+
+    @property
+    def is_free(self) -> bool:
+        """Whether nothing but a smooth contact acts on the bodies, all of which have inertia."""
+        alone = all(body.damping is None and body.spring == 0.0 for body in self.bodies)
+        return (
+            alone and self.axial_force == 0.0 and self.rubbing is None and self.scheme != "massless"
+        )
 
     def watch(self, points: NDArray[np.bool_]) -> None:
         """Watch these points from now on."""
@@ -590,11 +612,23 @@ class _Record:
         if force > self.highest:
             self.highest, self.peak = force, [body.u for body in run.bodies]
 
+    def fly(self, run: _Run, gaps: NDArray[np.float64]) -> None:
+        """Go on without contact; ``gaps`` now and after each further step, shape (nc, k + 1)."""
+        further = gaps.shape[1] - 1
+        self.force += [0.0] * further
+        self.gap += np.min(0.5 * (gaps[:, 1:] + gaps[:, :-1]), axis=0).tolist()
+        self.outside += [run.outside] * further
+        self.point_force += [np.zeros(run.count, dtype=np.float32)] * further
+        self.velocity += [self.velocity[-1]] * further
+        reached = run.bodies[0].centre() + self.velocity[-1][0] * further * run.step
+        self.lowest = min(self.lowest, reached)
+
 
 def _march(
     run: _Run,
     steps: int,
     stop_after_separation: float | None,
+    known: Sequence[KnownBody] | None,
     energy_interval: int,
     progress: Callable[[float], None] | None,
     show: Callable[[], None] | None,
@@ -622,6 +656,13 @@ def _march(
             progress(number / steps)
         if record.touched and record.quiet > patience:
             break
+        if known is not None and record.touched and record.quiet % _LOOK_STEPS == 1:
+            gaps = open_gaps(
+                run.bodies, known, run.at_rest, run.y, steps=steps - number, slack=run.margin
+            )
+            if gaps is not None:
+                record.fly(run, gaps)
+                break
     if record.energy_step[-1] != run.steps:
         record.keep_energy(run)
     if progress is not None:

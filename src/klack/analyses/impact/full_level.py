@@ -24,6 +24,7 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.loads import face_dashpots
 from klack.progress import Progress
 from klack.transient.body_damping import BodyDamping, body_damping
+from klack.transient.free_flight import KnownBody
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult, Snapshots
 
@@ -47,7 +48,7 @@ def simulate_in_full(
     problem : ContactProblem
     kept : mapping of body name to Modes
         Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
-        there.  Only damped bodies are looked up.
+        there, and they tell when the bodies have parted for good.
     progress : callable
     threads : int or None
     space : ContactSpace, optional
@@ -86,6 +87,7 @@ def simulate_in_full(
             pair.lower_surface,
         ),
         layer=pair.layer,
+        known=_known(problem, kept) if space is problem.space else None,
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,
@@ -167,6 +169,15 @@ def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
         doing=result.rubbing.doing,
         coefficient=case.contact.friction,
     )
+
+
+def _known(problem: ContactProblem, kept: Mapping[str, Modes]) -> list[KnownBody]:
+    """Modes of both bodies, and their compliance at the contact points of the problem."""
+    pair, condensed = problem.pair, problem.condensed
+    return [
+        KnownBody(modes=kept[body.name], compliance=compliance.diagonal())
+        for body, compliance in ((pair.upper, condensed.upper), (pair.lower, condensed.lower))
+    ]
 
 
 def _damping(case: Case, body: ElasticBody, kept: Mapping[str, Modes]) -> BodyDamping | None:
