@@ -1,7 +1,7 @@
 """Elastic modes selected by a case, and kept by its bodies."""
 
 from collections.abc import Mapping
-from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 
 from klack.assembling.problem import ContactProblem, PlacedBodies
 from klack.case.bodies import ModeChoice
@@ -13,6 +13,7 @@ from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes as chosen_modes
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
+from klack.side_by_side import side_by_side
 
 __all__ = [
     "PARTICIPATION_POOL",
@@ -39,42 +40,56 @@ def selection_of(choice: ModeChoice) -> ModeSelection:
     return ByParticipation(choice.participation or 1, choice.pool or 1)
 
 
-def mode_pools(placed: PlacedBodies, *, at_least: int, progress: Progress) -> Mapping[str, Modes]:
-    """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``."""
+def mode_pools(
+    placed: PlacedBodies, *, at_least: int, rough: int = 0, progress: Progress
+) -> Mapping[str, Modes]:
+    """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``.
+
+    With ``rough`` they have so many for an estimate, as of
+    :func:`klack.elasticity.eigen.eigenmodes`.
+    """
     bodies = [placed.pair.upper, placed.pair.lower]
     flexibilities = [placed.flexibility_upper, placed.flexibility_lower]
     if placed.opposite is not None:
         bodies.append(placed.opposite.body)
         flexibilities.append(placed.opposite.flexibility)
     progress("modes", 0.0)
-    # the triangular solves run outside of the interpreter: two bodies keep two cores busy
-    with ThreadPoolExecutor(max_workers=len(bodies)) as workers:
-        jobs = [
-            workers.submit(
+    pools = side_by_side(
+        [
+            partial(
                 mode_pool,
                 selection_of(placed.case.reduction.choice(body.name)),
                 body,
                 flexibility,
                 at_least=at_least,
+                rough=rough,
             )
             for body, flexibility in zip(bodies, flexibilities, strict=True)
-        ]
-        pools = [job.result() for job in jobs]
+        ],
+        at_once=placed.flexibility_upper.at_once,
+    )
     progress("modes", 1.0)
     return {body.name: pool for body, pool in zip(bodies, pools, strict=True)}
 
 
 def mode_pool(
-    choice: ModeSelection, body: ElasticBody, flexibility: Flexibility, *, at_least: int = 1
+    choice: ModeSelection,
+    body: ElasticBody,
+    flexibility: Flexibility,
+    *,
+    at_least: int = 1,
+    rough: int = 0,
 ) -> Modes:
-    """Elastic modes of a body that a selection can choose from."""
+    """Elastic modes of a body that a selection can choose from, ``rough`` as in mode_pools."""
     count = at_least
     if isinstance(choice, ByCount):
         count = max(count, choice.count)
     elif isinstance(choice, ByParticipation):
         count = max(count, choice.pool)
-    count = min(count, len(body.free) - body.rigid_modes.shape[1])
-    pool = eigenmodes(body, count=count, flexibility=flexibility)
+    else:
+        count = max(count, rough)
+    most = len(body.free) - body.rigid_modes.shape[1]
+    pool = eigenmodes(body, count=min(count, most), rough=min(rough, most), flexibility=flexibility)
     if isinstance(choice, ByFrequency) and pool.frequency[-1] < choice.maximum:
         return eigenmodes(body, max_frequency=choice.maximum, flexibility=flexibility)
     return pool

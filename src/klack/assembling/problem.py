@@ -1,7 +1,7 @@
 """Bodies of a case in their places, and the contact problem of one impact, for all levels."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 from klack.assembling.bodies import BodyPair, build_bodies
 from klack.assembling.candidates import Candidates, CondensedSpace
@@ -28,11 +28,13 @@ from klack.elasticity.statics import Flexibility
 from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, remark
+from klack.side_by_side import share_of, side_by_side
 from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]
 
 _USUAL_MODES = 50  # of a case that asks for a frequency
+_AT_ONCE = 150_000  # degrees of freedom of two bodies whose factors are small beside the memory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -183,13 +185,22 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
     if case.contact.gap is None:
         case = _with_gap(case, _drawn_gap(pair))
     progress("factorise", 0.0)
-    cache = result_cache()
-    upper = Flexibility(
-        pair.upper, threads=threads, cache=cache, budget=_budget(case, pair.upper, progress)
-    )
-    progress("factorise", 0.5)
-    lower = Flexibility(
-        pair.lower, threads=threads, cache=cache, budget=_budget(case, pair.lower, progress)
+    bodies = (pair.upper, pair.lower)
+    # large ones take the memory that is left one after the other, as its plan says
+    at_once = threads != 1 and sum(len(body.free) for body in bodies) <= _AT_ONCE
+    upper, lower = side_by_side(
+        [
+            partial(
+                Flexibility,
+                body,
+                threads=share_of(threads, len(bodies)) if at_once else threads,
+                cache=result_cache(),
+                budget=_budget(case, body, progress),
+                at_once=at_once,
+            )
+            for body in bodies
+        ],
+        at_once=at_once,
     )
     progress("factorise", 1.0)
     return PlacedBodies(

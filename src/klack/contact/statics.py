@@ -16,6 +16,7 @@ of mass, as in a modal model with the rigid mode as one coordinate.
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from klack.elasticity.condensation import condensation_memory
 from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.memory import require_memory
+from klack.side_by_side import side_by_side
 
 __all__ = [
     "COARSE",
@@ -119,10 +121,12 @@ def compliances_of(
         Symmetric; their sum is :func:`contact_compliance`.
     """
     _require_memory(space.G_a, space.G_b)
-    return (
-        flexibility_a.compliance_at(space.G_a, groups),
-        flexibility_b.compliance_at(space.G_b, groups),
+    sides = ((flexibility_a, space.G_a), (flexibility_b, space.G_b))
+    upper, lower = side_by_side(
+        [partial(flexibility.compliance_at, G, groups) for flexibility, G in sides],
+        at_once=flexibility_a.at_once and flexibility_b.at_once,
     )
+    return upper, lower
 
 
 def condensed_compliance(

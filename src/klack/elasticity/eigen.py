@@ -7,7 +7,7 @@ The inverse iteration runs on the static flexibility of the body: of a free body
 with the elastic modes, no shift has to be chosen, and statics and modes share one factorisation.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.linalg
@@ -41,10 +41,13 @@ class Modes:
     shapes : array, shape (n_dof, m) [1/sqrt(kg)]
         Mass-normalised, zero at fixed degrees of freedom, free of rigid motion.  The first
         component of (nearly) the largest magnitude is positive.
+    richer : Modes, optional
+        These and further ones that are not converged, for an estimate.
     """
 
     omega: NDArray[np.float64]
     shapes: NDArray[np.float64]
+    richer: "Modes | None" = None
 
     @property
     def frequency(self) -> NDArray[np.float64]:
@@ -63,6 +66,7 @@ def eigenmodes(
     *,
     count: int | None = None,
     max_frequency: float | None = None,
+    rough: int = 0,
     flexibility: Flexibility | None = None,
     backend: Backend = "auto",
     threads: int | None = None,
@@ -76,6 +80,9 @@ def eigenmodes(
         Number of modes.
     max_frequency : float, optional [Hz]
         All modes up to this frequency; with ``count`` as well, at most so many.
+    rough : int
+        Find so many where that is more than ``count``, those beyond it in the iteration only as
+        far as their frequencies are right to some 1e-4: ``richer`` of the result.
     flexibility : Flexibility, optional
         That of this body, if it is there already: saves its factorisation.
     backend, threads
@@ -88,24 +95,32 @@ def eigenmodes(
         modes of a free body do not lie below 0.1 Hz.
     """
     _check_request(body, count, max_frequency)
-    if count is not None:
-        _require_memory(body, count)
+    total = count if count is None else max(count, rough)
+    if total is not None:
+        _require_memory(body, total)
     rigid_frequencies(body)
+
+    def found(flexibility: Flexibility) -> Modes:
+        shapes = _iterated(flexibility, count, max_frequency, total)
+        return _lowest(body, shapes, total, max_frequency)
+
     if len(body.free) <= _LARGEST_DENSE:
-        return _lowest(body, _dense(body), count, max_frequency)
-    if flexibility is not None:
+        modes = _lowest(body, _dense(body), total, max_frequency)
+    elif flexibility is not None:
         # a pool of more modes is no answer: its first ones differ by 1e-8, the bound of Lanczos
-        return flexibility.remembered(
+        modes = flexibility.remembered(
             "modes",
-            (count, max_frequency),
-            lambda: _lowest(
-                body, _iterated(flexibility, count, max_frequency), count, max_frequency
-            ),
+            (count, max_frequency, total),
+            lambda: found(flexibility),
             lambda modes: Entry(arrays={"omega": modes.omega, "shapes": modes.shapes}),
             lambda entry: Modes(entry.arrays["omega"], entry.arrays["shapes"]),
         )
-    with Flexibility(body, backend=backend, threads=threads) as own:
-        return _lowest(body, _iterated(own, count, max_frequency), count, max_frequency)
+    else:
+        with Flexibility(body, backend=backend, threads=threads) as own:
+            modes = found(own)
+    if count is None or len(modes.omega) <= count:
+        return modes
+    return replace(modes.kept(np.arange(count)), richer=modes)
 
 
 def mode_memory(body: VibratingBody, count: int) -> float:
@@ -199,7 +214,7 @@ def _dense(body: VibratingBody) -> NDArray[np.float64]:
 
 
 def _iterated(
-    flexibility: Flexibility, count: int | None, max_frequency: float | None
+    flexibility: Flexibility, count: int | None, max_frequency: float | None, total: int | None
 ) -> NDArray[np.float64]:
     body = flexibility.body
 
@@ -207,7 +222,7 @@ def _iterated(
         return flexibility.solve(body.M @ X)
 
     def enough(values: NDArray[np.float64]) -> bool:
-        if count is not None and len(values) >= count:
+        if total is not None and len(values) >= total:
             return True
         if max_frequency is None or not len(values):
             return False
@@ -216,7 +231,9 @@ def _iterated(
     start = np.random.default_rng(2024).standard_normal((body.dof_count, _BLOCK))
     most = len(body.free) - body.rigid_modes.shape[1]
     expected = 0 if count is None else _VECTORS_EXPECTED * count + 2 * _BLOCK
-    _, shapes = block_lanczos(operator, body.M, operator(start), enough, most, expected=expected)
+    _, shapes = block_lanczos(
+        operator, body.M, operator(start), enough, most, exact=count, expected=expected
+    )
     return shapes
 
 

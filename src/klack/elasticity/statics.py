@@ -63,6 +63,8 @@ class Flexibility(Closing):
         What has to fit beside the factor.  Where a factor in double precision does not, one in
         single precision is taken and its solutions are refined (pardiso only;
         :mod:`klack.elasticity.refined`).
+    at_once : bool
+        Other bodies may be solved for at the same time: ``threads`` leaves them their cores.
     """
 
     def __init__(
@@ -73,8 +75,9 @@ class Flexibility(Closing):
         threads: int | None = None,
         cache: ResultCache | None = None,
         budget: Budget = WITHOUT,
+        at_once: bool = False,
     ) -> None:
-        self.body, self.cache = body, cache
+        self.body, self.cache, self.at_once = body, cache, at_once
         self._budget = replace(budget, name=budget.name or body.name)
         self._backend, self._threads = backend, threads
         self._factor: Factorization | None = None

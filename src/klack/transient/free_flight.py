@@ -7,8 +7,8 @@ and changes the gap of a row *g* (Cauchy-Schwarz) by no more than
 
 .. math:: |g u| \le \sqrt{2 E c}, \qquad c = g K^+ g^T - \sum_i \frac{(g \varphi_i)^2}{\omega_i^2},
 
-with what the known modes leave of the static compliance.  Before a needle and its seat have moved
-0.1 um apart, this is some 0.01 um.
+with what the known modes leave of the static compliance: 0.1 um for a needle and its seat of 87 000
+unknowns, which part at 0.01 um a step and are let go after 30 steps.
 """
 
 from collections.abc import Sequence

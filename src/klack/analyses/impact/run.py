@@ -44,6 +44,7 @@ from klack.analyses.impact.record import (
 )
 from klack.analyses.impact.running_in import asks_for_more, points_running_in, running_in
 from klack.analyses.impact.section import section_picture
+from klack.analyses.impact.summary import answer_so_far
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
 from klack.analyses.impact.yielding_level import (
@@ -98,6 +99,7 @@ from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, silent
 from klack.reduction.reduce import Correction
+from klack.reduction.structure import Structure
 from klack.reduction.transfer import TransferComparison
 from klack.stages import (
     StageClock,
@@ -211,7 +213,10 @@ def _with_modes(
 ) -> ImpactBodies:
     with collected_warnings() as notes:
         pools = mode_pools(
-            placed, at_least=_modes_needed(placed.case, levels, certify), progress=progress
+            placed,
+            at_least=_modes_needed(placed.case, levels),
+            rough=certificate_modes(placed.case) if certify and _has_reduced(levels) else 0,
+            progress=progress,
         )
     return ImpactBodies(placed=placed, pools=pools, notes=(*before, *notes))
 
@@ -250,15 +255,13 @@ def impact_of_bodies(
     return _study(case, bodies, wanted, certify, begin, clock, None, is_last=False, near=near)
 
 
-def _modes_needed(case: Case, levels: Sequence[str], certify: bool) -> int:
+def _modes_needed(case: Case, levels: Sequence[str]) -> int:
     """Elastic modes of each body that these levels and what they are compared with take."""
     needed = [1]
     if case.run.transfer is not None:
         needed.append(TRANSFER_MODES)
     if "reduced-participation" in levels:
         needed.append(PARTICIPATION_POOL)
-    if certify and any(level.startswith("reduced") for level in levels):
-        needed.append(certificate_modes(case))
     return max(needed)
 
 
@@ -275,68 +278,103 @@ def _study(
     near: Mapping[str, NearLoads] | None = None,
 ) -> ImpactStudy:
     """One impact of these bodies; the last one frees them, and compares its model with others."""
-    pools = bodies.pools
-    attempts = Attempts()
     with collected_warnings() as notes:
-        problem = contact_problem(case, bodies.placed, clock)
-        case = problem.case
-        reduced = [level for level in wanted if level.startswith("reduced")]
+        work = _Work(contact_problem(case, bodies.placed, clock), bodies)
+        work.reduce(wanted, certify, clock)
+        work.run_levels(wanted, clock)
+        if certify and _has_reduced(wanted):
+            work.estimate(clock)
+        work.check_contact()
+        if is_last and work.results and (set(wanted) & {"full"} or case.run.transfer is not None):
+            for line in answer_so_far(work.study((), begin, clock)):
+                clock.remark(line)
+        work.find_structures(near, clock)
+        if is_last:
+            work.compare(clock)
+            work.problem.close()
+        if "full" in wanted:
+            work.run_full(threads, clock)
+        work.attempts.require_one(work.results)
+        work.check_ends()
+    study = work.study(notes, begin, clock)
+    if study.failures:
+        raise IncompleteImpactError(study)
+    return study
+
+
+class _Work:
+    """One impact on its way, the answer first and what only adds to it last."""
+
+    def __init__(self, problem: ContactProblem, bodies: ImpactBodies) -> None:
+        self.problem, self.case, self.bodies, self.pools = (
+            problem,
+            problem.case,
+            bodies,
+            bodies.pools,
+        )
+        self.attempts = Attempts()
+        self.results: dict[str, LevelResult] = {}
+        self.twins: dict[str, ImpactHistory] = {}
+        self.ran: RunningIn | None = None
+        self.certificate = _Certificate()
+        self.classical: LocalStiffness | None = None
+        self.structures: tuple[Structure, ...] = ()
+        self.transfer: tuple[TransferComparison, ...] = ()
+        self.pictures: tuple[BodyPicture, ...] = ()
+        self.sections: tuple[SectionPicture, ...] = ()
+
+    def reduce(self, wanted: Sequence[Level], certify: bool, clock: StageClock) -> None:
+        """Bodies with the modes and the law of the case, elastic or with faces that yield."""
+        problem, pools = self.problem, self.pools
         clock("reduced", 0.0)
         with warnings_of("modes of the case"):
-            preview = own_pair(problem, pools, stiffness=first_stiffness(problem))
-        peak = min(preview.pattern_force, problem.static.max_force)
-        yielding = YieldingFaces.of(
+            self.own = own_pair(problem, pools, stiffness=first_stiffness(problem))
+        self.peak = min(self.own.pattern_force, problem.static.max_force)
+        self.yielding = YieldingFaces.of(
             problem,
             laws=bool({"reduced", "reduced-participation"} & set(wanted)),
-            points="interface" in wanted or (certify and bool(reduced)),
+            points="interface" in wanted or (certify and _has_reduced(wanted)),
             progress=clock,
         )
-        loops, limit = yielding.loops, yielding.limit
-        own, classical = preview, None
-        if isinstance(case.contact.local_law, SubmodelLocalLaw):
-            classical = classical_stiffness(problem, peak)
-            own = own_pair(problem, pools, stiffness=classical.stiffness)
-        elif is_last:
-            what = "the stiffness of the contact zone alone"
-            classical = for_comparison(what, lambda: classical_stiffness(problem, peak))
+        loops = self.yielding.loops
+        if isinstance(self.case.contact.local_law, SubmodelLocalLaw):
+            self.classical = classical_stiffness(problem, self.peak)
+            self.own = own_pair(problem, pools, stiffness=self.classical.stiffness)
         if loops is not None:
             with warnings_of("modes of the case"):
-                own = own_pair(problem, pools, stiffness=first_stiffness(problem), loops=loops)
-        clock("radiating surfaces", 0.0)
-        kept = kept_modes(problem, pools, own.ports)
-        at_once = {
-            "reduced": flat_for_reduced(problem, own),
-            "interface": flat_for_modes(problem, kept.values()),
+                self.own = own_pair(problem, pools, stiffness=first_stiffness(problem), loops=loops)
+        self.kept = kept_modes(problem, pools, self.own.ports)
+        self.flat = {
+            "reduced": flat_for_reduced(problem, self.own),
+            "interface": flat_for_modes(problem, self.kept.values()),
         }
-        structures = impact_structures(problem, pools, own, near)
-        clock("radiating surfaces", 1.0)
+
+    def run_levels(self, wanted: Sequence[Level], clock: StageClock) -> None:
+        """All levels but the full order."""
         clock("reduced", 0.5)
-        results: dict[str, LevelResult] = {}
-        twins: dict[str, ImpactHistory] = {}
+        loops = self.yielding.loops
         for level in wanted:
             if level == "lumped":
-                with attempts.at(level):
-                    results[level] = run_lumped(problem)
+                with self.attempts.at(level):
+                    self.results[level] = run_lumped(self.problem)
             elif level.startswith("reduced"):
-                with attempts.at(level), warnings_of(f"level '{level}'"):
-                    pair = own if level == "reduced" else _variant(level, problem, pools, loops)
-                    setup = clock.spent((*_SET_UP, *(["faces that yield"] if pair.yields else [])))
-                    results[level] = _run_variant(case, level, pair, setup_time=setup)
-                    results[level] = with_reduced_gauges(results[level], problem, pair)
-                    if pair.yields:
-                        twins[level] = elastic_twin(problem, pair)
-                        tell_yield(results[level], twins[level], _surfaces(case))
-                        assert loops is not None
-                        results[level] = doubt_large_strain(results[level], loops)
-        ran = running_in(case, own, loops) if loops is not None and "reduced" in results else None
+                with self.attempts.at(level), warnings_of(f"level '{level}'"):
+                    self._run_reduced(level, clock)
+        if loops is not None and "reduced" in self.results:
+            self.ran = running_in(self.case, self.own, loops)
         clock("reduced", 1.0)
         if "interface" in wanted:
-            with attempts.at("interface"), warnings_of("level 'interface'"):
-                results["interface"], at_points = _run_interface(
-                    problem, pools, own, limit, clock, is_first=not twins
+            with self.attempts.at("interface"), warnings_of("level 'interface'"):
+                self.results["interface"], at_points = _run_interface(
+                    self.problem,
+                    self.pools,
+                    self.own,
+                    self.yielding.limit,
+                    clock,
+                    is_first=not self.twins,
                 )
-                ran = ran or at_points
-        if ran is None and asks_for_more(case):
+                self.ran = self.ran or at_points
+        if self.ran is None and asks_for_more(self.case):
             warnings.warn(
                 "run.impacts: all impacts are like the first, for no level with yield was computed "
                 "or nothing yields. Try: level reduced (bodies in the meridian plane) or "
@@ -344,96 +382,130 @@ def _study(
                 AccuracyWarning,
                 stacklevel=2,
             )
-        certificate = None
-        if certify and reduced:
-            certificate = for_comparison(
-                "the error estimate",
-                lambda: _certificate(
-                    problem, pools, results, twins, None if twins else limit, clock
-                ),
-            )
-        certificate = certificate or _Certificate()
-        transfer: tuple[TransferComparison, ...] = ()
-        if is_last and case.run.transfer is not None:
+
+    def _run_reduced(self, level: str, clock: StageClock) -> None:
+        problem, loops = self.problem, self.yielding.loops
+        pair = self.own if level == "reduced" else _variant(level, problem, self.pools, loops)
+        setup = clock.spent((*_SET_UP, *(["faces that yield"] if pair.yields else [])))
+        result = _run_variant(self.case, level, pair, setup_time=setup)
+        self.results[level] = with_reduced_gauges(result, problem, pair)
+        if pair.yields:
+            self.twins[level] = elastic_twin(problem, pair)
+            tell_yield(self.results[level], self.twins[level], _surfaces(self.case))
+            assert loops is not None
+            self.results[level] = doubt_large_strain(self.results[level], loops)
+
+    def estimate(self, clock: StageClock) -> None:
+        """Errors of the reduced levels."""
+        limit = None if self.twins else self.yielding.limit
+        richer = {name: pool.richer or pool for name, pool in self.pools.items()}
+        found = for_comparison(
+            "the error estimate",
+            lambda: _certificate(self.problem, richer, self.results, self.twins, limit, clock),
+        )
+        self.certificate = found or self.certificate
+
+    def check_contact(self) -> None:
+        """Mesh and law of the contact under the highest load."""
+        worn = self.case.contact.worn
+        static, loaded = _as_loaded(self.problem, self.results, self.peak)
+        self.check = check_contact(
+            self.case,
+            self.problem.pair,
+            static,
+            loaded,
+            _surfaces(self.case),
+            worn_by=0.0 if worn is None else worn.force,
+            has_yield=self.yielding.limit is not None or self.yielding.loops is not None,
+        )
+
+    def find_structures(self, near: Mapping[str, NearLoads] | None, clock: StageClock) -> None:
+        """Held bodies, for their sound."""
+        clock("radiating surfaces", 0.0)
+        self.structures = impact_structures(self.problem, self.pools, self.own, near)
+        clock("radiating surfaces", 1.0)
+
+    def compare(self, clock: StageClock) -> None:
+        """What the levels are only compared with, and pictures; failures cost nothing else."""
+        problem, pools, own = self.problem, self.pools, self.own
+        if self.classical is None:
+            clock("classical stiffness", 0.0)
+            what = "the stiffness of the contact zone alone"
+            self.classical = for_comparison(what, lambda: classical_stiffness(problem, self.peak))
+        if self.case.run.transfer is not None:
             found = for_comparison(
                 "the comparison of transfer functions",
                 lambda: compare_transfer(problem, pools, own.ports, progress=clock),
             )
-            transfer = found or ()
-        pictures: tuple[BodyPicture, ...] = ()
-        if is_last:
-            clock("picture", 0.0)
-            drawn = for_comparison(
-                "the picture of the bodies",
-                lambda: _pictures(problem, pools, own, results.get("reduced")),
-            )
-            pictures = drawn or ()
-            clock("picture", 1.0)
-        worn = case.contact.worn
-        static, loaded = _as_loaded(problem, results, peak)
-        check = check_contact(
-            case,
-            problem.pair,
-            static,
-            loaded,
-            _surfaces(case),
-            worn_by=0.0 if worn is None else worn.force,
-            has_yield=limit is not None or loops is not None,
+            self.transfer = found or ()
+        clock("picture", 0.0)
+        drawn = for_comparison(
+            "the picture of the bodies",
+            lambda: _pictures(problem, pools, own, self.results.get("reduced")),
         )
-        if is_last:
-            problem.close()
-        sections: tuple[SectionPicture, ...] = ()
-        if "full" in wanted:
-            with attempts.at("full"), warnings_of("level 'full'"):
-                results["full"], run = run_full(
-                    problem,
-                    pools,
-                    kept=kept,
-                    progress=clock,
-                    threads=threads,
-                )
-                sections = _sections(problem, run)
-                pictures = _with_full_stress(problem, run, pictures)
-        attempts.require_one(results)
-        check = ends_reached(check, problem.pair, problem.space, results, _surfaces(case))
-    results = doubt_modal_levels(results, **at_once)
-    if not twins:
-        _take_better(results, certificate)
-    has_yield = [*twins, *(["interface"] if limit is not None else [])]
-    results = doubt_elastic_levels(results, has_yield)
-    reference = next((n for n in twins if not results[n].doubts), best_level(results))
-    compared = deviations(results, reference)
-    missing = failure_notes(attempts.texts)
-    study = ImpactStudy(
-        **case_fields(case),
-        speed=case.motion.speed,
-        gap=case.contact.gap or 0.0,
-        **run_fields(begin, clock),
-        bodies=_summaries(problem, own),
-        contact=_contact_summary(problem, check),
-        law=_law_summary(own, classical, peak),
-        levels=results,
-        reference=reference,
-        deviations=compared,
-        transfer=transfer,
-        sections=sections,
-        pictures=pictures,
-        warnings=(
-            *missing,
-            *dict.fromkeys([*bodies.notes, *notes]),
-            *trust_notes(results, reference, compared),
-        ),
-        failures=attempts.texts,
-        running_in=ran,
-        estimates=certificate.estimates,
-        estimate_basis=certificate.basis,
-        estimate_spread=certificate.spread,
-        estimate_doubt=certificate.doubt,
-        structures=structures,
-    )
-    if study.failures:
-        raise IncompleteImpactError(study)
-    return study
+        self.pictures = drawn or ()
+        clock("picture", 1.0)
+
+    def run_full(self, threads: int | None, clock: StageClock) -> None:
+        """Every degree of freedom; the static solutions are gone by then."""
+        problem = self.problem
+        with self.attempts.at("full"), warnings_of("level 'full'"):
+            self.results["full"], run = run_full(
+                problem, self.pools, kept=self.kept, progress=clock, threads=threads
+            )
+            self.sections = _sections(problem, run)
+            self.pictures = _with_full_stress(problem, run, self.pictures)
+
+    def check_ends(self) -> None:
+        """Whether a level has run over the end of a surface."""
+        problem = self.problem
+        self.check = ends_reached(
+            self.check, problem.pair, problem.space, self.results, _surfaces(self.case)
+        )
+
+    def study(self, notes: Sequence[str], begin: float, clock: StageClock) -> ImpactStudy:
+        """What is there so far, with the best of its levels as the answer."""
+        case, certificate = self.case, self.certificate
+        results = doubt_modal_levels(self.results, **self.flat)
+        if not self.twins:
+            _take_better(results, certificate)
+        has_yield = [*self.twins, *(["interface"] if self.yielding.limit is not None else [])]
+        results = doubt_elastic_levels(results, has_yield)
+        sound = (name for name in self.twins if not results[name].doubts)
+        reference = next(sound, best_level(results))
+        compared = deviations(results, reference)
+        failures = self.attempts.texts
+        return ImpactStudy(
+            **case_fields(case),
+            speed=case.motion.speed,
+            gap=case.contact.gap or 0.0,
+            **run_fields(begin, clock),
+            bodies=_summaries(self.problem, self.own),
+            contact=_contact_summary(self.problem, self.check),
+            law=_law_summary(self.own, self.classical, self.peak),
+            levels=results,
+            reference=reference,
+            deviations=compared,
+            transfer=self.transfer,
+            sections=self.sections,
+            pictures=self.pictures,
+            warnings=(
+                *failure_notes(failures),
+                *dict.fromkeys([*self.bodies.notes, *notes]),
+                *trust_notes(results, reference, compared),
+            ),
+            failures=failures,
+            running_in=self.ran,
+            estimates=certificate.estimates,
+            estimate_basis=certificate.basis,
+            estimate_spread=certificate.spread,
+            estimate_doubt=certificate.doubt,
+            structures=self.structures,
+        )
+
+
+def _has_reduced(levels: Sequence[str]) -> bool:
+    return any(level.startswith("reduced") for level in levels)
 
 
 def _require_time_to_touch(case: Case, gap: float | None) -> None:

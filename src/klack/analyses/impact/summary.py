@@ -30,6 +30,7 @@ __all__ = [
     "DeviationJson",
     "ImpactJson",
     "answer_line",
+    "answer_so_far",
     "estimate_lines",
     "gauge_rows",
     "gauge_text",
@@ -215,6 +216,13 @@ def answer_line(study: ImpactStudy) -> str:
         f"{contacts}; {touch}, "
         f"{100 * m.restitution:.2f} % of it after the impact."
     )
+
+
+def answer_so_far(study: ImpactStudy) -> tuple[str, ...]:
+    """Lines on a study to which further levels and comparisons are still to come."""
+    line = answer_line(study).replace("Answer", "Answer so far", 1)
+    doubts = (*study.levels[study.reference].doubts, contact_doubt(study.contact))
+    return (line, *filter(None, doubts), *estimate_lines(study))
 
 
 def no_estimate(study: ImpactStudy) -> str:

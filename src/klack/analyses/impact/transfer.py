@@ -1,6 +1,7 @@
 """Transfer functions of both bodies at the contact: full order against reduced."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from klack.reduction.receptance_entry import entry_of_receptance, receptance_of_
 from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount
 from klack.reduction.transfer import TransferComparison, compare_receptances
+from klack.side_by_side import side_by_side
 
 __all__ = ["LOSS_FACTOR", "TRANSFER_COUNTS", "TRANSFER_MODES", "compare_transfer", "sweep_of"]
 
@@ -53,14 +55,18 @@ def compare_transfer(
     Both carry the same structural damping, so that every peak and notch is finite.
     """
     frequencies = sweep_of(problem.case)
-    comparisons = []
     bodies = (
         (problem.pair.upper, problem.flexibility_upper),
         (problem.pair.lower, problem.flexibility_lower),
     )
-    for i, ((body, flexibility), port) in enumerate(zip(bodies, ports, strict=True)):
-        progress("transfer functions", i / 2)
-        comparisons.append(_compare(body, flexibility, pools[body.name], port, frequencies))
+    progress("transfer functions", 0.0)
+    comparisons = side_by_side(
+        [
+            partial(_compare, body, flexibility, pools[body.name], port, frequencies)
+            for (body, flexibility), port in zip(bodies, ports, strict=True)
+        ],
+        at_once=problem.flexibility_upper.at_once,
+    )
     progress("transfer functions", 1.0)
     return tuple(comparisons)
 
