@@ -51,6 +51,25 @@ def test_frequencies_are_those_of_lapack(fixed):
     np.testing.assert_allclose(modes.omega, np.sqrt(squares), rtol=1e-9)
 
 
+@pytest.mark.parametrize("fixed", [False, True])
+def test_modes_for_an_estimate_stop_short_of_round_off(fixed):
+    """Those asked for are as good as ever, and the rest costs fewer solutions."""
+    body = bar(fixed=fixed)
+    exact, solved = eigenmodes(body, count=60), []
+    with Flexibility(body) as flexibility:
+        solve = flexibility.solve
+        flexibility.solve = lambda F: (solved.append(F.shape[1]), solve(F))[1]
+        modes = eigenmodes(body, count=20, rough=60, flexibility=flexibility)
+        found, _ = sum(solved), solved.clear()
+        eigenmodes(body, count=60, flexibility=flexibility)
+    assert modes.omega == pytest.approx(exact.omega[:20], rel=1e-10)
+    assert np.array_equal(modes.richer.omega[:20], modes.omega)
+    assert len(modes.richer.omega) == 60
+    assert modes.richer.omega == pytest.approx(exact.omega, rel=1e-4)
+    assert found < 0.9 * sum(solved)
+    assert exact.richer is None
+
+
 def test_small_bodies_give_all_their_modes():
     """LAPACK path; the sum of static shares of all modes is the flexibility (1e-8: round-off)."""
     mesh = lattice_mesh("hex8", [np.linspace(0, 1e-3, 3)] * 3)

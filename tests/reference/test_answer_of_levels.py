@@ -3,6 +3,7 @@
 A ball on a damped block, on meshes that take seconds.
 """
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from klack.analyses.impact import run as impact
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.summary import answer_line, estimate_lines, study_to_json
-from klack.case.impact_sections import LinearLocalLaw, Spring
+from klack.case.impact_sections import LinearLocalLaw, Spring, TransferSweep
 from klack.case.reader import load_case, read_case
 from klack.case.schema import Case
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
@@ -34,6 +35,53 @@ def with_contact(**contact: object) -> Case:
 @cache
 def both() -> ImpactStudy:
     return run_impact(load_case(CASE), levels=("reduced", "interface", "full"))
+
+
+class Terminal:
+    """What a run shows, in its order: lines, and stages where they begin."""
+
+    def __init__(self) -> None:
+        self.shown: list[str] = []
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        if not self.shown or self.shown[-1] != stage:
+            self.shown.append(stage)
+
+    def remark(self, line: str) -> None:
+        self.shown.append(line)
+
+
+def test_the_answer_comes_before_what_only_adds_to_it():
+    terminal = Terminal()
+    transfer = TransferSweep.model_validate({"from": "2 kHz", "to": "20 kHz", "points": 3})
+
+    study = run_impact(changed(transfer=transfer), levels=("reduced", "full"), progress=terminal)
+
+    (at,) = (i for i, line in enumerate(terminal.shown) if line.startswith("Answer so far"))
+    first = replace(study, levels={"reduced": study.levels["reduced"]}, reference="reduced")
+    expected = answer_line(first).replace("Answer", "Answer so far"), *estimate_lines(study)
+    assert tuple(terminal.shown[at : at + 2]) == expected
+    assert "error estimate" in terminal.shown[:at]
+    later = {"classical stiffness", "transfer functions", "picture", "full order"}
+    assert later <= set(terminal.shown[at:])
+    assert not later & set(terminal.shown[:at])
+    assert len(study.transfer) == 2
+
+
+@pytest.mark.parametrize("levels", [("reduced",), ("full",)])
+def test_an_answer_so_far_is_told_only_where_more_is_to_come(levels):
+    terminal = Terminal()
+    run_impact(load_case(CASE), levels=levels, certify=False, progress=terminal)
+    assert not any(line.startswith("Answer") for line in terminal.shown)
+
+
+def test_bodies_side_by_side_are_those_one_after_the_other():
+    """But for round-off: their factors have other threads."""
+    case = load_case(CASE)
+    one, two = (run_impact(case, levels=("reduced",), threads=n) for n in (1, 2))
+    for name in ("peak_force", "contact_time", "restitution"):
+        values = [getattr(study.levels["reduced"].measures, name) for study in (one, two)]
+        assert values[0] == pytest.approx(values[1], rel=1e-9), name
 
 
 def test_damping_is_that_of_the_case_at_every_level():
