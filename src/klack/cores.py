@@ -1,8 +1,12 @@
-"""Processor cores available to this process."""
+"""Processor cores available to this process, and work that shares them."""
 
 import os
+from collections.abc import Callable, Sequence
+from typing import TypeVar
 
-__all__ = ["available_cores"]
+__all__ = ["available_cores", "share_of", "side_by_side"]
+
+_T = TypeVar("_T")
 
 
 def available_cores() -> int:
@@ -13,3 +17,32 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def share_of(threads: int | None, parts: int) -> int:
+    """Threads of each part; of all cores without a number."""
+    return max(1, (threads or available_cores()) // parts)
+
+
+def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> list[_T]:
+    """Results of independent tasks, in their order.
+
+    Parameters
+    ----------
+    tasks : sequence of callable
+        What takes long in them runs outside of the interpreter: solves and products.
+    at_once : bool
+        One after the other if not, with all threads of BLAS.
+    """
+    if not at_once:
+        return [task() for task in tasks]
+    from concurrent.futures import ThreadPoolExecutor
+
+    from threadpoolctl import threadpool_limits
+
+    with (
+        threadpool_limits(limits=share_of(None, len(tasks)), user_api="blas"),
+        ThreadPoolExecutor(max_workers=len(tasks)) as workers,
+    ):
+        jobs = [workers.submit(task) for task in tasks]
+        return [job.result() for job in jobs]

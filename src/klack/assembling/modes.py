@@ -5,6 +5,7 @@ from functools import partial
 
 from klack.assembling.problem import ContactProblem, PlacedBodies
 from klack.case.bodies import ModeChoice
+from klack.cores import side_by_side
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
@@ -13,7 +14,6 @@ from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes as chosen_modes
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
-from klack.side_by_side import side_by_side
 
 __all__ = [
     "PARTICIPATION_POOL",

@@ -21,6 +21,7 @@ from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
 from klack.contact.worn_faces import opened_by
+from klack.cores import share_of, side_by_side
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
@@ -28,7 +29,6 @@ from klack.elasticity.statics import Flexibility
 from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, remark
-from klack.side_by_side import share_of, side_by_side
 from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]

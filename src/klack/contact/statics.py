@@ -27,11 +27,11 @@ from klack.contact.asperity_layer import AsperityLayer, press
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction, with_still_directions
 from klack.contact.mortar import ContactSpace
+from klack.cores import side_by_side
 from klack.elasticity.condensation import condensation_memory
 from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError, require_positive
 from klack.memory import require_memory
-from klack.side_by_side import side_by_side
 
 __all__ = [
     "COARSE",

@@ -613,7 +613,7 @@ class _Record:
             self.highest, self.peak = force, [body.u for body in run.bodies]
 
     def fly(self, run: _Run, gaps: NDArray[np.float64]) -> None:
-        """Go on without contact; ``gaps`` now and after each further step, shape (nc, k + 1)."""
+        """Continue without contact; ``gaps`` now and after each further step, shape (nc, k + 1)."""
         further = gaps.shape[1] - 1
         self.force += [0.0] * further
         self.gap += np.min(0.5 * (gaps[:, 1:] + gaps[:, :-1]), axis=0).tolist()

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from klack.assembling.problem import ContactProblem
 from klack.case.impact_sections import TransferSweep
 from klack.case.schema import Case
+from klack.cores import side_by_side
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -21,7 +22,6 @@ from klack.reduction.receptance_entry import entry_of_receptance, receptance_of_
 from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount
 from klack.reduction.transfer import TransferComparison, compare_receptances
-from klack.side_by_side import side_by_side
 
 __all__ = ["LOSS_FACTOR", "TRANSFER_COUNTS", "TRANSFER_MODES", "compare_transfer", "sweep_of"]
 
