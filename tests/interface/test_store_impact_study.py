@@ -1,7 +1,7 @@
 """Round trip and damage of stored studies; the truth is the object that was saved."""
 
 import shutil
-from dataclasses import fields, is_dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +11,7 @@ import zarr
 from klack.analyses import store as record_store
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.store import RESULT_NAME
+from klack.analyses.store import RESULT_NAME, RecordFormat, load_record, save_record
 from klack.errors import InputError
 
 
@@ -67,6 +67,46 @@ def test_arrays_carry_units_for_other_readers(impact_study: ImpactStudy, tmp_pat
 
     assert force.attrs["unit"] == "N"
     np.testing.assert_array_equal(force[...], impact_study.levels["full"].history.force)
+
+
+@dataclass(frozen=True)
+class Arrays:
+    """Kinds of numbers that records have."""
+
+    numbers: dict[str, np.ndarray]
+
+
+@pytest.mark.parametrize("most", [1, 40, 1 << 24])
+def test_arrays_of_several_files_come_back_by_zarr(most: int, tmp_path: Path, monkeypatch):
+    monkeypatch.setattr(record_store, "_CHUNK", most)
+    x = np.arange(-5.0, 9.0)
+    numbers = {
+        "double": x,
+        "columns": np.asfortranarray(x.reshape(7, 2)),
+        "single": x.astype(np.float32).reshape(2, 7),
+        "swapped": x.astype(">f8"),
+        "complex": (x - 1j * x).reshape(7, 1, 2),
+        "true": x > 2.0,
+        "short": x.astype(np.int16),
+        "byte": x.astype(np.uint8),
+        "zero": np.array([0.0, -0.0, np.nan]),
+        "none": np.zeros((0, 3)),
+        "hollow": np.zeros((3, 0), dtype=np.int64),
+    }
+    form = RecordFormat(name="arrays", version=1, kind=Arrays, command="none", units={"true": "1"})
+    save_record(Arrays(numbers), tmp_path, form)
+
+    stored = zarr.open_group(tmp_path / RESULT_NAME / "study" / "numbers", mode="r")
+    assert sorted(stored) == sorted(numbers)
+    for name, given in numbers.items():
+        assert stored[name].dtype == given.dtype.newbyteorder("<")
+        assert stored[name][...].tobytes() == given.astype(given.dtype.newbyteorder("<")).tobytes()
+        assert stored[name].shape == given.shape
+    del numbers["swapped"]  # comes back in the order of this machine
+    with pytest.raises(TypeError, match="an array of"):
+        save_record(Arrays({"words": np.array(["a"])}), tmp_path / "words", form)
+    save_record(Arrays(numbers), tmp_path, form)
+    assert_same(load_record(tmp_path, form), Arrays(numbers))
 
 
 def test_saving_again_replaces_the_result(

@@ -15,17 +15,18 @@ from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import cache
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 from urllib.parse import quote
 from zlib import crc32
 
 import numpy as np
-import zarr
 
 from klack.errors import InputError
 from klack.own_file import kind_of
-from klack.uninterrupted import uninterrupted
 from klack.whole_file import completed, in_exchange, whole_file
+
+if TYPE_CHECKING:
+    import zarr
 
 __all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
 
@@ -33,6 +34,7 @@ Found = TypeVar("Found")
 
 RESULT_NAME = "result.zarr"
 _TRIES, _PAUSE = 10, 0.01  # [-], [s]: files move to their place in milliseconds
+_CHUNK = 1 << 24  # [byte] of numbers in a file, before they are packed
 _LARGEST = 4_000_000_000  # bytes; the largest results have some 100 MB
 
 
@@ -71,12 +73,9 @@ def save_record(record: Any, folder: Path, form: RecordFormat) -> Path:
     Path
         Of the store.
     """
-    with whole_file(folder / RESULT_NAME) as new, uninterrupted():  # zarr encodes in threads
-        to = _Written(new)
-        root = zarr.open_group(to.store, mode="w", zarr_format=3)
-        root.attrs.put({"format": form.name, "format_version": form.version})
-        _write(root, "study", record, form, to)
-        to.flush(whole=True)
+    with whole_file(folder / RESULT_NAME) as new:
+        _describe(new, "group", {"format": form.name, "format_version": form.version})
+        _write(new / "study", "study", record, form)
     return folder / RESULT_NAME
 
 
@@ -154,7 +153,9 @@ def stored_format(folder: Path) -> str:
     return _steadily(folder, lambda path: str(_open(path)[1].get("format")))
 
 
-def _open(path: Path) -> tuple[zarr.Group, dict[str, Any]]:
+def _open(path: Path) -> "tuple[zarr.Group, dict[str, Any]]":
+    import zarr  # for reading only
+
     _require_plain_files(path)
     try:
         root = zarr.open_group(path, mode="r", zarr_format=3)
@@ -214,33 +215,58 @@ def _damaged(path: Path, got: str) -> InputError:
 # --------------------------------------------------------------------------- writing
 
 
-class _Written:
-    """A store whose files are written from here, the numbers of one array at a time.
+def _describe(place: Path, kind: str, attributes: Mapping[str, Any], **more: Any) -> None:
+    """Make a node, a group or an array, of its description."""
+    place.mkdir()
+    words = {"attributes": attributes, "zarr_format": 3, "node_type": kind, **more}
+    (place / "zarr.json").write_text(json.dumps(words, indent=2), encoding="utf-8")
 
-    zarr itself takes four times as long: it hands each file of a folder to a thread.
+
+def _write_array(place: Path, value: np.ndarray, attributes: Mapping[str, Any]) -> None:
+    """Store numbers, some rows of the first axis in each file; the last one is filled up.
+
+    Written by hand: zarr hands each file to a thread, and a stroke to the disk in three times as
+    long.
     """
+    from numcodecs.zstd import Zstd
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._files: dict[str, Any] = {}
-        self.store = zarr.storage.MemoryStore(self._files)
+    if value.dtype.kind not in "biufc":
+        raise TypeError(f"store: an array of {value.dtype}")
+    rows = max(1, min(len(value), _CHUNK // max(value[:1].nbytes, 1)))
+    marks = {"crc32": _checksum(value), "stored": _kind(value)}
+    one_byte = value.dtype.itemsize == 1
+    zero = np.zeros((), value.dtype).item()
+    _describe(
+        place,
+        "array",
+        marks | dict(attributes),
+        shape=value.shape,
+        data_type=value.dtype.name,
+        chunk_grid={
+            "name": "regular",
+            "configuration": {"chunk_shape": (rows, *(max(n, 1) for n in value.shape[1:]))},
+        },
+        chunk_key_encoding={"name": "default", "configuration": {"separator": "/"}},
+        fill_value=[0.0, 0.0] if isinstance(zero, complex) else zero,
+        codecs=[
+            {"name": "bytes"} | ({} if one_byte else {"configuration": {"endian": "little"}}),
+            {"name": "zstd", "configuration": {"level": 0, "checksum": False}},
+        ],
+        storage_transformers=[],
+    )
+    for i in range(-(-len(value) // rows) if value.size else 0):
+        part = np.zeros((rows, *value.shape[1:]), value.dtype.newbyteorder("<"))
+        given = value[i * rows : (i + 1) * rows]
+        part[: len(given)] = given
+        file = place.joinpath("c", f"{i}", *("0" for _ in value.shape[1:]))
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_bytes(Zstd(level=0).encode(part))
 
-    def flush(self, *, whole: bool = False) -> None:
-        """Write numbers and let go of them; with ``whole`` also the words, which zarr looks up."""
-        for name in [name for name in self._files if whole or not name.endswith("zarr.json")]:
-            file = self._folder / name
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(self._files.pop(name).to_bytes())
 
-
-def _write(parent: zarr.Group, name: str, value: Any, form: RecordFormat, to: _Written) -> None:
-    """Store a value that is or holds arrays or records as a child of ``parent``."""
+def _write(place: Path, name: str, value: Any, form: RecordFormat) -> None:
+    """Store a value that is or holds arrays or records as a node of this name."""
     if isinstance(value, np.ndarray):
-        attributes: dict[str, Any] = {"crc32": _checksum(value), "stored": _kind(value)}
-        if name in form.units:
-            attributes["unit"] = form.units[name]
-        parent.create_array(name, data=np.ascontiguousarray(value), attributes=attributes)
-        to.flush()
+        _write_array(place, value, {"unit": form.units[name]} if name in form.units else {})
         return
     table = name in form.tables and len(value) > 0
     if table:
@@ -251,18 +277,15 @@ def _write(parent: zarr.Group, name: str, value: Any, form: RecordFormat, to: _W
         members = dict(value)
     else:
         members = {str(i): member for i, member in enumerate(value)}
-    group = parent.create_group(quote(name, safe=" "))
-    plain: dict[str, Any] = {}
-    for key, member in members.items():
-        if _has_arrays(member):
-            _write(group, key, member, form, to)
-        else:
-            plain[key] = _plain(member)
+    children = {key: member for key, member in members.items() if _has_arrays(member)}
+    plain = {key: _plain(member) for key, member in members.items() if key not in children}
     # the order of a mapping is part of it, and a zarr group does not keep it
     order = list(members)
     marks = {"table": True} if table else {}
     check = _words_checksum(plain, order)
-    group.attrs.put({"values": plain, "order": order, "crc32": check, **marks})
+    _describe(place, "group", {"values": plain, "order": order, "crc32": check, **marks})
+    for key, member in children.items():
+        _write(place / quote(key, safe=" "), key, member, form)
 
 
 def _columns(records: Sequence[Any]) -> dict[str, Any]:
@@ -312,8 +335,10 @@ def _words_checksum(values: Mapping[str, Any], order: list[str]) -> int:
 # --------------------------------------------------------------------------- reading
 
 
-def _require_size(root: zarr.Group, largest: int) -> None:
+def _require_size(root: "zarr.Group", largest: int) -> None:
     """Check all sizes before allocating memory: a lost or packed chunk may be large."""
+    import zarr
+
     total = 0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # zarr's, about parts that are lost: reading says it better
@@ -325,7 +350,9 @@ def _require_size(root: zarr.Group, largest: int) -> None:
                 raise _incomplete(f"arrays of more than {largest / 1e9:.3g} GB")
 
 
-def _read(parent: zarr.Group, name: str, hint: Any) -> Any:
+def _read(parent: "zarr.Group", name: str, hint: Any) -> Any:
+    import zarr
+
     node = parent[quote(name, safe=" ")]
     if isinstance(node, zarr.Array):
         values = np.asarray(node[...])
@@ -354,7 +381,7 @@ def _read(parent: zarr.Group, name: str, hint: Any) -> Any:
     return members if _is_mapping(hint) else tuple(members.values())
 
 
-def _read_record(node: zarr.Group, kind: Any, plain: Mapping[str, Any], order: list[str]) -> Any:
+def _read_record(node: "zarr.Group", kind: Any, plain: Mapping[str, Any], order: list[str]) -> Any:
     hints = _hints(kind)
     members = {}
     for field in fields(kind):
@@ -368,7 +395,7 @@ def _read_record(node: zarr.Group, kind: Any, plain: Mapping[str, Any], order: l
 
 
 def _read_table(
-    node: zarr.Group, kind: Any, plain: Mapping[str, Any], order: list[str]
+    node: "zarr.Group", kind: Any, plain: Mapping[str, Any], order: list[str]
 ) -> tuple[Any, ...]:
     columns = {
         name: plain[name] if name in plain else _read(node, name, Any).tolist() for name in order

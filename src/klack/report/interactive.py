@@ -152,7 +152,12 @@ def _has_names(chart: Chart) -> bool:
 
 def _numbers(values: ArrayLike) -> list[float | None]:
     """Six digits are more than a picture can show; gaps become null."""
-    return [float(f"{v:.6g}") if np.isfinite(v) else None for v in np.asarray(values)]
+    array = np.asarray(values)
+    finite = np.isfinite(array).tolist()
+    return [
+        float(f"{v:.6g}") if is_finite else None
+        for v, is_finite in zip(array.tolist(), finite, strict=True)
+    ]
 
 
 def _axis(axis: AxisSpec) -> dict[str, Any]:
