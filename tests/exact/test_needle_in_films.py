@@ -42,6 +42,7 @@ def land(*, lean, step=STEP, series=BULK, sectors=36, speed=1.0, duration=26e-6)
     return v, fly_in_films(model, ROW, q, v, sectors=sectors, **options)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("series", [0.0, BULK])
 @pytest.mark.parametrize("lean", [0.0, 2e-4, 8e-4])
 @pytest.mark.parametrize("duration", [8e-6, 12e-6, 26e-6])
@@ -56,6 +57,7 @@ def test_energy_of_a_landing(lean, series, duration):
     assert np.any(ended.force > 0.0) or duration < 10e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("series", "bound"), [(0.0, 2e-5), (BULK, 5e-3)])
 def test_a_landing_converges_with_the_step(series, bound):
     """Convergence: order 1, since film and contact change places within a step.
@@ -72,6 +74,7 @@ def test_a_landing_converges_with_the_step(series, bound):
     assert series > 0.0 or errors[1] < 0.4 * errors[0]
 
 
+@pytest.mark.slow
 def test_sectors_converge():
     """Convergence: 36 sectors within 0.5 % of 144, as the table of the issue of lands says."""
     _, many = land(lean=8e-4, sectors=144)
@@ -79,6 +82,7 @@ def test_sectors_converge():
     np.testing.assert_allclose(some.v, many.v, atol=5e-3 * np.abs(many.v).max())
 
 
+@pytest.mark.slow
 def test_a_film_rights_a_needle_that_leans():
     """Symmetry: two leans that mirror each other end mirrored, and the film turns them back."""
     model = needle_on_ring(8e-6)

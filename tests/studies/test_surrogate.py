@@ -16,6 +16,7 @@ from klack.studies.surrogate_model import share_estimates
 from klack.studies.surrogate_process import ProcessFit
 
 KINDS = ("polynomial-chaos", "gaussian-process")
+LONG = [KINDS[0], pytest.param(KINDS[1], marks=pytest.mark.slow)]  # seconds of optimisation
 COUNTS = {"polynomial-chaos": 128, "gaussian-process": 200}
 SPREADS = {
     "range": Range(2.0, 5.0),
@@ -108,9 +109,9 @@ def test_a_polynomial_is_reproduced_exactly():
     assert effect == pytest.approx(3.0 + 2.0 * np.sqrt(3.0) * np.array([-1.0, 0.5]), abs=1e-6)
 
 
-@pytest.mark.parametrize(("kind", "count"), [("polynomial-chaos", 128), ("gaussian-process", 200)])
-def test_indices_of_ishigami_are_within_the_stated_error(kind, count):
-    found = fitted(kind, ishigami, 3, count)
+@pytest.mark.parametrize("kind", LONG)
+def test_indices_of_ishigami_are_within_the_stated_error(kind):
+    found = fitted(kind, ishigami, 3, COUNTS[kind])
     assert found.reason == ""
     apart = {"polynomial-chaos": 0.003, "gaussian-process": 0.03}[kind]
     for estimates, exact in zip((found.first, found.total), ISHIGAMI, strict=True):
@@ -119,7 +120,7 @@ def test_indices_of_ishigami_are_within_the_stated_error(kind, count):
         assert estimates.value == pytest.approx(exact, abs=apart)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", LONG)
 def test_indices_of_the_g_function_are_within_the_stated_error(kind):
     """A function with kinks; as those of Saltelli's design with 30 times as many points."""
     found = fitted(kind, g_function, 4, COUNTS[kind])
@@ -161,7 +162,7 @@ def test_stated_residuals_have_not_seen_the_point(fit):
     assert after[7] - before[7] == pytest.approx(0.02, rel=1e-4)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", LONG)
 @pytest.mark.parametrize(("function", "parameters"), [(smooth, 3), (g_function, 4)])
 def test_fresh_points_are_predicted_as_well_as_stated(kind, function, parameters):
     found = fitted(kind, function, parameters, COUNTS[kind])
