@@ -87,7 +87,7 @@ def simulate_in_full(
             pair.lower_surface,
         ),
         layer=pair.layer,
-        known=_known(problem, kept) if space is problem.space else None,
+        known=_known(problem, kept) if space is problem.static.space else None,
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,
@@ -172,7 +172,7 @@ def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:
 
 
 def _known(problem: ContactProblem, kept: Mapping[str, Modes]) -> list[KnownBody]:
-    """Modes of both bodies, and their compliance at the contact points of the problem."""
+    """Modes of both bodies, and their compliance at the points of the static contact."""
     pair, condensed = problem.pair, problem.condensed
     return [
         KnownBody(modes=kept[body.name], compliance=compliance.diagonal())

@@ -306,12 +306,8 @@ class _Work:
     """One impact on its way, the answer first and what only adds to it last."""
 
     def __init__(self, problem: ContactProblem, bodies: ImpactBodies) -> None:
-        self.problem, self.case, self.bodies, self.pools = (
-            problem,
-            problem.case,
-            bodies,
-            bodies.pools,
-        )
+        self.problem, self.bodies = problem, bodies
+        self.case, self.pools = problem.case, bodies.pools
         self.attempts = Attempts()
         self.results: dict[str, LevelResult] = {}
         self.twins: dict[str, ImpactHistory] = {}
