@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
-from klack.transient.interface_arrays import Bore, Modes
+from klack.transient.interface_arrays import Bore, Modes, Step
 
 __all__ = ["GuideRub", "begin_rub", "no_rub", "rub_guide", "stopping_force"]
 
@@ -150,16 +150,7 @@ def begin_rub(bore: Bore, before: Matrix, after: Matrix, rub: GuideRub) -> bool:
 
 
 @inner
-def rub_guide(
-    modes: Modes,
-    share: float,
-    rub: GuideRub,
-    before: Vector,
-    known: Vector,
-    whole: Vector,
-    q: Vector,
-    v: Vector,
-) -> float:
+def rub_guide(modes: Modes, rub: GuideRub, before: Vector, step: Step) -> float:
     """Let friction act on what the other forces make of a step; returns what the spring adds [N].
 
     Called again, after other forces have come, it changes the friction by what they change.
@@ -167,14 +158,13 @@ def rub_guide(
     Parameters
     ----------
     modes : Modes
-    share : float [N/m]
-        Force of the spring per displacement that the step would have without it.
     rub : GuideRub
     before : array, shape (M,)
         Coordinates at the start of the step.
-    known, whole, q, v : array, shape (M,)
+    step : Step
         In and out: modal forces of the step and the state at its end.
     """
+    known, whole, q, v, share = step.known, step.whole, step.q, step.v, step.share
     push, B1, B2 = modes.push, modes.B1, modes.B2
     answer = 0.0
     largest = 0.0

@@ -23,6 +23,7 @@ __all__ = [
     "Closed",
     "ContactPoints",
     "Films",
+    "Grip",
     "Layer",
     "Limit",
     "Modes",
@@ -31,6 +32,7 @@ __all__ = [
     "Record",
     "Rubbing",
     "State",
+    "Step",
     "Worn",
 ]
 
@@ -76,71 +78,50 @@ class Outside(NamedTuple):
 
 
 class Limit(NamedTuple):
-    """Pressure limit of the points, see :mod:`klack.contact.pressure_limit`; empty without."""
+    """Pressure limit of the points, see :mod:`klack.contact.pressure_limit`."""
 
     area: Vector  # (n,) [m^2]; infinite for a point that stays elastic
     set: Vector  # (m,) [m]
     pressure: Vector  # (m,) [Pa]
     softness: Vector  # (m,) [m/Pa] beyond each of them
 
-    @classmethod
-    def none(cls) -> Self:
-        """Return the limit of points that stay elastic."""
-        return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
-
 
 class Layer(NamedTuple):
-    """Layer of asperities on the points, see :mod:`klack.contact.asperity_layer`; empty without."""
+    """Layer of asperities on the points, see :mod:`klack.contact.asperity_layer`."""
 
     area: Vector  # (n,) [m^2]
     closure: Vector  # (m,) [m]
     pressure: Vector  # (m,) [Pa]
     energy: Vector  # (m,) [J/m^2]
 
-    @classmethod
-    def none(cls) -> Self:
-        """Return the layer of smooth points."""
-        return cls(np.zeros(0), np.zeros(0), np.zeros(0), np.zeros(0))
+
+class Grip(NamedTuple):
+    """Friction between the faces at the points."""
+
+    tangents: Matrix  # (ways n, M), ways = d - 1
+    axial: Vector  # (ways n,)
+    static: Vector  # (n,) [-] coefficients of friction
+    kinetic: Vector  # (n,) [-]
+    fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
 
 
 class ContactPoints(NamedTuple):
-    """Points that may close; none in flight, where no contact is looked at."""
+    """Points that may close.
+
+    What they do not have is None: its code is not compiled then.  They have one of it at most.
+    """
 
     A: Matrix  # (d n, d n) [m/N] of ``contact_compliance``; d = 1 without friction
     traces: Matrix  # (n, M)
     gap: Vector  # (n,) [m] at q = 0, of the faces as they are: with their set
     axial: Vector  # (n,)
-    tangents: Matrix  # (ways n, M), ways = d - 1
-    axial_across: Vector  # (ways n,)
-    static: Vector  # (n,) [-] coefficients of friction
-    kinetic: Vector  # (n,) [-]
-    fade: Vector  # (n,) [m] slip within a step over which the first fades to the second
-    limit: Limit  # of points that yield; then A is changed in place
-    layer: Layer  # of rough points
+    grip: Grip | None = None  # of points that rub
+    limit: Limit | None = None  # of points that yield; then A is changed in place
+    layer: Layer | None = None  # of rough points
 
-    @classmethod
-    def frictionless(
-        cls,
-        A: Matrix,
-        traces: Matrix,
-        gap: Vector,
-        axial: Vector,
-        limit: Limit | None = None,
-        layer: Layer | None = None,
-    ) -> Self:
-        """Return points without friction."""
-        nothing, rows = np.zeros(0), np.zeros((0, traces.shape[1]))
-        return cls(
-            *(A, traces, gap, axial, rows, nothing, nothing, nothing, nothing),
-            Limit.none() if limit is None else limit,
-            Layer.none() if layer is None else layer,
-        )
-
-    @classmethod
-    def none(cls, modes: int) -> Self:
-        """Return no point at all."""
-        nothing = np.zeros(0)
-        return cls.frictionless(np.zeros((0, 0)), np.zeros((0, modes)), nothing, nothing)
+    def away(self) -> Self:
+        """Return none of them, as in flight, where no contact is looked at."""
+        return self._replace(A=self.A[:0, :0], traces=self.traces[:0], gap=self.gap[:0])
 
 
 class Bore(NamedTuple):
@@ -351,6 +332,29 @@ class State(NamedTuple):
             np.zeros((heights, 3)),
             np.zeros(_BOOKS),
         )
+
+
+class Step(NamedTuple):
+    """The step that is being taken: forces over it, state at its end."""
+
+    share: float  # [N/m] force of the spring per displacement that the step would have without it
+    known: Vector  # (M,) modal force from outside and from the guide
+    whole: Vector  # (M,) all modal forces
+    kick: Vector  # (M,) the modal force that comes next
+    q: Vector
+    v: Vector
+    open_gap: Vector  # (n,) [m] without contact forces at the end
+    gap: Vector  # (n,) [m]
+    lam: Vector  # (n,) [N]
+    both: Vector  # (n,) [N] sum of the contact forces at both ends
+    normal: Matrix  # (k, 2) [N] of the guide on the shaft
+    dragging: Vector  # (k,) change of the sliding speed per speed that drag has braked [-]
+    free: Vector  # (d n,) [m] gaps and increments of offset without contact forces; friction only
+    motion: Vector  # (d n,) [m] the same with them
+    way: Vector  # (M,) of the modes within the step
+    moved: Vector  # (ways n,) [m] the part of the offsets that the modes move
+    bent: Vector  # (ways n,) [m] the other part, at the end
+    mu: Vector  # (n,) [-]
 
 
 class Record(NamedTuple):

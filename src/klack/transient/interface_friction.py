@@ -18,6 +18,9 @@ The first term is what friction takes.  It has the right sign wherever the slip 
 a right angle within a step; the rest joins the debt of the contact, as the second term does (of
 points that close or open), and is paid by normal forces: friction never pays.  What a payment moves
 closed points by is no slip, but part of their offset *e* from then on.
+
+Points without friction have no ``grip``: what is here does nothing for them then, and is not
+compiled.
 """
 
 import numpy as np
@@ -25,14 +28,22 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import inner
 from klack.simulation.phase import phase
-from klack.transient.interface_arrays import FRICTION, ContactPoints, Record, Rubbing, State
+from klack.transient.interface_arrays import (
+    FRICTION,
+    ContactPoints,
+    Grip,
+    Record,
+    Rubbing,
+    State,
+    Step,
+)
 from klack.transient.rubbing import SLIP, solve_rubbing
 
 __all__ = [
-    "friction_work",
+    "across",
+    "begin_offsets",
+    "forget",
     "held_across",
-    "hold_offsets",
-    "offset_change",
     "push_across",
     "remember",
     "rub",
@@ -49,44 +60,64 @@ small change of the forces to pay it."""
 
 
 @inner
-def offset_change(
-    points: ContactPoints, before: Vector, q: Vector, way: Vector, moved: Vector
-) -> None:
-    """How far the modes move the points across their normals, on their ``way``."""
-    for i in range(len(way)):
-        way[i] = q[i] - before[i]
-    np.dot(points.tangents, way, moved)
+def _offset_change(grip: Grip, before: Vector, step: Step) -> None:
+    """How far the modes move the points across their normals, on their way."""
+    for i in range(len(step.way)):
+        step.way[i] = step.q[i] - before[i]
+    np.dot(grip.tangents, step.way, step.moved)
 
 
 @inner
-def hold_offsets(
-    points: ContactPoints,
-    rubbing: Rubbing,
-    before: Vector,
-    q: Vector,
-    motion: Vector,
-    way: Vector,
-    moved: Vector,
-    bent: Vector,
-) -> None:
+def begin_offsets(grip: Grip | None, state: State, step: Step) -> None:
+    """Offsets at the end of the step as the modes and the law have found them."""
+    if grip is not None:
+        n, rubbing = len(state.rubbing.slip), state.rubbing
+        _offset_change(grip, state.q, step)
+        for i in range(len(step.bent)):
+            step.bent[i] = rubbing.bent[i] + step.motion[n + i] - step.moved[i]
+
+
+@phase
+def forget(grip: Grip | None, rubbing: Rubbing, step: Step) -> None:
+    """Points that have all opened begin anew."""
+    if grip is not None:
+        for i in range(len(step.bent)):
+            step.bent[i] = 0.0
+            rubbing.forces[len(rubbing.slip) + i] = 0.0
+
+
+@inner
+def _hold_offsets(grip: Grip, state: State, step: Step) -> None:
     """Let closed points slip as their law has found, wherever the modes are moved besides.
 
     What moves them after that, the payment of a debt or the guide, joins their offsets, as it does
     the gaps.
     """
-    n = len(rubbing.slip)
-    offset_change(points, before, q, way, moved)
-    for i in range(len(moved)):
+    n, rubbing = len(state.rubbing.slip), state.rubbing
+    _offset_change(grip, state.q, step)
+    for i in range(len(step.moved)):
         if rubbing.forces[i % n] > 0.0:
-            bent[i] = rubbing.bent[i] + motion[n + i] - moved[i]
+            step.bent[i] = rubbing.bent[i] + step.motion[n + i] - step.moved[i]
 
 
 @phase
-def held_across(rubbing: Rubbing, bent: Vector) -> float:
+def across(grip: Grip | None, state: State, step: Step) -> float:
+    """Work of tangential forces, energy that they hold, and what friction takes, in all [J]."""
+    if grip is None:
+        return 0.0
+    _hold_offsets(grip, state, step)
+    given, lost = _friction_work(state.rubbing, step.bent, step.moved)
+    return given + held_across(grip, state.rubbing, step.bent) + lost
+
+
+@phase
+def held_across(grip: Grip | None, rubbing: Rubbing, bent: Vector) -> float:
     """Energy of the contact across the normals at the end of the step [J]."""
-    n, held = len(rubbing.slip), 0.0
-    for i in range(len(bent)):
-        held += 0.5 * rubbing.forces[n + i] * bent[i]
+    held = 0.0
+    if grip is not None:
+        n = len(rubbing.slip)
+        for i in range(len(bent)):
+            held += 0.5 * rubbing.forces[n + i] * bent[i]
     return held
 
 
@@ -105,63 +136,55 @@ def _guess(rubbing: Rubbing) -> None:
 
 
 @inner
-def rub(
-    points: ContactPoints,
-    state: State,
-    q: Vector,
-    open_gap: Vector,
-    free: Vector,
-    motion: Vector,
-    way: Vector,
-    moved: Vector,
-    mu: Vector,
-    tolerance: float,
-) -> int:
-    """Forces of all directions at the end of the step; returns the rounds, 0: none found.
+def rub(points: ContactPoints, grip: Grip, state: State, step: Step, tolerance: float) -> int:
+    """Forces of all directions at the end of the step; returns the rounds, -1: none found.
 
-    ``free`` and ``motion`` become gaps and increments of offset without and with the new forces.
+    Gaps and increments of offset without and with the new forces become known in ``step``.
     """
     n, rubbing = len(points.gap), state.rubbing
-    offset_change(points, state.q, q, way, moved)
+    _offset_change(grip, state.q, step)
     for k in range(n):
-        free[k] = open_gap[k]
+        step.free[k] = step.open_gap[k]
         fall = 1.0
         if rubbing.slip[k] > 0.0:
-            fall = np.exp(-rubbing.slip[k] / points.fade[k]) if points.fade[k] > 0.0 else 0.0
-        mu[k] = points.kinetic[k] + fall * (points.static[k] - points.kinetic[k])
-    for i in range(len(moved)):
-        free[n + i] = moved[i] - rubbing.bent[i]
+            fall = np.exp(-rubbing.slip[k] / grip.fade[k]) if grip.fade[k] > 0.0 else 0.0
+        step.mu[k] = grip.kinetic[k] + fall * (grip.static[k] - grip.kinetic[k])
+    for i in range(len(step.moved)):
+        step.free[n + i] = step.moved[i] - rubbing.bent[i]
     _guess(rubbing)
     rounds = solve_rubbing(
         points.A,
-        free,
-        mu,
+        step.free,
+        step.mu,
         rubbing.closed,
         rubbing.forces,
-        motion,
+        step.motion,
         rubbing.doing,
         _SHARE * tolerance,
     )
     carrying = 0
     for k in range(n):
+        step.lam[k] = rubbing.forces[k]
+        step.gap[k] = step.motion[k]
         if rubbing.forces[k] > 0.0:
             carrying += 1
     state.contact.counts[0] = carrying
-    return int(rounds)
+    return abs(rounds) if rounds != 0 else -1
 
 
 @phase
-def push_across(points: ContactPoints, across: Vector, factor: float, kick: Vector) -> None:
-    """Add the modal force of tangential forces, times a factor."""
-    for i in range(len(across)):
-        if across[i] != 0.0:
-            a = factor * across[i]
-            for j in range(len(kick)):
-                kick[j] += a * points.tangents[i, j]
+def push_across(grip: Grip | None, forces: Vector, first: int, factor: float, kick: Vector) -> None:
+    """Add the modal force of tangential forces, ``first`` and those behind it, times a factor."""
+    if grip is not None:
+        for i in range(len(forces) - first):
+            if forces[first + i] != 0.0:
+                a = factor * forces[first + i]
+                for j in range(len(kick)):
+                    kick[j] += a * grip.tangents[i, j]
 
 
 @phase
-def friction_work(rubbing: Rubbing, bent: Vector, moved: Vector) -> tuple[float, float]:
+def _friction_work(rubbing: Rubbing, bent: Vector, moved: Vector) -> tuple[float, float]:
     """Work of the mean tangential forces on the modes, and what friction takes [J]."""
     n = len(rubbing.slip)
     ways = len(moved) // n
@@ -181,30 +204,33 @@ def friction_work(rubbing: Rubbing, bent: Vector, moved: Vector) -> tuple[float,
 
 @phase
 def tell_friction(
-    points: ContactPoints, state: State, record: Record, taken: int, pressed: float
+    grip: Grip | None, rubbing: Rubbing, record: Record, taken: int, pressed: float
 ) -> float:
     """Record the mean friction of every point; returns its axial resultant [N]."""
-    rubbing, n = state.rubbing, len(points.gap)
     force = 0.0
-    for i in range(len(rubbing.across)):
-        mean = 0.5 * (rubbing.across[i] + rubbing.forces[n + i])
-        force += points.axial_across[i] * mean
-        if len(record.across):
-            record.across[taken, i] = mean
-    record.pressed[taken] = pressed
-    if len(record.doing):
-        for k in range(n):
-            record.doing[taken, k] = rubbing.doing[k]
+    if grip is not None:
+        n = len(rubbing.slip)
+        for i in range(len(rubbing.across)):
+            mean = 0.5 * (rubbing.across[i] + rubbing.forces[n + i])
+            force += grip.axial[i] * mean
+            if len(record.across):
+                record.across[taken, i] = mean
+        record.pressed[taken] = pressed
+        if len(record.doing):
+            for k in range(n):
+                record.doing[taken, k] = rubbing.doing[k]
     return force
 
 
 @phase
-def remember(state: State, bent: Vector, moved: Vector, lost: float) -> None:
+def remember(grip: Grip | None, state: State, step: Step) -> None:
     """The end of the step becomes the state."""
-    rubbing = state.rubbing
+    if grip is None or len(step.moved) == 0:
+        return
+    rubbing, bent, moved = state.rubbing, step.bent, step.moved
     n = len(rubbing.slip)
     ways = len(moved) // n
-    state.books[FRICTION] += lost
+    state.books[FRICTION] += _friction_work(rubbing, bent, moved)[1]
     for k in range(n):
         way, taken = 0.0, 0.0
         for c in range(ways):

@@ -44,8 +44,6 @@ the start alone less: :math:`\theta` is never beyond :math:`\pm\tfrac12`, and of
 step.  For one point on a rigid body this is the mean pressure of the layer between two closures.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -70,16 +68,20 @@ from klack.transient.interface_arrays import (
     Bore,
     ContactPoints,
     Films,
+    Grip,
+    Layer,
+    Limit,
     Modes,
     Outside,
     Record,
     State,
+    Step,
 )
 from klack.transient.interface_friction import (
-    friction_work,
+    across,
+    begin_offsets,
+    forget,
     held_across,
-    hold_offsets,
-    offset_change,
     push_across,
     remember,
     rub,
@@ -124,28 +126,6 @@ _PAY_LIMIT = 1e-3
 More may, where the debt is more than that share of the energy that the contact holds."""
 
 
-class _Step(NamedTuple):
-    """The step that is being taken: forces over it, state at its end."""
-
-    known: Vector  # (M,) modal force from outside and from the guide
-    whole: Vector  # (M,) all modal forces
-    kick: Vector  # (M,) the modal force that comes next
-    q: Vector
-    v: Vector
-    open_gap: Vector  # (n,) [m] without contact forces at the end
-    gap: Vector  # (n,) [m]
-    lam: Vector  # (n,) [N]
-    both: Vector  # (n,) [N] sum of the contact forces at both ends
-    normal: Matrix  # (k, 2) [N] of the guide on the shaft
-    dragging: Vector  # (k,) change of the sliding speed per speed that drag has braked [-]
-    free: Vector  # (d n,) [m] gaps and increments of offset without contact forces; friction only
-    motion: Vector  # (d n,) [m] the same with them
-    way: Vector  # (M,) of the modes within the step
-    moved: Vector  # (ways n,) [m] the part of the offsets that the modes move
-    bent: Vector  # (ways n,) [m] the other part, at the end
-    mu: Vector  # (n,) [-]
-
-
 def contact_compliance(
     local: NDArray, traces: NDArray, B1: NDArray, push: NDArray, spring: float
 ) -> NDArray:
@@ -177,22 +157,23 @@ def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
 
 
 @phase
-def _push_by_films(films: Films, bore: Bore, state: State, step: _Step) -> None:
+def _push_by_films(films: Films, bore: Bore | None, state: State, step: Step) -> None:
     """Modal force of all films as in the step before."""
     for i in range(len(step.kick)):
         step.kick[i] = 0.0
         for k in range(len(films.lowest)):
             for c in range(3):
                 step.kick[i] += films.rows[k, c, i] * state.films[k, c]
-        for k in range(len(films.room)):
-            for c in range(2):
-                step.kick[i] += bore.traces[k, c, i] * state.bearing[k, c]
+        if bore is not None:
+            for k in range(len(films.room)):
+                for c in range(2):
+                    step.kick[i] += bore.traces[k, c, i] * state.bearing[k, c]
 
 
 @phase
-def _hold(step: _Step, modes: Modes, share: float) -> float:
+def _hold(step: Step, modes: Modes) -> float:
     """Let the spring answer the next force; returns its part [N]."""
-    kick, push, B1 = step.kick, modes.push, modes.B1
+    kick, push, B1, share = step.kick, modes.push, modes.B1, step.share
     if share == 0.0:
         return 0.0
     moved = 0.0
@@ -204,7 +185,7 @@ def _hold(step: _Step, modes: Modes, share: float) -> float:
 
 
 @phase
-def _add(step: _Step, modes: Modes, factor: float) -> None:
+def _add(step: Step, modes: Modes, factor: float) -> None:
     """Let the next force act, times a factor."""
     for i in range(len(step.kick)):
         step.whole[i] += factor * step.kick[i]
@@ -286,7 +267,7 @@ def _payment(owed: float, slope: float, square: float) -> float:
 
 
 @phase
-def _work(points: ContactPoints, before: Vector, step: _Step) -> tuple[float, float]:
+def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, float]:
     """Work of the mean contact forces over a step, and the potential at its end [J]."""
     traces = points.traces
     work = 0.0
@@ -304,17 +285,20 @@ def _work(points: ContactPoints, before: Vector, step: _Step) -> tuple[float, fl
 
 
 @njit
-def _start(modes: Modes, points: ContactPoints, bore: Bore) -> _Step:
-    """Room for a step, and how much drag brakes the shaft."""
-    M, n, guides = len(modes.push), len(points.gap), len(bore.clearance)
-    rubs = len(points.tangents)
+def _start(modes: Modes, outside: Outside, bore: Bore | None, n: int, rubs: int) -> Step:
+    """Room for a step, the answer of the spring, and how much drag brakes the shaft."""
+    M, guides = len(modes.push), 0
+    if bore is not None:
+        guides = len(bore.clearance)
     dragging = np.zeros(guides)
-    for k in range(guides):
-        for j in range(guides):
-            for i in range(M):
-                yields = abs(bore.slide[k, i] * bore.slide[j, i] * modes.B2[i])
-                dragging[k] += bore.viscous[j] * yields
-    return _Step(
+    if bore is not None:
+        for k in range(guides):
+            for j in range(guides):
+                for i in range(M):
+                    yields = abs(bore.slide[k, i] * bore.slide[j, i] * modes.B2[i])
+                    dragging[k] += bore.viscous[j] * yields
+    return Step(
+        _spring_share(modes.B1, modes.push, outside.spring),
         np.empty(M),
         np.empty(M),
         np.empty(M),
@@ -354,30 +338,31 @@ def _potential(points: ContactPoints, state: State) -> float:
 
 
 @phase
-def _begin(modes: Modes, outside: Outside, bore: Bore, state: State, step: _Step) -> float:
+def _begin(modes: Modes, outside: Outside, bore: Bore | None, state: State, step: Step) -> float:
     """Forces known before the step, the guide's as they were; returns its drag [N]."""
     for i in range(len(modes.push)):
         step.known[i] = modes.push[i] * outside.constant
     braking = 0.0
-    for k in range(len(bore.clearance)):
-        slide = 0.0
-        for i in range(len(state.v)):
-            slide += bore.slide[k, i] * state.v[i]
-        # of the mean speed over the step
-        drag = -bore.viscous[k] * slide / (1.0 + 0.5 * step.dragging[k])
-        braking += drag
-        for i in range(len(state.v)):
-            step.known[i] += bore.slide[k, i] * drag
-            for c in range(2):
-                step.known[i] += 0.5 * bore.traces[k, c, i] * state.guide_force[k, c]
+    if bore is not None:
+        for k in range(len(bore.clearance)):
+            slide = 0.0
+            for i in range(len(state.v)):
+                slide += bore.slide[k, i] * state.v[i]
+            # of the mean speed over the step
+            drag = -bore.viscous[k] * slide / (1.0 + 0.5 * step.dragging[k])
+            braking += drag
+            for i in range(len(state.v)):
+                step.known[i] += bore.slide[k, i] * drag
+                for c in range(2):
+                    step.known[i] += 0.5 * bore.traces[k, c, i] * state.guide_force[k, c]
     return braking
 
 
 @phase
-def _move(modes: Modes, state: State, step: _Step, share: float) -> float:
+def _move(modes: Modes, state: State, step: Step) -> float:
     """Take the bodies over the step under all forces known by now; returns the spring's [N]."""
     A11, A12, B1, q, v = modes.A11, modes.A12, modes.B1, state.q, state.v
-    pull = 0.0
+    pull, share = 0.0, step.share
     if share > 0.0:
         rest = 0.0
         for i in range(len(B1)):
@@ -394,7 +379,7 @@ def _move(modes: Modes, state: State, step: _Step, share: float) -> float:
 
 
 @phase
-def _press(modes: Modes, bore: Bore, step: _Step, k: int, share: float) -> float:
+def _press(modes: Modes, bore: Bore, step: Step, k: int) -> float:
     """Keep the shaft in a disc of clearance around the axis; returns what the spring adds [N]."""
     step.normal[k, 0] = 0.0
     step.normal[k, 1] = 0.0
@@ -418,7 +403,7 @@ def _press(modes: Modes, bore: Bore, step: _Step, k: int, share: float) -> float
         step.kick[i] = 0.5 * (
             step.normal[k, 0] * bore.traces[k, 0, i] + step.normal[k, 1] * bore.traces[k, 1, i]
         )
-    answer = _hold(step, modes, share)
+    answer = _hold(step, modes)
     for i in range(len(step.q)):
         step.known[i] += step.kick[i]
     _add(step, modes, 1.0)
@@ -426,7 +411,7 @@ def _press(modes: Modes, bore: Bore, step: _Step, k: int, share: float) -> float
 
 
 @phase
-def _look(points: ContactPoints, step: _Step) -> tuple[float, float]:
+def _look(points: ContactPoints, step: Step) -> tuple[float, float]:
     """Gaps without new contact forces: the least one and the largest distance from zero [m]."""
     least, widest = 1e300, 0.0
     for k in range(len(points.gap)):
@@ -438,7 +423,7 @@ def _look(points: ContactPoints, step: _Step) -> tuple[float, float]:
 
 
 @phase
-def _turned(points: ContactPoints, state: State, step: _Step) -> bool:
+def _turned(points: ContactPoints, state: State, step: Step) -> bool:
     """Whether the contact pushes the other way than the last one did."""
     axial = 0.0
     for k in range(len(points.gap)):
@@ -451,7 +436,7 @@ def _turned(points: ContactPoints, state: State, step: _Step) -> bool:
 
 
 @phase
-def _close(points: ContactPoints, state: State, step: _Step) -> float:
+def _close(points: ContactPoints, state: State, step: Step) -> float:
     """Let the new contact forces act; returns the least gap [m]."""
     least = 1e300
     for k in range(len(points.gap)):
@@ -459,18 +444,54 @@ def _close(points: ContactPoints, state: State, step: _Step) -> float:
             state.carried[k] = True
         least = min(least, step.gap[k])
     _gather(points.traces, step.lam, 0.5, step.kick)
-    if len(points.tangents):
-        push_across(points, state.rubbing.forces[len(points.gap) :], 0.5, step.kick)
+    push_across(points.grip, state.rubbing.forces, len(points.gap), 0.5, step.kick)
     return least
 
 
 @phase
-def _across(points: ContactPoints, state: State, step: _Step) -> float:
-    """Work of tangential forces, energy that they hold, and what friction takes, in all [J]."""
-    rubbing = state.rubbing
-    hold_offsets(points, rubbing, state.q, step.q, step.motion, step.way, step.moved, step.bent)
-    given, lost = friction_work(rubbing, step.bent, step.moved)
-    return given + held_across(rubbing, step.bent) + lost
+def _touch(
+    points: ContactPoints,
+    grip: Grip | None,
+    limit: Limit | None,
+    layer: Layer | None,
+    state: State,
+    step: Step,
+    widest: float,
+) -> int:
+    """Contact forces at the end of the step; returns the rounds, below zero if none are found."""
+    n, diagonal = len(points.gap), 0.0
+    for k in range(n):
+        diagonal += points.A[k, k] / n
+    tolerance = max(1e-15, 1e-13 * widest)
+    lam, gap = step.lam, step.gap
+    if grip is not None:
+        return rub(points, grip, state, step, tolerance / diagonal)
+    if limit is not None:
+        worn, contact = state.worn, state.contact
+        return solve_yielding(
+            points.A, step.open_gap, limit, worn, contact, lam, gap, tolerance, diagonal
+        )
+    if layer is not None:
+        rounds = solve_rough(points.A, step.open_gap, layer, state.pressed, lam, gap)
+        state.contact.counts[0] = np.count_nonzero(lam)
+        return rounds
+    return solve_active(points.A, step.open_gap, state.contact, lam, gap, tolerance, diagonal)
+
+
+@phase
+def _take_up(
+    points: ContactPoints, limit: Limit | None, layer: Layer | None, state: State, step: Step
+) -> float:
+    """What faces that yield have taken, or layers of asperities beyond the potential [J]."""
+    taken = 0.0
+    if limit is not None:
+        taken = let_yield(limit, state.worn, step.lam, points.gap)
+        state.books[PLASTIC] += taken
+    if layer is not None:
+        held = layer_energy(layer, step.lam, step.gap)
+        taken = held - state.books[LAYER]
+        state.books[LAYER] = held
+    return taken
 
 
 @phase
@@ -478,8 +499,7 @@ def _pay(
     modes: Modes,
     points: ContactPoints,
     state: State,
-    step: _Step,
-    share: float,
+    step: Step,
     potential: float,
     answer: float,
     yielded: float,
@@ -496,11 +516,10 @@ def _pay(
     work, stored = _work(points, state.q, step)
     whole_step = potential > 0.0 and stored > 0.0
     owed = state.books[DEBT] + work + stored - potential + yielded
-    rubs = len(points.tangents) > 0 and work != 0.0
-    across = 0.0
+    rubs, sideways = points.grip is not None and work != 0.0, 0.0
     if rubs:
-        across = _across(points, state, step)
-        owed += across
+        sideways = across(points.grip, state, step)
+        owed += sideways
     pay = 0.0
     if owed != 0.0 and abs(work) > _PAY_FROM * (potential + stored):
         limit = 1.0
@@ -508,13 +527,13 @@ def _pay(
             limit = min(max(_PAY_LIMIT, 2.0 * abs(owed) / potential), 1.0)
         pay = min(max(-owed / work, -limit), limit)
         _gather(points.traces, step.both, 0.5 * pay, step.kick)
-        back = _hold(step, modes, share)
+        back = _hold(step, modes)
         answer += back
         _add(step, modes, 1.0)
         first, kept = _work(points, state.q, step)
         change = 0.0
         if rubs:
-            change = _across(points, state, step) - across
+            change = across(points.grip, state, step) - sideways
         if whole_step or pay == 0.0:
             work, stored = first, kept  # what is left of the debt comes next
         else:
@@ -531,8 +550,8 @@ def _pay(
             stored += pay * stored_slope
     state.books[DEBT] += (1.0 + pay) * work + stored - potential + yielded
     if rubs:
-        state.books[DEBT] += _across(points, state, step)
-        stored += held_across(state.rubbing, step.bent)
+        state.books[DEBT] += across(points.grip, state, step)
+        stored += held_across(points.grip, state.rubbing, step.bent)
     return pay, stored, answer
 
 
@@ -541,8 +560,7 @@ def _balance(
     modes: Modes,
     points: ContactPoints,
     state: State,
-    step: _Step,
-    share: float,
+    step: Step,
     potential: float,
     answer: float,
     held: float,
@@ -561,7 +579,7 @@ def _balance(
         if change != 0.0:
             for i in range(M):
                 step.kick[i] += change * points.traces[k, i]
-    back = _hold(step, modes, share)
+    back = _hold(step, modes)
     work, stored = _work(points, state.q, step)
     slope, square, given = 0.0, 0.0, 0.0
     for k in range(n):
@@ -588,8 +606,26 @@ def _balance(
 
 
 @phase
+def _settle(
+    modes: Modes,
+    points: ContactPoints,
+    layer: Layer | None,
+    state: State,
+    step: Step,
+    potential: float,
+    answer: float,
+    taken_up: float,
+) -> tuple[float, float, float]:
+    """Balance the energy of the step; returns as :func:`_pay`."""
+    if layer is not None:
+        stored, answer = _balance(modes, points, state, step, potential, answer, taken_up)
+        return 0.0, stored, answer
+    return _pay(modes, points, state, step, potential, answer, taken_up)
+
+
+@phase
 def _tell_forces(
-    points: ContactPoints, state: State, step: _Step, pay: float, record: Record, taken: int
+    points: ContactPoints, state: State, step: Step, pay: float, record: Record, taken: int
 ) -> None:
     """Record the mean contact forces, and count the steps of the contact."""
     force = 0.0
@@ -598,8 +634,7 @@ def _tell_forces(
         force += points.axial[k] * mean
         if len(record.points):
             record.points[taken, k] = mean
-    if len(points.tangents):
-        force += tell_friction(points, state, record, taken, force)
+    force += tell_friction(points.grip, state.rubbing, record, taken, force)
     record.force[taken] = force
     if state.contact.counts[0] > 0:
         state.books[OPEN_STEPS] = 0.0
@@ -610,7 +645,7 @@ def _tell_forces(
 
 @phase
 def _count(
-    modes: Modes, outside: Outside, bore: Bore, state: State, step: _Step, axial: float
+    modes: Modes, outside: Outside, bore: Bore | None, state: State, step: Step, axial: float
 ) -> None:
     """Add the step to the sums of energy; ``axial`` is the force from outside [N]."""
     books, q, v, loss = state.books, state.q, state.v, modes.loss
@@ -627,7 +662,7 @@ def _count(
                 + step.whole[i]
                 * (loss[3, i] * q[i] + loss[4, i] * v[i] + loss[5, i] * step.whole[i])
             )
-    if len(bore.clearance):
+    if bore is not None:
         given = 0.0
         for i in range(len(q)):
             part = step.known[i] - modes.push[i] * axial
@@ -646,7 +681,7 @@ def _count(
 def _finish(
     modes: Modes,
     state: State,
-    step: _Step,
+    step: Step,
     record: Record,
     taken: int,
     gap: float,
@@ -662,10 +697,6 @@ def _finish(
             record.places[taken, i] = step.q[i]
     for k in range(len(step.lam)):
         state.lam[k] = step.lam[k]
-    if len(step.moved):
-        remember(
-            state, step.bent, step.moved, friction_work(state.rubbing, step.bent, step.moved)[1]
-        )
     for b in range(modes.drift.shape[0]):
         s = 0.0
         for i in range(len(state.v)):
@@ -680,7 +711,7 @@ def march(
     modes: Modes,
     outside: Outside,
     points: ContactPoints,
-    bore: Bore,
+    bore: Bore | None,
     films: Films | None,
     state: State,
     record: Record,
@@ -693,8 +724,8 @@ def march(
     wait : int
         Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
     modes, outside, points, bore, films, state
-        ``films`` is None without any: their code is not compiled then.
-        See :mod:`klack.transient.interface_arrays`.
+        ``bore`` and ``films`` are None without any, as are parts of ``points``: their code is not
+        compiled then.  See :mod:`klack.transient.interface_arrays`.
     record : Record
         Out, for at least ``steps`` steps.
 
@@ -702,14 +733,11 @@ def march(
     -------
     taken, status : int
     """
-    n, books, rubs = len(points.gap), state.books, len(points.tangents) > 0
-    yields, rough = len(points.limit.area) > 0, len(points.layer.area) > 0
-    step = _start(modes, points, bore)
-    guide = no_rub(len(bore.clearance), len(modes.push))
-    share = _spring_share(modes.B1, modes.push, outside.spring)
-    diagonal = 0.0
-    for k in range(n):
-        diagonal += points.A[k, k] / n
+    n, books = len(points.gap), state.books
+    step = _start(modes, outside, bore, n, len(state.rubbing.across))
+    rubs_guide = False
+    if bore is not None:
+        guide = no_rub(len(bore.clearance), len(modes.push))
     if films is not None:
         for k in range(len(films.lowest)):
             bend_faces(films, k, state.films[k, :3], points.gap)
@@ -718,14 +746,14 @@ def march(
     for taken in range(steps):
         braking = _begin(modes, outside, bore, state, step)
         _gather(points.traces, state.lam, 0.5, step.kick)
-        if rubs:
-            push_across(points, state.rubbing.across, 0.5, step.kick)
-        axial = outside.constant + _move(modes, state, step, share)
-        for k in range(len(bore.clearance)):
-            axial += _press(modes, bore, step, k, share)
-        rubs_guide = begin_rub(bore, state.guide_force, step.normal, guide)
-        if rubs_guide:
-            axial += rub_guide(modes, share, guide, state.q, step.known, step.whole, step.q, step.v)
+        push_across(points.grip, state.rubbing.across, 0, 0.5, step.kick)
+        axial = outside.constant + _move(modes, state, step)
+        if bore is not None:
+            for k in range(len(bore.clearance)):
+                axial += _press(modes, bore, step, k)
+            rubs_guide = begin_rub(bore, state.guide_force, step.normal, guide)
+            if rubs_guide:
+                axial += rub_guide(modes, guide, state.q, step)
         if films is not None:
             begin_films(state, modes.step)
             _push_by_films(films, bore, state, step)
@@ -738,7 +766,7 @@ def march(
                         return taken, FAILED
                     _add(step, modes, 1.0)
                     moved = max(moved, change)
-                if len(films.room):
+                if bore is not None and len(films.room):
                     change = squeeze_guide(films, modes, bore, state, step.q, step.kick)
                     if change < 0.0:
                         return taken, FAILED
@@ -758,111 +786,43 @@ def march(
             np.dot(points.traces, step.q, step.open_gap)
             least, widest = _look(points, step)
             if least < 0.0 or state.contact.counts[0] > 0:
-                tolerance = max(1e-15, 1e-13 * widest)
-                if rubs:
-                    rounds = rub(
-                        points,
-                        state,
-                        step.q,
-                        step.open_gap,
-                        step.free,
-                        step.motion,
-                        step.way,
-                        step.moved,
-                        step.mu,
-                        tolerance / diagonal,
-                    )
-                    if rounds == 0:
-                        return taken, FAILED
-                    for k in range(n):
-                        step.lam[k] = state.rubbing.forces[k]
-                        step.gap[k] = step.motion[k]
-                elif yields:
-                    rounds = solve_yielding(
-                        points.A,
-                        step.open_gap,
-                        points.limit,
-                        state.worn,
-                        state.contact,
-                        step.lam,
-                        step.gap,
-                        tolerance,
-                        diagonal,
-                    )
-                    if rounds < 0:
-                        return taken, FAILED
-                elif rough:
-                    rounds = solve_rough(
-                        points.A,
-                        step.open_gap,
-                        points.layer,
-                        state.pressed,
-                        step.lam,
-                        step.gap,
-                    )
-                    if rounds < 0:
-                        return taken, FAILED
-                    state.contact.counts[0] = np.count_nonzero(step.lam)
-                else:
-                    rounds = solve_active(
-                        points.A,
-                        step.open_gap,
-                        state.contact,
-                        step.lam,
-                        step.gap,
-                        tolerance,
-                        diagonal,
-                    )
-                    if rounds < 0:
-                        return taken, FAILED
+                rounds = _touch(
+                    points, points.grip, points.limit, points.layer, state, step, widest
+                )
+                if rounds < 0:
+                    return taken, FAILED
                 if wait and _turned(points, state, step):
                     return taken, TURNED
-                books[ROUNDS] += abs(rounds)
-                if yields:
-                    taken_up = let_yield(points.limit, state.worn, step.lam, points.gap)
-                    books[PLASTIC] += taken_up
-                elif rough:
-                    held = layer_energy(points.layer, step.lam, step.gap)
-                    taken_up = held - books[LAYER]
-                    books[LAYER] = held
+                books[ROUNDS] += rounds
+                taken_up = _take_up(points, points.limit, points.layer, state, step)
                 if films is not None:
                     for k in range(len(films.lowest)):
                         taken_up += bulk_work(films, k, state, step.lam)
                 least = _close(points, state, step)
-                answer += _hold(step, modes, share)
+                answer += _hold(step, modes)
                 _add(step, modes, 1.0)
-                if rubs:
-                    offset_change(points, state.q, step.q, step.way, step.moved)
-                    for i in range(len(step.bent)):
-                        step.bent[i] = state.rubbing.bent[i] + step.motion[n + i] - step.moved[i]
-                if rubs_guide:
-                    axial += rub_guide(
-                        modes, share, guide, state.q, step.known, step.whole, step.q, step.v
-                    )
-            if rubs and state.contact.counts[0] == 0:
-                for i in range(len(step.bent)):
-                    step.bent[i] = 0.0
-                    state.rubbing.forces[n + i] = 0.0
-            pay = 0.0
-            if rough:
-                potential, answer = _balance(
-                    modes, points, state, step, share, potential, answer, taken_up
-                )
-            else:
-                pay, potential, answer = _pay(
-                    modes, points, state, step, share, potential, answer, taken_up
-                )
+                begin_offsets(points.grip, state, step)
+                if bore is not None and rubs_guide:
+                    axial += rub_guide(modes, guide, state.q, step)
+            if state.contact.counts[0] == 0:
+                forget(points.grip, state.rubbing, step)
+            pay, potential, answer = _settle(
+                modes, points, points.layer, state, step, potential, answer, taken_up
+            )
             _tell_forces(points, state, step, pay, record, taken)
         _count(modes, outside, bore, state, step, axial)
         if films is not None:
             for k in range(len(films.lowest)):
                 count_squeeze(films, k, state, step.q, step.lam, modes.step)
                 record.film[taken, k] = films.axial[k] * state.films[k, 0]
-            for k in range(len(films.room)):
-                count_bearing(k, bore, state, step.q)
-        for k in range(len(guide.most)):
-            braking += guide.force[k, 0]
+            if bore is not None:
+                for k in range(len(films.room)):
+                    count_bearing(k, bore, state, step.q)
+        if bore is not None:
+            for k in range(len(guide.most)):
+                braking += guide.force[k, 0]
         mean_gap = 0.5 * (least + smallest) if taken else least
+        remember(points.grip, state, step)
         _finish(modes, state, step, record, taken, mean_gap, axial + answer + braking)
         smallest = least
         if wait and books[OPEN_STEPS] > wait:

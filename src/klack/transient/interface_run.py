@@ -38,6 +38,7 @@ from klack.transient.interface_arrays import (
     ActiveSet,
     Bore,
     ContactPoints,
+    Grip,
     Layer,
     Limit,
     Modes,
@@ -194,8 +195,8 @@ def contact_points(
     push = np.ascontiguousarray(model.rigid[2])
     if not model.ways:
         A = contact_compliance(model.compliance, model.traces, B1, push, spring)
-        laws = _limit(model), _layer(model)
-        return ContactPoints.frictionless(A, model.traces, model.gap, model.axial, *laws)
+        laws = None, _limit(model), _layer(model)
+        return ContactPoints(A, model.traces, model.gap, model.axial, *laws)
     rows = np.vstack([model.traces, model.tangents])
     counts = [last - first for _, first, last in model.contacts]
     static, kinetic, fade = np.repeat(
@@ -206,20 +207,20 @@ def contact_points(
         model.traces,
         model.gap,
         model.axial,
-        model.tangents,
-        model.axial_across,
-        np.ascontiguousarray(static),
-        np.ascontiguousarray(kinetic),
-        np.ascontiguousarray(fade),
-        Limit.none(),
-        Layer.none(),
+        Grip(
+            model.tangents,
+            model.axial_across,
+            np.ascontiguousarray(static),
+            np.ascontiguousarray(kinetic),
+            np.ascontiguousarray(fade),
+        ),
     )
 
 
-def _limit(model: InterfaceModel) -> Limit:
+def _limit(model: InterfaceModel) -> Limit | None:
     """Pressure limit of the points of one contact; those of others stay elastic."""
     if model.limit is None:
-        return Limit.none()
+        return None
     area = np.full(model.count, np.inf)
     first, last = model.contacts[0][1:]
     area[first:last] = model.area[first:last]
@@ -243,11 +244,11 @@ def _require_layer_alone(model: InterfaceModel) -> None:
         )
 
 
-def _layer(model: InterfaceModel) -> Layer:
+def _layer(model: InterfaceModel) -> Layer | None:
     """Layer of asperities of the points."""
     law = model.layer
     if law is None:
-        return Layer.none()
+        return None
     return Layer(model.area, law.closure, law.pressure, law.state(law.closure)[2])
 
 
@@ -458,7 +459,7 @@ class _Run:
 
     def fly(self, duration: float, progress: Callable[[float], None] | None) -> None:
         """Jump until a gap may close soon; recompute the gaps meanwhile."""
-        away = ContactPoints.none(self.model.mode_count)
+        away = self.contact.away()
         while self.time < duration:
             stale = self.stale()
             horizon = min(2.0 * _FLIGHT_CHUNK, duration - self.time + self.step)
@@ -574,7 +575,8 @@ class _Run:
             steps, len(self.model.bodies), n, ways, keep_points=self.points and n > 0
         )
         outside = Outside(self.constant, self.spring)
-        taken, status = march(steps, wait, modes, outside, points, self.bore, None, state, record)
+        bore = None if self.guide is None else self.bore
+        taken, status = march(steps, wait, modes, outside, points, bore, None, state, record)
         return taken, status, record
 
     # ------------------------------------------------------------------ records

@@ -61,7 +61,6 @@ from klack.transient.interface_arrays import (
     GUIDE,
     GUIDE_STRAIN,
     ActiveSet,
-    ContactPoints,
     Modes,
     Outside,
     Record,
@@ -231,7 +230,7 @@ class _Moving:
         self.fine, self.whole = modes_of_step(model, h), modes_of_step(model, sizes.coarse * h)
         self.points = contact_points(model, self.fine.B1, h)
         self.resting = contact_points(model, self.whole.B1, sizes.coarse * h)
-        self.nothing = ContactPoints.none(model.mode_count)
+        self.nothing = self.points.away()
         self.bore = bore_arrays(valve.guide, model.mode_count)
         wet = {row.component: row.film for row in network.rows.interfaces if row.film is not None}
         self.squeezed = [film for film in valve.films if film.stop in wet]
@@ -767,7 +766,8 @@ class _Moving:
         if points:
             touching = (self.resting if rest else self.points)._replace(gap=self.gap0)
         state = self.state if points else self.apart
-        _, status = march(count, 0, modes, _NONE, touching, self.bore, self.films, state, record)
+        bore = self.bore if len(self.bore.clearance) else None
+        _, status = march(count, 0, modes, _NONE, touching, bore, self.films, state, record)
         failed = status == FAILED or not np.all(np.isfinite(self.q))
         return None if failed else record
 

@@ -17,7 +17,6 @@ from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
 from klack.transient.interface_arrays import (
-    Bore,
     Modes,
     Outside,
     Record,
@@ -288,7 +287,7 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
         Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift, step),
         Outside(0.0, 0.0),
         contact_points(model, P.B1, step),
-        Bore.none(M),
+        None,
         None,
         state,
         Record.empty(steps, len(model.bodies), n, model.ways, keep_points=False),

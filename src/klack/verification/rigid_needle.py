@@ -169,7 +169,8 @@ def fly_in_films(
         steps, len(model.bodies), model.count, keep_points=False, films=len(films.lowest)
     )
     points = contact_points(model, modes.B1, step)
-    _, status = march(steps, 0, modes, Outside(0.0, 0.0), points, bore, films, state, record)
+    there = bore if len(bore.clearance) else None
+    _, status = march(steps, 0, modes, Outside(0.0, 0.0), points, there, films, state, record)
     if status == FAILED:
         raise ConvergenceError("rigid needle: no forces found")
     bent = np.array(model.gap)
