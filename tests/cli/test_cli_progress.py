@@ -71,6 +71,31 @@ def test_compiling_is_called_so(screen, monkeypatch):
         assert "compiling" not in screen.text.rsplit("50 %", 1)[0].rsplit("run", 1)[-1]
 
 
+def test_waiting_for_another_process_is_told_as_waiting(screen, monkeypatch):
+    from numba.core import event
+
+    with shown_on(screen, monkeypatch) as progress:
+        assert screen.shows("starting")
+        progress("run", 0.0)
+        with event.trigger_event("numba:compile"):  # of a function that calls the other's
+            with event.trigger_event("klack:wait"):
+                assert screen.shows("run: waiting for another process that compiles")
+            assert screen.shows("run: compiling (once)")
+
+
+def test_lines_tell_compiling_and_waiting_once_each(capsys):
+    from numba.core import event
+
+    with show_progress() as progress:
+        progress("run", 0.0)
+        for kind in ("klack:wait", "numba:compile", "klack:wait"):
+            with event.trigger_event(kind):
+                pass
+
+    told = [line.partition(";")[0] for line in capsys.readouterr().err.splitlines()]
+    assert told == ["waiting for another process that compiles", "compiling (once)"]
+
+
 def test_a_short_command_leaves_the_screen_alone(screen, monkeypatch):
     with shown_on(screen, monkeypatch) as progress:
         progress("mesh", 1.0)

@@ -12,7 +12,7 @@ from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
 from klack.errors import KlackError
 from klack.network.step_function import is_step_function
-from klack.warming.groups import all_steps
+from klack.warming.groups import GROUPS, all_steps
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 # an output stage with capacitor, gas, several free volumes at the start, three dimensions
@@ -77,7 +77,7 @@ def test_it_says_what_was_compiled_and_where(warm):
     assert numbers["folder"] in said
     assert numbers["count"] > 150
     assert numbers["size_B"] > 1e6
-    assert set(numbers["groups"]) == {*("loop", "rest", "components", "valve", "spatial", "impact")}
+    assert set(numbers["groups"]) == set(GROUPS)
 
 
 @pytest.mark.slow
@@ -85,7 +85,7 @@ def test_a_second_time_compiles_nothing(warm, capsys):
     assert main(["warm", "--json", "-"]) == 0
 
     again = json.loads(capsys.readouterr().out)
-    assert [group["compiled"] for group in again["groups"].values()] == [0] * 6
+    assert not any(group["compiled"] for group in again["groups"].values())
     assert again["count"] >= warm[0]["count"]  # other processes may add to the store
 
 

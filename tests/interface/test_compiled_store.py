@@ -321,6 +321,39 @@ def test_who_waits_too_long_compiles_itself(tmp_path):
     first.end()
 
 
+def test_an_old_lock_is_not_waited_for(tmp_path, monkeypatch):
+    """That of a process that was stopped, in the functions within one that was waited for."""
+    from klack.compiling import turn
+
+    lock, done = tmp_path / "f.lock", tmp_path / "f.code"
+    lock.touch()
+    os.utime(lock, (0.0, 0.0))  # left by a process that was killed
+    first = turn.take_turn(lock, done)
+    assert first is not None
+    assert lock.stat().st_mtime > 0.0  # its time begins now
+    os.utime(lock, (0.0, 0.0))
+    monkeypatch.setattr(turn.time, "sleep", lambda seconds: pytest.fail("waits"))
+    assert turn.take_turn(lock, done) is not None
+    first.end()
+
+
+@pytest.mark.slow
+def test_a_plain_impact_does_not_compile_what_it_does_not_have(tmp_path):
+    """On the axis, elastic, smooth, without friction: time loops of both levels, an empty store."""
+    program = "from klack.warming.small_impact import plain_impacts; plain_impacts()"
+    subprocess.run(
+        [sys.executable, "-c", program],
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
+        check=True,
+    )
+    compiled = {file.name.rpartition("-")[0] for file in tmp_path.glob("*/*.code")}
+    assert {"single_contact.run_one_contact", "interface_kernel.march"} <= compiled
+    assert "active_set.solve_active" in compiled
+    absent = {"rubbing", "closed_points", "yielding_points", "rough_points", "guide_friction"}
+    absent |= {"guide_films", "tilting_films", "guide_film"}
+    assert not {name for name in compiled if name.partition(".")[0] in absent}
+
+
 def test_no_function_goes_past_the_store():
     root = Path(__file__).parents[2] / "src" / "klack"
     for file in root.rglob("*.py"):

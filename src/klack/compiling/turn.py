@@ -22,7 +22,11 @@ WAITING = "klack:wait"
 """Event of numba's kind while this process waits for another one that compiles."""
 
 _PAUSE = 0.02  # [s]
-_PATIENCE = 600.0  # [s] then it compiles itself: the other one may have been stopped (Ctrl-Z)
+_PATIENCE = 60.0
+"""Age of a lock [s] from which a process compiles itself: twice what the longest function takes.
+
+The other one may have been stopped (Ctrl-Z), or has hardly any time of the processor.  What it has
+compiled until then is in the store."""
 
 
 class Turn:
@@ -50,9 +54,11 @@ def take_turn(path: Path, done: Path, patience: float = _PATIENCE) -> Turn | Non
     done : Path
         What the process that has the lock will have written.
     patience : float [s]
+        From when on the other process has the lock: those of functions within functions run out at
+        the same time.
     """
-    end = time.monotonic() + patience
     turn = _try(path)
+    end = time.monotonic() + patience - _age(path)
     if turn is None:
         with event.trigger_event(WAITING, data={"file": str(done)}):
             while turn is None and not done.exists():
@@ -65,6 +71,13 @@ def take_turn(path: Path, done: Path, patience: float = _PATIENCE) -> Turn | Non
             turn.end()
         return None
     return turn
+
+
+def _age(path: Path) -> float:
+    """Time since the lock was taken [s]."""
+    with suppress(OSError):
+        return max(0.0, time.time() - path.stat().st_mtime)
+    return 0.0
 
 
 def _try(path: Path) -> Turn | None:
@@ -80,6 +93,7 @@ def _try(path: Path) -> Turn | None:
     if taken:
         with suppress(OSError):
             if os.path.samestat(path.stat(), os.fstat(handle)):
+                os.utime(path)  # the file may be that of a process that was killed
                 return Turn(path, handle)
     os.close(handle)  # locked by another, or removed by the one that had the lock
     return None

@@ -22,7 +22,11 @@ PROGRESS_FILE = "KLACK_PROGRESS_FILE"
 _PATIENCE = 2.0  # s that a stage may take without a line
 _OFTEN = 0.2  # s between two lines of one stage in a file
 _SOON = 0.5  # s until the bar is there
-_KINDS = ("numba:compile", "klack:wait")  # the second while another process compiles
+_KINDS = {
+    "klack:wait": "waiting for another process that compiles",
+    "numba:compile": "compiling (once)",
+}
+"""Events and their words, the first that is on before the others."""
 
 
 class Progress(Protocol):
@@ -81,12 +85,12 @@ class _Lines:
     def __init__(self) -> None:
         self.stage, self.start = "", time.perf_counter()
         self.compiling = _Compiling(self._tell)
-        self._has_told = False
+        self._told = {""}
 
-    def _tell(self, on: bool) -> None:
-        if on and not self._has_told:
-            self._has_told = True
-            print("compiling (once); 'klack warm' does it ahead", file=sys.stderr, flush=True)
+    def _tell(self, words: str) -> None:
+        if words not in self._told:
+            self._told.add(words)
+            print(f"{words}; 'klack warm' does it ahead", file=sys.stderr, flush=True)
 
     def __call__(self, stage: str, fraction: float) -> None:
         self.compiling.watch()
@@ -126,14 +130,14 @@ def _bar() -> Iterator[Progress]:
     task = bar.add_task(now, total=1.0)
     soon = threading.Timer(_SOON, bar.start)
     soon.daemon = True
-    compiling = _Compiling(lambda on: bar.update(task, description=_described(now, on)))
+    compiling = _Compiling(lambda words: bar.update(task, description=_described(now, words)))
 
     def update(stage: str, fraction: float) -> None:
         nonlocal now
         compiling.watch()
         if stage != now:
             now = stage
-            bar.reset(task, description=_described(stage, compiling.is_on), total=1.0)
+            bar.reset(task, description=_described(stage, compiling.words), total=1.0)
         bar.update(task, completed=min(max(fraction, 0.0), 1.0))
 
     # names of bodies may hold brackets, which rich would take for its own
@@ -149,27 +153,27 @@ def _bar() -> Iterator[Progress]:
             bar.stop()
 
 
-def _described(stage: str, compiling: bool) -> str:
-    return f"{stage}: compiling (once)" if compiling else stage
+def _described(stage: str, words: str) -> str:
+    return f"{stage}: {words}" if words else stage
 
 
 class _Compiling:
-    """Detects when numba compiles a function that is not cached.
+    """Detects when numba compiles a function that is not cached, or another process does.
 
     Parameters
     ----------
     tell : callable
-        Called with True when it begins, and with False when it is over.
+        Called with the words for what begins; with none when it is over.
     """
 
-    def __init__(self, tell: Callable[[bool], None]) -> None:
-        self._tell, self._depth = tell, 0
+    def __init__(self, tell: Callable[[str], None]) -> None:
+        self._tell, self._depth = tell, dict.fromkeys(_KINDS, 0)
         self._listener: Any = None
 
     @property
-    def is_on(self) -> bool:
-        """Whether something is being compiled now."""
-        return self._depth > 0
+    def words(self) -> str:
+        """What is going on now; empty if nothing is compiled."""
+        return next((_KINDS[kind] for kind, depth in self._depth.items() if depth), "")
 
     def watch(self) -> None:
         """Listen from now on, if numba is there already: its import alone takes a second."""
@@ -181,10 +185,10 @@ class _Compiling:
 
         class Listener(event.Listener):
             def on_start(self, event: Any) -> None:
-                outer._count(1)
+                outer._count(event.kind, 1)
 
             def on_end(self, event: Any) -> None:
-                outer._count(-1)
+                outer._count(event.kind, -1)
 
         self._listener = Listener()
         for kind in _KINDS:
@@ -198,7 +202,8 @@ class _Compiling:
             for kind in _KINDS:
                 event.unregister(kind, self._listener)
 
-    def _count(self, change: int) -> None:
-        before, self._depth = self.is_on, self._depth + change
-        if self.is_on != before:
-            self._tell(self.is_on)
+    def _count(self, kind: str, change: int) -> None:
+        before = self.words
+        self._depth[kind] += change
+        if self.words != before:
+            self._tell(self.words)

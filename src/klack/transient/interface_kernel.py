@@ -473,7 +473,9 @@ def _touch(
         )
     if layer is not None:
         rounds = solve_rough(points.A, step.open_gap, layer, state.pressed, lam, gap)
-        state.contact.counts[0] = np.count_nonzero(lam)
+        state.contact.counts[0] = 0
+        for k in range(n):
+            state.contact.counts[0] += lam[k] != 0.0
         return rounds
     return solve_active(points.A, step.open_gap, state.contact, lam, gap, tolerance, diagonal)
 

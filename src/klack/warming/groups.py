@@ -86,6 +86,18 @@ def _spatial() -> None:
     run_stroke(spatial_valve("swept"))
 
 
+def _levels() -> None:
+    from klack.warming.small_impact import plain_impacts
+
+    plain_impacts()
+
+
+def _features() -> None:
+    from klack.warming.small_impact import featured_impacts
+
+    featured_impacts()
+
+
 def _impact() -> None:
     from klack.analyses.impact.run import run_impact
     from klack.case.reader import load_case
@@ -101,7 +113,9 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         "spatial": Group("strokes in three dimensions", _spatial),
         "components": Group("steps of all components", _components),
         "rest": Group("static equilibrium", _rest),
-        "impact": Group("impacts between bodies", _impact),
+        "levels": Group("time loops of impacts", _levels),
+        "features": Group("the same with guide, friction, yield, rough faces", _features),
+        "impact": Group("meshes, bodies and contacts of impacts", _impact),
     }
 )
 """All groups, those first that take longest."""
