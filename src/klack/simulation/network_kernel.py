@@ -106,7 +106,7 @@ from klack.simulation.network_pressures import (
     push_by_fluid,
     solve_pressures,
 )
-from klack.simulation.network_record import record_means, record_points
+from klack.simulation.network_record import Moment, record_means, record_points
 from klack.simulation.network_sliders import (
     begin_macro_sliders,
     begin_sub_sliders,
@@ -280,11 +280,8 @@ def run_network(
         if in_record == per_record:
             bring(bodies, at, at)
             record_means(recording, record, record_time, loop.sums, loop.peaks)
-            record_points(
-                recording,
-                record,
+            moment = Moment(
                 bodies,
-                at,
                 loop.elements.state,
                 loop.fluid.state.p,
                 loop.fluid.nodes.nodes,
@@ -294,6 +291,7 @@ def run_network(
                 contacts.state.gap,
                 contacts.rows.interfaces,
             )
+            record_points(recording, record, at, moment)
             record += 1
             in_record, record_time = 0, 0.0
     bring(bodies, at, FINE)

@@ -1,6 +1,6 @@
 """What the time loop writes at the end of a record: means, peaks, and the state of the moment."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from klack.compiling.jit import njit
 from klack.network.step_function import pointers
@@ -9,7 +9,36 @@ from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
 from klack.simulation.network_ports import port_speed
 from klack.simulation.phase import phase
 
-__all__ = ["record_means", "record_points", "record_start"]
+__all__ = ["Moment", "moment_of", "record_means", "record_moment", "record_points"]
+
+
+class Moment(NamedTuple):
+    """Where the state of the moment is: of a whole network only what is recorded of it."""
+
+    bodies: Any
+    elements: Any  # states
+    pressures: Any  # [Pa]
+    nodes: int
+    shares: Any  # of free gas
+    slow: int  # volumes that have such a share
+    branches: Any  # states
+    gaps: Any  # [m]
+    interfaces: int
+
+
+def moment_of(network: NetworkArrays) -> Moment:
+    """Arrays of a network that change as it moves."""
+    return Moment(
+        network.bodies,
+        network.elements.state,
+        network.node_state.p,
+        network.nodes.nodes,
+        network.node_state.free,
+        network.nodes.volumes * network.nodes.slow_gas,
+        network.branches.state,
+        network.interface_state.gap,
+        network.interfaces.interfaces,
+    )
 
 
 @phase
@@ -25,25 +54,12 @@ def record_means(recording: Recording, record: int, duration: float, sums: Any, 
 
 
 @phase
-def record_points(
-    recording: Recording,
-    record: int,
-    bodies: Any,
-    level: int,
-    elements: Any,
-    pressures: Any,
-    nodes: int,
-    shares: Any,
-    slow: int,
-    branches: Any,
-    gaps: Any,
-    interfaces: int,
-) -> None:
+def record_points(recording: Recording, record: int, level: int, now: Moment) -> None:
     """Columns of ports, centres of mass, pressures, shares of free gas, states, gaps, drives.
 
     The modes are those of a size of step, with no force pending.
     """
-    out, place = recording.points[record], 0
+    out, place, bodies = recording.points[record], 0, now.bodies
     for i in range(bodies.ports):
         block0, block1 = recording.port_block0[i], recording.port_block1[i]
         out[i] = bodies.at[i]
@@ -54,39 +70,42 @@ def record_points(
             bodies, level, recording.cm_block0[b], recording.cm_block1[b], -1
         )
     place += recording.cm_block0.size
-    for i in range(nodes):
-        out[place + i] = pressures[i]
-    place += nodes
-    for i in range(slow):
-        out[place + i] = shares[i]
-    place += slow
+    for i in range(now.nodes):
+        out[place + i] = now.pressures[i]
+    place += now.nodes
+    for i in range(now.slow):
+        out[place + i] = now.shares[i]
+    place += now.slow
     for i in range(recording.states.size):
-        out[place + i] = elements[recording.states[i]]
+        out[place + i] = now.elements[recording.states[i]]
     place += recording.states.size
     for i in range(recording.branch_states.size):
-        out[place + i] = branches[recording.branch_states[i]]
+        out[place + i] = now.branches[recording.branch_states[i]]
     place += recording.branch_states.size
-    for c in range(interfaces):
-        out[place + c] = gaps[c]
-    place += interfaces
+    for c in range(now.interfaces):
+        out[place + c] = now.gaps[c]
+    place += now.interfaces
     for d in range(bodies.driven):
         out[place + d] = drive_force(bodies, d)
 
 
 @njit(_nrt=False, error_model="numpy")
-def record_start(recording: Recording, network: NetworkArrays) -> None:
-    """Record the state before the first step as the first one."""
+def record_moment(recording: Recording, record: int, now: Moment) -> None:
+    """Record the present state as the end of a record, or as that before the first step."""
+    bodies = pointers(now.bodies)
     record_points(
         recording,
-        0,
-        pointers(network.bodies),
+        record,
         FINE,
-        network.elements.state,
-        network.node_state.p,
-        network.nodes.nodes,
-        network.node_state.free,
-        network.nodes.volumes * network.nodes.slow_gas,
-        network.branches.state,
-        network.interface_state.gap,
-        network.interfaces.interfaces,
+        Moment(
+            bodies,
+            now.elements,
+            now.pressures,
+            now.nodes,
+            now.shares,
+            now.slow,
+            now.branches,
+            now.gaps,
+            now.interfaces,
+        ),
     )

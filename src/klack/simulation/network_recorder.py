@@ -19,7 +19,7 @@ from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.modal_step import FIXED_ROWS
 from klack.simulation.network_arrays import Recording
 from klack.simulation.network_compile import CompiledNetwork
-from klack.simulation.network_record import record_start
+from klack.simulation.network_record import moment_of, record_moment
 from klack.simulation.network_result import ChannelData, InterfaceRecord
 
 __all__ = ["Recorder", "recorded_columns"]
@@ -140,7 +140,7 @@ class Recorder:
 
     def start(self, time: float, finder: ImpactFinder, *, fresh: bool) -> None:
         """Record the present state as that before the first step."""
-        record_start(self.recording, self.network.arrays)
+        record_moment(self.recording, 0, moment_of(self.network.arrays))
         self._points[:, 0] = self.recording.points[0]
         if fresh:  # a run that goes on knows this moment
             none = [np.empty((0, _FINE))] * len(self._fine)

@@ -57,11 +57,11 @@ from klack.simulation.network_pressures import (
     end_nodes,
     guess_pressures,
 )
-from klack.simulation.network_record import record_means, record_points
+from klack.simulation.network_record import record_means
 from klack.simulation.step_status import STATUS_DONE, STATUS_REFUSED, STATUS_REPEAT
 from klack.simulation.wave_rows import waves_commit, waves_incoming
 
-__all__ = ["answer_step", "begin_step", "end_step", "record_moment"]
+__all__ = ["answer_step", "begin_step", "end_step"]
 
 Vector = NDArray[np.float64]
 
@@ -213,22 +213,3 @@ def end_step(
     end_ports(bodies)
     if record >= 0:
         record_means(recording, record, record_time, sums, first(scratch.peaks))
-
-
-@njit(_nrt=False, error_model="numpy")
-def record_moment(record: int, network: NetworkArrays, recording: Recording) -> None:
-    """Record the present state as the end of a record."""
-    record_points(
-        recording,
-        record,
-        pointers(network.bodies),
-        FINE,
-        network.elements.state,
-        network.node_state.p,
-        network.nodes.nodes,
-        network.node_state.free,
-        network.nodes.volumes * network.nodes.slow_gas,
-        network.branches.state,
-        network.interface_state.gap,
-        network.interfaces.interfaces,
-    )

@@ -10,7 +10,7 @@ from klack.compiling.jit import njit
 from klack.compiling.tangent_number import tangent_number, with_tangents
 from klack.network.step_function import StepFunction
 from klack.simulation.network_kernel import run_network
-from klack.simulation.network_record import record_start
+from klack.simulation.network_record import record_moment
 
 __all__ = ["LANES", "lanes_of", "run_with_tangents", "start_with_tangents", "tangent_address"]
 
@@ -62,9 +62,9 @@ def run_with_tangents(
 
 
 @njit
-def start_with_tangents(recording: Any, network: Any) -> None:
-    """:func:`klack.simulation.network_record.record_start` with derivatives."""
-    record_start(with_tangents(LANES, recording), with_tangents(LANES, network))
+def start_with_tangents(recording: Any, now: Any) -> None:
+    """:func:`klack.simulation.network_record.record_moment` of the start, with derivatives."""
+    record_moment(with_tangents(LANES, recording), 0, with_tangents(LANES, now))
 
 
 def lanes_of(shape: tuple[int, ...]) -> NDArray[np.float64]:

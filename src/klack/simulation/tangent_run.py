@@ -34,6 +34,7 @@ from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.network_arrays import PARTS, scratch_memory
 from klack.simulation.network_compile import compile_network
 from klack.simulation.network_kernel import CLOCK
+from klack.simulation.network_record import moment_of
 from klack.simulation.network_recorder import Recorder
 from klack.simulation.network_result import (
     ChannelData,
@@ -504,7 +505,7 @@ class _Running:
     def _start(self) -> "_Part":
         """The state before the first step."""
         none = np.zeros((0, 5, LANES))
-        start_with_tangents(self.recording, self.numbers)
+        start_with_tangents(self.recording, moment_of(self.numbers))
         return _Part(
             time=np.zeros((1, LANES)),
             points=self.recording.points[:1].copy(),

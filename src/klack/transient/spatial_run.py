@@ -37,13 +37,14 @@ from klack.simulation.network_arrays import (
 )
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_network
+from klack.simulation.network_record import moment_of, record_moment
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import everything, put_back
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import longest_period
 from klack.simulation.spatial_impact import SpatialImpact
 from klack.simulation.spatial_path import SpatialPath
-from klack.simulation.spatial_step import answer_step, begin_step, end_step, record_moment
+from klack.simulation.spatial_step import answer_step, begin_step, end_step
 from klack.simulation.step_sizes import StepSizes
 from klack.simulation.step_status import (
     STATUS_DONE,
@@ -630,7 +631,7 @@ class _Moving:
             left -= taken
         self._steady(before)
         self.write()
-        record_moment(row, self.arrays, run.recording)
+        record_moment(run.recording, row, moment_of(self.arrays))
         return STATUS_DONE
 
     def _step(self, run: _Run, level: int, points: bool, record: int, record_time: float) -> int:
