@@ -13,6 +13,7 @@ from math import pi
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from klack.errors import require_positive
@@ -46,14 +47,11 @@ class LowPass:
     @property
     def poles(self) -> NDArray[np.complex128]:
         """Poles [1/s], shape (order,)."""
-        # takes half a second to load, which cases without a low pass save
-        from scipy.signal import bessel, butter
-
         omega = 2.0 * pi * self.cut_off
         if self.kind == "butterworth":
-            _, denominator = butter(self.order, omega, analog=True)
+            _, denominator = scipy.signal.butter(self.order, omega, analog=True)
         else:
-            _, denominator = bessel(self.order, omega, analog=True, norm="mag")
+            _, denominator = scipy.signal.bessel(self.order, omega, analog=True, norm="mag")
         return np.asarray(np.roots(denominator), dtype=np.complex128)
 
     @property
@@ -93,8 +91,6 @@ def low_passed(values: Floats, poles: NDArray[np.complex128], step: float) -> Fl
     >>> float(round((ramp - low_passed(ramp, np.array([-0.1 + 0j]), 1.0))[-1], 6))
     10.0
     """
-    from scipy.signal import lfilter
-
     shown = np.zeros(np.shape(values))
     for pole, residue in zip(poles, _residues(poles), strict=True):
         decay = np.exp(pole * step)
@@ -103,7 +99,7 @@ def low_passed(values: Floats, poles: NDArray[np.complex128], step: float) -> Fl
         b = residue * np.array([end, whole - end])
         a = np.array([1.0, -decay])
         at_rest = (b.sum() / (1.0 - decay) - b[0]) * values[..., :1]
-        part, _ = lfilter(b, a, values.astype(np.complex128), axis=-1, zi=at_rest)
+        part, _ = scipy.signal.lfilter(b, a, values.astype(np.complex128), axis=-1, zi=at_rest)
         shown += part.real
     return shown
 

@@ -1,8 +1,8 @@
 """Lay one impact over another: force history and one-third-octave levels."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.acoustics.spectrum import energy_spectral_density, impulse_spectrum
 from klack.acoustics.third_octave import ThirdOctaves, band_energies
@@ -96,5 +96,5 @@ def _means(series: TimeSeries, edges: NDArray) -> NDArray:
     """Mean values between new edges; the impulse gathered is interpolated, so none is lost."""
     own = series.start + series.step * (np.arange(series.values.size + 1) - 0.5)
     gathered = np.concatenate(([0.0], np.cumsum(series.values) * series.step))
-    impulse = PchipInterpolator(own, gathered)(np.clip(edges, own[0], own[-1]))
+    impulse = scipy.interpolate.PchipInterpolator(own, gathered)(np.clip(edges, own[0], own[-1]))
     return np.diff(impulse) / np.diff(edges)

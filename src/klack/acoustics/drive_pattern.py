@@ -3,8 +3,7 @@
 from math import ceil, floor, pi
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
-from scipy.special import diric
+import scipy
 
 from klack.errors import require_positive
 from klack.signals import TimeSeries
@@ -36,12 +35,16 @@ def drive_pattern(click: TimeSeries, rate: float, duration: float) -> TimeSeries
     count = max(floor(duration / click.step + 0.5), 1)
     clicks = max(ceil(duration * rate * (1.0 - 1e-12)), 1)
     whole = count + click.values.size + ceil(1.0 / (rate * click.step))
-    n = next_fast_len(whole, real=True)
-    f = rfftfreq(n, click.step)
-    comb = clicks * diric(2.0 * pi * f / rate, clicks) * np.exp(-1j * pi * f * (clicks - 1) / rate)
+    n = scipy.fft.next_fast_len(whole, real=True)
+    f = scipy.fft.rfftfreq(n, click.step)
+    comb = (
+        clicks
+        * scipy.special.diric(2.0 * pi * f / rate, clicks)
+        * np.exp(-1j * pi * f * (clicks - 1) / rate)
+    )
     return TimeSeries(
         step=click.step,
-        values=irfft(rfft(click.values, n) * comb, n)[:count],
+        values=scipy.fft.irfft(scipy.fft.rfft(click.values, n) * comb, n)[:count],
         unit=click.unit,
         name=f"{click.name} at {rate:.4g} Hz",
     )

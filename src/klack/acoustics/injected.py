@@ -16,7 +16,7 @@ the static energy between the first and the last one.
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft, rfftfreq
+import scipy
 
 from klack.acoustics.port_forces import aligned_forces
 from klack.compiling.jit import njit
@@ -60,10 +60,10 @@ def injected_density(
     axis, values = aligned_forces(structure, forces)
     step, spacing = axis.step, resolution or float(width.min()) / _PER_HALF_WIDTH
     # room for the vibration to die away after the record: what is cut off comes back at its start
-    n = next_fast_len(len(values) + int(np.ceil(1.0 / (spacing * step))), real=True)
+    n = scipy.fft.next_fast_len(len(values) + int(np.ceil(1.0 / (spacing * step))), real=True)
     steps = np.diff(values, axis=0, prepend=values[:1])
-    frequency = rfftfreq(n, step)
-    turned = rfft(steps, n, axis=0)
+    frequency = scipy.fft.rfftfreq(n, step)
+    turned = scipy.fft.rfft(steps, n, axis=0)
     density = _density(
         2.0 * np.pi * frequency, turned, structure.omega, structure.damping, structure.port_shapes
     )

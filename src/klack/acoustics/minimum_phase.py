@@ -6,8 +6,8 @@ logarithm of its magnitude (Oppenheim and Schafer, Discrete-Time Signal Processi
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, rfft
 
 __all__ = ["minimum_phase_filter"]
 
@@ -38,8 +38,8 @@ def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex12
     True
     """
     n = 2 * (magnitude.size - 1)
-    cepstrum = irfft(np.log(magnitude), n)
+    cepstrum = scipy.fft.irfft(np.log(magnitude), n)
     cepstrum[1 : n // 2] *= 2.0
     cepstrum[n // 2 + 1 :] = 0.0
-    response: NDArray[np.complex128] = np.exp(rfft(cepstrum))
+    response: NDArray[np.complex128] = np.exp(scipy.fft.rfft(cepstrum))
     return response

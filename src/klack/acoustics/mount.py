@@ -15,7 +15,7 @@ mount.  The force of the impacts stays that of the rigidly held body.
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from klack.acoustics.plate import Plate

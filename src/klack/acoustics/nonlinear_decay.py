@@ -18,8 +18,8 @@ rise above ``v`` in falling. ``u`` is taken straight between its values, which c
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from klack.compiling.jit import njit
 
@@ -46,7 +46,7 @@ def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
     network = np.array([[-1.0 / _SHORT - b, b], [1.0 / _VARIABLE, -1.0 / _VARIABLE]])
     out: NDArray[np.float64] = _follow(
         np.ascontiguousarray(core, dtype=float),
-        expm(h * network),
+        scipy.linalg.expm(h * network),
         float(np.exp(-h / _LONG)),
         float(np.exp(-h / _VARIABLE)),
         _FINE,

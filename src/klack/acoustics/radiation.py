@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import j1
 
 from klack.acoustics.air import Air
 from klack.acoustics.harmonic import HarmonicResponse, harmonic_response
@@ -148,4 +148,6 @@ def piston_efficiency(
     """
     x = 4.0 * np.pi * np.asarray(frequency, dtype=float) / sound_speed * np.sqrt(area / np.pi)
     safe = np.maximum(x, _SERIES_BELOW)
-    return np.where(x < _SERIES_BELOW, x**2 / 8.0 - x**4 / 192.0, 1.0 - 2.0 * j1(safe) / safe)
+    return np.where(
+        x < _SERIES_BELOW, x**2 / 8.0 - x**4 / 192.0, 1.0 - 2.0 * scipy.special.j1(safe) / safe
+    )

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from math import log10
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft, rfftfreq
+import scipy
 
 from klack.acoustics.third_octave import ThirdOctaves, band_energies
 from klack.acoustics.weighting import a_weighted
@@ -151,10 +151,10 @@ def pressure_third_octaves(
     """
     finest = 0.1 * low  # of the lowest band's width, a quarter of low
     count = max(pressure.values.size, int(np.ceil(1.0 / (finest * pressure.step))))
-    n = next_fast_len(2 * count, real=True)
-    spectrum = rfft(pressure.values, n) * pressure.step
+    n = scipy.fft.next_fast_len(2 * count, real=True)
+    spectrum = scipy.fft.rfft(pressure.values, n) * pressure.step
     density = Spectrum(
-        frequency=rfftfreq(n, pressure.step),
+        frequency=scipy.fft.rfftfreq(n, pressure.step),
         values=2.0 * np.abs(spectrum) ** 2,
         unit="Pa^2 s/Hz",
         name=pressure.name,

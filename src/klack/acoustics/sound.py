@@ -11,9 +11,8 @@ early as possible.  Directivity, reflections and the travel time ``r/c`` are lef
 from math import pi
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len
-from scipy.interpolate import PchipInterpolator
 
 from klack.acoustics.minimum_phase import minimum_phase_filter
 from klack.acoustics.spectrum import change_spectrum
@@ -90,7 +89,7 @@ def click_pressure(
     _require_transfer(frequency, transfer)
     span = force.values.size * force.step
     count = int(np.ceil((_LEAD + span + tail) * rate))
-    n = next_fast_len(int(_LONG * count), real=True)
+    n = scipy.fft.next_fast_len(int(_LONG * count), real=True)
     n += n % 2
     f = np.arange(n // 2 + 1) * rate / n
     strength = density * sound_speed / (4.0 * pi * distance**2)
@@ -100,7 +99,7 @@ def click_pressure(
     filtered[1:] *= changes[1:] / (2j * pi * f[1:])
     return TimeSeries(
         step=1.0 / rate,
-        values=irfft(filtered, n)[:count] * rate,
+        values=scipy.fft.irfft(filtered, n)[:count] * rate,
         unit="Pa",
         start=start,
         name=f"sound of {force.name}" if force.name else "sound",
@@ -158,7 +157,9 @@ def _interpolated(
     x, y = np.log(frequency[known]), squared[known]
     y = np.log(np.maximum(y, _DEEPEST * y.max()))
     within = np.clip(np.log(f), x[0], x[-1])
-    middle = PchipInterpolator(x, y)(within) if x.size > 1 else np.full(f.shape, y[0])
+    middle = (
+        scipy.interpolate.PchipInterpolator(x, y)(within) if x.size > 1 else np.full(f.shape, y[0])
+    )
     out: NDArray[np.float64] = np.exp(middle) * np.minimum(f / frequency[known][0], 1.0) ** 4
     return out
 

@@ -16,8 +16,8 @@ from functools import lru_cache
 from typing import cast
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft, rfftfreq
 
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError, require_positive
@@ -121,9 +121,13 @@ def impulse_spectrum(
             expected="a value above 0 Hz",
             hint="a tenth of the lowest band width is fine enough.",
         )
-    n = next_fast_len(max(values.size, int(np.ceil(1.0 / (resolution * series.step)))), real=True)
-    frequency = rfftfreq(n, series.step)
-    spectrum = rfft(values, n) * series.step * np.exp(-2j * np.pi * frequency * series.start)
+    n = scipy.fft.next_fast_len(
+        max(values.size, int(np.ceil(1.0 / (resolution * series.step)))), real=True
+    )
+    frequency = scipy.fft.rfftfreq(n, series.step)
+    spectrum = (
+        scipy.fft.rfft(values, n) * series.step * np.exp(-2j * np.pi * frequency * series.start)
+    )
     if interval_means:
         spectrum = spectrum / np.sinc(frequency * series.step)
     return Spectrum(frequency=frequency, values=spectrum, unit=f"{series.unit} s", name=series.name)
@@ -194,9 +198,7 @@ def _zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
 
 @lru_cache(maxsize=16)
 def _kept_zoom(size: int, high: float, count: int, rate: float) -> _Zoom:
-    from scipy.signal import ZoomFFT  # takes a second to load, which other commands save
-
-    return cast(_Zoom, ZoomFFT(size, (0.0, high), count, fs=rate, endpoint=True))
+    return cast(_Zoom, scipy.signal.ZoomFFT(size, (0.0, high), count, fs=rate, endpoint=True))
 
 
 def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None = None) -> Spectrum:

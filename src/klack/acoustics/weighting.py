@@ -1,8 +1,8 @@
 """The A-weighting of IEC 61672-1, as formula over frequency."""
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
 from klack.signals import TimeSeries
 
@@ -49,12 +49,14 @@ def a_weighted(pressure: TimeSeries) -> TimeSeries:
     ----------
     pressure : TimeSeries [Pa]
     """
-    n = next_fast_len(pressure.values.size + int(_PADDING / pressure.step), real=True)
-    f = rfftfreq(n, pressure.step)
+    n = scipy.fft.next_fast_len(pressure.values.size + int(_PADDING / pressure.step), real=True)
+    f = scipy.fft.rfftfreq(n, pressure.step)
     factor = a_weighting(f) * np.exp(1j * _phase(f))
     return TimeSeries(
         step=pressure.step,
-        values=irfft(rfft(pressure.values, n) * factor, n)[: pressure.values.size],
+        values=scipy.fft.irfft(scipy.fft.rfft(pressure.values, n) * factor, n)[
+            : pressure.values.size
+        ],
         unit=pressure.unit,
         start=pressure.start,
         name=f"{pressure.name}, A-weighted",

@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import Any, Protocol, cast
 
 import numpy as np
+import scipy
 from threadpoolctl import ThreadpoolController
 
 from klack.acoustics.drive_pattern import drive_pattern
@@ -431,10 +432,8 @@ def _sounds(now: TimeSeries | None, pinned: TimeSeries | None) -> tuple[bytes, b
 
 def _spectrogram(pressure: TimeSeries) -> tuple[Floats, Floats, Floats]:
     """Level over time [ms] and frequency [kHz], Hann windows of 5.3 ms."""
-    from scipy.signal import spectrogram
-
     first = pressure.values[: int(_SHOWN * pressure.rate)]
-    f, t, power = spectrogram(
+    f, t, power = scipy.signal.spectrogram(
         first, pressure.rate, window="hann", nperseg=256, noverlap=208, mode="psd"
     )
     level = 10.0 * np.log10(np.maximum(power, 1e-30) / _REFERENCE**2)

@@ -1,8 +1,8 @@
 """Pressure limit of contact points, fitted to the static loops of their own contact."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
@@ -71,7 +71,9 @@ def fitted_limit(loops: YieldingLoops, space: ContactSpace, C: Floats) -> Pressu
         return np.append(weight[:, None] * found, _UNEVEN * np.diff(powers))
 
     start = np.full(len(sets) - 1, np.log(_RISE / (len(sets) - 1)))
-    return limit(least_squares(misses, start, diff_step=[1e-2], ftol=1e-4, xtol=1e-3).x)
+    return limit(
+        scipy.optimize.least_squares(misses, start, diff_step=[1e-2], ftol=1e-4, xtol=1e-3).x
+    )
 
 
 def _chosen(loops: YieldingLoops) -> list[int]:

@@ -6,8 +6,8 @@ from functools import partial
 from math import exp, log1p, pi, sqrt
 from typing import Annotated, Any, Literal
 
+import scipy
 from pydantic import PlainValidator, ValidationInfo, WithJsonSchema
-from scipy.special import ndtr, ndtri
 
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
@@ -54,8 +54,10 @@ class Distribution:
         if self.kind == "rayleigh":
             return float(self.first * (-2.0 * log1p(-share)) ** 0.5)
         if self.kind == "normal" and self.second > 0.0:
-            below = float(ndtr(-self.first / self.second))
-            value = self.first + self.second * float(ndtri(below + share * (1.0 - below)))
+            below = float(scipy.special.ndtr(-self.first / self.second))
+            value = self.first + self.second * float(
+                scipy.special.ndtri(below + share * (1.0 - below))
+            )
             return max(value, 0.0)
         return self.first
 
@@ -69,7 +71,7 @@ class Distribution:
         if self.kind == "normal" and self.second > 0.0:
             a = self.first / self.second
             density = exp(-0.5 * a * a) / sqrt(2.0 * pi)
-            return self.first + self.second * density / float(ndtr(a))
+            return self.first + self.second * density / float(scipy.special.ndtr(a))
         return self.first
 
     @property

@@ -14,9 +14,8 @@ last one is flipped, which ends for every positive definite matrix (Murty 1974).
 from collections import deque
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg.blas import dsyrk, dtrsm
-from scipy.linalg.lapack import dpotrf, dpotrs
 
 from klack.errors import ConvergenceError, InputError
 
@@ -121,7 +120,7 @@ class ComplementaritySolver:
             self._factorise(q, active)
         if not len(self._active):
             return np.empty(0)
-        forces, _ = dpotrs(self._factor, -q[self._active], lower=1)
+        forces, _ = scipy.linalg.lapack.dpotrs(self._factor, -q[self._active], lower=1)
         return forces
 
     def _factorise(self, q: NDArray[np.float64], active: NDArray[np.bool_]) -> None:
@@ -167,10 +166,10 @@ def _bordered(
     count, size = len(known), len(known) + len(corner)
     factor = np.empty((size, size), order="F")
     if count:
-        border = dtrsm(1.0, known, beside, lower=1)
-        corner = dsyrk(-1.0, border, beta=1.0, c=corner, trans=1, lower=1)
+        border = scipy.linalg.blas.dtrsm(1.0, known, beside, lower=1)
+        corner = scipy.linalg.blas.dsyrk(-1.0, border, beta=1.0, c=corner, trans=1, lower=1)
         factor[:count, :count], factor[count:, :count] = known, border.T
-    factor[count:, count:], info = dpotrf(corner, lower=1)
+    factor[count:, count:], info = scipy.linalg.lapack.dpotrf(corner, lower=1)
     if info != 0:
         raise ConvergenceError(
             f"complementarity: the compliance of {size} active contact points is "

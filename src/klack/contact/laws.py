@@ -13,9 +13,8 @@ from dataclasses import dataclass, field
 from math import log1p
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from klack.contact.step_constants import LAW_HERTZ, LAW_LINEAR, LAW_TABLE
 from klack.errors import InputError, require_nonnegative, require_positive
@@ -310,7 +309,9 @@ def gonthier_coefficient(restitution: float) -> float:
     upper = float(np.nextafter(1.0, 0.0))
     if excess(upper) <= 0.0:
         return upper / e  # below e = 0.028 the root is 1 in double precision
-    return float(brentq(excess, (1.0 - e) * 1e-3, upper, xtol=1e-17, rtol=8.9e-16)) / e
+    return (
+        float(scipy.optimize.brentq(excess, (1.0 - e) * 1e-3, upper, xtol=1e-17, rtol=8.9e-16)) / e
+    )
 
 
 def _closed(indentation: ArrayLike) -> NDArray[np.float64]:
@@ -348,7 +349,7 @@ def _monotone_cubics(d: NDArray[np.float64], f: NDArray[np.float64]) -> NDArray[
     if d.size == 2:
         slope = np.repeat(secant, 2)
     else:
-        slope = PchipInterpolator(d, f)(d, 1)
+        slope = scipy.interpolate.PchipInterpolator(d, f)(d, 1)
         if slope[-1] <= 0.0:
             slope[-1] = secant[-1]  # else the continuation would be a constant force
     h = np.diff(d)

@@ -19,8 +19,8 @@ of the fall from ten times the threshold to the threshold.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError
@@ -291,7 +291,7 @@ def _time_since_touch(force: NDArray[np.float64], h: float) -> float:
     elif bend(high) >= 0.0:
         n = high
     else:
-        n = float(brentq(bend, low, high, xtol=1e-12))
+        n = float(scipy.optimize.brentq(bend, low, high, xtol=1e-12))
     x = J ** (1.0 / (1.0 + n))
     return float(min(h, h * x[0] / (x[1] - x[0])))
 

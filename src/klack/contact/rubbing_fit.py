@@ -18,8 +18,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from klack.contact.laws import TableLaw
 from klack.contact.local_law import LocalLaw
@@ -138,7 +138,9 @@ def _reverse(closing: TableLaw, loops: Sequence[Loop]) -> float:
         found = [law.along(np.append(0.0, loop.approach))[1:] - loop.force for loop in loops]
         return np.concatenate(found) / size
 
-    fitted = least_squares(apart, (0.8, 0.5), bounds=((1e-3, 1e-3), (1.0, _STIFFEST)))
+    fitted = scipy.optimize.least_squares(
+        apart, (0.8, 0.5), bounds=((1e-3, 1e-3), (1.0, _STIFFEST))
+    )
     return float(fitted.x[0])
 
 

@@ -10,8 +10,8 @@ can reproduce it; the consistent law (:mod:`klack.contact.local_law`) needs no s
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from klack.cache.result_cache import ResultCache
 from klack.contact.statics import StaticContact, contact_compliance, static_contact
@@ -109,7 +109,7 @@ def local_stiffness(
 
 def _region(body: ElasticBody, carrying: NDArray[np.float64], size: float) -> ElasticBody:
     """Return the body with everything beyond ``size`` held."""
-    distance, _ = cKDTree(carrying).query(body.mesh.points)
+    distance, _ = scipy.spatial.cKDTree(carrying).query(body.mesh.points)
     beyond = np.flatnonzero(distance > size)
     free = body.mesh.node_count - len(beyond)
     if not len(beyond) or free < 10:

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components
 
 from klack.elasticity.assembly import assemble
 from klack.elasticity.rigid_motions import (
@@ -211,7 +211,7 @@ def _check_one_piece(name: str, mesh: Mesh) -> None:
     graph = coo_array(
         (np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(mesh.node_count,) * 2
     )
-    count, label = connected_components(graph, directed=False)
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
     if count == 1:
         return
     smallest = np.flatnonzero(label == np.argmin(np.bincount(label)))

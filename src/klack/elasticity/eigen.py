@@ -10,7 +10,7 @@ with the elastic modes, no shift has to be chosen, and statics and modes share o
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from klack.cache.entry import Entry

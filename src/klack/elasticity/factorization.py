@@ -16,8 +16,8 @@ from types import TracebackType
 from typing import Any, Literal, Protocol, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigvalsh_tridiagonal
 
 from klack.elasticity.budget import WITHOUT, Budget
 from klack.errors import InputError
@@ -248,6 +248,6 @@ def _check_definite(factor: Factorization) -> None:
             if not beside[k] > _ROUNDING * abs(diagonal[: k + 1]).max():
                 diagonal, beside = diagonal[: k + 1], beside[:k]
                 break
-    values = eigvalsh_tridiagonal(diagonal, beside)
+    values = scipy.linalg.eigvalsh_tridiagonal(diagonal, beside)
     if values[0] < -_ROUNDING * abs(values).max():
         raise not_positive_definite("it has a negative eigenvalue")

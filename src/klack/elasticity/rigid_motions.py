@@ -1,7 +1,7 @@
 r"""Rigid motions of the nodes of a body, and the forces that given matrices answer them with."""
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 

@@ -1,10 +1,9 @@
 r"""The lowest end of the spectra of K and M: definiteness, and motions without strain."""
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, dia_array
-from scipy.sparse.linalg import eigsh
 
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import eigenmodes
@@ -33,7 +32,9 @@ def require_positive_mass(where: str, M: csr_array, free: NDArray[np.int64]) -> 
         smallest = float(scipy.linalg.eigvalsh(scaled.toarray(), subset_by_index=[0, 0])[0])
     else:
         start = np.random.default_rng(5).standard_normal(len(free))
-        values = eigsh(scaled, k=1, which="SA", tol=1e-2, v0=start, return_eigenvectors=False)
+        values = scipy.sparse.linalg.eigsh(
+            scaled, k=1, which="SA", tol=1e-2, v0=start, return_eigenvectors=False
+        )
         smallest = float(values[0])
     if not smallest > 0:
         raise InputError(

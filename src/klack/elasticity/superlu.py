@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
 from klack.closing import Closing
 from klack.elasticity.budget import WITHOUT, Budget
@@ -25,7 +25,7 @@ class SuperluFactorization(Closing):
         budget.require(self.backend, self.size, A.nnz, needed)
         try:
             # symmetric mode pivots on the diagonal, so that the fill of the ordering is kept
-            factor = splu(
+            factor = scipy.sparse.linalg.splu(
                 A.tocsc(),
                 permc_spec="MMD_AT_PLUS_A",
                 diag_pivot_thresh=0.0,

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from klack.contact.step_constants import shared_constants
 from klack.errors import InputError
@@ -42,15 +43,13 @@ def write_matlab(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]
     tuple of Path
         The ``.mat`` file of each model, followed by its scripts.
     """
-    from scipy.io import savemat
-
     names: list[str] = []
     with model_folder(models, folder) as stage:
         for model in models:
             content = matlab_structure(named_apart(model))
             _require_size(model, content)
             names.append(f"{model.name}.mat")
-            savemat(
+            scipy.io.savemat(
                 stage / names[-1],
                 {"klack": content},
                 long_field_names=True,

@@ -11,8 +11,8 @@ sequential quadratic programming.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import LinearConstraint, minimize
 
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
@@ -153,12 +153,12 @@ def _nearest(mesh: Mesh, near: LocatedPoint, point: Floats) -> LocatedPoint:
 
     straight = 0 if family.startswith(("quad", "hex")) else 2 if family.startswith("wedge") else 3
     row = (np.arange(len(near.xi)) < straight).astype(float)
-    found = minimize(
+    found = scipy.optimize.minimize(
         apart,
         near.xi,
         method="SLSQP",
         bounds=list(zip(corners.min(axis=0), corners.max(axis=0), strict=True)),
-        constraints=LinearConstraint(row[None], -np.inf, 1.0) if straight else (),
+        constraints=scipy.optimize.LinearConstraint(row[None], -np.inf, 1.0) if straight else (),
         options={"ftol": 1e-14, "maxiter": 100},
     )
     xi = _inside(family, np.asarray(found.x, dtype=float))

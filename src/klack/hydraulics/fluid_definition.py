@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
@@ -97,16 +97,18 @@ class MeasuredProperties:
     range_source: str
 
     @cached_property
-    def _over_temperature(self) -> CubicSpline:
+    def _over_temperature(self) -> "scipy.interpolate.CubicSpline":
         columns = (self.density, self.bulk_modulus, self.bulk_modulus_slope)
-        return CubicSpline(self.temperature, np.column_stack((*columns, self.pressure_viscosity)))
+        return scipy.interpolate.CubicSpline(
+            self.temperature, np.column_stack((*columns, self.pressure_viscosity))
+        )
 
     @cached_property
-    def _over_inverse(self) -> CubicSpline:
+    def _over_inverse(self) -> "scipy.interpolate.CubicSpline":
         """Logarithms of viscosity and vapour pressure over 1/T (Andrade; Clausius-Clapeyron)."""
         x = 1.0 / np.array(self.temperature)[::-1]
         logs = np.log(np.column_stack((self.viscosity, self.vapour_pressure)))
-        return CubicSpline(x, logs[::-1])
+        return scipy.interpolate.CubicSpline(x, logs[::-1])
 
     def at(self, temperature: float) -> FluidState:
         """Properties at a temperature [K]."""

@@ -17,8 +17,8 @@ from functools import cache
 from math import pi
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import jn_zeros
 
 from klack.errors import require_positive
 
@@ -107,7 +107,7 @@ def laminar_weight(tau: ArrayLike) -> Values:
 @cache
 def _bessel_zeros() -> tuple[float, ...]:
     """Positive zeros of ``J_2``."""
-    return tuple(float(zero) for zero in jn_zeros(2, _SERIES_TERMS))
+    return tuple(float(zero) for zero in scipy.special.jn_zeros(2, _SERIES_TERMS))
 
 
 def zielke_weight(tau: ArrayLike) -> Values:

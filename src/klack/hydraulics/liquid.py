@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.errors import InputError, require_nonnegative, require_positive
 
@@ -234,7 +234,7 @@ class TabulatedLiquid:
         if p.size == 2:
             slopes = np.repeat(secant, 2)
         else:
-            slopes = np.asarray(PchipInterpolator(p, rho)(p, 1))
+            slopes = np.asarray(scipy.interpolate.PchipInterpolator(p, rho)(p, 1))
             for end in (0, -1):
                 if slopes[end] <= 0.0:
                     slopes[end] = secant[end]  # else the liquid would be rigid beyond

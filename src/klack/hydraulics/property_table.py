@@ -25,8 +25,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.fluid_definition import FluidDefinition, FluidState
@@ -92,14 +92,14 @@ class CompressedLiquid:
     name: str
     pressure: Values
     density_at_lowest: float
-    _fall: PchipInterpolator
-    _area: PchipInterpolator
+    _fall: "scipy.interpolate.PchipInterpolator"
+    _area: "scipy.interpolate.PchipInterpolator"
 
     def __init__(
         self, name: str, pressure: ArrayLike, density: float, compressibility: ArrayLike
     ) -> None:
         p = np.asarray(pressure, dtype=float)
-        fall = PchipInterpolator(p, np.asarray(compressibility, dtype=float))
+        fall = scipy.interpolate.PchipInterpolator(p, np.asarray(compressibility, dtype=float))
         for key, value in (
             ("name", name), ("pressure", p), ("density_at_lowest", density), ("_fall", fall),
             ("_area", fall.antiderivative()),
@@ -213,7 +213,9 @@ class PropertyTable:
         if self.temperature.size == 1:
             return columns[0]
         inside = np.clip(temperature, self.temperature[0], self.temperature[-1])
-        return np.asarray(PchipInterpolator(self.temperature, columns, axis=0)(inside))
+        return np.asarray(
+            scipy.interpolate.PchipInterpolator(self.temperature, columns, axis=0)(inside)
+        )
 
 
 def _exponential(pressure: Values, viscosity: Values) -> tuple[float, float, float]:
@@ -304,7 +306,7 @@ def _stiffness(where: str, T: Values, p: Values, columns: dict[str, Values]) -> 
         K = by_sound
     if K is None:
         return None
-    strain = PchipInterpolator(p, 1.0 / K, axis=1).integrate(p[0], p[-1])
+    strain = scipy.interpolate.PchipInterpolator(p, 1.0 / K, axis=1).integrate(p[0], p[-1])
     ratio = np.log(rho[:, -1] / rho[:, 0]) / strain
     low, high = _STIFFER
     if not np.all((ratio > low) & (ratio < high)):

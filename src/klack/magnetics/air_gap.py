@@ -22,8 +22,8 @@ from functools import cache
 from math import pi
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import ive, kve
 
 from klack.magnetics.iron import VACUUM_PERMEABILITY
 
@@ -195,7 +195,11 @@ def _round_spectrum(q: float) -> tuple[Vector, Vector]:
     k = np.exp(edges[:-1, None] + half * (1.0 + nodes)).ravel()
     # scaled functions: I(x) = e^x ive(x), K(x) = e^-x kve(x); common factor e^(k (q - 1))
     fade = np.exp(-2.0 * k * (q - 1.0))
-    top = kve(1, k) * ive(0, k * q) + fade * ive(1, k) * kve(0, k * q)
-    bottom = kve(0, k) * ive(0, k * q) - fade * ive(0, k) * kve(0, k * q)
+    top = scipy.special.kve(1, k) * scipy.special.ive(0, k * q) + fade * scipy.special.ive(
+        1, k
+    ) * scipy.special.kve(0, k * q)
+    bottom = scipy.special.kve(0, k) * scipy.special.ive(0, k * q) - fade * scipy.special.ive(
+        0, k
+    ) * scipy.special.kve(0, k * q)
     density = (top / bottom - 1.0 / np.tanh(k * wall)) / k
     return k, density * k * (half * weights).ravel() / pi

@@ -20,8 +20,8 @@ import warnings
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from klack.errors import AccuracyWarning, InputError
 from klack.units import format_si
@@ -143,8 +143,8 @@ class FluxMap:
             x,
             energy,
             through,
-            CubicSpline(x, energy, axis=1)(x, 1),
-            CubicSpline(x, through, axis=1)(x, 1),
+            scipy.interpolate.CubicSpline(x, energy, axis=1)(x, 1),
+            scipy.interpolate.CubicSpline(x, through, axis=1)(x, 1),
         )
         made._require_rising()
         if force is not None:
@@ -326,7 +326,7 @@ def _checked(
 
 def _column(i: Vector, psi: Vector, common: Vector) -> tuple[Vector, Vector]:
     """Energy and current over the common linkages, at one gap."""
-    curve: PPoly = PchipInterpolator(psi, i)
+    curve: scipy.interpolate.PPoly = scipy.interpolate.PchipInterpolator(psi, i)
     slope = float(curve(psi[-1], 1)) or float((i[-1] - i[-2]) / (psi[-1] - psi[-2]))
     inside = np.minimum(common, psi[-1])
     beyond = common - inside

@@ -33,8 +33,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator, PPoly
 
 from klack.errors import InputError, require_positive
 from klack.magnetics.iron import VACUUM_PERMEABILITY, IronCurve, measured
@@ -232,11 +232,15 @@ def measured_width(
     B = np.linspace(0.0, tip, _INTERVALS + 1)
     width = np.maximum(-0.5 * (branch(B) + branch(-B)), 0.0)
     width[-1] = 0.0
-    even = PchipInterpolator(np.append(-B[:0:-1], B), np.append(width[:0:-1], width))
+    even = scipy.interpolate.PchipInterpolator(
+        np.append(-B[:0:-1], B), np.append(width[:0:-1], width)
+    )
     return LoopWidth(B, width, even(B, 1), _reversal(curve, width[0], initial_permeability))
 
 
-def _branch(flux_density: ArrayLike, field_strength: ArrayLike) -> tuple[PPoly, float]:
+def _branch(
+    flux_density: ArrayLike, field_strength: ArrayLike
+) -> "tuple[scipy.interpolate.PPoly, float]":
     """Falling branch ``H(B)``, symmetric at its tips, and the flux density of the tip."""
     B, H = (np.array(v, dtype=float).ravel() for v in (flux_density, field_strength))
     where = "hysteresis loop"
@@ -267,7 +271,7 @@ def _branch(flux_density: ArrayLike, field_strength: ArrayLike) -> tuple[PPoly, 
     tip, field = 0.5 * (B[-1] - B[0]), 0.5 * (H[-1] - H[0])
     B = B - 0.5 * (B[0] + B[-1])
     H[0], H[-1] = -field, field
-    branch: PPoly = PchipInterpolator(B, H)
+    branch: scipy.interpolate.PPoly = scipy.interpolate.PchipInterpolator(B, H)
     inner = np.linspace(0.0, tip, 8 * _INTERVALS + 1)[:-1]
     least = float(np.min(-(branch(inner) + branch(-inner))))
     if not least > 2.0 * _CROSSED * float(branch(0.0)):

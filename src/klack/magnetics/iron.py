@@ -26,9 +26,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from klack.errors import InputError, require_positive
 from klack.magnetics.reluctance import IronReluctance
@@ -95,7 +94,9 @@ class IronCurve:
         law, most = self.law(1.0, 1.0), _HIGHEST + 2.0 * _MU0 * abs(field)
         if field == 0.0:
             return 0.0
-        root = brentq(lambda b: float(law.mmf(b, 0.0)) - abs(field), 0.0, most, xtol=1e-15)
+        root = scipy.optimize.brentq(
+            lambda b: float(law.mmf(b, 0.0)) - abs(field), 0.0, most, xtol=1e-15
+        )
         return float(np.copysign(root, field))
 
 
@@ -240,7 +241,9 @@ def measured(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
             expected="flux density and field strength, both increasing from (0, 0)",
             hint="use the initial magnetisation curve, sorted; remove repeated points.",
         )
-    slope = PchipInterpolator(B, H)(B, 1) if B.size > 2 else np.full(2, H[1] / B[1])
+    slope = (
+        scipy.interpolate.PchipInterpolator(B, H)(B, 1) if B.size > 2 else np.full(2, H[1] / B[1])
+    )
     secant = np.diff(H) / np.diff(B)
     slope[-1] = min(max(slope[-1], secant[-1]), 1.0 / _MU0)
     slope = np.where(slope > 0.0, slope, np.append(secant, secant[-1]))
@@ -262,7 +265,7 @@ def _tabulate(curve: Callable[[Vector], tuple[Vector, Vector]]) -> IronCurve:
     if above.size:
         high = float(coarse[above[0]])
         low = max(high - 0.01, 1e-12)
-        end = float(brentq(excess, low, high)) if excess(low) < 0.0 else high
+        end = float(scipy.optimize.brentq(excess, low, high)) if excess(low) < 0.0 else high
     B = hermite_grid(curve, 0.0, end, tolerance=_TOLERANCE)
     H, slope = curve(B)
     H[0] = 0.0

@@ -32,8 +32,8 @@ from functools import cache
 from math import pi
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.integrate import quad
 
 from klack.magnetics.air_gap import (
     cylinder_wall,
@@ -191,6 +191,8 @@ def _window_tube() -> tuple[float, float]:
     def falling(r: float) -> float:
         return float(1.0 - np.log(r / RADIUS) / whole)
 
-    square = quad(lambda r: own(r) ** 2 * r, RADIUS, YOKE_INNER, points=[begin])[0]
-    mixed = quad(lambda r: own(r) * falling(r) * r, RADIUS, YOKE_INNER, points=[begin])[0]
+    square = scipy.integrate.quad(lambda r: own(r) ** 2 * r, RADIUS, YOKE_INNER, points=[begin])[0]
+    mixed = scipy.integrate.quad(
+        lambda r: own(r) * falling(r) * r, RADIUS, YOKE_INNER, points=[begin]
+    )[0]
     return 2.0 * pi * _MU0 * mixed**2 / (_WINDOW * square), square / mixed

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticCircuit
@@ -51,7 +51,7 @@ def steady_fluxes(
             )
     if current == 0.0:
         return np.zeros(1)
-    linkage = brentq(
+    linkage = scipy.optimize.brentq(
         lambda psi: plant.current_at(psi, gap) - current, 0.0, high, xtol=1e-18, rtol=1e-15
     )
     return np.array([linkage])

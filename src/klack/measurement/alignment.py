@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from klack.errors import InputError
 from klack.measurement.cutting import Piece
@@ -52,4 +52,7 @@ def onto_axis(piece: Piece, axis: Vector) -> Mapping[str, Vector]:
     count = len(next(iter(piece.values.values())))
     time = piece.start + piece.step * np.arange(count)
     inside = np.clip(axis, time[0], time[-1])
-    return {role: CubicSpline(time, values)(inside) for role, values in piece.values.items()}
+    return {
+        role: scipy.interpolate.CubicSpline(time, values)(inside)
+        for role, values in piece.values.items()
+    }

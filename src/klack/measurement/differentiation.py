@@ -24,8 +24,8 @@ from itertools import pairwise
 from math import pi
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import savgol_coeffs, savgol_filter
 
 from klack.errors import InputError, require_positive
 from klack.measurement.uniform import uniform_step
@@ -111,7 +111,7 @@ def velocity_of(
     )
     window = 2 * half + 1
     weights = _weights(window)
-    velocity = savgol_filter(
+    velocity = scipy.signal.savgol_filter(
         np.asarray(lift, dtype=np.float64), window, _DEGREE, deriv=1, delta=step, axis=-1
     )
     return VelocityEstimate(
@@ -178,7 +178,7 @@ def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.f
 
 def _weights(window: int) -> NDArray[np.float64]:
     """Weights ``c_1 .. c_m`` of the samples after the middle, for a step of one."""
-    c = savgol_coeffs(window, _DEGREE, deriv=1, use="dot")
+    c = scipy.signal.savgol_coeffs(window, _DEGREE, deriv=1, use="dot")
     return np.asarray(c[window // 2 + 1 :])
 
 

@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from klack.measurement.shot_covariance import seen_by_data
 
@@ -123,7 +123,7 @@ def fit_within_bounds(
     if not free.any():
         z = start.copy()
     else:
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             residual,
             np.clip(start[free], _INSIDE, 1.0 - _INSIDE),  # the method begins inside
             jac=slopes,

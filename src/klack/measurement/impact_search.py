@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from klack.measurement.stop_levels import SmoothLift
 from klack.measurement.stroke_measures import Stop
@@ -67,7 +67,7 @@ def find_touches(smooth: SmoothLift, levels: Mapping[Stop, float]) -> tuple[Touc
 def _turns(away: NDArray[np.float64], smooth: SmoothLift, span: float) -> list[int]:
     """Samples at which a distance from a stop is least, near the stop."""
     inner = away[smooth.half : away.size - smooth.half]  # its smoothed ends are noisy
-    peaks, found = find_peaks(-inner, prominence=smooth.least_height)
+    peaks, found = scipy.signal.find_peaks(-inner, prominence=smooth.least_height)
     peaks = peaks + smooth.half
     near = max(_NEAR * span, 2.0 * smooth.least_height)
     out = []

@@ -12,8 +12,8 @@ so that 3 dB are lost at the bandwidth ``f_b`` (polynomials: Butterworth 1930). 
 from math import pi
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.signal import butter
 
 from klack.low_pass import low_passed
 from klack.measurement.sensor import LiftSensor
@@ -70,7 +70,7 @@ def sensor_poles(sensor: LiftSensor) -> NDArray[np.complex128]:
     """
     if sensor.bandwidth is None:
         return np.empty(0, dtype=np.complex128)
-    _, denominator = butter(sensor.order, 2.0 * pi * sensor.bandwidth, analog=True)
+    _, denominator = scipy.signal.butter(sensor.order, 2.0 * pi * sensor.bandwidth, analog=True)
     return np.asarray(np.roots(denominator), dtype=np.complex128)
 
 
@@ -81,6 +81,6 @@ def sensor_polynomial(sensor: LiftSensor) -> NDArray[np.float64]:
     """
     if sensor.bandwidth is None:
         return np.ones(1)
-    _, denominator = butter(sensor.order, 2.0 * pi * sensor.bandwidth, analog=True)
+    _, denominator = scipy.signal.butter(sensor.order, 2.0 * pi * sensor.bandwidth, analog=True)
     ascending = np.asarray(denominator[::-1], dtype=np.float64)
     return np.asarray(ascending / ascending[0])

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import find_peaks
 
 from klack.errors import InputError
 
@@ -189,8 +188,8 @@ def _period(time: Floats, x: Floats, rise: float) -> float:
     Noise is taken off with a bell of a sixth of the rise, to which nothing faster belongs.
     """
     step = float(np.median(np.diff(time)))
-    smooth = gaussian_filter1d(x, max(_BELL * rise / step, 0.5))
-    crests, _ = find_peaks(smooth, prominence=_RIPPLE)
+    smooth = scipy.ndimage.gaussian_filter1d(x, max(_BELL * rise / step, 0.5))
+    crests, _ = scipy.signal.find_peaks(smooth, prominence=_RIPPLE)
     if len(crests) < 2:
         return float("nan")
     a, b = (_vertex(smooth, int(k)) for k in crests[:2])

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from klack.measurement.pulse import Pulse
 
@@ -83,7 +83,7 @@ def fit_pulse(
     edges = np.linspace(-_REACH, _REACH, _TRIES)
     best = min(
         (
-            minimize_scalar(
+            scipy.optimize.minimize_scalar(
                 lambda part: at(middle + part * length)[0],
                 bounds=(a, b),
                 method="bounded",

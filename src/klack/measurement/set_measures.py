@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from klack.errors import InputError
@@ -257,11 +258,12 @@ def expected_maximum(count: int) -> float:
     >>> round(expected_maximum(2), 6), round(expected_maximum(50), 4)  # 1/sqrt(pi); tables
     (0.56419, 2.2491)
     """
-    from scipy.special import log_ndtr
-
     x = np.linspace(-9.0, 9.0, 4001)
     density = np.exp(
-        np.log(count) - 0.5 * x**2 - 0.5 * np.log(2.0 * np.pi) + (count - 1) * log_ndtr(x)
+        np.log(count)
+        - 0.5 * x**2
+        - 0.5 * np.log(2.0 * np.pi)
+        + (count - 1) * scipy.special.log_ndtr(x)
     )
     return float(np.trapezoid(x * density, x))
 

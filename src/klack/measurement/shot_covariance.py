@@ -21,8 +21,8 @@ parameters) the correlations, not the single errors, become unreliable.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 __all__ = [
     "ShotCovariance",
@@ -66,7 +66,7 @@ class ShotCovariance:
     @property
     def quantile(self) -> float:
         """Standard errors from the value to each end of the 95 % interval."""
-        return float(student.ppf(0.975, self.degrees))
+        return float(scipy.stats.t.ppf(0.975, self.degrees))
 
     @property
     def correlation(self) -> Matrix:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from klack.measurement.differentiation import VelocityEstimate, velocity_of
@@ -62,20 +63,18 @@ class StopLevels:
 
 def smooth_lift(time: NDArray[np.float64], lift: NDArray[np.float64]) -> SmoothLift:
     """Lift as cubic windows smooth it: as wide as the noise demands, at least 20 us."""
-    from scipy.signal import savgol_coeffs, savgol_filter
-
     step = float(time[-1] - time[0]) / (time.size - 1)
     chosen: VelocityEstimate = velocity_of(time, lift)
     narrow = max(2, round(0.5 * _LEAST_SMOOTHING / step))
     wide = max(narrow, round(0.5 * _MOST_SMOOTHING / step))
     half = min(max(chosen.window // 2, narrow), wide, (time.size - 1) // 2)
     window = 2 * half + 1
-    smooth = savgol_filter(lift, window, 3)
-    shake = chosen.lift_noise * float(np.sqrt(np.sum(savgol_coeffs(window, 3) ** 2)))
-    rate = savgol_coeffs(window, 3, deriv=1, delta=step)
+    smooth = scipy.signal.savgol_filter(lift, window, 3)
+    shake = chosen.lift_noise * float(np.sqrt(np.sum(scipy.signal.savgol_coeffs(window, 3) ** 2)))
+    rate = scipy.signal.savgol_coeffs(window, 3, deriv=1, delta=step)
     return SmoothLift(
         lift=smooth,
-        velocity=savgol_filter(lift, window, 3, deriv=1, delta=step),
+        velocity=scipy.signal.savgol_filter(lift, window, 3, deriv=1, delta=step),
         noise=chosen.lift_noise,
         lift_noise=shake,
         velocity_noise=chosen.lift_noise * float(np.sqrt(np.sum(rate**2))),

@@ -5,9 +5,9 @@ from itertools import pairwise
 from typing import Any, ClassVar, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.interpolate import PchipInterpolator
 
 from klack.compiling.jit import inner
 from klack.input.problem import CaseProblem
@@ -289,7 +289,7 @@ def table_curve(deflection: tuple[float, ...], force: tuple[float, ...]) -> NDAr
         inside = np.array([[f[0], slope, 0.0, 0.0]])
         ends = (slope, slope)
     else:
-        cubics = PchipInterpolator(s, f)
+        cubics = scipy.interpolate.PchipInterpolator(s, f)
         inside = cubics.c[::-1].T
         first, last = cubics.derivative()(s[[0, -1]])
         ends = (float(first), float(last))

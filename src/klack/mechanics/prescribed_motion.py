@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import ClassVar, Literal, Self
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.interpolate import PchipInterpolator
 
 from klack.errors import InputError
 from klack.input.existing_file import InputPath
@@ -107,7 +107,9 @@ class PrescribedMotion(Component):
                 hint="sort the points; write a jump as a short ramp, e.g. of 1 us.",
             )
         if self.between == "smooth" and len(time) > 2:
-            after = before = np.asarray(PchipInterpolator(time, place).derivative()(time))
+            after = before = np.asarray(
+                scipy.interpolate.PchipInterpolator(time, place).derivative()(time)
+            )
         else:
             slope = np.diff(place) / np.diff(time)
             after, before = np.append(slope, 0.0), np.insert(slope, 0, 0.0)

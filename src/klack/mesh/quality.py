@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from klack.errors import InputError
 from klack.mesh.families import ElementFamily
@@ -257,7 +257,7 @@ def require_connected(where: str, mesh: Mesh) -> None:
     j = np.concatenate([block.connectivity[:, 1:].ravel() for block in mesh.blocks])
     n = mesh.node_count
     graph = coo_array((np.ones(len(i), dtype=np.int8), (i, j)), shape=(n, n))
-    count, labels = connected_components(graph, directed=False)
+    count, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     if count > 1:
         sizes = np.bincount(labels)
         small = int(np.argmin(sizes))

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from klack.mesh.boundary import outer_surface
 from klack.mesh.mesh import FaceBlock, Mesh
@@ -254,6 +254,6 @@ def _smooth_parts(
     links = coo_array(
         (np.ones(int(smooth.sum())), (one[smooth], other[smooth])), shape=(count, count)
     )
-    part = connected_components(links, directed=False)[1].astype(np.int64)
+    part = scipy.sparse.csgraph.connected_components(links, directed=False)[1].astype(np.int64)
     creases = ~smooth
     return part, ends[same[creases]], np.column_stack([part[one], part[other]])[creases]

@@ -6,7 +6,7 @@ from math import inf
 from typing import Self
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from klack.network.rows import Rows
 
@@ -126,7 +126,7 @@ class Travel:
         cost = np.zeros(len(place))
         for body, factor in wanted.items():
             cost[place[body]] = -factor / most
-        found = linprog(cost, A_ub=closing, b_ub=gaps / length, bounds=(None, None))
+        found = scipy.optimize.linprog(cost, A_ub=closing, b_ub=gaps / length, bounds=(None, None))
         if found.fun is None or found.status != 0:
             return inf, ()
         met = [

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
@@ -235,7 +235,7 @@ class YieldingContact:
         lowest = max(self.space.touch - self._start, 1e-6 * deepest)
         if self._over_yield(lowest) > 0.0:
             return lowest
-        return float(brentq(self._over_yield, lowest, deepest, rtol=1e-3))
+        return float(scipy.optimize.brentq(self._over_yield, lowest, deepest, rtol=1e-3))
 
     def _over_yield(self, approach: float) -> float:
         """Largest von Mises stress over the yield stress, less one, of bodies still elastic."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from scipy.optimize import brentq
+import scipy
 
 __all__ = ["lowest_share"]
 
@@ -28,4 +28,4 @@ def lowest_share(slope: Callable[[float], float], noise: float) -> float:
     first, last = slope(0.0), slope(1.0)
     if last <= _ENOUGH * abs(first) or max(abs(first), last) <= noise or first >= 0.0:
         return 1.0
-    return float(brentq(slope, 0.0, 1.0, xtol=_EXACT))
+    return float(scipy.optimize.brentq(slope, 0.0, 1.0, xtol=_EXACT))

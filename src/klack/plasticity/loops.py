@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from math import sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
@@ -69,7 +69,7 @@ class Opening:
     @property
     def energy(self) -> float:
         """What opening gives back [J]."""
-        curve = PchipInterpolator(self.approach, self.force)
+        curve = scipy.interpolate.PchipInterpolator(self.approach, self.force)
         return float(curve.integrate(self.approach[0], self.approach[-1]))
 
 
@@ -118,7 +118,9 @@ class YieldingLoops:
 
     def plastic_gap_after(self, force: float) -> Floats:
         """Plastic gap [m] of the contact points after a largest force [N], shape (nc,)."""
-        gaps = PchipInterpolator(self.force, [state.plastic_gap for state in self.states])
+        gaps = scipy.interpolate.PchipInterpolator(
+            self.force, [state.plastic_gap for state in self.states]
+        )
         return np.asarray(gaps(np.clip(force, self.force[0], self.force[-1])))
 
     @property
@@ -219,7 +221,7 @@ def yielding_loops(
             )
             break
     first = openings[0]
-    curve = PchipInterpolator(
+    curve = scipy.interpolate.PchipInterpolator(
         np.concatenate([first.approach, [state.approach for state in states[1:]]]),
         np.concatenate([first.force, [state.force for state in states[1:]]]),
     )

@@ -5,8 +5,8 @@ alike: the share is linear, so that it drops out of every loop.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
@@ -51,17 +51,19 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
                 expected="a remainder that rises with the force",
                 hint="keep fewer modes.",
             )
-        along = PchipInterpolator((d - d[0]) / (d[-1] - d[0]), one.force / one.force[-1])
+        along = scipy.interpolate.PchipInterpolator(
+            (d - d[0]) / (d[-1] - d[0]), one.force / one.force[-1]
+        )
         shapes[i] = along(places)
     # faces as made meet at a weighted gap that a coarse mesh closes late
     parted = np.array([one.set for one in loops.openings]) - loops.openings[0].set
     fine = largest[0] + (largest[-1] - largest[0]) * (np.arange(_STATES) / (_STATES - 1)) ** 2
     closing, shape = (
-        PchipInterpolator(largest, force)(fine),
-        PchipInterpolator(largest, shapes)(fine),
+        scipy.interpolate.PchipInterpolator(largest, force)(fine),
+        scipy.interpolate.PchipInterpolator(largest, shapes)(fine),
     )
     # the elastic way and not the set: both rise, but their difference need not between states
-    way = PchipInterpolator(largest, largest - parted)(fine)
+    way = scipy.interpolate.PchipInterpolator(largest, largest - parted)(fine)
     return YieldingLaw(
         largest=fine,
         set=_rising_loss(fine, fine - way, closing, shape, places),

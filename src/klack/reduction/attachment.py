@@ -32,8 +32,8 @@ error of the order ``(omega_1 / omega_{m+1})^4``; with two shifts far below, of 
 from collections.abc import Sequence
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from klack.elasticity.body import ElasticBody
@@ -136,7 +136,9 @@ def shifted_attachment(
         if not own.shape[1]:
             continue  # the kept modes have it all
         rest = own - found @ (found.T @ (body.M @ own))
-        sine = np.sqrt(max(float(eigh(rest.T @ (body.M @ rest), eigvals_only=True)[0]), 0.0))
+        sine = np.sqrt(
+            max(float(scipy.linalg.eigh(rest.T @ (body.M @ rest), eigvals_only=True)[0]), 0.0)
+        )
         if sine < _PARALLEL:
             raise _parallel(body, shifts, i, sine)
         found = np.hstack([found, _orthonormal(body.M, rest)])
@@ -207,14 +209,14 @@ def _new_directions(body: ElasticBody, kept: Modes, vectors: Floats) -> Floats:
 
 
 def _orthonormal(M: csr_array, vectors: Floats) -> Floats:
-    values, turn = eigh(vectors.T @ (M @ vectors))
+    values, turn = scipy.linalg.eigh(vectors.T @ (M @ vectors))
     independent = values > _DEPENDENT**2
     return np.asarray(vectors @ (turn[:, independent] / np.sqrt(values[independent])))
 
 
 def _diagonal(body: ElasticBody, vectors: Floats) -> Modes:
     """Rayleigh-Ritz in the span of M-orthonormal vectors."""
-    squares, turn = eigh(vectors.T @ (body.K @ vectors))
+    squares, turn = scipy.linalg.eigh(vectors.T @ (body.K @ vectors))
     return Modes(omega=np.sqrt(squares), shapes=vectors @ turn)
 
 

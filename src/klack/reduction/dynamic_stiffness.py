@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.sparse.linalg import splu
 
 from klack.elasticity.factorization import available_backends
 
@@ -49,7 +49,7 @@ def factorized_symmetric(A: csr_array) -> Iterator[Solver]:
         Full storage, symmetric, definite or not.
     """
     if "pardiso" not in available_backends():
-        yield splu(A.tocsc()).solve
+        yield scipy.sparse.linalg.splu(A.tocsc()).solve
         return
     from klack.elasticity.pardiso import PardisoFactorization
 

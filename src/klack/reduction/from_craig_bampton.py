@@ -8,7 +8,7 @@ is the row of its boundary displacement.
 from collections.abc import Sequence
 
 import numpy as np
-import scipy.linalg
+import scipy
 from numpy.typing import NDArray
 
 from klack.errors import InputError

@@ -32,8 +32,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
 from klack.elasticity.body import ElasticBody
@@ -288,7 +288,7 @@ class _KrylovSpace:
             norms = _norms(M, vectors)
             kept = norms > _DEPENDENT * scale
             vectors = vectors[:, kept] / norms[kept]
-            values, turn = eigh(vectors.T @ (M @ vectors))
+            values, turn = scipy.linalg.eigh(vectors.T @ (M @ vectors))
             values, turn = values[values > _PARALLEL], turn[:, values > _PARALLEL]
             vectors = vectors @ (turn / np.sqrt(values))
             link = (np.sqrt(values)[:, None] * turn.T * norms[kept]) @ link[kept]
@@ -297,7 +297,7 @@ class _KrylovSpace:
 
     def receptance(self, omega: NDArray[np.float64], eta: float) -> NDArray[np.complex128]:
         """Projected receptance, shape (n, p, p)."""
-        squares, turn = eigh(self.stiffness)
+        squares, turn = scipy.linalg.eigh(self.stiffness)
         elastic = turn.T @ (self.basis.T @ self.patterns)
         rigid = self.body.rigid_modes.T @ self.patterns
         shapes = np.vstack([rigid, elastic])
@@ -306,7 +306,7 @@ class _KrylovSpace:
 
     def residual_energy(self, omega: NDArray[np.float64], eta: float) -> NDArray[np.float64]:
         """Energy norm squared, ``r^H K^+ r``, of the residual of each port, (n, p) [m/N]."""
-        squares, turn = eigh(self.stiffness)
+        squares, turn = scipy.linalg.eigh(self.stiffness)
         w2 = omega[:, None, None] ** 2
         loads = turn.T @ (self.basis.T @ self.patterns)
         y = np.matmul(turn, loads / (squares[:, None] * (1 + 1j * eta) - w2))

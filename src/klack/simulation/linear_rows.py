@@ -21,9 +21,9 @@ quadratic in the step: two steps remove it, and their difference tells whether t
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
-from scipy.linalg import qr, schur, solve_sylvester
 
 from klack.compiling.jit import njit
 from klack.errors import ConvergenceError, InputError
@@ -329,14 +329,14 @@ def _split(P: Matrix) -> tuple[Matrix, Matrix, list[int]]:
     """
     if not len(P):
         return np.zeros((0, 0)), np.zeros((0, 0)), []
-    T, Z, count = schur(P, output="real", sort=lambda re, im: re > _KEPT)
+    T, Z, count = scipy.linalg.schur(P, output="real", sort=lambda re, im: re > _KEPT)
     slow = Z[:, :count]
     fast = Z[:, count:]
     if 0 < count < len(P):
-        fast = fast + slow @ solve_sylvester(
+        fast = fast + slow @ scipy.linalg.solve_sylvester(
             T[:count, :count], -T[count:, count:], -T[:count, count:]
         )
     if not count:
         return slow, fast, []
-    named = sorted(int(j) for j in qr(slow.T, pivoting=True, mode="r")[1][:count])
+    named = sorted(int(j) for j in scipy.linalg.qr(slow.T, pivoting=True, mode="r")[1][:count])
     return slow @ np.linalg.inv(slow[named]), fast, named

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from math import ceil, factorial
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import eig
 
 from klack.errors import InputError
 
@@ -278,7 +278,7 @@ def modes(system: LinearSystem, band: float) -> tuple[list[Mode], int]:
     model = rational(system, band)
     factors = _balance(model.A)
     scaled = model.A * factors[None, :] / factors[:, None]
-    roots, left, right = eig(scaled, left=True, right=True)  # type: ignore[misc]
+    roots, left, right = scipy.linalg.eig(scaled, left=True, right=True)  # type: ignore[misc]
     size = float(np.linalg.norm(scaled, 2)) if len(scaled) else 0.0
     found: list[Mode] = []
     lost = 0

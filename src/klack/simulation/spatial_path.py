@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 __all__ = ["SpatialPath"]
 
@@ -42,7 +42,9 @@ class SpatialPath:
         """Position between the moments, shape (len(time), 6): cubic, with the velocities."""
         if len(self._rows) < 2:
             return np.repeat(self.position, len(time), axis=0)
-        return np.asarray(CubicHermiteSpline(self.time, self.position, self.velocity)(time))
+        return np.asarray(
+            scipy.interpolate.CubicHermiteSpline(self.time, self.position, self.velocity)(time)
+        )
 
     @property
     def time(self) -> Vector:

@@ -9,8 +9,8 @@ from inspect import signature
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from klack.errors import InputError
 
@@ -85,7 +85,7 @@ def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
         For a count, number of parameters or seed that cannot be used.
     """
     require_size(count, parameters)
-    engine = qmc.LatinHypercube(parameters, **_random(seed))
+    engine = scipy.stats.qmc.LatinHypercube(parameters, **_random(seed))
     # one draw in 2^53 is a bound, where a normal distribution has no value
     return np.clip(engine.random(count), np.finfo(np.float64).eps, 1.0 - np.finfo(np.float64).eps)
 
@@ -118,14 +118,14 @@ def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
         For a count, number of parameters or seed that cannot be used.
     """
     require_size(count, parameters)
-    if parameters > qmc.Sobol.MAXDIM:
+    if parameters > scipy.stats.qmc.Sobol.MAXDIM:
         raise InputError(
             "design",
             got=f"a Sobol sequence of {parameters} columns",
-            expected=f"at most {qmc.Sobol.MAXDIM}",
+            expected=f"at most {scipy.stats.qmc.Sobol.MAXDIM}",
             hint="use a Latin hypercube, or fewer parameters.",
         )
-    engine = qmc.Sobol(parameters, scramble=True, bits=_BITS, **_random(seed))
+    engine = scipy.stats.qmc.Sobol(parameters, scramble=True, bits=_BITS, **_random(seed))
     whole = 1 << (int(count) - 1).bit_length()  # a power of two: SciPy warns of any other number
     return engine.random(whole)[:count] + 0.5 / 2**_BITS
 
@@ -173,7 +173,7 @@ def _random(seed: int) -> dict[str, Any]:
 @cache
 def _random_keyword() -> str:
     """Name of the argument for random numbers: ``rng``, before SciPy 1.15 ``seed``."""
-    return "rng" if "rng" in signature(qmc.Sobol).parameters else "seed"
+    return "rng" if "rng" in signature(scipy.stats.qmc.Sobol).parameters else "seed"
 
 
 def _require(count: int, what: str) -> None:

@@ -1,8 +1,8 @@
 """How evenly points fill the unit cube, against points drawn at random."""
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.stats import qmc
 
 __all__ = ["unevenness"]
 
@@ -24,4 +24,4 @@ def unevenness(points: ArrayLike) -> float:
     x = np.asarray(points, dtype=float)
     count, parameters = x.shape
     mean = ((5 / 4) ** parameters - (13 / 12) ** parameters) / count
-    return float(qmc.discrepancy(x, method="CD")) / mean
+    return float(scipy.stats.qmc.discrepancy(x, method="CD")) / mean

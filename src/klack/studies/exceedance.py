@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.special import betaincinv
 
 from klack.errors import InputError
 from klack.studies.counts import require_count
@@ -123,9 +123,13 @@ def count_exceedance(
 
 def _lower(count: int, runs: int, tail: float) -> float:
     """Probability at which ``count`` or more events have the probability ``tail``."""
-    return 0.0 if count == 0 else float(betaincinv(count, runs - count + 1, tail))
+    return 0.0 if count == 0 else float(scipy.special.betaincinv(count, runs - count + 1, tail))
 
 
 def _upper(count: int, runs: int, tail: float) -> float:
     """Probability at which ``count`` or fewer events have the probability ``tail``."""
-    return 1.0 if count == runs else float(betaincinv(count + 1, runs - count, 1.0 - tail))
+    return (
+        1.0
+        if count == runs
+        else float(scipy.special.betaincinv(count + 1, runs - count, 1.0 - tail))
+    )

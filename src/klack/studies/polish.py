@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize
 
 __all__ = ["NoValue", "polish"]
 
@@ -68,7 +68,7 @@ def polish(
     box = [(edge, 1.0 - edge)] * first.size + [(None, None)]
     try:
         problem = _Problem(values, slopes, first, np.asarray(scales, dtype=float))
-        minimize(  # type: ignore[call-overload]  # the stubs of scipy know no dict here
+        scipy.optimize.minimize(  # type: ignore[call-overload]  # the stubs of scipy know no dict here
             problem.goal,
             np.append(first, 0.0),
             jac=problem.goal_slopes,

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import betainc
 
 from klack.errors import InputError
 from klack.studies.samples import require_level, split_failed
@@ -151,7 +151,7 @@ def _ranks(runs: int, probability: float, tail: float) -> tuple[int, int]:
 def _at_least(counts: NDArray[np.int64], runs: int, probability: float) -> NDArray[np.float64]:
     """Probability that as many values or more are below the quantile, for every count."""
     inside = np.clip(counts, 1, runs)
-    found = betainc(inside, runs - inside + 1, probability)
+    found = scipy.special.betainc(inside, runs - inside + 1, probability)
     return np.asarray(np.where(counts < 1, 1.0, np.where(counts > runs, 0.0, found)))
 
 

@@ -7,7 +7,7 @@ design of points in the unit cube serves them all.
 from dataclasses import dataclass
 from math import exp, log
 
-from scipy.special import ndtr, ndtri
+import scipy
 
 from klack.studies.designs import even_levels
 
@@ -57,13 +57,17 @@ class Normal:
 
     def at(self, share: float) -> float:
         """Value that is not exceeded with the probability ``share``, 0 <= share <= 1."""
-        below = float(ndtr(-CUT))
-        return self.mean + self.deviation * float(ndtri(below + share * (1.0 - 2.0 * below)))
+        below = float(scipy.special.ndtr(-CUT))
+        return self.mean + self.deviation * float(
+            scipy.special.ndtri(below + share * (1.0 - 2.0 * below))
+        )
 
     def share(self, value: float) -> float:
         """Probability below a value; 0 and 1 where the distribution is cut off."""
-        below = float(ndtr(-CUT))
-        part = (float(ndtr((value - self.mean) / self.deviation)) - below) / (1.0 - 2.0 * below)
+        below = float(scipy.special.ndtr(-CUT))
+        part = (float(scipy.special.ndtr((value - self.mean) / self.deviation)) - below) / (
+            1.0 - 2.0 * below
+        )
         return min(max(part, 0.0), 1.0)
 
     def levels(self, count: int) -> tuple[float, ...]:

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from klack.studies.spread import CUT, Listed, Normal, Range, Spread
 
@@ -109,7 +109,7 @@ class SurrogateAxis:
         """
         if isinstance(self.spread, Listed):
             return self.nodes
-        end = -float(ndtri(0.005)) / CUT if isinstance(self.spread, Normal) else 1.0
+        end = -float(scipy.special.ndtri(0.005)) / CUT if isinstance(self.spread, Normal) else 1.0
         return np.linspace(-end, end, count)
 
     def functions(self, t: Floats, degree: int) -> Floats:

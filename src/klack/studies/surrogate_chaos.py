@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from klack.studies.surrogate_axis import SurrogateAxis
 from klack.studies.surrogate_library import require_scikit_learn
@@ -142,7 +142,9 @@ class ChaosFit:
         """Fit these terms to all values."""
         terms = chosen[1]
         q, r = np.linalg.qr(_matrix(self._functions, terms))
-        return ChaosModel(self._axes, terms, solve_triangular(r, q.T @ y), int(terms.max()))
+        return ChaosModel(
+            self._axes, terms, scipy.linalg.solve_triangular(r, q.T @ y), int(terms.max())
+        )
 
 
 def _most_terms(points: int) -> int:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
 
 from klack.studies.surrogate_axis import SurrogateAxis
 from klack.studies.surrogate_library import require_scikit_learn
@@ -182,7 +182,7 @@ class ProcessFit:
         With the covariance matrix K and ``P = K^-1 - K^-1 1 (1' K^-1 1)^-1 1' K^-1``, which is the
         inverse with an unknown mean, ``e_i = (P y)_i / P_ii`` (Dubrule 1983).
         """
-        inverse = cho_solve(self._decomposed(chosen), np.eye(len(y)))
+        inverse = scipy.linalg.cho_solve(self._decomposed(chosen), np.eye(len(y)))
         sums = np.sum(inverse, axis=1)
         projected = inverse - np.outer(sums, sums) / np.sum(sums)
         return (projected @ y) / np.diag(projected)
@@ -190,9 +190,9 @@ class ProcessFit:
     def model(self, y: Floats, chosen: Covariance) -> ProcessModel:
         """Process with this covariance, given all values."""
         decomposed = self._decomposed(chosen)
-        ones = cho_solve(decomposed, np.ones(len(y)))
+        ones = scipy.linalg.cho_solve(decomposed, np.ones(len(y)))
         mean = float(ones @ y / np.sum(ones))
-        weights = cho_solve(decomposed, y - mean)
+        weights = scipy.linalg.cho_solve(decomposed, y - mean)
         return ProcessModel(
             self._axes, self._columns, self._lengths(chosen), mean, weights, chosen.noise
         )
@@ -201,7 +201,7 @@ class ProcessFit:
         pairs = zip(self._columns, self._lengths(chosen), strict=True)
         matrix = _product(_factor(own, own, lengths) for own, lengths in pairs)
         matrix[np.diag_indices_from(matrix)] += chosen.noise
-        return cho_factor(matrix, lower=True)
+        return scipy.linalg.cho_factor(matrix, lower=True)
 
     def _lengths(self, chosen: Covariance) -> tuple[Floats, ...]:
         ends = np.cumsum([own.shape[1] for own in self._columns])

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from klack.errors import InputError
 from klack.network.network import Network
@@ -102,7 +102,7 @@ class HeatNetwork:
         """Islands of free nodes without a path to a known temperature."""
         n = self.count
         links = self.links(self.start)
-        _, label = connected_components(links.between > 0.0, directed=False)
+        _, label = scipy.sparse.csgraph.connected_components(links.between > 0.0, directed=False)
         islands = [tuple(np.flatnonzero(label == i).tolist()) for i in np.unique(label)]
         return tuple(nodes for nodes in islands if n and not links.to_fixed[list(nodes)].any())
 

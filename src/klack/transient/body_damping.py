@@ -23,8 +23,8 @@ continues beyond that face.
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 from scipy.sparse import csr_array
 
 from klack.elasticity.body import ElasticBody
@@ -129,8 +129,8 @@ class DampingMatrix:
             rigid = body.rigid_modes
             loads = M @ rigid
             root = np.linalg.cholesky(rigid.T @ loads)
-            loads = solve_triangular(root, loads.T, lower=True).T
-            motion = solve_triangular(root, rigid.T, lower=True).T
+            loads = scipy.linalg.solve_triangular(root, loads.T, lower=True).T
+            motion = scipy.linalg.solve_triangular(root, rigid.T, lower=True).T
             # modes of another mass than M would drag the rigid motion a little
             columns = columns - loads @ (motion.T @ columns)
             if damping.alpha > 0.0:

@@ -26,8 +26,8 @@ from dataclasses import dataclass, field, replace
 from math import inf
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 from scipy.sparse import csr_array, vstack
 
 from klack.contact.asperity_layer import AsperityLayer
@@ -435,7 +435,7 @@ def model_at_points(
     _require_sound(checks)
     own = moving.omega[moving.omega > 0]
     counts = [len(body.omega) for body in bodies]
-    observed = block_diag(*(body.observed for body in bodies))
+    observed = scipy.linalg.block_diag(*(body.observed for body in bodies))
     flexible = observed[:, elastic] / omega[elastic] ** 2
     static = np.vstack([body.observed_static for body in bodies])
     rigid = np.zeros((6, sum(counts)))

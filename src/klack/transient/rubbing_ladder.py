@@ -22,8 +22,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction, lifted_offset
@@ -172,8 +172,10 @@ def _opened(
 
 
 def _loop(closing: StaticContact, approach: Vector, force: Vector) -> Loop:
-    up = PchipInterpolator(np.append(0.0, closing.approach), np.append(0.0, closing.force))
-    down = PchipInterpolator(approach[::-1], force[::-1])
+    up = scipy.interpolate.PchipInterpolator(
+        np.append(0.0, closing.approach), np.append(0.0, closing.force)
+    )
+    down = scipy.interpolate.PchipInterpolator(approach[::-1], force[::-1])
     top = approach[0]
     loss = float(up.integrate(0.0, top) - down.integrate(approach[-1], top))
     return Loop(approach=approach, force=force, loss=loss)

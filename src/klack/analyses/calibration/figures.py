@@ -3,8 +3,8 @@
 from math import isfinite
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from klack.analyses.calibration.record import (
     CalibratedParameter,
@@ -125,7 +125,7 @@ def profile_chart(profile: ProfileCurve, parameter: CalibratedParameter) -> Char
     parabola = ((line - factor * parameter.value) / (factor * parameter.standard_error)) ** 2
     # the signed root of a profile is nearly a straight line
     root = np.sqrt(profile.excess) * np.sign(x - factor * parameter.value)
-    smooth = PchipInterpolator(x, root)(line) ** 2
+    smooth = scipy.interpolate.PchipInterpolator(x, root)(line) ** 2
     top = 1.8 * profile.threshold
     ends = [
         Mark(value=factor * end, label=f"{factor * end:.5g}")

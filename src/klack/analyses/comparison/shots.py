@@ -18,8 +18,8 @@ from pathlib import Path
 from time import perf_counter
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import ks_2samp
 
 from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
 from klack.analyses.comparison.strokes import compare_numbers, sensor_words
@@ -219,7 +219,7 @@ def _distribution(
 ) -> MeasuredDistribution:
     values, heights = _numbers(computed, kind.key), _numbers(computed, "rebound_height")
     measured, risen = _numbers(impacts, kind.key), _numbers(impacts, "rebound_height")
-    test = ks_2samp(values[np.isfinite(values)], measured)
+    test = scipy.stats.ks_2samp(values[np.isfinite(values)], measured)
     return MeasuredDistribution(
         name=kind.name,
         unit="" if kind.unit == "1" else kind.unit,

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from math import floor, inf, isfinite, log10, nan, pi, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from klack.analyses.impact.record import LevelResult, PressureRecord
 from klack.analyses.impact.yield_check import check_yield
@@ -203,7 +203,7 @@ def ends_reached(
             continue
         record = result.pressure
         points = _as_drawn(record.points, space.dimension)
-        _, nearest = cKDTree(space.points).query(points)
+        _, nearest = scipy.spatial.cKDTree(space.points).query(points)
         force = np.max(record.point_force, axis=0)
         with warnings_of(f"level '{name}'"):
             if _tell_ends(_edges(pair), points, space.size[nearest], force, surfaces):

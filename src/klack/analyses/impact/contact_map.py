@@ -17,9 +17,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import maximum_filter, minimum_filter, uniform_filter
-from scipy.spatial import cKDTree
 
 from klack.analyses.impact.record import PressureRecord
 
@@ -179,7 +178,7 @@ def map_cells(
     if found.shape == "ring":
         scale = np.radians(found.radius)  # [m/deg]
         points = np.concatenate([points + np.array([turn, 0.0]) for turn in (-360.0, 0.0, 360.0)])
-    tree = cKDTree(points * [scale, 1.0])
+    tree = scipy.spatial.cKDTree(points * [scale, 1.0])
     centres = np.meshgrid(0.5 * scale * (x[1:] + x[:-1]), 0.5 * (y[1:] + y[:-1]))
     distance, owner = tree.query(np.stack(centres, axis=-1))
     if found.shape == "spot":
@@ -232,7 +231,9 @@ def averaged(values: Floats, cells: Cells) -> Floats:
     inside = (cells.owner >= 0).astype(float)
     size = tuple(2 * width for width in _cell_size(cells))
     border: list[Literal["constant", "wrap"]] = ["constant", "wrap" if cells.closed else "constant"]
-    mean, weight = (uniform_filter(v, size, mode=border) for v in (values * inside, inside))
+    mean, weight = (
+        scipy.ndimage.uniform_filter(v, size, mode=border) for v in (values * inside, inside)
+    )
     return np.divide(mean, weight, out=np.zeros_like(mean), where=weight > 0)
 
 
@@ -242,7 +243,9 @@ def closed(carries: NDArray[np.bool_], cells: Cells) -> NDArray[np.bool_]:
     # beyond the ends of a ring is its other end, beyond all others nothing
     wide = np.pad(carries, [(rows, rows), (0, 0)])
     wide = np.pad(wide, [(0, 0), (columns, columns)], mode="wrap" if cells.closed else "constant")
-    filled = minimum_filter(maximum_filter(wide, (rows, columns)), (rows, columns))
+    filled = scipy.ndimage.minimum_filter(
+        scipy.ndimage.maximum_filter(wide, (rows, columns)), (rows, columns)
+    )
     return np.asarray(filled[rows:-rows, columns:-columns] & (cells.owner >= 0))
 
 

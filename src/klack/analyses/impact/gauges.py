@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from klack.analyses.impact.record import LevelResult
@@ -110,8 +111,6 @@ def modal_motion(
         At the start.
     step : float [s]
     """
-    from scipy.signal import lfilter  # takes half a second to load
-
     n, m = loads.shape
     q, v = np.zeros((n + 1, m)), np.zeros((n + 1, m))
     for i in range(m):
@@ -126,7 +125,9 @@ def modal_motion(
             decay = np.exp(pole * step)
             # of an impulse at the start the state is the velocity itself
             start = np.array([decay * velocity[i]])
-            part, _ = lfilter([(decay - 1.0) / pole], [1.0, -decay], f.astype(complex), zi=start)
+            part, _ = scipy.signal.lfilter(
+                [(decay - 1.0) / pole], [1.0, -decay], f.astype(complex), zi=start
+            )
             states.append((pole, np.append(velocity[i], part)))
         (p1, z1), (p2, z2) = states
         q[:, i] = ((z1 - z2) / (p1 - p2)).real

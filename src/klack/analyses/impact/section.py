@@ -8,10 +8,9 @@ the picture shows the elements and not their division.
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from klack.analyses.impact.record import SectionPicture
 from klack.errors import InputError
@@ -306,9 +305,9 @@ def _compact(
     """Drop unused points, merge those that coincide, drop what vanishes by that."""
     used = np.unique(triangles)
     scale = np.ptp(points[used], axis=0).max()
-    pairs = cKDTree(points[used]).query_pairs(_MERGED * scale, output_type="ndarray")
+    pairs = scipy.spatial.cKDTree(points[used]).query_pairs(_MERGED * scale, output_type="ndarray")
     links = coo_array((np.ones(len(pairs)), pairs.T), shape=(len(used), len(used)))
-    count, group = connected_components(links, directed=False)
+    count, group = scipy.sparse.csgraph.connected_components(links, directed=False)
     number = np.full(len(points), -1, dtype=np.int64)
     number[used] = group
     keep = np.empty(count, dtype=np.int64)

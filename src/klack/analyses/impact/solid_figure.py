@@ -10,6 +10,7 @@ from math import floor, isfinite, log10
 from typing import Any
 
 import numpy as np
+import scipy
 from matplotlib import rc_context
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
@@ -17,7 +18,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
 from klack.assembling.touch_ring import goes_round
@@ -112,7 +112,9 @@ def _painted(picture: BodyPicture, touching: NDArray[np.bool_]) -> _Painted:
     joined = coo_array(
         (np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(len(skin.points),) * 2
     )
-    part = connected_components(joined, directed=False)[1][triangles[:, 0]].astype(np.int64)
+    part = scipy.sparse.csgraph.connected_components(joined, directed=False)[1][
+        triangles[:, 0]
+    ].astype(np.int64)
     held = np.asarray(picture.held[triangles].all(axis=1))
     return _Painted(skin, 4 * part + 2 * touching + held, touching, held)
 

@@ -7,8 +7,8 @@ what is injected there, is :math:`T = -L/(1 + L)`, so :math:`L = -T/(1 + T)`.
 from collections.abc import Callable
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from klack.analyses.linearisation.record import LoopMargins
 from klack.simulation.linear_system import LinearSystem, transfer
@@ -77,7 +77,9 @@ def _crossings(
     found = []
     for i in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0.0):
         if where is None or (where[i] and where[i + 1]):
-            found.append(float(brentq(at, axis[i], axis[i + 1], xtol=1e-12 * axis[i])))
+            found.append(
+                float(scipy.optimize.brentq(at, axis[i], axis[i + 1], xtol=1e-12 * axis[i]))
+            )
     return found
 
 

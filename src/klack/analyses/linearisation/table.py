@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from klack.analyses.linearisation.record import LinearModel, LoopMargins, Response
 
@@ -15,15 +16,13 @@ __all__ = ["write_files"]
 
 def write_files(record: LinearModel, folder: Path) -> tuple[str, ...]:
     """Write all of them into a folder; returns their names."""
-    from scipy.io import savemat
-
     content = _content(record)
     np.savez_compressed(folder / "linear-model.npz", **content)
     cells = {
         key: np.array(value, dtype=object) if key in _WORDS else value
         for key, value in content.items()
     }
-    savemat(
+    scipy.io.savemat(
         folder / "linear-model.mat",
         {"klack": cells},
         long_field_names=True,

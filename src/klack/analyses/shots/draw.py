@@ -17,8 +17,8 @@ from dataclasses import dataclass
 from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtri
 
 from klack.assembling.position_in_guide import axis_through, in_disc
 from klack.case.any_case import AnyCase
@@ -129,7 +129,7 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
         low, high = shots.waviness.harmonics
     harmonics = np.arange(low, high + 1)
     first = _HARMONICS + 2 * (harmonics - 1)
-    waves = ndtri(np.stack([stream[first], stream[first + 1]], axis=1))
+    waves = scipy.special.ndtri(np.stack([stream[first], stream[first + 1]], axis=1))
     scale = float(np.sqrt(np.sum(waves**2) / 2.0))  # root mean square round the ring
     return ShotDraw(
         index=index,

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 from threadpoolctl import threadpool_limits
 
 from klack.analyses.noise.measures import DESIGN_MEASURES
@@ -325,7 +325,7 @@ def rebound_height(
     """
     others = [e.time for e in events if e.time > event.time and e.stop != event.stop]
     until = min(others, default=float(path.time[-1]))
-    z = CubicHermiteSpline(path.time, path.position[:, 2], path.velocity[:, 2])
+    z = scipy.interpolate.CubicHermiteSpline(path.time, path.position[:, 2], path.velocity[:, 2])
     turns = z.derivative().roots(extrapolate=False)
     turns = turns[(turns > event.time) & (turns < until)]
     away = side * (z(np.append(turns, until)) - z(event.time))

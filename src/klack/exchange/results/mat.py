@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 
 from klack.errors import InputError
 from klack.exchange.results.naming import identifiers, octave_text
@@ -40,8 +41,6 @@ def write_mat(table: ResultTable, path: Path) -> Path:
         If a run is larger than 2 GiB, which the format cannot hold, or the place cannot be written
         to.
     """
-    from scipy.io import savemat
-
     runs = identifiers([run.name for run in table.runs], _OWN)
     variables: dict[str, Any] = {
         name: _run(run, path) for name, run in zip(runs, table.runs, strict=True)
@@ -52,7 +51,7 @@ def write_mat(table: ResultTable, path: Path) -> Path:
         for name, value in zip(identifiers(list(about)), about.values(), strict=True)
     }
     with whole_file(path) as new:
-        savemat(
+        scipy.io.savemat(
             new,
             _padded(variables),
             appendmat=False,
