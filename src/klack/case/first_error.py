@@ -6,7 +6,6 @@ from typing import Any
 from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
-from klack.case.field_example import fitting_example
 from klack.case.origin import ExpandedCase
 from klack.errors import InputError
 from klack.input.computed import Computed
@@ -55,6 +54,8 @@ def _problem(details: ErrorDetails, data: Any, case: type[Section]) -> CaseProbl
     if isinstance(own, InputError):
         hint = own.hint
         if isinstance(own, QuantityError):
+            from klack.case.field_example import fitting_example  # loads what a network is
+
             example = fitting_example(case, data, _existing(data, details["loc"]), own.kind)
             hint = hint.replace(own.kind.example, example)
         return CaseProblem((), got=own.got, expected=own.expected, hint=hint)

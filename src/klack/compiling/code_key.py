@@ -22,6 +22,8 @@ from numba import types
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
+from klack.compiling.jit import Marked
+
 __all__ = ["code_key"]
 
 _SETTINGS = (
@@ -145,6 +147,8 @@ def _outside(function: Any) -> Iterator[tuple[str, Any]]:
 
 def _value(value: Any, calls: list[Any]) -> str:
     """Words for what is behind a name; compiled functions are added to ``calls``."""
+    if isinstance(value, Marked):
+        value = value.made
     if isinstance(value, Dispatcher):
         calls.append(value)
         return _name(value)

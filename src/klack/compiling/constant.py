@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from llvmlite import ir
-from numba.extending import intrinsic
+from klack.compiling.jit import intrinsic
 
 __all__ = ["constant", "with_slope_of"]
 
@@ -18,6 +17,8 @@ def constant(typingctx: Any, number: Any) -> Any:
     guess or a length follows from that of the step before, what is left of their own derivatives
     would grow from step to step without bound.
     """
+    from llvmlite import ir
+
     lanes = getattr(number, "lanes", 0)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -36,6 +37,8 @@ def with_slope_of(typingctx: Any, number: Any, twin: Any) -> Any:
 
     For a number whose own way loses them, as a root at zero that is multiplied by itself does.
     """
+    from llvmlite import ir
+
     lanes = getattr(number, "lanes", 0)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:

@@ -1,11 +1,13 @@
 """Faces that earlier impacts have worn: the gap that has stayed between them, over the radius."""
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.contact.mortar import ContactSpace
+if TYPE_CHECKING:
+    from klack.contact.mortar import ContactSpace
 
 __all__ = ["WornFaces", "opened_by"]
 
@@ -27,7 +29,7 @@ class WornFaces:
     opening: NDArray[np.float64]
 
 
-def opened_by(space: ContactSpace, worn: WornFaces | None) -> ContactSpace:
+def opened_by(space: "ContactSpace", worn: WornFaces | None) -> "ContactSpace":
     """Contact points of worn faces, which touch first where those as made did along the axis.
 
     Parameters

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 import numpy as np
-from numba import carray
 from pydantic import Field, model_validator
 
 from klack.hydraulics.fluid_table import fluid_at
@@ -14,7 +13,7 @@ from klack.input.section import Section
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
 from klack.network.rows import Book, Rows
-from klack.network.step_function import step_function
+from klack.network.step_function import carray, step_function
 from klack.units import Time, VolumeFlow
 
 __all__ = ["FlowSource", "FlowStep", "FlowTable"]

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from math import pi
 from typing import Any, ClassVar, Literal, Self
 
-from numba import carray
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner
@@ -14,7 +13,7 @@ from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
 from klack.network.rows import Book, Channel, Rows
-from klack.network.step_function import step_function
+from klack.network.step_function import carray, step_function
 from klack.units import Area, Length
 
 __all__ = ["Inertance"]

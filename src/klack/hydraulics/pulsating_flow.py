@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from math import pi, sin
 from typing import Any, ClassVar
 
-from numba import carray
 from pydantic import Field
 
 from klack.hydraulics.fluid_table import fluid_at
@@ -13,7 +12,7 @@ from klack.input.section import Section
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
 from klack.network.rows import Book, Rows
-from klack.network.step_function import step_function
+from klack.network.step_function import carray, step_function
 from klack.units import Angle, Frequency, VolumeFlow
 
 __all__ = ["FlowHarmonic", "PulsatingFlow", "pulsating_flow_step"]

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from math import cos, pi, sin
 from typing import Any, ClassVar, Self
 
-from numba import carray
 from pydantic import Field, model_validator
 
 from klack.compiling.jit import inner, njit
@@ -15,7 +14,7 @@ from klack.input.section import Count
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
 from klack.network.rows import Book, Channel, Rows
-from klack.network.step_function import step_function
+from klack.network.step_function import carray, step_function
 from klack.units import Angle, Pressure, Ratio, Rotation, Volume
 
 __all__ = ["Pump", "laminar_leak_step", "pump_step", "swept_share"]

@@ -20,11 +20,7 @@ All arrays are pointers to ``float64``; ``at`` is the start of the circuit in ``
 from math import sqrt
 from typing import Any
 
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
-
-from klack.compiling.jit import inner
+from klack.compiling.jit import inner, intrinsic
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
 from klack.magnetics.flux_table import MOST_TUBES, SETTLES
@@ -66,6 +62,9 @@ def stack(typingctx: Any, of: Any, size: Any) -> Any:
 
     They are of the kind that ``of``, a pointer, points to.
     """
+    from numba import types
+    from numba.core import cgutils
+
     if not isinstance(size, types.IntegerLiteral):
         return None
     signature = of(of, size)

@@ -38,18 +38,15 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import Marked, intrinsic, njit
 
 __all__ = [
-    "STEP",
     "StepFunction",
     "address_of",
     "call",
+    "carray",
     "compile_step",
     "evaluate",
     "first",
@@ -60,10 +57,6 @@ __all__ = [
     "shift",
     "step_function",
 ]
-
-_POINTER = types.CPointer(types.float64)
-STEP = types.int64(_POINTER, _POINTER, _POINTER, _POINTER)
-"""Signature of all step functions."""
 
 StepFunction = Any
 """What :func:`step_function` and :func:`python_step` return."""
@@ -87,7 +80,9 @@ def step_function(function: Callable[..., int]) -> StepFunction:
 @intrinsic
 def pointer(typingctx: Any, array: Any, offset: Any) -> Any:
     """Pointer to ``array[offset]``, in compiled code."""
-    signature = _POINTER(array, offset)
+    from numba import types
+
+    signature = types.CPointer(types.float64)(array, offset)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         view = context.make_array(sig.args[0])(context, builder, args[0])
@@ -102,6 +97,8 @@ def first(typingctx: Any, array: Any) -> Any:
 
     Indexing it costs one load: no bounds, no negative indices, no strides.
     """
+    from numba import types
+
     signature = types.CPointer(array.dtype)(array)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -113,6 +110,8 @@ def first(typingctx: Any, array: Any) -> Any:
 @intrinsic
 def pointers(typingctx: Any, bundle: Any) -> Any:
     """Return a named tuple with :func:`first` of every array in it, in compiled code."""
+    from numba import types
+
     members = [types.CPointer(t.dtype) if isinstance(t, types.Array) else t for t in bundle]
     signature = types.BaseTuple.from_types(members, bundle.instance_class)(bundle)
 
@@ -142,6 +141,9 @@ def shift(typingctx: Any, start: Any, offset: Any) -> Any:
 @intrinsic
 def call(typingctx: Any, address: Any, par: Any, state: Any, inp: Any, out: Any) -> Any:
     """Call the step function at an address of :func:`address_of`, in compiled code."""
+    from llvmlite import ir
+    from numba import types
+
     signature = types.int64(address, par, state, inp, out)
 
     def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -153,6 +155,16 @@ def call(typingctx: Any, address: Any, par: Any, state: Any, inp: Any, out: Any)
     return signature, codegen
 
 
+def _array(make: Any) -> Any:
+    import numba
+
+    return numba.carray
+
+
+carray = Marked(lambda pointer, shape: None, _array)
+"""Array of a shape at a pointer, in compiled code: :func:`numba.carray`."""
+
+
 def is_step_function(found: object) -> bool:
     """Whether something is what :func:`step_function` returned."""
     return getattr(found, "is_klack_step", False) is True
@@ -160,7 +172,14 @@ def is_step_function(found: object) -> bool:
 
 def compile_step(step: StepFunction) -> None:
     """Compile a step function, or load it."""
-    step.get_compile_result(STEP)
+    _compiled(step)
+
+
+def _compiled(step: StepFunction) -> Any:
+    """Code of a step function for the one signature of all."""
+    from numba import types
+
+    return step.get_compile_result(types.int64(*4 * [types.CPointer(types.float64)]))
 
 
 def address_of(step: StepFunction) -> int:
@@ -170,7 +189,7 @@ def address_of(step: StepFunction) -> int:
     """
     if isinstance(step, _PythonStep):
         return step.address
-    result = step.get_compile_result(STEP)
+    result = _compiled(step)
     name = result.fndesc.llvm_cfunc_wrapper_name
     return int(result.library.get_pointer_to_function(name))
 

@@ -50,12 +50,14 @@ def calibrate(
         if number is not None:
             require_positive(option, number, unit)
 
-    from klack.analyses.calibration.run import calibration_of, run_calibration
     from klack.case.case_tree import read_case_tree
     from klack.case.shipped import find_case
 
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()
+
+    from klack.analyses.calibration.run import calibration_of, run_calibration
+
     fitted = calibration_of(checked).channels
     ending = Ending.of(wanted, f"{checked.name}-calibration")
 

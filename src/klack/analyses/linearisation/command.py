@@ -106,6 +106,12 @@ def linearise(
 ) -> int:
     """Linear state space about the operating point: eigenvalues, response, margins, stability."""
     with show_progress(asked.quiet):
+        from klack.case.case_tree import read_case_tree
+        from klack.case.shipped import find_case
+
+        tree = read_case_tree(find_case(case), imported(component))
+        checked = tree.case()
+
         from klack.analyses.linearisation.analysis import LINEARISATION
         from klack.analyses.linearisation.figures import linear_charts
         from klack.analyses.linearisation.run import run_linearisation
@@ -115,12 +121,7 @@ def linearise(
             asked_sweeps,
             stated_drive,
         )
-        from klack.case.case_tree import read_case_tree
-        from klack.case.shipped import find_case
         from klack.units import CURRENT, FREQUENCY, LENGTH, VOLTAGE, parse_quantity
-
-        tree = read_case_tree(find_case(case), imported(component))
-        checked = tree.case()
 
     def hertz(text: str, option: str) -> float:
         value = parse_quantity(text, FREQUENCY, option)

@@ -14,6 +14,7 @@ from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.analyses.noise.source import NoiseSource
+    from klack.case.any_case import AnyCase
     from klack.case.valve_reader import OwnComponents
 
 __all__ = ["noise"]
@@ -53,8 +54,7 @@ def noise(
     """Estimate the sound: force spectra, vibration, radiated sound, loudness, WAV files."""
     names = tuple(name for item in variant or () for name in item.split(",") if name)
     paths = (a,) if b is None else (a, b)
-    _require_known(paths)
-    own = imported(component)
+    cases = _cases(paths, imported(component))
     ending = Ending.of(wanted, _folder_name(paths))
 
     with show_progress(wanted.quiet):
@@ -65,20 +65,19 @@ def noise(
     with show_progress(wanted.quiet) as progress:
         sources = [
             source
-            for path in paths
-            for source in _sources(path, names, own, progress, wanted.threads)
+            for path, case in zip(paths, cases, strict=True)
+            for source in _sources(path, case, names, progress, wanted.threads)
         ]
         study = run_noise(sources, names=_names(paths, sources), progress=progress)
     return ending.end(NOISE, study, beside=lambda folder: write_sounds(study, folder))
 
 
-def _require_known(paths: Sequence[Path]) -> None:
-    """Find every path before the long work begins."""
+def _cases(paths: Sequence[Path], own: "OwnComponents") -> "list[AnyCase | None]":
+    """Read every case before the long work begins; None for stored results."""
     from klack.case.shipped import find_case
+    from klack.case.valve_reader import load_any_case
 
-    for path in paths:
-        if not is_result(path):
-            find_case(path)
+    return [None if is_result(path) else load_any_case(find_case(path), own) for path in paths]
 
 
 def _folder_name(paths: Sequence[Path]) -> str:
@@ -93,22 +92,17 @@ def _short(path: Path) -> str:
 
 def _sources(
     path: Path,
+    case: "AnyCase | None",
     names: Sequence[str],
-    own: "OwnComponents",
     progress: Progress,
     threads: int | None,
 ) -> tuple["NoiseSource", ...]:
     """Forces and bodies of a stored result, or of a case that is run now."""
     from klack.analyses.noise.source import load_sources, run_sources
 
-    if is_result(path):
+    if case is None:
         progress("result", 0.0)
         return load_sources(path, names)
-
-    from klack.case.shipped import find_case
-    from klack.case.valve_reader import load_any_case
-
-    case = load_any_case(find_case(path), own)
     return run_sources(case, names, progress=progress, threads=threads)
 
 

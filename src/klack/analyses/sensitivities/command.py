@@ -56,19 +56,22 @@ def sensitivities(
         require_files("--study", [study])
 
     with show_progress(wanted.quiet):
-        from klack.analyses.sensitivities.analysis import SENSITIVITIES
-        from klack.analyses.sensitivities.any_case import sensitivities_of
         from klack.case.case_tree import read_case_tree
         from klack.case.shipped import find_case
         from klack.case.study_source import study_if_any
 
-    tree = read_case_tree(find_case(case), imported(component))
-    checked = tree.any_case()
+        tree = read_case_tree(find_case(case), imported(component))
+        checked = tree.any_case()
+        source = study_if_any(checked, tree, study)
+
+        from klack.analyses.sensitivities.analysis import SENSITIVITIES
+        from klack.analyses.sensitivities.any_case import sensitivities_of
+
     with show_progress(wanted.quiet) as progress:
         record = sensitivities_of(checked, variant, level)(
             checked,
             tree,
-            study_if_any(checked, tree, study),
+            source,
             parameters=parameter or (),
             measures=measure or (),
             check=check,

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
+from klack.analyses.named import named
 from klack.errors import require_positive
 from klack.terminal.options import CaseArgument, Components, StudyPath, imported, require_files
 from klack.terminal.progress import PROGRESS_FILE
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
 
     from klack.analyses.study.record import StudyRecord
     from klack.progress import Progress
@@ -58,9 +59,7 @@ def study(
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute measures of a stroke or an impact at many points: ranges, designs, tolerances."""
-    from klack.analyses.study.run import run_study
-
-    return _run(run_study, "study", case, study, component, wanted, workers, dask, made)
+    return _run("study.run:run_study", "study", case, study, component, wanted, workers, dask, made)
 
 
 def optimise(
@@ -74,10 +73,8 @@ def optimise(
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Search the ranges of a study for the best points: one to four objectives, within bounds."""
-    from klack.analyses.study.optimise import run_optimisation
-
     words = (case, study, component, wanted, workers, dask)
-    return _run(run_optimisation, "optimum", *words, is_search=True)
+    return _run("study.optimise:run_optimisation", "optimum", *words, is_search=True)
 
 
 @contextmanager
@@ -98,7 +95,7 @@ def _live(progress: "Progress") -> "Iterator[dict[str, Any]]":
 
 
 def _run(
-    run: "Callable[..., StudyRecord]",
+    run: str,
     name: str,
     case: Path,
     file: Path | None,
@@ -114,20 +111,22 @@ def _run(
     if file is not None:
         require_files("--study", [file])
 
-    from klack.analyses.study.analysis import STUDY
-    from klack.analyses.study.log import point_log_form
-    from klack.analyses.study.where import Where
     from klack.case.case_tree import read_case_tree
     from klack.case.shipped import find_case
     from klack.case.study_source import study_of
 
-    where = Where(threads=wanted.threads, workers=workers, dask=dask, is_free=True)
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.any_case()
     source = study_of(checked, tree, file)
     if made is not None:
         source, name = source.made(made), "made"
     ending = Ending.of(wanted, f"{checked.name}-{name}")
+
+    from klack.analyses.study.analysis import STUDY
+    from klack.analyses.study.log import point_log_form
+    from klack.analyses.study.where import Where
+
+    where = Where(threads=wanted.threads, workers=workers, dask=dask, is_free=True)
     with ending.resumable(point_log_form(checked, tree)[0]) as progress, _live(progress) as seen:
         page = None
         if is_search and ending.report:
@@ -135,7 +134,7 @@ def _run(
 
             page = ProgressPage(ending.folder, progress)
             seen["seen"] = page.write
-        record = run(
+        record: StudyRecord = named(run)(
             checked, tree, source, folder=ending.folder, where=where, progress=progress, **seen
         )
     code = ending.end(STUDY, record)
