@@ -14,7 +14,8 @@ import pytest
 
 from klack import verification
 from klack.cli import demo as demo_module
-from klack.cli.main import COMMANDS, main
+from klack.cli.commands import COMMANDS
+from klack.cli.main import main
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.terminal.output import staged_folder, write_json
 from klack.terminal.progress import show_progress

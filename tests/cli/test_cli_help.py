@@ -5,7 +5,8 @@ import shlex
 import pytest
 
 from klack.case import find_case
-from klack.cli.main import COMMANDS, app, main
+from klack.cli.commands import COMMANDS, app
+from klack.cli.main import main
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from json_schema_check import require_documented
 
-from klack.cli.main import COMMANDS, main
+from klack.cli.commands import COMMANDS
+from klack.cli.main import main
 
 DATA = Path(__file__).parents[1] / "data"
 RODS = DATA / "tiny_rods.yaml"

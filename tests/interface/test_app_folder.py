@@ -154,7 +154,7 @@ def test_notes_and_drafts_outlive_the_server(folder):
 
 def test_other_commands_load_no_browser_application():
     code = (
-        "import sys, klack, klack.cli.main; "
+        "import sys, klack, klack.cli.commands; "
         "sys.exit(any(n.startswith(('nicegui', 'fastapi', 'klack.app')) for n in sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

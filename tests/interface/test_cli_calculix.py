@@ -14,7 +14,8 @@ import pytest
 from klack.analyses.comparison.calculix import COMPARISON_COLUMNS
 from klack.analyses.impact.analysis import IMPACT
 from klack.case import find_case
-from klack.cli.main import app, main
+from klack.cli.commands import app
+from klack.cli.main import main
 from klack.errors import ConvergenceError, InputError
 from klack.exchange.calculix_run import run_calculix
 

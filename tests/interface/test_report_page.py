@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.content import NEXT_STEPS
-from klack.cli.main import app
+from klack.cli.commands import app
 from klack.report.chart import AxisSpec, Chart, Curve, Panel
 from klack.report.html import render_html
 from klack.report.page import Content, NextStep, Section, Table

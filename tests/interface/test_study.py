@@ -704,7 +704,7 @@ class TestOptimum:
             ("today - 1 %", "400 mm", "a force"),
             ("today - 1 %", "today - 1 mm", "a force"),
             ("{most: today - 1 %}", "{}", "no bound"),
-            ("population: 20", "population: 5", "8 to 10000"),
+            ("population: 20", "population: 5", "8 or more"),
             ("most: today - 1 %", "most: 1 N", "No point keeps all bounds"),
         ],
     )

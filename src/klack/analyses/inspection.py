@@ -13,7 +13,7 @@ from klack.case.surface_names import require_surface_names
 from klack.errors import InputError
 from klack.input.existing_file import refuse_lfs_pointer
 from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
-from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh
@@ -25,7 +25,6 @@ from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]
 
-STEP_ENDINGS = (".step", ".stp")
 
 INSPECTED = (*STEP_ENDINGS, *MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
 """Endings of the files that :func:`inspect_file` knows."""

@@ -9,7 +9,7 @@ from math import radians
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, Reduction, SurfaceName
 from klack.case.face_form import FaceRoughness, FaceWaviness
@@ -295,7 +295,7 @@ class TransferSweep(Section):
 
     lowest: Frequency = Field(alias="from", gt=0, description="Lowest frequency.")
     highest: Frequency = Field(alias="to", gt=0, description="Highest frequency.")
-    points: Count = Field(
+    points: Annotated[int, Strict()] = Field(
         default=200, ge=2, le=5000, description="Number of frequencies, logarithmic."
     )
     nodes: Mapping[Name, tuple[Length, ...]] = Field(

@@ -155,8 +155,8 @@ class StudyLimit(Section):
 class StudySearch(Section):
     """How long a search for the best points lasts."""
 
-    population: Count = Field(
-        default=40, ge=20, le=10_000, description="Points that are computed together."
+    population: Annotated[int, Strict()] = Field(
+        default=40, ge=8, le=10_000, description="Points that are computed together."
     )
     generations: Count = Field(default=50, le=100_000, description="Populations, one by one.")
     refinements: Annotated[int, Strict()] = Field(
@@ -180,7 +180,7 @@ class StudyRobust(Section):
         description="Parameter, or path of a key of the case: standard deviation of made valves "
         "about the value of the design, with its unit.",
     )
-    valves: Count = Field(
+    valves: Annotated[int, Strict()] = Field(
         default=16,
         ge=4,
         le=10_000,

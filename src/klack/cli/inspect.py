@@ -46,9 +46,10 @@ def inspect(
     Of a case: its parameters and expressions in SI, the components of included parts, and the
     bodies that come from other programs, checked as a run checks them.
     """
-    from klack.analyses.inspection import STEP_ENDINGS, inspect_case, inspect_file
+    from klack.analyses.inspection import inspect_case, inspect_file
     from klack.case.shipped import find_case, shipped_cases
     from klack.errors import InputError
+    from klack.mesh.files.catalogue import STEP_ENDINGS
     from klack.units import LENGTH, parse_quantity
 
     is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()

@@ -1,7 +1,5 @@
 """The command ``klack``: its subcommands and their exit codes.
 
-Nothing heavy is imported here or at the top of the command modules, so that ``--help`` is quick.
-
 ===== =================================================================================
 code  meaning
 ===== =================================================================================
@@ -16,18 +14,11 @@ code  meaning
 
 import os
 import sys
-import traceback
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from inspect import getdoc
-from typing import Any
-
-from cyclopts import App, CycloptsError, UnusedCliTokensError
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 from klack import __version__
-from klack.analyses.catalogue import commands
-from klack.cli import app as browser_app
-from klack.cli import cache, compare, demo, export, inspect, report, schema, show, verify, warm
 from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
@@ -45,36 +36,12 @@ from klack.errors import (
 )
 from klack.terminal.printable import printable
 
-__all__ = ["COMMANDS", "app", "main"]
+if TYPE_CHECKING:
+    from cyclopts import CycloptsError
+
+__all__ = ["main"]
 
 EXIT_OK, EXIT_FAILED, EXIT_BAD_INPUT, EXIT_BUG = 0, 1, 2, 70
-
-app = App(
-    name="klack",
-    help="Predict how a valve needle hits its end stops.",
-    version=f"klack {__version__}",
-    version_flags=["--version"],
-    help_format="plaintext",
-    suppress_keyboard_interrupt=False,
-)
-COMMANDS: Mapping[Callable[..., int], str] = {
-    demo.demo: "klack demo",
-    **commands(),
-    inspect.inspect: "klack inspect needle.step",
-    show.show: "klack show demo-stroke --out valve.svg",
-    report.report: "klack report klack-results/demo-stroke --out report",
-    export.export: "klack export demo-valve-axisymmetric --to mat --out models",
-    compare.compare: "klack compare klack-results/demo-stroke --measurement wet=strokes.csv",
-    verify.verify: "klack verify --group contact",
-    schema.schema: "klack schema --kind stroke --json valve.schema.json",
-    cache.cache: "klack cache --clear",
-    warm.warm: "klack warm",
-    browser_app.app: "klack app my-valves",
-}
-"""Every command, with the example that its help shows."""
-
-for _command, _example in COMMANDS.items():
-    app.command(_command, help=f"{getdoc(_command)}\n\nExample: {_example}")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -87,12 +54,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     prepare_streams()
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if arguments == ["--version"]:
+        print(f"klack {__version__}")
+        return EXIT_OK
     name = " ".join(["klack", *(a for a in arguments[:1] if not a.startswith("-"))])
     try:
         with terminable():
             return _run(arguments, name)
-    except CycloptsError as error:
-        return _complain(f"{name}: {_one_line(error)}\nTry: {_help_of(name)}", EXIT_BAD_INPUT)
     except ConvergenceError as error:
         return _complain(f"{name}: {error}", EXIT_FAILED)
     except KlackError as error:
@@ -116,6 +84,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str], name: str) -> int:
+    from cyclopts import CycloptsError
+
+    from klack.cli.commands import app
+
     def note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
         if issubclass(category, (AccuracyWarning, CacheWarning, LeftAloneWarning)):
             print(printable(f"{name}: note: {message}"), file=sys.stderr)
@@ -128,12 +100,20 @@ def _run(arguments: list[str], name: str) -> int:
             require_present_folder()
             if arguments[0] != "warm":  # which says itself that there is no folder
                 prepare_compiling()
-        code = app(arguments, print_error=False, exit_on_error=False, result_action="return_value")
+        try:
+            code = app(
+                arguments, print_error=False, exit_on_error=False, result_action="return_value"
+            )
+        except CycloptsError as error:
+            shown = name if name.removeprefix("klack").strip() in app else "klack"
+            return _complain(f"{name}: {_one_line(error)}\nTry: {shown} --help", EXIT_BAD_INPUT)
     sys.stdout.flush()
     return code if isinstance(code, int) else EXIT_OK
 
 
 def _bug(name: str) -> int:
+    import traceback
+
     traceback.print_exc()
     text = "internal error, not caused by your input; please report the text above."
     return _complain(f"{name}: {text}", EXIT_BUG)
@@ -144,16 +124,13 @@ def _complain(text: str, code: int) -> int:
     return code
 
 
-def _one_line(error: CycloptsError) -> str:
+def _one_line(error: "CycloptsError") -> str:
+    from cyclopts import UnusedCliTokensError
+
     if isinstance(error, UnusedCliTokensError):
         words = ", ".join(f"'{word}'" for word in error.unused_tokens or ())
         return f"got {words}, which belongs to no option, expected one value for each option."
     return " ".join(str(error).split())
-
-
-def _help_of(name: str) -> str:
-    known = name.removeprefix("klack").strip() in app
-    return f"{name if known else 'klack'} --help"
 
 
 if __name__ == "__main__":

@@ -133,18 +133,20 @@ def _draw_page(
 ) -> int:
     from klack.terminal.progress import show_progress
     from klack.units import LENGTH, parse_quantity
-    from klack.viewer.page import page_of
     from klack.viewer.source import named_case, view_of_source
 
+    network = named_case(source, own)
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
     with show_progress(wanted.quiet) as progress:
         view = view_of_source(source, own, unit_length=length, progress=progress)
     file = out if out is not None else Path(f"{view.name}.html")
     require_file_target("--out", file)
+    from klack.viewer.page import page_of
+
     page = page_of(view)
     _write(file, page)
     wanted.say(f"{_content(view)}\nPage: {file} ({len(page) / 1e6:.2g} MB); open it in a browser.")
-    wanted.write(lambda: _numbers(view.name, file, network=named_case(source, own), view=view))
+    wanted.write(lambda: _numbers(view.name, file, network=network, view=view))
     return 0
 
 

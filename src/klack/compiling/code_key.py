@@ -22,7 +22,7 @@ from numba import types
 from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
-from klack.compiling.jit import Marked
+from klack.compiling.marked import Marked
 
 __all__ = ["code_key"]
 

@@ -40,7 +40,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import Marked, intrinsic, njit
+from klack.compiling.jit import intrinsic, njit
+from klack.compiling.marked import Marked
 
 __all__ = [
     "StepFunction",

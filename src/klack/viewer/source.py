@@ -2,25 +2,20 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from klack.analyses.catalogue import load_result
-from klack.analyses.inspection import STEP_ENDINGS
 from klack.analyses.result_folder import is_result
 from klack.case.shipped import find_case
 from klack.case.valve import ValveCase
 from klack.case.valve_reader import load_any_case
 from klack.errors import InputError
-from klack.mesh.files.catalogue import MESH_FORMATS
-from klack.mesh.files.mesh_file import read_mesh_file
-from klack.mesh.quality import PoorElementError
-from klack.mesh.sizing import MeshSizing
-from klack.mesh.solid import mesh_step
-from klack.mesh.step_content import step_content
+from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS
 from klack.network.component import Component
 from klack.progress import Progress, silent
-from klack.viewer.of_case import view_of_case, view_of_mesh
-from klack.viewer.of_result import view_of_result
-from klack.viewer.view import View
+
+if TYPE_CHECKING:
+    from klack.viewer.view import View
 
 __all__ = ["named_case", "view_of_source"]
 
@@ -33,7 +28,7 @@ def view_of_source(
     *,
     unit_length: float | None = None,
     progress: Progress = silent,
-) -> View:
+) -> "View":
     """What a page of this source shows.
 
     Parameters
@@ -51,10 +46,14 @@ def view_of_source(
     InputError
         For a source that is none of these, or has nothing to draw.
     """
+    from klack.viewer.of_case import view_of_case, view_of_mesh
+
     ending = source.suffix.lower()
     if source.is_file() and ending in STEP_ENDINGS:
         return _step_view(source)
     if source.is_file() and ending in MESH_FORMATS:
+        from klack.mesh.files.mesh_file import read_mesh_file
+
         model = read_mesh_file(source, unit_length, solids_only=True)
         return view_of_mesh(model.mesh, source.name)
     if unit_length is not None:
@@ -65,6 +64,8 @@ def view_of_source(
             hint="leave it out: cases, results and STEP files have their units.",
         )
     if is_result(source):
+        from klack.viewer.of_result import view_of_result
+
         return view_of_result(load_result(source), source, tuple(components), progress)
     return view_of_case(load_any_case(find_case(source), components), progress)
 
@@ -77,7 +78,13 @@ def named_case(source: Path, components: Iterable[type[Component]] = ()) -> Valv
     return case if isinstance(case, ValveCase) else None
 
 
-def _step_view(source: Path) -> View:
+def _step_view(source: Path) -> "View":
+    from klack.mesh.quality import PoorElementError
+    from klack.mesh.sizing import MeshSizing
+    from klack.mesh.solid import mesh_step
+    from klack.mesh.step_content import step_content
+    from klack.viewer.of_case import view_of_mesh
+
     content = step_content(source)
     longest = max(max(b - a for a, b in zip(s.low, s.high, strict=True)) for s in content.solids)
     try:

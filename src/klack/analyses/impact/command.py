@@ -1,11 +1,11 @@
 """``klack impact``: one dry impact at one or several levels."""
 
-from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from klack import __version__
 from klack.analyses.ending import Ending
 from klack.terminal.options import CaseArgument, Levels
 from klack.terminal.progress import show_progress
@@ -63,7 +63,7 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
         found = study.running_in
         if found is None or checked.path is None or found.level != "reduced":
             return ()
-        text = worn_text(checked.source, checked.path, found, ending.folder, version("klack"))
+        text = worn_text(checked.source, checked.path, found, ending.folder, __version__)
         (stage / WORN).write_text(text, "utf-8")
         return (WORN,)
 

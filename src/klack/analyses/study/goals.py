@@ -13,7 +13,16 @@ from klack.case.study_source import StudySource
 from klack.errors import InputError
 from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
 
-__all__ = ["Bound", "Goals", "Side", "bound_text", "bounds_of", "goals_of", "is_by_today"]
+__all__ = [
+    "Bound",
+    "Goals",
+    "Side",
+    "bound_text",
+    "bounds_of",
+    "goals_of",
+    "is_by_today",
+    "require_objectives",
+]
 
 Side = tuple[str, bool]
 """A measure, and whether its high side is the worse one."""
@@ -101,6 +110,17 @@ class Goals:
         return np.column_stack(found) if found else np.zeros((count, 0))
 
 
+def require_objectives(source: StudySource) -> None:
+    """Refuse a study that has nothing to search for, before its first point."""
+    if not source.study.objectives:
+        raise InputError(
+            source.where(()),
+            got="no objectives",
+            expected="one to four measures to minimise or maximise",
+            hint="add 'objectives: {closing_time: minimise}' to the study.",
+        )
+
+
 def goals_of(
     source: StudySource, measures: Mapping[str, Measure[object]], today: Mapping[str, float]
 ) -> Goals:
@@ -117,17 +137,10 @@ def goals_of(
     Raises
     ------
     InputError
-        With file, line and key: without an objective, for a bound of another unit, and one by the
-        case as it is where that has no value.
+        With file, line and key: for a bound of another unit, and one by the case as it is where
+        that has no value.
     """
     study = source.study
-    if not study.objectives:
-        raise InputError(
-            source.where(()),
-            got="no objectives",
-            expected="one to four measures to minimise or maximise",
-            hint="add 'objectives: {closing_time: minimise}' to the study.",
-        )
     return Goals(
         objectives=tuple(study.objectives),
         signs=tuple(1.0 if way == "minimise" else -1.0 for way in study.objectives.values()),

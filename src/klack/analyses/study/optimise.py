@@ -19,7 +19,7 @@ from klack.analyses.study.columns import (
 )
 from klack.analyses.study.computing import sounds_of
 from klack.analyses.study.evaluation import Evaluation, asked_of
-from klack.analyses.study.goals import Goals, Side, goals_of
+from klack.analyses.study.goals import Goals, Side, goals_of, require_objectives
 from klack.analyses.study.gradients import Gradients, require_gradients
 from klack.analyses.study.live_record import Seen
 from klack.analyses.study.log import point_log_form
@@ -97,9 +97,11 @@ def run_optimisation(
         Without pymoo.
     """
     begin = perf_counter()
+    require_objectives(source)
     require_pymoo()
     space = space_of(case, source)
     require_varied(source, space.varied)
+    settings = _settings(source, space)
     _require_same_draws(source)
     study = source.study
     names = dict.fromkeys((*study.measures, *study.objectives, *study.constraints))
@@ -118,7 +120,7 @@ def run_optimisation(
         known = {item.name: item.measure for item in asked.chosen}
         front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
         robust_today = made.row_of_today(front.goals.sides, work.rows) if made else None
-        search = _search(source, space, front.goals)
+        search = Search(settings, [space.today()])
 
         def record(
             sounds: tuple[PointSound, ...] = (), warnings: tuple[str, ...] = ()
@@ -126,7 +128,7 @@ def run_optimisation(
             columns = measure_columns(asked, work.found, today)
             if made is not None and robust_today is not None:
                 columns += made.columns(columns, front.goals.sides, work.made_rows, robust_today)
-            optimum = _optimum(front, search.settings.algorithm, source, columns, made)
+            optimum = _optimum(front, settings.algorithm, source, columns, made)
             of_rows = row_warnings(work.found, today, columns)
             return StudyRecord(
                 **case_fields(case),
@@ -328,17 +330,16 @@ def _edge(space: Space) -> float:
     return 0.0 if all(isinstance(item.spread, Range) for item in space.varied) else _EDGE
 
 
-def _search(source: StudySource, space: Space, goals: Goals) -> Search:
+def _settings(source: StudySource, space: Space) -> SearchSettings:
     given = source.study.search
-    settings = SearchSettings(
+    return SearchSettings(
         parameters=len(space.varied),
-        objectives=len(goals.objectives),
+        objectives=len(source.study.objectives),
         population=given.population,
         generations=given.generations,
         seed=given.seed,
         edge=_edge(space),
     )
-    return Search(settings, [space.today()])
 
 
 def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | None:

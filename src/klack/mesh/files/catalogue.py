@@ -9,7 +9,7 @@ from typing import Protocol, cast
 
 from klack.mesh.files.mesh_model import MeshModel
 
-__all__ = ["FORMATS", "MESH_FORMATS", "MeshFormat", "MeshReader", "format_of"]
+__all__ = ["FORMATS", "MESH_FORMATS", "STEP_ENDINGS", "MeshFormat", "MeshReader", "format_of"]
 
 
 class MeshReader(Protocol):
@@ -70,6 +70,9 @@ FORMATS = (
     MeshFormat("vtk.reader.read_vtk", "VTK grid", (".vtk", ".vtu")),
 )
 """Reader, program and suffixes of each format."""
+
+STEP_ENDINGS = (".step", ".stp")
+"""Of CAD files, which are meshed."""
 
 MESH_FORMATS: Mapping[str, str] = {
     ending: " or ".join(other.program for other in FORMATS if ending in other.endings)
