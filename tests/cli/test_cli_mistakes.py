@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from klack.cli.main import main
+
 CASES = Path(__file__).parents[2] / "cases"
 
 IMPACT = ("impact", "noise", "reduce", "advise --error=2%", "study", "optimise", "show")
@@ -14,6 +16,8 @@ IMPACT += ("export --to=mat", "export --to=calculix", "sensitivities")
 STROKE = ("stroke", "shots", "study", "optimise", "show", "noise", "advise --error=2%")
 STROKE += ("export --to=fmu", "linearise", "heat", "calibrate --strokes=1 --measurement={file}")
 STROKE += ("sensitivities",)
+
+SMALL = "{search: {population: 6}, parameters: {motion.speed: 1 m/s}, measures: [peak_force]}"
 
 RUN = """
 import json, sys
@@ -48,7 +52,7 @@ def test_a_mistake_is_told_before_anything_heavy_is_loaded(written, tmp_path):
         *([words.split()[0], impact, *words.split()[1:]] for words in IMPACT),
         *([words.split()[0], stroke, *words.format(file=file).split()[1:]] for words in STROKE),
         ["impact", "two-rods", "--level", "reducde"],
-        ["optimise", written("demo-stroke", "study:", "study:\n  search: {population: 6}")],
+        ["optimise", written("two-rods", "motion:", f"study: {SMALL}\nmotion:")],
     ]
     command = [sys.executable, "-c", RUN, json.dumps(asked)]
     done = subprocess.run(command, check=False, capture_output=True, text=True, cwd=tmp_path)
@@ -57,3 +61,11 @@ def test_a_mistake_is_told_before_anything_heavy_is_loaded(written, tmp_path):
     told = done.stderr.split("klack ")
     for words in ("motoin", "netwerk", "reducde", "population"):
         assert any(words in text for text in told), done.stderr
+
+
+def test_a_search_for_nothing_computes_nothing(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("klack.analyses.study.optimise.asked_of", pytest.fail)
+
+    assert main(["optimise", "demo-stroke"]) == 2
+    assert "no objectives" in capsys.readouterr().err
