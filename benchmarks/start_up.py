@@ -18,6 +18,7 @@ from number import Number, Size
 
 __all__ = ["numbers"]
 
+_CASES = Path(__file__).parents[1] / "cases"
 _KLACK = [sys.executable, "-m", "klack"]
 
 
@@ -34,6 +35,7 @@ def numbers(size: Size) -> list[Number]:
             goal=0.3,
         ),
     ]
+    found += _processor(repeats)
     if size != "smallest":
         impact = [*_KLACK, "impact", "two-rods", "--level", "reduced", "--quiet"]
         name = "klack impact two-rods, reduced, with the report"
@@ -45,6 +47,39 @@ def numbers(size: Size) -> list[Number]:
         found.append(Number(name="the same with nothing compiled yet", value=seconds, unit="s"))
         found += _strokes(repeats)
     return found
+
+
+def _processor(repeats: int) -> list[Number]:
+    """Processor time of short commands, everything compiled."""
+    with tempfile.TemporaryDirectory() as folder:
+        out, case = Path(folder) / "out", Path(folder) / "case.yaml"
+        given = _CASES / "demo-stroke" / "case.yaml"
+        case.write_text(f"netwerk: {{}}\n{given.read_text('utf-8')}", "utf-8")
+        impact = [*_KLACK, "impact", "two-rods", "--level", "reduced", "--quiet", "--out", str(out)]
+        load = f"import klack; klack.load_result({str(out)!r})"
+        rows = {
+            "klack --version": ([*_KLACK, "--version"], 0.15),
+            "a misspelt key of a stroke": ([*_KLACK, "stroke", str(case)], 1.0),
+            "klack impact two-rods, reduced": (impact, 3.0),
+            "import klack, load_result of an impact": ([sys.executable, "-c", load], 1.5),
+        }
+        return [
+            Number(
+                name=f"{name}, processor time", value=_spent(words, repeats), unit="s", goal=goal
+            )
+            for name, (words, goal) in rows.items()
+        ]
+
+
+def _spent(command: list[str], repeats: int) -> float:
+    """Least processor time [s] of a process and those that it starts."""
+    spent = []
+    for _ in range(repeats + 1):  # the first one compiles
+        before = os.times()
+        subprocess.run(command, check=False, capture_output=True)
+        after = os.times()
+        spent.append(sum(after[2:4]) - sum(before[2:4]))
+    return min(spent[1:])
 
 
 def _pages(repeats: int) -> list[Number]:
