@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner
 from klack.transient.interface_arrays import Films, State
 from klack.transient.tilting_films import contact_resultant, film_state
 
@@ -12,7 +12,7 @@ __all__ = ["tell_land"]
 Vector = NDArray[np.float64]
 
 
-@njit
+@inner
 def tell_land(films: Films, k: int, state: State, q: Vector, out: Vector) -> None:
     """Write lift and tilts of film ``k`` at the start and at the end of a step, shape (6,).
 

@@ -8,7 +8,7 @@ film yet.  Where the wall holds it no film is squeezed across, only along the wa
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner
 from klack.hydraulics.guide_film import guide_film_step
 from klack.transient.interface_arrays import Bore, Films, Modes, State
 
@@ -21,7 +21,7 @@ _ROUNDS, _HALVINGS = 40, 12
 _FOUND, _NEARLY = 1e-11, 1e-6  # places that do not fit, over the clearance
 
 
-@njit
+@inner
 def shaft_place(bore: Bore, k: int, q: Vector) -> Vector:
     """Place of the shaft across the axis at a height [m], shape (2,)."""
     place = bore.offset[k].copy()
@@ -31,14 +31,14 @@ def shaft_place(bore: Bore, k: int, q: Vector) -> Vector:
     return place
 
 
-@njit
+@inner
 def _within(place: Vector, clearance: float) -> float:
     """Share of a place that lies within the clearance."""
     distance = np.sqrt(place[0] ** 2 + place[1] ** 2)
     return clearance / distance if distance > clearance else 1.0
 
 
-@njit
+@inner
 def _bearings(
     films: Films, bore: Bore, before: Matrix, after: Matrix, step: float, slides: bool
 ) -> tuple[Vector, Matrix]:
@@ -70,7 +70,7 @@ def _bearings(
     return force, slopes
 
 
-@njit
+@inner
 def squeeze_guide(
     films: Films, modes: Modes, bore: Bore, state: State, q: Vector, kick: Vector
 ) -> float:
@@ -107,7 +107,7 @@ def squeeze_guide(
     return float(np.max(np.abs(soft @ force)) / way)
 
 
-@njit
+@inner
 def _search(
     films: Films,
     bore: Bore,
@@ -146,7 +146,7 @@ def _search(
     return force, size
 
 
-@njit
+@inner
 def count_bearing(k: int, bore: Bore, state: State, q: Vector) -> None:
     """Add the loss of the film at a height over the step that leads to ``q``."""
     for c in range(2):

@@ -62,7 +62,7 @@ class GuideRub(NamedTuple):
     rim: Cube  # (k, 2, M) displacement of the rim of the shaft in these directions
 
 
-@njit
+@inner
 def no_rub(heights: int, modes: int) -> GuideRub:
     """Room for the friction at some heights."""
     return GuideRub(np.zeros(heights), np.zeros((heights, 2)), np.zeros((heights, 2, modes)))

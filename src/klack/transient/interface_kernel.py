@@ -47,7 +47,7 @@ step.  For one point on a rigid body this is the mean pressure of the layer betw
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
 from klack.transient.film_record import tell_land
@@ -284,7 +284,7 @@ def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, flo
     return work, stored
 
 
-@njit
+@inner
 def _start(modes: Modes, outside: Outside, bore: Bore | None, n: int, rubs: int) -> Step:
     """Room for a step, the answer of the spring, and how much drag brakes the shaft."""
     M, guides = len(modes.push), 0

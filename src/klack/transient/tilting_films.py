@@ -18,7 +18,7 @@ film is found before the contact, with the contact forces of the step before.
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner, njit
 from klack.hydraulics.tilted_film import Land, film_pressure, film_slopes
 from klack.transient.interface_arrays import Films, Modes, State
 
@@ -54,7 +54,7 @@ slopes are known [s], these nine slopes, lift and tilts for which the film was s
 sectors are at the limit of tension."""
 
 
-@njit
+@inner
 def land_at(films: Films, k: int) -> Land:
     """Arrays of the land of film ``k``."""
     S, N, G, Q, shared = films.sizes[k]
@@ -70,7 +70,7 @@ def land_at(films: Films, k: int) -> Land:
     return Land(between, along, around, load, data[at : at + N], shared)
 
 
-@njit
+@inner
 def _spread(films: Films, k: int) -> Matrix:
     """Heights of the circles of all sectors per unit of lift and tilts, shape (S N, 3)."""
     S, N = films.sizes[k, 0], films.sizes[k, 1]
@@ -89,7 +89,7 @@ def film_state(films: Films, k: int, q: Vector) -> Vector:
     return u
 
 
-@njit
+@inner
 def contact_resultant(films: Films, k: int, lam: Vector) -> Vector:
     """Force and moments of contact forces under a film, shape (3,)."""
     held = np.zeros(3)
@@ -109,7 +109,7 @@ def bend_faces(films: Films, k: int, change: Vector, gap: Vector) -> None:
             gap[i] += films.arms[k, i, c] * bend[c]
 
 
-@njit
+@inner
 def _raw_heights(films: Films, k: int, u: Vector) -> Matrix:
     """Gaps of the circles of all sectors, shape (S, N) [m]; below 0 where closed."""
     S, N = films.sizes[k, 0], films.sizes[k, 1]
@@ -121,7 +121,7 @@ def _raw_heights(films: Films, k: int, u: Vector) -> Matrix:
     return x
 
 
-@njit
+@inner
 def _pressed(
     films: Films, k: int, u0: Vector, u1: Vector, step: float, steeply: bool, limit: Vector
 ) -> tuple[Vector, Matrix]:
@@ -190,7 +190,7 @@ def _pressed(
     return f, slopes
 
 
-@njit
+@inner
 def begin_films(state: State, step: float) -> None:
     """Remember the forces of the step before, and guess those of this one on a straight line."""
     films = state.films
@@ -201,7 +201,7 @@ def begin_films(state: State, step: float) -> None:
             films[k, SOLVED + c] = np.inf
 
 
-@njit
+@inner
 def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> float:
     """Change of the modal force of a film over the step that leads to ``q`` with its present force.
 
@@ -303,7 +303,7 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
     return float(_size(soft @ best, reach) / (tiny + _size(u - before, reach)))
 
 
-@njit
+@inner
 def _follow(
     films: Films,
     k: int,
@@ -338,13 +338,13 @@ def _follow(
     return True
 
 
-@njit
+@inner
 def _weight(f: Vector, reach: float) -> float:
     """Force and moments as one force [N]."""
     return abs(f[0]) + (abs(f[1]) + abs(f[2])) / reach
 
 
-@njit
+@inner
 def _resisting(slopes: Matrix, reach: float) -> Matrix:
     """The part of a film's stiffness that resists: symmetric, without what is below zero.
 
@@ -357,13 +357,13 @@ def _resisting(slopes: Matrix, reach: float) -> Matrix:
     return stiff / np.outer(scale, scale)
 
 
-@njit
+@inner
 def _size(u: Vector, reach: float) -> float:
     """Largest height that lift and tilts make [m]."""
     return abs(u[0]) + reach * np.sqrt(u[1] ** 2 + u[2] ** 2)
 
 
-@njit
+@inner
 def bulk_work(films: Films, k: int, state: State, lam: Vector) -> float:
     """Work [J] of the contact forces, up to ``lam``, on the bulk that a film bends."""
     D, work = films.compliance[k], 0.0
@@ -375,7 +375,7 @@ def bulk_work(films: Films, k: int, state: State, lam: Vector) -> float:
     return work
 
 
-@njit
+@inner
 def bulk_energy(films: Films, k: int, force: Vector, held: Vector) -> float:
     """Energy [J] that the bulk holds by a film beside that by contact forces, ``held``."""
     D, energy = films.compliance[k], 0.0
@@ -385,7 +385,7 @@ def bulk_energy(films: Films, k: int, force: Vector, held: Vector) -> float:
     return energy
 
 
-@njit
+@inner
 def count_squeeze(films: Films, k: int, state: State, q: Vector, lam: Vector, step: float) -> None:
     """Add the loss of a film over the step that leads to ``q`` and the contact forces ``lam``."""
     f = state.films[k]
