@@ -66,8 +66,12 @@ def sensitivities(
 
         from klack.analyses.sensitivities.analysis import SENSITIVITIES
         from klack.analyses.sensitivities.any_case import sensitivities_of
+        from klack.case.valve import ValveCase
+        from klack.compiling.ahead import compiling_ahead
 
-    with show_progress(wanted.quiet) as progress:
+    # derivatives are compiled here, what the check of a stroke needs beside them
+    ahead = ("loop",) if isinstance(checked, ValveCase) else ("levels",)
+    with show_progress(wanted.quiet) as progress, compiling_ahead(ahead, wanted.threads):
         record = sensitivities_of(checked, variant, level)(
             checked,
             tree,
