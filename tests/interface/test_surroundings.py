@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+import klack
 from klack.analyses.catalogue import load_result
 from klack.cli.main import main
 from klack.errors import InputError
@@ -198,6 +199,57 @@ def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypat
     place = Path(os.environ["NUMBA_CACHE_DIR"])
     assert place.stat().st_mode & 0o077 == 0
     assert "compiled functions cannot be cached" in capsys.readouterr().err
+
+
+def test_bytecode_is_kept_apart_from_sources_where_a_variable_forbids_it(tmp_path: Path):
+    """Of a command alone, in a private folder that ``klack warm --clear`` empties."""
+    from klack.compiling.compiled_folder import clear_folder
+
+    source = tmp_path / "source"
+    shutil.copytree(
+        Path(klack.__file__).parent, source / "klack", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    env = {"PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(source)}
+    env["NUMBA_CACHE_DIR"] = str(tmp_path / "own")
+    store = tmp_path / "own" / "klack-compiled"
+
+    def written_by(*words: str) -> int:
+        command = [sys.executable, *words]
+        subprocess.run(command, cwd=tmp_path, env=ALONE | env, capture_output=True, check=True)
+        assert not [*source.rglob("__pycache__")]
+        return len([*store.rglob("units.*.pyc")])
+
+    assert written_by("-c", "import klack.units") == 0  # the user's own process
+    assert (
+        written_by("-c", "import klack.cli.main as m; m.main(['cache']); import klack.units") == 0
+    )
+    assert written_by("-P", "-m", "klack", "schema") == 1
+    kept = store / "bytecode"
+    assert kept.stat().st_mode & 0o777 == 0o700
+    clear_folder(store)
+    assert not kept.exists()
+    store.chmod(0o777)  # another user may exchange it
+    assert written_by("-P", "-m", "klack", "schema") == 0
+
+
+@pytest.mark.parametrize("spoil", ["others may read", "another user", "a parent", "a file"])
+def test_bytecode_is_kept_in_no_folder_that_others_reach(spoil: str, tmp_path: Path, monkeypatch):
+    """Truth: Python runs what lies there, whoever wrote it."""
+    from klack.compiling import compiled_folder
+
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "own"))
+    found = compiled_folder.bytecode_folder()
+    assert found is not None
+    if spoil == "others may read":
+        found.chmod(0o711)
+    elif spoil == "another user":
+        monkeypatch.setattr(compiled_folder, "caller", lambda: os.geteuid() + 1)
+    elif spoil == "a parent":
+        (tmp_path / "own").chmod(0o777)
+    else:
+        found.rmdir()
+        found.touch()
+    assert compiled_folder.bytecode_folder() is None
 
 
 def shell(text: str, folder: Path, **env: str) -> "subprocess.CompletedProcess[str]":

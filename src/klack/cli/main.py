@@ -23,6 +23,7 @@ from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
     in_words,
+    keep_bytecode,
     prepare_compiling,
     prepare_streams,
     require_present_folder,
@@ -57,6 +58,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     if arguments == ["--version"]:
         print(f"klack {__version__}")
         return EXIT_OK
+    if argv is None:  # a process of klack's own
+        keep_bytecode()
     name = " ".join(["klack", *(a for a in arguments[:1] if not a.startswith("-"))])
     try:
         with terminable():

@@ -4,6 +4,7 @@ import errno
 import os
 import sys
 from collections.abc import Mapping
+from importlib.util import find_spec
 from io import TextIOWrapper
 from typing import TextIO
 
@@ -12,6 +13,7 @@ from klack.errors import InputError
 __all__ = [
     "close_quietly",
     "in_words",
+    "keep_bytecode",
     "prepare_compiling",
     "prepare_streams",
     "require_present_folder",
@@ -44,6 +46,26 @@ def prepare_streams() -> None:
             setattr(sys, name, open(os.devnull, "r" if name == "stdin" else "w"))
         elif name != "stdin" and isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+
+
+def keep_bytecode() -> None:
+    """Keep what Python compiles in a folder of klack, where a variable forbids it beside sources.
+
+    Each command would compile klack and its libraries anew, for some seconds.  Left as it is where
+    their bytecode is there already, and where another folder is set.
+    """
+    if not os.environ.get("PYTHONDONTWRITEBYTECODE") or sys.pycache_prefix:
+        return
+    places = [find_spec(name) for name in ("klack.cli", "numba", "pydantic")]
+    if all(place and place.cached and os.path.exists(place.cached) for place in places):
+        return
+    from klack.compiling.compiled_folder import bytecode_folder
+
+    folder = bytecode_folder()
+    if folder is not None:
+        sys.pycache_prefix, sys.dont_write_bytecode = str(folder), False
+        os.environ["PYTHONPYCACHEPREFIX"] = str(folder)  # for processes that klack starts
+        del os.environ["PYTHONDONTWRITEBYTECODE"]
 
 
 def prepare_compiling() -> None:

@@ -1,6 +1,7 @@
 """Where machine code is kept: a folder of the caller that no other user can write to."""
 
 import os
+import shutil
 import stat
 import warnings
 from contextlib import suppress
@@ -12,6 +13,7 @@ from klack.own_file import caller
 
 __all__ = [
     "FOLDER_VARIABLE",
+    "bytecode_folder",
     "clear_folder",
     "compiled_folder",
     "is_trusted",
@@ -22,7 +24,7 @@ __all__ = [
 
 FOLDER_VARIABLE = "NUMBA_CACHE_DIR"
 """Environment variable that names another parent folder; numba uses it as well."""
-_NAME = "klack-compiled"
+_NAME, _BYTECODE = "klack-compiled", "bytecode"
 
 
 def compiled_folder() -> Path | None:
@@ -49,6 +51,33 @@ def is_trusted(state: os.stat_result) -> bool:
     return state.st_uid in (0, caller()) and not state.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
+def bytecode_folder() -> Path | None:
+    """Folder for what Python compiles, made if absent; None where another user could write to it.
+
+    Python runs what it finds there and looks at no owner.  So nobody else may enter the folder, nor
+    put another one in its place.
+    """
+    folder = compiled_folder()
+    if folder is None or caller() is None:
+        return None
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        (folder / _BYTECODE).mkdir(mode=0o700, exist_ok=True)
+        found = (folder / _BYTECODE).resolve()
+        own, *above = (path.stat() for path in (found, *found.parents))
+    except OSError:
+        return None
+    if own.st_uid != caller() or own.st_mode & (stat.S_IRWXG | stat.S_IRWXO):
+        return None
+    kept = all(is_trusted(state) or _is_sticky(state) for state in above)
+    return found if kept and os.access(found, os.W_OK | os.X_OK) else None
+
+
+def _is_sticky(state: os.stat_result) -> bool:
+    """Whether others may add to a folder, but not rename what is there (``/tmp``)."""
+    return bool(state.st_uid in (0, caller()) and state.st_mode & stat.S_ISVTX)
+
+
 def is_usable(folder: Path | None) -> bool:
     """Whether code can be written to the folder, now or once it is made."""
     if folder is None:
@@ -71,7 +100,7 @@ def stored(folder: Path) -> tuple[int, int]:
 
 
 def clear_folder(folder: Path) -> None:
-    """Delete what is kept, except what another process writes at this moment.
+    """Delete what is kept, bytecode too, except what another process writes at this moment.
 
     Raises
     ------
@@ -82,6 +111,7 @@ def clear_folder(folder: Path) -> None:
         for entry in os.scandir(folder):
             if entry.name.endswith((".code", ".part")):
                 Path(entry.path).unlink(missing_ok=True)
+    shutil.rmtree(folder / _BYTECODE, ignore_errors=True)
 
 
 @cache
