@@ -3,7 +3,9 @@
 import math
 import subprocess
 import sys
+from pathlib import Path
 
+import pint
 import pytest
 from draws import each
 
@@ -63,6 +65,7 @@ BAD = [
     ("LENGTH", 80, "without unit"),
     ("LENGTH", "80", "without unit"),
     ("LENGTH", "1,5 mm", '"1.5 mm"'),  # pint itself would read 15 mm
+    ("LENGTH", "5 m m", "a length"),  # not 5 mm
     ("LENGTH", "5 foo", "unknown unit 'foo'"),
     ("PRESSURE", "210 gpa", "upper and lower case"),
     ("DENSITY", "7850 kg/m3", "kg/m^3"),
@@ -128,10 +131,19 @@ def test_si_numbers_are_written_with_a_prefix(value, unit, text):
     assert format_si(value, unit) == text
 
 
-def test_pint_waits_until_a_unit_is_read():
-    # klack --help and reports of stored results import klack.units, but read no unit
-    code = "import sys, klack.units; sys.exit('pint' in sys.modules)"
+def test_pint_waits_until_a_rare_unit_is_read():
+    case = Path(__file__).parents[1] / "data" / "tiny_rods.yaml"
+    code = f"import sys; from klack.case import load_case; load_case({str(case)!r}); "
+    code += "sys.exit('pint' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_common_units_have_the_size_that_pint_gives_them_to_the_last_digit():
+    registry = pint.UnitRegistry()
+    for kind in units.KINDS:
+        for unit in () if kind.factors else kind.common:
+            size = float(registry.Quantity(1.0, unit).to(kind.unit).magnitude)
+            assert units._factor(f"1 {unit}", unit, kind, "length") == size, unit
 
 
 # SI brochure, table 4: derived units in base units
