@@ -11,6 +11,7 @@ from klack.compiling.tangent_number import tangent_number, with_tangents
 from klack.network.step_function import StepFunction
 from klack.simulation.network_kernel import run_network
 from klack.simulation.network_record import record_moment
+from klack.simulation.phase import unfolded
 
 __all__ = ["LANES", "lanes_of", "run_with_tangents", "start_with_tangents", "tangent_address"]
 
@@ -21,8 +22,11 @@ _ALIGNED = 8 * LANES  # bytes
 _POINTER = types.CPointer(tangent_number(LANES))
 _STEP = types.int64(_POINTER, _POINTER, _POINTER, _POINTER)
 
+# called as it is, the loop would be optimised and turned into machine code once more for itself
+_run = unfolded(run_network.__wrapped__)
 
-@njit
+
+@njit(_nrt=False, error_model="numpy")
 def run_with_tangents(
     macros: int,
     per_record: int,
@@ -44,7 +48,7 @@ def run_with_tangents(
     axis of :data:`LANES`: the value and its derivatives.  They are made by :func:`lanes_of`; the
     step functions are those of :func:`tangent_address`.
     """
-    return run_network(
+    return _run(
         macros,
         per_record,
         clock,

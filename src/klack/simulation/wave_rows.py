@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner
 from klack.errors import InputError
 from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE, WaveRow
 from klack.network.step_function import address_of, call, evaluate, first, shift
@@ -105,7 +105,7 @@ def wave_store(waves: Waves, rows: Sequence[WaveRow], k: int) -> Vector:
     return out[:4]
 
 
-@njit(error_model="numpy", _nrt=False)
+@inner(error_model="numpy", _nrt=False)
 def waves_incoming(waves: Waves, H: float, c: Vector, Z: Vector) -> None:
     """Fill ``c`` [Pa] and ``Z`` [Pa s/m^3] of every end of the rows for a step of ``H``.
 
@@ -130,7 +130,7 @@ def waves_incoming(waves: Waves, H: float, c: Vector, Z: Vector) -> None:
                 c[end] = np.nan
 
 
-@njit(error_model="numpy", _nrt=False)
+@inner(error_model="numpy", _nrt=False)
 def waves_commit(waves: Waves, H: float, c: Vector, Z: Vector, q: Vector, losses: Any) -> None:
     """Move all rows on with the flows ``q`` [m^3/s] into their ends.
 
@@ -153,7 +153,7 @@ def waves_commit(waves: Waves, H: float, c: Vector, Z: Vector, q: Vector, losses
             losses[k, j] += waves.outputs[j]
 
 
-@njit(error_model="numpy", _nrt=False)
+@inner(error_model="numpy", _nrt=False)
 def _ask(waves: Waves, k: int) -> int:
     return int(
         call(
