@@ -43,11 +43,11 @@ def warm(tmp_path_factory):
     return json.loads(file.read_text()), done.stdout
 
 
-def compiled_by(*words, out):
-    command = [sys.executable, "-c", COUNT, *map(str, words), "--no-report", "--quiet"]
-    done = subprocess.run(
-        [*command, "--out", str(out)], capture_output=True, text=True, env=os.environ, check=True
-    )
+def compiled_by(*words, out=None):
+    command = [sys.executable, "-c", COUNT, *map(str, words), "--quiet"]
+    if out is not None:
+        command += ["--no-report", "--out", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, env=os.environ, check=True)
     code, functions = done.stdout.split()[-2:]
     assert code == "0", done.stderr
     return int(functions)
@@ -99,6 +99,14 @@ def test_strokes_of_shipped_cases_compile_nothing(warm, tmp_path, case):
 def test_impacts_compile_nothing(warm, tmp_path):
     words = ("impact", "two-rods", "--level", "reduced,interface")
     assert compiled_by(*words, out=tmp_path / "out") == 0
+
+
+@pytest.mark.slow
+def test_derivatives_of_a_valve_compile_nothing(warm, tmp_path):
+    valve, parameter = HOW_TO / "small_valve.yaml", "network.components.spring.preload"
+
+    assert compiled_by("linearise", valve, out=tmp_path / "out") == 0
+    assert compiled_by("sensitivities", valve, "--parameter", parameter) == 0
 
 
 def test_no_folder_is_a_clear_error(tmp_path, monkeypatch, capsys):

@@ -21,7 +21,7 @@ def warm(
     ] = False,
     wanted: Shown = SHOWN,
 ) -> int:
-    """Compile ahead what strokes and impacts need, once for each processor and version.
+    """Compile ahead what strokes, impacts and derivatives need, once per processor and version.
 
     Without it the first command compiles, for half a minute to a minute.
     What is there already is not compiled again.

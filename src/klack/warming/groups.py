@@ -54,6 +54,19 @@ def _components() -> None:
     evaluate(constant_force_step, [1.0], [], [0.0] * 4, 4)  # as gases find their steady flow
 
 
+def _derivatives() -> None:
+    from klack.analyses.linearisation.run import run_linearisation
+    from klack.simulation.tangent_loop import tangent_address
+    from klack.simulation.tangent_run import compile_tangents
+    from klack.warming.small_valve import small_valve
+
+    case = small_valve()
+    compile_tangents(case.network.network().rows(), step=case.run.step)
+    run_linearisation(case)
+    for step in all_steps():
+        tangent_address(step)
+
+
 def all_steps() -> set[Any]:
     """Step functions of all files of the rooms in which components are."""
     from klack.network.catalogue import component_classes
@@ -109,6 +122,7 @@ def _impact() -> None:
 GROUPS: Mapping[str, Group] = MappingProxyType(
     {
         "loop": Group("time loop of a network", _loop),
+        "derivatives": Group("the same loop and steps with derivatives", _derivatives),
         "valve": Group("meshes, bodies and contacts of a valve", _valve),
         "spatial": Group("strokes in three dimensions", _spatial),
         "components": Group("steps of all components", _components),
