@@ -1,6 +1,8 @@
 """Round trip and damage of stored studies; the truth is the object that was saved."""
 
+import json
 import shutil
+import sys
 from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 
@@ -107,6 +109,51 @@ def test_arrays_of_several_files_come_back_by_zarr(most: int, tmp_path: Path, mo
         save_record(Arrays({"words": np.array(["a"])}), tmp_path / "words", form)
     save_record(Arrays(numbers), tmp_path, form)
     assert_same(load_record(tmp_path, form), Arrays(numbers))
+
+
+def stored_by_zarr(folder: Path) -> RecordFormat:
+    """A record whose array zarr has written in pieces along both axes, as klack once did."""
+    form = RecordFormat(name="arrays", version=1, kind=Arrays, command="none", units={})
+    x = np.arange(35.0).reshape(7, 5)
+    save_record(Arrays({"x": x}), folder, form)
+    place = folder / RESULT_NAME / "study" / "numbers"
+    marks = dict(zarr.open_array(place / "x", mode="r").attrs)
+    shutil.rmtree(place / "x")
+    root = zarr.open_group(place, mode="r+")
+    root.create_array("x", data=x, chunks=(3, 2), attributes=marks)
+    return form
+
+
+def test_pieces_along_all_axes_are_read_without_zarr(tmp_path: Path, monkeypatch):
+    form = stored_by_zarr(tmp_path)
+    monkeypatch.setitem(sys.modules, "zarr", None)  # its import fails
+    found = load_record(tmp_path, form).numbers["x"]
+    assert np.array_equal(found, np.arange(35.0).reshape(7, 5))
+
+
+@pytest.mark.parametrize(
+    ("was", "now"),
+    [
+        ('"float64"', '"object"'),
+        ('"float64"', '"<f8"'),
+        ('"little"', '"big"'),
+        ('"zstd"', '"gzip"'),
+        ("3,2", "4,2"),  # another grid than that of the files
+        ("3,2", "3,1"),  # files hold more than a piece
+        ("3,2", "300000000,300000"),  # a piece larger than the array
+        ("3,2", "0,2"),
+        ("7,5", "70000000,50000"),
+        ('"zarr_format":3', '"zarr_format":2'),
+    ],
+)
+def test_arrays_of_another_kind_are_refused(was: str, now: str, tmp_path: Path):
+    form = stored_by_zarr(tmp_path)
+    file = tmp_path / RESULT_NAME / "study" / "numbers" / "x" / "zarr.json"
+    text = json.dumps(json.loads(file.read_text()), separators=(",", ":"))
+    assert was in text
+    file.write_text(text.replace(was, now))
+    with pytest.raises(InputError, match="result"):
+        load_record(tmp_path, form)
 
 
 def test_saving_again_replaces_the_result(
