@@ -16,7 +16,7 @@ from math import atan2, cos, hypot, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner, njit
 
 __all__ = ["guide_film_damping", "guide_film_drag", "guide_film_force", "guide_film_step"]
 
@@ -125,7 +125,7 @@ def guide_film_drag(eccentricity: float) -> float:
     return 1.0 / sqrt(1.0 - eccentricity * eccentricity)
 
 
-@njit
+@inner
 def _integrals(eps: float, first: float, last: float) -> tuple[float, float, float]:
     """``int (cos^2, sin cos, sin^2)/(1 - eps cos)^3`` from ``first`` to ``last``, up to 3 pi."""
     a, b = _sommerfeld(eps, first), _sommerfeld(eps, last)
@@ -140,7 +140,7 @@ def _integrals(eps: float, first: float, last: float) -> tuple[float, float, flo
     return cc, sc, ss
 
 
-@njit
+@inner
 def _sommerfeld(eps: float, theta: float) -> float:
     """``psi`` of an angle within one turn and a half of 0, without a jump."""
     turns = 0.0

@@ -18,7 +18,7 @@ positive definite.
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner
 
 __all__ = ["eliminate_ring", "solve_ring"]
 
@@ -27,7 +27,7 @@ Matrix = NDArray[np.float64]
 Vector = NDArray[np.float64]
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _inverse(A: Matrix, X: Matrix) -> None:
     """Inverse of a small positive definite matrix, which is destroyed."""
     n = A.shape[0]
@@ -47,7 +47,7 @@ def _inverse(A: Matrix, X: Matrix) -> None:
                     X[k, j] -= factor * X[i, j]
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _keep_across(X: Matrix, normal: Vector) -> None:
     """Leave of a symmetric inverse what moves its first unknowns across ``normal`` only."""
     n, along = X.shape[0], np.zeros(X.shape[0])
@@ -62,7 +62,7 @@ def _keep_across(X: Matrix, normal: Vector) -> None:
             X[i, j] -= along[i] * along[j] / square
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def eliminate_ring(
     blocks: Cube,
     links: Cube,
@@ -166,7 +166,7 @@ def eliminate_ring(
     return ring
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _chain(inverses: Cube, passed: Cube, x: Cube) -> None:
     """Solve for the open chain, in place; ``x`` has a column for each right-hand side."""
     m, o = inverses.shape[0], inverses.shape[1]
@@ -195,7 +195,7 @@ def _chain(inverses: Cube, passed: Cube, x: Cube) -> None:
                         x[k, i, j] -= factor * x[k + 1, c, j]
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def solve_ring(
     ring: tuple[Cube, Cube, Cube, Cube, Matrix], links: Cube, x: Cube, y: Matrix
 ) -> None:
@@ -215,7 +215,7 @@ def solve_ring(
     _close(ring, links, x, y)
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _close(ring: tuple[Cube, Cube, Cube, Cube, Matrix], links: Cube, x: Cube, y: Matrix) -> None:
     """Close the ring of the solution of the open chain."""
     inverses, _, shared, reduced, closing = ring

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.compiling.jit import inner, njit
 from klack.errors import InputError, require_nonnegative, require_positive
 from klack.hydraulics.ring_system import eliminate_ring, solve_ring
 
@@ -421,8 +421,7 @@ def film_pressure(
         if not _regroup(blocks, links, border, x, X, Y, mean, base, held, one):
             break
         tries += 1
-        X[:] = x
-        Y[:] = y
+        X, Y = x.copy(), y.copy()
     P, force = np.empty((S, Q)), np.empty((S, N))
     for k in range(S):
         for a in range(Q):
@@ -532,7 +531,7 @@ def film_slopes(
     return slopes
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _loads(land: Land) -> Array:
     """Forces on the circles per unit of each function of the radius, shape (N, Q) [m^2]."""
     G, N = land.between.shape
@@ -544,7 +543,7 @@ def _loads(land: Land) -> Array:
     return L
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _stiffness(land: Land, mobility: Array) -> tuple[Array, Array, Array, Array]:
     """Blocks and links of the ring, its coupling with what all share, and that itself."""
     along, around, shared = land.along, land.around, land.shared
@@ -577,7 +576,7 @@ def _stiffness(land: Land, mobility: Array) -> tuple[Array, Array, Array, Array]
     return blocks, links, border, corner
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _regroup(
     blocks: Array,
     links: Array,
@@ -628,7 +627,7 @@ def _regroup(
     return changed
 
 
-@njit(error_model="numpy")
+@inner(error_model="numpy")
 def _hold(
     blocks: Array,
     links: Array,

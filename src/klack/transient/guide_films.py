@@ -86,8 +86,9 @@ def squeeze_guide(
     rows = bore.traces.reshape((n, M))
     before, free = np.empty((heights, 2)), np.empty(n)
     for k in range(heights):
-        before[k] = shaft_place(bore, k, state.q)
-        free[2 * k : 2 * k + 2] = shaft_place(bore, k, q)
+        was, now = shaft_place(bore, k, state.q), shaft_place(bore, k, q)
+        for c in range(2):
+            before[k, c], free[2 * k + c] = was[c], now[c]
     soft = (rows * modes.B1) @ rows.T
     old = state.bearing[:, :2].copy().reshape(n)
     free -= soft @ old
@@ -103,7 +104,9 @@ def squeeze_guide(
         state.bearing[k, 0], state.bearing[k, 1] = force[2 * k], force[2 * k + 1]
     way = np.max(np.abs(free + soft @ force - before.reshape(n))) + _FOUND * least
     force -= old
-    kick[:] = rows.T @ force
+    pushed = rows.T @ force
+    for i in range(M):
+        kick[i] = pushed[i]
     return float(np.max(np.abs(soft @ force)) / way)
 
 

@@ -281,7 +281,7 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
             size = _size(left, reach)
             if size < least:
                 least = size
-                best[:] = f
+                best = f.copy()
             if size <= tiny or _size(share * change, reach) <= _ROUND_OFF * _size(u, reach):
                 break
             if size <= _ALONG * way and _follow(films, k, u, f, slopes, soft, left, best):
@@ -293,8 +293,9 @@ def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: V
             for d in range(3):
                 state.films[k, SLOPES + 3 * c + d] = slopes[c, d]
         state.films[k, KNOWN] = step
-    state.films[k, :3] = best
-    solved[:] = free + soft @ best
+    fits = free + soft @ best
+    for c in range(3):
+        state.films[k, c], solved[c] = best[c], fits[c]
     best -= now
     for i in range(len(q)):
         kick[i] = 0.0
@@ -334,7 +335,8 @@ def _follow(
         corner = abs(u[0]) <= size
     if corner and _weight(np.linalg.solve(soft, change), reach) > little:
         return False
-    best[:] = f + more
+    for c in range(3):  # a slice would have the text of its error compiled
+        best[c] = f[c] + more[c]
     return True
 
 
