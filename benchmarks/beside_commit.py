@@ -114,11 +114,9 @@ def main() -> int:
         for row in (row for row in ROWS if any(word in row.name for word in args.only)):
             for place in places:
                 _prepare(place, row)
-            both: list[Spent] = []
-            for _ in range(args.repeat):
-                found = [_run(place, row) for place in places]
-                both = [min(pair, key=lambda s: s.wall) for pair in zip(*[both or found, found])]
-            print(_line(row, *both), flush=True)
+            rounds = [[_run(place, row) for place in places] for _ in range(args.repeat)]
+            best = [min(runs, key=lambda run: run.wall) for runs in zip(*rounds, strict=True)]
+            print(_line(row, *best), flush=True)
     return 0
 
 
