@@ -54,7 +54,7 @@ def is_trusted(state: os.stat_result) -> bool:
 def bytecode_folder() -> Path | None:
     """Folder for what Python compiles, made if absent; None where another user could write to it.
 
-    Python runs what it finds there and looks at no owner.  So nobody else may enter the folder, nor
+    Python runs what it finds there and looks at no owner.  So no other user may enter the folder, nor
     put another one in its place.
     """
     folder = compiled_folder()

@@ -12,7 +12,7 @@ __all__ = ["Marked"]
 
 
 class Marked:
-    """A function, and what numba makes of it once somebody calls it or compiles a call of it.
+    """A function, and what numba makes of it once it is called, or a call of it compiled.
 
     Parameters
     ----------

@@ -87,7 +87,9 @@ def simulate_in_full(
             pair.lower_surface,
         ),
         layer=pair.layer,
-        known=_known(problem, kept) if space is problem.static.space else None,
+        known=_known(problem, kept)
+        if snapshots is None and space is problem.static.space
+        else None,
         longest_period=longest_period,
         precision="single",
         threads=threads or 2,
