@@ -163,7 +163,7 @@ def _call(place: Path, words: tuple[str, ...], *, code: int = 0) -> tuple[float,
     before, begin, answer = getrusage(RUSAGE_CHILDREN), perf_counter(), 0.0
     command = [str(place / ".venv" / "bin" / words[0]), *words[1:]]
     with subprocess.Popen(
-        command, cwd=place, env=given, text=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        command, cwd=place, env=given, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
     ) as process:
         assert process.stdout is not None
         for line in process.stdout:
