@@ -54,8 +54,8 @@ def is_trusted(state: os.stat_result) -> bool:
 def bytecode_folder() -> Path | None:
     """Folder for what Python compiles, made if absent; None where another user could write to it.
 
-    Python runs what it finds there and looks at no owner.  So no other user may enter the folder, nor
-    put another one in its place.
+    Python runs what it finds there and looks at no owner.  So no other user may enter the folder,
+    nor put another one in its place.
     """
     folder = compiled_folder()
     if folder is None or caller() is None:
