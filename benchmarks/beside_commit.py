@@ -70,19 +70,15 @@ ROWS = (
     Row(name="two rods, second call", words=_impact("two-rods", "reduced"), finds="both"),
     Row(name="sensitivities, warm", words=(*_SLOPES, _SPRING), finds="both"),
     Row(name="linearise, warm", words=("klack", "linearise", "one-mass.yaml"), finds="both"),
-    Row(
-        name="misspelt key, impact",
-        words=("klack", "impact", "wrong-impact.yaml"),
-        finds="both",
-        writes=False,
-        code=2,
-    ),
-    Row(
-        name="misspelt key, stroke",
-        words=("klack", "stroke", "wrong-stroke.yaml"),
-        finds="both",
-        writes=False,
-        code=2,
+    *(
+        Row(
+            name=f"misspelt key, {kind}",
+            words=("klack", kind, f"wrong-{kind}.yaml"),
+            finds="both",
+            writes=False,
+            code=2,
+        )
+        for kind in ("impact", "stroke")
     ),
     Row(name="load_result", words=("python", "-c", _LOAD), finds="both", writes=False),
     Row(name="klack --version", words=("klack", "--version"), finds="both", writes=False),

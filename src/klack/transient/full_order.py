@@ -59,6 +59,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
+from klack.cores import share_of
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import Backend, Precision
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
@@ -253,7 +254,7 @@ def simulate_full_order(
         run = _Run(bodies, space, speed, step, scheme, pool, axial_force, friction, layer)
         run.together(
             [
-                partial(b.set_up, step, scheme, backend, precision, _share(threads, bodies))
+                partial(b.set_up, step, scheme, backend, precision, share_of(threads, len(bodies)))
                 for b in bodies
             ]
         )
@@ -302,11 +303,6 @@ def _returned(precision: Precision) -> float:
     A closed gap is zero to the precision of the factor, times its change in a step.
     """
     return _RETURNED if precision == "single" else 0.0
-
-
-def _share(threads: int, bodies: Sequence[FullBody]) -> int:
-    """Threads of one body while the others work as well."""
-    return max(1, threads // len(bodies))
 
 
 class _Run:
