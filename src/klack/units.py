@@ -388,7 +388,7 @@ def _factor(value: object, unit: str, kind: Kind, where: str) -> float:
         )
     if unit == kind.unit:
         return 1.0
-    if unit in kind.common:
+    if unit in kind.common and unit in _SIZES:
         return _SIZES[unit]
     import pint
 
