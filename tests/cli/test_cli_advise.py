@@ -232,6 +232,7 @@ def test_a_valve_has_no_band(capsys):
     assert "first impacts" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_short_run_is_refused(path, capsys):
     path.write_text(CASE.replace("duration: 20 us", "duration: 3 us"))
     assert main(["advise", str(path)]) == 2

@@ -17,6 +17,7 @@ def filled(tmp_path, monkeypatch):
     return tmp_path / "cache"
 
 
+@pytest.mark.slow
 def test_it_says_where_how_many_and_how_large(filled, capsys):
     assert main(["cache", "--json", "-"]) == 0
 

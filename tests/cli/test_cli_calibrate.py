@@ -13,6 +13,8 @@ from klack.analyses.calibration.motion import MotionModel
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def bench(tmp_path_factory):

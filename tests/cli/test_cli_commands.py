@@ -409,6 +409,7 @@ def test_browser_needs_a_screen(monkeypatch):
     assert not demo_module._has_display()
 
 
+@pytest.mark.slow
 def test_reader_of_a_pipe_may_leave_early():
     # klack schema | head -1: no traceback, and no error code for the shell to stumble over
     command = f"{quote(sys.executable)} -m klack schema; echo code $? >&2"

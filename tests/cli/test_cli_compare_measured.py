@@ -62,6 +62,7 @@ def compared(result: Path, *words: str) -> dict:
     return json.loads(numbers.read_text())
 
 
+@pytest.mark.slow
 def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
     path = record(result, tmp_path / "strokes.csv")
     numbers = tmp_path / "numbers.json"
@@ -100,6 +101,7 @@ def test_a_stroke_agrees_with_itself(result, tmp_path, capsys):
     assert "Later impacts and the lift between the stops are shown, not counted." in out
 
 
+@pytest.mark.slow
 def test_dry_impacts_have_the_restitution_of_the_case(result, tmp_path):
     path = record(result, tmp_path / "dry.csv", "dry")
     found = compared(result, "--measurement", f"dry={path}")
@@ -128,11 +130,13 @@ def test_an_offset_is_a_residual_until_the_sensor_has_it(result, tmp_path):
     assert known["agreement"] == "excellent"
 
 
+@pytest.mark.slow
 def test_lift_that_is_zeroed_forgets_the_offset(result, tmp_path):
     path = record(result, tmp_path / "strokes.csv", offset=3e-6)
     assert compared(result, "--measurement", str(path))["lift_rms_m"] < NOISE
 
 
+@pytest.mark.slow
 def test_one_stroke_has_no_scatter(result, tmp_path):
     """What strokes scatter is not known of one; differences are judged by its reading error."""
     path = record(result, tmp_path / "strokes.csv", strokes=1)
@@ -147,6 +151,7 @@ def test_one_stroke_has_no_scatter(result, tmp_path):
         assert impact["time_difference_in_scatter"] == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_another_lift_is_told_from_the_computed_one(result, tmp_path):
     found = compared(
         result, "--measurement", str(record(result, tmp_path / "strokes.csv", gain=1.05))

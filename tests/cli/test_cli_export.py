@@ -36,6 +36,7 @@ def exported(tmp_path: Path, *arguments: str, source: object = VALVE) -> set[str
     return {path.name for path in out.iterdir()}
 
 
+@pytest.mark.slow
 def test_models_for_matlab_hold_every_body_and_the_pair(tmp_path, study):
     made = exported(tmp_path, "--to", "mat")
 
@@ -64,6 +65,7 @@ def test_a_body_that_is_not_there_is_refused_and_nothing_written(tmp_path, capsy
     assert not out.exists()
 
 
+@pytest.mark.slow
 def test_an_fmu_of_the_pair_hits_as_hard_as_klack_says(tmp_path, study):
     fmpy = pytest.importorskip("fmpy")
 
@@ -144,6 +146,7 @@ def test_models_do_not_come_from_a_result(stored, capsys):
     assert "case" in told
 
 
+@pytest.mark.slow
 def test_the_pair_of_a_valve_says_what_it_leaves_out(tmp_path, capsys):
     words = ["demo-stroke", "--to", "csv", "--part"]
     assert main(["export", *words, "pair", "--out", str(tmp_path / "pair")]) == 0

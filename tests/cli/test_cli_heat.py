@@ -53,6 +53,7 @@ def test_a_warm_up_with_its_files(case, tmp_path, capsys):
     ]
 
 
+@pytest.mark.slow
 def test_soaked_strokes_with_their_causes(case, tmp_path, capsys):
     assert (
         main(["heat", str(case), "--soak", "-30 degC, 80 degC", "--json", "-", "-q", "--no-report"])

@@ -50,6 +50,7 @@ run: {duration: 10 us}
 """
 
 
+@pytest.mark.slow
 def test_a_step_file_shows_its_faces_alone_and_in_a_case(tmp_path: Path, capsys):
     """Truth: areas and volume of the drawn cylinder."""
     pin = Profile(
@@ -194,6 +195,7 @@ def test_one_of_several_matrices(tmp_path: Path, capsys):
     assert "2 to 2" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_both_matrices_of_ansys(capsys):
     """Truth: the example of a package that reads such files, of solids in three directions."""
     package = pytest.importorskip("ansys.mapdl.reader")
@@ -232,6 +234,7 @@ def test_an_fmu_for_model_exchange_shows_what_it_is(spring_damper_fmu, tmp_path:
     assert "output F N" in shown
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_an_fmu_shows_its_inputs_and_outputs(tmp_path: Path, capsys):
     pytest.importorskip("fmpy")

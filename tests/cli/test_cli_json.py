@@ -67,6 +67,7 @@ def test_who_reads_a_result_by_program_sees_its_doubts(kind, capsys):
     assert whole["warnings"]["items"] == {"type": "string"}
 
 
+@pytest.mark.slow
 def test_the_cache_and_a_verification(capsys):
     assert said(capsys, "cache")["schema"] == "klack-cache/1"
     assert all(

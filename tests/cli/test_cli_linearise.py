@@ -37,6 +37,7 @@ def linearise(*words: str) -> int:
     return main(["linearise", *words])
 
 
+@pytest.mark.slow
 def test_all_files_hold_the_same_model(capsys):
     words = ("--current", "1 A", "--from", "coil.voltage", "--to", "coil.current")
     assert linearise("valve.yaml", *words, "--json", "n.json", "--no-report", "--out", "out") == 0
@@ -62,6 +63,7 @@ def test_all_files_hold_the_same_model(capsys):
     assert size == pytest.approx(0.5, rel=0.02)  # 1/R at a low frequency
 
 
+@pytest.mark.slow
 def test_a_relief_valve_on_a_pipe_is_told_unstable_and_where_it_becomes_so(capsys):
     words = ("--band", "2 kHz", "--loop", "edge.mass_flow", "--no-report", "--out", "out")
     assert linearise("relief.yaml", *words, *SWEEP) == 0
@@ -123,6 +125,7 @@ def test_a_switching_controller_has_no_margins(capsys):
     assert "a switch has no linear law" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_every_channel_of_a_gas_network_is_an_output_of_its_own():
     path = HOW_TO / "pneumatic_valve.yaml"
     assert linearise(str(path), "--no-report", "--quiet", "--out", "out") == 0

@@ -174,6 +174,7 @@ def test_a_stored_study_is_reported_again(heard, tmp_path):
     assert again == (heard / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_two_designs_stand_side_by_side(impact, tmp_path, capsys):
     other = copytree(impact, tmp_path / "other")
     words = ["--out", "ab", "--json", "ab.json", "--no-report"]
@@ -207,6 +208,7 @@ def test_differences_of_two_designs_are_levels(heard):
     assert shown["SEL [dBA]"] == "+0.0 dB"
 
 
+@pytest.mark.slow
 def test_levels_of_one_result_are_compared(impact):
     words = ["--level", "reduced,lumped", "--json", "levels.json", "--no-report", "-q"]
     assert main(["noise", str(impact), *words]) == 0

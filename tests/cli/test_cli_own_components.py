@@ -133,6 +133,7 @@ def test_an_option_for_another_class_lets_this_one_stay_out(evil, monkeypatch, c
     assert not (evil.parent / "it-ran").exists()
 
 
+@pytest.mark.slow
 def test_a_class_that_was_let_in_acts_and_stands_in_the_record(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(HOW_TO)
     monkeypatch.chdir(tmp_path)

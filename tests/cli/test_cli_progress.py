@@ -46,11 +46,13 @@ def shown_on(screen: Screen, monkeypatch: pytest.MonkeyPatch, **options: bool):
     return show_progress(**options)
 
 
+@pytest.mark.slow
 def test_it_shows_before_anything_reports(screen, monkeypatch):
     with shown_on(screen, monkeypatch):
         assert screen.shows("starting")  # nobody has called it
 
 
+@pytest.mark.slow
 def test_a_stage_is_shown_when_it_begins(screen, monkeypatch):
     with shown_on(screen, monkeypatch) as progress:
         assert screen.shows("starting")
@@ -58,6 +60,7 @@ def test_a_stage_is_shown_when_it_begins(screen, monkeypatch):
         assert screen.shows("mesh")  # and nothing more is called: it is meshing
 
 
+@pytest.mark.slow
 def test_compiling_is_called_so(screen, monkeypatch):
     from numba.core import event
 
@@ -71,6 +74,7 @@ def test_compiling_is_called_so(screen, monkeypatch):
         assert "compiling" not in screen.text.rsplit("50 %", 1)[0].rsplit("run", 1)[-1]
 
 
+@pytest.mark.slow
 def test_waiting_for_another_process_is_told_as_waiting(screen, monkeypatch):
     from numba.core import event
 
@@ -102,6 +106,7 @@ def test_a_short_command_leaves_the_screen_alone(screen, monkeypatch):
     assert not screen.shows("mesh", patience=0.3)
 
 
+@pytest.mark.slow
 def test_quiet_shows_nothing(screen, monkeypatch):
     with shown_on(screen, monkeypatch, quiet=True) as progress:
         progress("mesh", 1.0)

@@ -15,6 +15,8 @@ import klack.analyses.shots.run as workflow
 from klack.analyses.shots.log import SHOT_LOG
 from klack.cli.main import main
 
+pytestmark = pytest.mark.slow
+
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = HOW_TO / "guided_needle.yaml"
 PAGE = (HOW_TO / "shots.md").read_text(encoding="utf-8")

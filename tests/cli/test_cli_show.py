@@ -90,6 +90,7 @@ def test_a_mesh_is_drawn_with_its_names(tmp_path, capsys):
     assert (tmp_path / "needle.html").is_file()
 
 
+@pytest.mark.slow
 def test_a_result_has_modes_and_motion(tmp_path, capsys):
     assert main(["impact", str(RODS), "--no-report", "--no-certify", "-q", "--out", "result"]) == 0
 

@@ -171,6 +171,7 @@ def test_two_runs_are_one(run):
     )
 
 
+@pytest.mark.slow
 def test_the_report_of_a_stroke_is_written_again(run, capsys):
     copytree(run / "out", "r")
 
@@ -271,6 +272,7 @@ def least_force_on_the_seat() -> float:
     return float(np.min(force(swing.y)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quiet", [False, True])
 def test_a_valve_that_does_not_open_says_so(tmp_path, capsys, recwarn, quiet):
     """5 N of the magnet against 12 N of the spring: 7 N are missing."""

@@ -53,6 +53,7 @@ def compiled_by(*words, out=None):
     return int(functions)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::UserWarning")
 def test_every_step_of_the_valves_of_the_how_to_pages_is_in_a_group():
     """Wherever its file is; steps of the user's own and of other programs are compiled by none."""

@@ -15,6 +15,7 @@ PAGE = (Path(__file__).parents[2] / "docs/how-to/bring-a-reduced-model.md").read
 CASE = Path(__file__).parents[2] / "cases/from-other-tools/case.yaml"
 
 
+@pytest.mark.slow
 def test_impact_and_reduce_of_the_shipped_case(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["impact", "from-other-tools", "--json", "numbers.json", "--quiet"]) == 0
@@ -47,6 +48,7 @@ def test_what_needs_a_mesh_ends_with_a_message(tmp_path, capsys, monkeypatch, co
     assert words in error
 
 
+@pytest.mark.slow
 def test_noise_knows_the_force_alone(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["noise", "from-other-tools"]) == 0

@@ -58,6 +58,7 @@ def three_loops(eddies, remanence, seed):
     return MagneticCircuit(branches=branches, loops=np.array(loops), main="gap")
 
 
+@pytest.mark.slow
 @settings(max_examples=15, deadline=None)
 @given(
     eddies=st.tuples(*[st.floats(0.0, 3000.0)] * 3),
@@ -127,6 +128,7 @@ def test_books_of_a_map_balance_across_its_edges():
     assert r.work != 0.0
 
 
+@pytest.mark.slow
 def test_quick_and_general_step_are_the_same():
     """The general step, with the quick one forbidden, on the states of a run."""
     circuit = injector()

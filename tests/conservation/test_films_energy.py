@@ -65,6 +65,7 @@ def test_any_step_from_any_state(name):
     assert acted > 1000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-6, 100e-9, 20e-9], ids=["1 us", "100 ns", "20 ns"])
 @pytest.mark.parametrize("suction", [0.6, 1e9], ids=["cavitating", "pulling"])
 def test_rods_with_film_asperities_and_compliance(step, suction):

@@ -11,7 +11,7 @@ from klack.simulation.bodies import rod_body
 from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 TABLE = TableLaw(np.array([0.2, 0.5, 1.0, 2.0]) * 1e-6, [20.0, 70.0, 190.0, 520.0])

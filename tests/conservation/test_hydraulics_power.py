@@ -132,6 +132,7 @@ def balance(part, fluid, rng, count=300):
     return np.array(lost), np.array(scale)
 
 
+@pytest.mark.slow
 @each("fluid", FLUIDS)
 @each("name", PARTS)
 def test_loss_is_never_negative(name, fluid):
@@ -141,6 +142,7 @@ def test_loss_is_never_negative(name, fluid):
     assert np.all(lost >= -1e-12 * scale)
 
 
+@pytest.mark.slow
 def test_pumps_and_a_column_without_friction_lose_nothing():
     rng = np.random.default_rng(8)
     smooth = Inertance(length=5e-3, diameter=1e-3, friction="none")

@@ -50,6 +50,7 @@ def test_a_thousand_impacts_of_a_pressed_needle_keep_the_energy():
     assert abs(run.energy.residual) < 1e-6
 
 
+@pytest.mark.slow
 def test_hundreds_of_impacts_of_a_pressed_rod_keep_the_energy():
     model = free_rod(10, stiffness=1e9)
     force = 2 * 0.1 * model.mass / 1e-3

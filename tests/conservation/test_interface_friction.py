@@ -76,6 +76,7 @@ def test_records_hold_the_sum_of_the_forces(blocks):
     assert segment.doing.shape == (len(axial), blocks.count)
 
 
+@pytest.mark.slow
 def test_faces_and_guide_rub_at_once(blocks):
     guide = lateral_guide(blocks, clearance=1e-6, stiffness=2e7, friction=0.2, heights=(0.5e-3,))
     result = hit(blocks, Friction.coulomb(0.2), guide=guide)

@@ -28,6 +28,7 @@ def rough_line(steps, segments, vapour):
     )
 
 
+@pytest.mark.slow
 @each("coarse", [1, 2, 16])
 @each("segments", [1, 2, 5])
 @each("steps", [80.0, 97.0, 130.37])

@@ -94,6 +94,7 @@ def balance(
     return np.array(residual), np.array(losses), largest
 
 
+@pytest.mark.slow
 @each("name", PARTS)
 @each("ways", ["long", "short"])
 def test_books_balance_to_round_off_on_any_way(name, ways):

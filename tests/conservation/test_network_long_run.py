@@ -145,6 +145,7 @@ def test_memory_of_the_records_is_asked_for_before_the_run(monkeypatch: pytest.M
         simulate_network(switched_valve(), duration=60.0, step=50e-9, record=0.8e-6)
 
 
+@pytest.mark.slow
 def test_compiling_is_no_part_of_the_wall_time(monkeypatch):
     """Truth: the first call of the loop, which compiles, advances nothing and is not timed."""
     calls, kernel = [], network_run.run_network

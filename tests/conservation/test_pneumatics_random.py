@@ -22,6 +22,8 @@ from klack.pneumatics.gas_element import GasNetwork
 from klack.pneumatics.gas_library import GASES
 from klack.pneumatics.gas_step import OF_CHAMBER, gas_step
 
+pytestmark = pytest.mark.slow
+
 AMBIENT = Ambient()
 
 

@@ -281,6 +281,7 @@ def test_compliance_is_reciprocal_and_passive(setup, here, there):
         assert R[i, j] ** 2 <= R[i, i] * R[j, j] * (1 + 1e-9) + (1e-12 * np.max(C)) ** 2
 
 
+@pytest.mark.slow
 @examples(12)
 @given(SETUPS, st.integers(2, 6))
 def test_two_parallel_contacts_of_every_scale_settle(setup, share):

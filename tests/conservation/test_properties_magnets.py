@@ -183,6 +183,7 @@ def rough_maps(draw) -> FluxMap | None:
         return None
 
 
+@pytest.mark.slow
 @examples(12)
 @given(rough_maps(), st.floats(0.0, 1.0))
 def test_current_rises_on_every_map_that_is_not_refused(plant, place):
@@ -193,6 +194,7 @@ def test_current_rises_on_every_map_that_is_not_refused(plant, place):
     assert np.all(np.diff(current) > -1e-13 * current[-1])
 
 
+@pytest.mark.slow
 @examples(40)
 @given(flux_maps(), st.floats(-1.5, 1.5), st.floats(-0.2, 1.3))
 def test_a_map_is_one_energy(plant, share, place):
@@ -302,6 +304,7 @@ DRIVERS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @examples(30)
 @given(st.one_of(solenoids(), flux_maps()), DRIVERS, log_range(5e-8, 5e-6), st.floats(-1.0, 1.0))
 def test_any_driver_on_any_coil_keeps_the_books(plant, driver, step, way):

@@ -17,6 +17,7 @@ with pytest.MonkeyPatch.context() as patch:
     DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_catalogue.py"))
 
 
+@pytest.mark.slow
 def test_every_component_type_is_drawn():
     found = Counter(
         word for seed in range(200) for word in set(DRAWS["draw"](seed, "damper.fmu").types)

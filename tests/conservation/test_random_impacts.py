@@ -29,6 +29,7 @@ def impacts() -> Iterator[ModuleType]:
     sys.modules.pop("random_impacts", None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("index", SAMPLE)
 def test_a_random_impact_runs_and_keeps_its_energy(impacts, index):
     found = impacts.outcome(impacts.draw(SEED, index))

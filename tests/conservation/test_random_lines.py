@@ -19,6 +19,7 @@ with pytest.MonkeyPatch.context() as patch:
 SAMPLE = (*range(6), 20, 30, 34, 100, 161, 1018, 1123, 1138)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("seed", SAMPLE)
 def test_a_random_network_of_lines_runs_and_keeps_its_energy(seed):

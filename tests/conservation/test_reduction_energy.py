@@ -156,6 +156,7 @@ def test_damped_body_takes_in_power(block, correction, with_residual, loss_facto
     assert np.all(lowest > -1e-12 * np.abs(receptance.values).max(axis=(1, 2)))
 
 
+@pytest.mark.slow
 def test_full_order_receptance_agrees_with_direct_solutions(block):
     """Truth: K - w^2 M factorised at four frequencies; 1e-6 for those close to a resonance."""
     body, ports, _, flexibility = block
@@ -169,6 +170,7 @@ def test_full_order_receptance_agrees_with_direct_solutions(block):
     assert "direct solutions at 4 of them" in full.note
 
 
+@pytest.mark.slow
 def test_error_bound_of_the_krylov_receptance_holds(block):
     """Truth: the same curve with a far smaller tolerance; the bound lies above, within 1/eta."""
     body, ports, _, flexibility = block
@@ -187,6 +189,7 @@ def test_error_bound_of_the_krylov_receptance_holds(block):
     assert np.all(drive <= 1.01 * coarse.error_bound + 1e-8)
 
 
+@pytest.mark.slow
 def test_known_modes_shorten_the_krylov_basis(block):
     """The same receptance from a basis that starts with modes; both bounds say 1e-4 at most."""
     body, ports, pool, flexibility = block

@@ -18,6 +18,8 @@ from klack.transient.interface_run import simulate_interface
 from klack.transient.revolved_model import reduced_bodies
 from klack.verification.ring_bodies import NeedleOnRing, impulse_on_needle, momentum_of_needle
 
+pytestmark = pytest.mark.slow
+
 STEP = 40e-9
 ASIDE = np.array([3e-7, 1.2e-7, 0.0, 5e-5, -3e-5, 0.0])
 

@@ -6,6 +6,8 @@ import pytest
 from klack.verification.ring_bodies import NeedleOnRing
 from klack.verification.ring_strokes import RingStroke
 
+pytestmark = pytest.mark.slow
+
 VELOCITY = np.array([1e-3, 2e-3, 0.0, 3.0, -2.0, 50.0])  # [m/s], [rad/s]
 
 

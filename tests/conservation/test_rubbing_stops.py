@@ -236,6 +236,7 @@ def test_a_continued_run_has_the_bits_of_one_in_one_go():
     assert np.array_equal(second.state["laws.stop"], whole.state["laws.stop"])
 
 
+@pytest.mark.slow
 def test_the_bulk_behind_the_faces_takes_nothing_from_a_loop():
     """Faces and bulk in series: the closing curve of the whole, and the loss of its loop."""
     ratio, friction, modal = 4.0, 0.15, 1e-9

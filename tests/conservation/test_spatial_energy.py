@@ -54,6 +54,7 @@ def test_energy_of_a_stroke_off_its_axis_closes(step, coarse):
     assert abs(books.residual) < 1e-11 * books.scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mu", "step", "coarse"), [(0.1, 40e-9, 1), (0.3, 20e-9, None), (1.5, 40e-9, None)]
 )
@@ -66,6 +67,7 @@ def test_energy_of_faces_that_rub_closes(mu, step, coarse):
         assert books.losses[f"{stop} friction"] > 1e-3 * books.scale
 
 
+@pytest.mark.slow
 def test_a_needle_that_comes_to_rest_sticks_without_loss():
     """Its modes still ring: what pays the debts of the contact must not count as slip."""
     needle = Needle(
@@ -84,6 +86,7 @@ def test_a_needle_that_comes_to_rest_sticks_without_loss():
     assert run.books.losses["seat friction"] > 1e-3 * run.books.scale
 
 
+@pytest.mark.slow
 def test_a_run_in_two_parts_of_faces_that_rub():
     """The first part ends while the needle leaves its seat; then within its impact there."""
     for parts in ((1, 40), (200, 25)):
@@ -111,6 +114,7 @@ def test_a_shaft_that_does_not_rub_loses_next_to_nothing_in_its_guide():
     assert abs(books.losses["guide friction"]) < 1e-3 * books.scale
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parts", [(40, 270), (120, 190), (163, 147)])
 def test_a_run_in_two_parts_is_the_run_in_one(parts):
     """Bit by bit up to the next contact; in contact the order of the points is another."""

@@ -159,6 +159,7 @@ def test_momentum_of_an_impact_on_either_stop(valve: Valve):
         assert event.impulse == pytest.approx(mass * abs(after - speed), rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.0, 0.1, 0.3])
 def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve, friction: float):
     """Same bodies and speed through `klack impact`: another port pattern, another time loop."""

@@ -54,6 +54,7 @@ def test_peak_force_settles_with_the_step():
     assert error[0] > error[-1]
 
 
+@pytest.mark.slow
 def test_smeared_front_of_a_rod_sharpens_with_the_mesh():
     """A front smears over n^(1/3) of n elements, so 1 - e falls with the power 2/3 of h."""
     elements = np.array([50, 100, 200, 400])

@@ -39,6 +39,7 @@ def explorer() -> Explorer:
     return found
 
 
+@pytest.mark.slow
 def test_a_move_is_the_impact_of_the_case_with_these_values(explorer):
     values = {"motion.speed": 0.45, "motion.force": 20.0, "bodies.needle.damping.modal": 0.01}
     answer = explorer.move(values)
@@ -77,6 +78,7 @@ def test_an_impact_that_is_cut_off_has_no_numbers_but_a_doubt():
     assert any("ends before separation" in doubt for doubt in first.doubts)
 
 
+@pytest.mark.slow
 def test_what_speaks_against_a_level_goes_with_its_sound_and_into_comparisons(tmp_path):
     """A force that ends at its highest value has the spectrum of a step, 28 dB(A) too loud here."""
     case = read_case(TEXT.replace("duration: 55 us", "duration: 20 us"), PATH)
@@ -95,6 +97,7 @@ def test_what_speaks_against_a_level_goes_with_its_sound_and_into_comparisons(tm
     assert (ghost.run, now.run) == ("level lumped", "level reduced")
 
 
+@pytest.mark.slow
 def test_a_contact_in_doubt_is_in_doubt_on_every_page(tmp_path):
     """As in the text of the command."""
     case = read_case(TEXT.replace("duration: 55 us", "duration: 20 us"), PATH)
@@ -153,6 +156,7 @@ def test_a_text_without_moves_is_that_of_the_file():
     assert found.text_at({}) == path.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_the_sound_hardly_depends_on_earlier_moves(explorer):
     """Far from the contact, static solutions of earlier moves are combined."""
     for speed in (0.4, 0.44, 0.48, 0.52):

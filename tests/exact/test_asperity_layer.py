@@ -216,6 +216,7 @@ def test_drawn_friction_beside_roughness_is_one_clear_error(tmp_path):
     assert "shots.contact_friction" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_an_estimate_of_errors_has_the_roughness(tmp_path):
     """It takes the interface level: of the reduced one, the full order says less than 0.2 %."""
     study = run_impact(needle(tmp_path, SUMMITS), levels=("reduced",))
@@ -224,6 +225,7 @@ def test_an_estimate_of_errors_has_the_roughness(tmp_path):
     assert abs(study.estimates["reduced"].peak_force) < 2e-3
 
 
+@pytest.mark.slow
 def test_yield_beside_roughness_is_left_out_and_said(tmp_path):
     steel = ("density: 7850 kg/m^3}", "density: 7850 kg/m^3, yield: 400 MPa}")
     study = run_impact(needle(tmp_path, SUMMITS, more=steel), levels=("interface",), certify=False)

@@ -77,6 +77,7 @@ def sampled(part, count=601):
     return points, np.stack([r, (r - r_low) / tan(seat)], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["sharp", "rounded", "chamfered", "blunt"])
 def test_no_pair_of_points_has_a_smaller_mantle(kind):
     rng = np.random.default_rng(3)

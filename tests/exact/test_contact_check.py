@@ -159,6 +159,7 @@ def split(at: float) -> str:
     )
 
 
+@pytest.mark.slow
 def test_a_contact_over_the_end_of_the_named_surface_names_the_next_one():
     """A sphere touches a cone of 45 degrees at 45 degrees; its named arc ends there."""
     whole, none = checked(case(BALL, CONE, 0.005, extent=0.05), 20.0)
@@ -179,6 +180,7 @@ def test_an_end_beside_the_contact_is_not_told():
     assert found.doubts == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("level", ["interface", "full"])
 def test_levels_with_contact_points_tell_the_end_as_well(level):
     asked = case(split(np.pi / 4), CONE, 0.005, extent=0.05)

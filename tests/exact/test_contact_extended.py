@@ -41,6 +41,7 @@ def test_new_points_join_the_known_ones():
     assert extended == pytest.approx(whole, rel=1e-10, abs=1e-12 * np.abs(whole).max())
 
 
+@pytest.mark.slow
 def test_the_full_order_goes_on_to_as_many_points_as_it_reaches():
     """As the interface level does: the static contact bounds one quasi-static impact only."""
     problem = build_problem(load_case(BALL), silent)

@@ -84,6 +84,7 @@ def joined(magnet, first, second, body=STILL):
     )
 
 
+@pytest.mark.slow
 @each(("first", "second"), [(BOOST, PEAK), (PEAK, BOOST), (BOOST, BOOST), (CHOPPED, PEAK)])
 @each(
     "change",
@@ -142,6 +143,7 @@ def test_a_run_continues_bit_for_bit():
         assert channel.values[-1] == whole.channels[name].values[-1], name
 
 
+@pytest.mark.slow
 def test_a_controller_sets_the_voltage_of_its_own_coil():
     pid = PidController(
         kind="pid",

@@ -217,6 +217,7 @@ def test_nothing_is_divided_by_a_step_of_zero_length():
     assert out[2 + state.size + 3] == pytest.approx(0.5 * (MAIN * 9e-12 + LEAK * 4e-12), rel=1e-14)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     level=st.floats(2.0, 8.0),

@@ -23,6 +23,7 @@ def _quiet(*_):
     pass
 
 
+@pytest.mark.slow
 def test_reduced_bodies_exports_and_recovered_motion_say_that_they_are_elastic():
     case = load_case(SPHERES)
     with pytest.warns(AccuracyWarning, match="reduced bodies are those of elastic .* 'steel'"):

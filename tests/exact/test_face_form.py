@@ -111,6 +111,7 @@ def test_a_crown_is_an_arc_drawn_on_the_face(tmp_path, crown):
     assert approach[0] == pytest.approx(approach[1], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_crown_presses_like_the_sphere_of_hertz(tmp_path):
     """Radius R^2 / (2 h) = 2.5 m; the contact takes 6 to 9 % of the radius of the face."""
     static = build_problem(case(tmp_path, "crown: 20 um", fine="0.1 mm"), silent).static

@@ -74,6 +74,7 @@ def test_flat_faces_are_told_of_at_levels_of_modes(flat):
     assert not any(SAID in doubt for doubt in study.levels["full"].doubts)
 
 
+@pytest.mark.slow
 def test_the_error_estimate_does_not_hide_them(tmp_path):
     study = run_impact(rods(tmp_path), levels=("reduced",))
     assert study.estimate_doubt
@@ -94,6 +95,7 @@ def test_a_form_that_the_modes_follow_is_not_told_of(tmp_path):
     assert said(shallow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["demo-valve-axisymmetric", "sphere-on-rod"])
 def test_curved_faces_are_not_flat(name):
     study = run_impact(load_case(find_case(name)), levels=("reduced",), certify=False)

@@ -91,6 +91,7 @@ def test_beyond_its_ends_it_goes_on_rising():
     assert below == pytest.approx(exact, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fluid", [HEPTANE, USER], ids=lambda fluid: fluid.name)
 def test_the_pressure_is_found_again(fluid):
     """Digits of the density limit it: dp/p = (K/p) 2e-16, so compare densities, and p if soft."""

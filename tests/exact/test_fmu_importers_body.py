@@ -46,6 +46,7 @@ def step_response(model, time):
     return q @ shape, v @ shape
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["needle", "housing"])
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_constant_force(bodies, tmp_path, name, fmi):

@@ -71,6 +71,7 @@ def test_it_slows_down_by_mu_times_the_impulse_against_its_way():
     assert energy.friction[-1] == pytest.approx(gone, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_it_stops_where_its_energy_is_spent():
     """After v^2 m / (2 mu F), to the step; then it holds, with less than mu times the force."""
     result = slide(Friction.coulomb(0.2), 300e-6)

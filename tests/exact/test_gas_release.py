@@ -43,6 +43,7 @@ def oil(release: float | None, absorption: float | None, exponent: float = 1.2):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exponent", [1.0, 1.2, 1.4])
 def test_a_mixture_that_has_settled_is_the_fluid_in_equilibrium(exponent):
     fluid = oil(1e-3, 5e-3, exponent)

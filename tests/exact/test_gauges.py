@@ -192,6 +192,7 @@ def test_a_struck_rod_carries_the_wave_of_st_venant():
     assert way.exact[-1] == pytest.approx(-40e-3 / C, rel=3e-3)  # stops when the wave is there
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("faces", ["gap: 0 um}", "gap: 0 um, friction: 0.3}"])
 def test_all_levels_read_the_same_where_their_contact_is_the_same(faces):
     """Ball on a rod: the force is smooth, so the three levels agree in the force and the strain."""

@@ -103,6 +103,7 @@ def test_a_block_breaks_loose_at_mu_n(needle):
     assert loose.motion.velocity[-1, 2] == pytest.approx(-50.0 * h * MOST / MASS, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_slip_at_an_angle_brakes_along_its_direction(needle):
     """A straight path of v^2 m / (2 mu N), whatever the way of the slip."""
     h, v, guide = 10e-9, np.array([0.0, 0.03, -0.04]), squeezed(needle)

@@ -72,6 +72,7 @@ def test_leakage_of_a_closed_edge_is_that_of_its_annulus(covered, eccentricity):
     assert out[0] / RHO < slot * 30e5
 
 
+@pytest.mark.slow
 def test_flow_is_continuous_where_the_edge_opens_and_rises_with_the_opening():
     part = SpoolEdge(**EDGE, direction="opening")
     y = 50e-6 + np.linspace(-2e-6, 2e-6, 4001)

@@ -325,6 +325,7 @@ def test_one_turn_of_a_pump_delivers_its_displacement(pistons):
     assert swept_share(5.0, 6 * pi, pistons) == pytest.approx(3.0, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pistons", [2, 3, 5, 6, 7, 9, 10, 11])
 def test_ripple_of_a_pump_has_its_order_and_size(pistons):
     part = Pump(displacement=10e-6, speed=25.0, pistons=pistons, phase=0.1)

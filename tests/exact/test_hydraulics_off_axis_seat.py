@@ -200,6 +200,7 @@ def test_pressure_presses_normal_to_the_face(face):
         assert moment == pytest.approx(np.cross(centre, force), rel=1e-9, abs=1e-14 * RADIUS**3)
 
 
+@pytest.mark.slow
 @every_face
 def test_pressure_is_the_integral_over_the_face(face):
     """The part of the face within the feet, in strips from the middle of the needle outwards."""

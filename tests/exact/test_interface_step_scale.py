@@ -13,6 +13,8 @@ from klack.contact.laws import ContactLaw, HertzLaw, LinearLaw, TableLaw
 from klack.contact.step_constants import NO_LAW
 from klack.simulation.interface_step import solve_interface
 
+pytestmark = pytest.mark.slow
+
 DEPTHS = np.array([0.2, 0.5, 1.0, 2.0])
 
 

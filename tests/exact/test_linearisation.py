@@ -182,6 +182,7 @@ def test_a_contact_that_just_touches_has_no_linear_law():
         linear(parts, joints)
 
 
+@pytest.mark.slow
 def test_doubts_name_friction_weak_contacts_and_hysteresis():
     friction = linear(
         needle(guide=GuideFriction(coulomb=0.5)), [["needle.tip", "spring.end", "guide.body"]]
@@ -215,6 +216,7 @@ def test_doubts_name_friction_weak_contacts_and_hysteresis():
     assert any("'relief' is not smooth" in text for text in play.doubts)
 
 
+@pytest.mark.slow
 def test_bristles_are_a_spring_about_rest():
     """LuGre sticks as a spring of sigma_0, elasto-plastic or not."""
     sigma = 2e6

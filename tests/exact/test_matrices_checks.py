@@ -52,6 +52,7 @@ def refused(body: ElasticBody, *, mesh=None, K=None, M=None, **options) -> str:
     return str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("elements", [True, False])
 def test_a_sound_body_tells_its_material_and_its_modes(body, elements):
     mesh = body.mesh if elements else without_elements(body.mesh)

@@ -136,6 +136,7 @@ def test_noise_of_lift_and_velocity_are_as_stated():
     assert np.std(estimate.velocity) == pytest.approx(estimate.noise, rel=0.06)
 
 
+@pytest.mark.slow
 def test_the_chosen_window_is_nearly_the_best():
     """Truth: the RMS error of all windows against the exact velocity of a bouncing parabola."""
     drop = BouncingDrop(speed=0.5, acceleration=1500.0, restitution=(0.7, 0.6, 0.5))

@@ -308,6 +308,7 @@ def _random_part(rng: np.random.Generator) -> Component:
     )
 
 
+@pytest.mark.slow
 @each("seed", range(5))
 def test_random_networks_keep_their_energy(seed):
     rng = np.random.default_rng(seed)

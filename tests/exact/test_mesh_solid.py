@@ -153,6 +153,7 @@ def test_step_keeps_names_solids_and_size(step):
     assert volume(mesh) == pytest.approx(pin().volume + cap().volume, rel=3e-4)
 
 
+@pytest.mark.slow
 def test_unit_of_the_step_file_is_respected(step, tmp_path):
     text = step.read_text()
     assert "SI_UNIT(.MILLI.,.METRE.)" in text
@@ -171,6 +172,7 @@ def test_same_profiles_write_the_same_file(step, tmp_path):
     assert again.read_bytes() == step.read_bytes()
 
 
+@pytest.mark.slow
 def test_faces_without_a_name_are_numbered(step, tmp_path):
     nameless = tmp_path / "nameless.step"
     text = step.read_text()

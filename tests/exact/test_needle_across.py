@@ -120,6 +120,7 @@ def test_an_eccentric_bore_pulls_a_centred_needle_to_its_nearer_wall():
     assert flux > 1.002 * centred
 
 
+@pytest.mark.slow
 def test_a_guided_needle_goes_to_the_wall_that_it_is_nearer_to():
     """A negative stiffness against a film, that only slows it: one side, ever further."""
     coil = held_coil(ArmatureBore(height=1.5e-3), current=20.0)  # in the middle of the guide
@@ -167,6 +168,7 @@ def test_reluctance_that_is_left_out_is_told():
 # ---------------------------------------------------------------------- seat
 
 
+@pytest.mark.slow
 def test_a_seat_in_a_run_has_the_area_and_the_force_of_its_placement():
     run = seat_off_axis((20e-6, -10e-6, 0, 2e-3, 1e-3, 0))
 

@@ -117,6 +117,7 @@ def valve(*, placement=None, guide=False, curved=0.0):
     )
 
 
+@pytest.mark.slow
 def test_points_without_a_face_do_not_tilt_a_film():
     """Exact: where nothing faces a point its gap is some millimetres, which is no height of a film.
 
@@ -196,6 +197,7 @@ def test_centred_and_wet_as_along_the_axis():
     assert abs(space.books.relative_residual) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("half_angle", [0.5 * pi, 0.25 * pi])
 def test_recorded_gaps_before_the_touch_are_those_of_the_bodies(half_angle):
     """Exact: the gap of the axial network, also where no point is looked at yet, and on a cone."""
@@ -223,6 +225,7 @@ def test_energy_of_a_wet_eccentric_run():
     assert found.events
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", [30e-6, 46e-6, 100e-6])
 def test_a_wet_run_in_two_parts_is_the_same(first):
     """Exact: cut in flight, in the contact and after it."""

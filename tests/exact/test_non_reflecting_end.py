@@ -60,6 +60,7 @@ def test_with_lateral_strain_a_long_pulse_leaves():
     assert echo(full(LONG.replace("poisson: 0.0", "poisson: 0.3"))) < 1e-3
 
 
+@pytest.mark.slow
 def test_a_bar_without_end_does_not_move_as_a_whole():
     level = full(OPEN)
 

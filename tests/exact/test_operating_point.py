@@ -126,6 +126,7 @@ def test_a_held_direct_injector_passes_what_both_restrictions_pass():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "current"),
     [
@@ -160,6 +161,7 @@ def test_a_run_from_the_operating_point_of_a_valve_stays_there(name, current):
     assert max(map(abs, found.point.inflow.values()), default=0.0) < 1e-15
 
 
+@pytest.mark.slow
 def test_forces_on_the_needle_of_the_open_brake_valve_add_up():
     record = points(
         read_case_tree(VALVES / "brake_valve_hot.yaml"), base=Conditions(current={"coil": 2.0})
@@ -182,6 +184,7 @@ def test_forces_on_the_needle_of_the_open_brake_valve_add_up():
     assert one(record, "coil voltage") == pytest.approx(2.0 * 4.0 * 1.393, rel=1e-13)
 
 
+@pytest.mark.slow
 def test_the_energised_pilot_lets_the_control_volume_down():
     """12 A open the pilot: the two throttles divide the rail pressure, and the needle lifts."""
     tree = read_case_tree(VALVES / "pilot_injector.yaml")
@@ -233,6 +236,7 @@ MAGNET_IN_SERIES = (
 )
 
 
+@pytest.mark.slow
 def test_iron_with_hysteresis_is_told_to_lie_on_its_mean_curve():
     plain = IRON[: IRON.index(", hysteresis")] + "}]\n"
     base = Conditions(current={"coil": 1.0})

@@ -43,6 +43,8 @@ from klack.simulation.operating_point import (
 from klack.simulation.static_start import begin_steady
 from klack.simulation.step_sizes import step_sizes
 
+pytestmark = pytest.mark.slow
+
 KICK = 1e-6  # [m/s]
 FLUID = library_fluid("n-heptane").at(293.15)
 AMBIENT, MU0 = 101325.0, 4e-7 * pi
@@ -271,7 +273,6 @@ def test_pressures_guessed_so_high_that_the_search_fails_are_left_with_a_word():
         assert abs(left) <= 1e-8 * size, name
 
 
-@pytest.mark.slow
 def test_many_random_valves_end_in_a_right_point_or_in_words():
     found = tally(range(1000, 1150))
 
@@ -279,7 +280,6 @@ def test_many_random_valves_end_in_a_right_point_or_in_words():
     assert found.get("not found", 0) <= 3, found
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [12, 31, 49, 66, 93])
 def test_a_kicked_valve_moves_as_its_linear_model(seed):
     drawn = Drawn.of(seed)

@@ -42,6 +42,7 @@ def result(case):
     return simulate_network(case.network.network().rows(), duration=case.run.duration, record=1e-6)
 
 
+@pytest.mark.slow
 @each("seed", range(20, 32))
 @each("step", [1e-7, 1.28e-6, 10e-6])
 def test_random_stages_balance_at_any_step(seed, step):

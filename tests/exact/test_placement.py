@@ -99,6 +99,7 @@ def test_an_axisymmetric_mesh_cannot_leave_its_axis():
         mesh.placed(Pose.along_z(1.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("placement", "aside", "lowered"),
     [
@@ -122,6 +123,7 @@ def test_an_eccentric_ball_stands_higher_on_its_cone(centred, placement, aside, 
     assert np.arctan2(centre[1], centre[0]) == pytest.approx(towards, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_a_touch_outside_the_fine_mesh_is_told():
     with pytest.warns(AccuracyWarning, match="'housing' touches first"):
         placed("{eccentricity: 40 um}")

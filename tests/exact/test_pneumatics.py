@@ -32,6 +32,7 @@ def _network(parts, connections, **more):
     return Network({**BODY, **parts}, [JOINED, *connections], gas=AIR, **more)
 
 
+@pytest.mark.slow
 @each("b", [0.0, 0.2, 0.528, 1.0 - LAMINAR, 1.0])
 @each("crack", [0.0, 3e4, 6e5, 7e5])
 def test_the_flow_falls_with_the_pressure_behind_and_joins_everywhere(b, crack):

@@ -67,6 +67,7 @@ def drawn(rng):
     return C, limit, area, rng.uniform(-1.0, 1.0, n) * 10.0 ** rng.uniform(-8, -5)
 
 
+@pytest.mark.slow
 @each("seed", range(40))
 def test_random_points_keep_the_law_as_they_are_pressed_and_let_go(seed):
     """Exact: complementarity, pressure at most at the limit, and there where the set has grown."""
@@ -119,6 +120,7 @@ def one_point(limit):
     return replace(model, limit=limit)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [0.05, 0.3])
 def test_three_impacts_of_a_mass_on_one_point(speed):
     """Exact: energy of two straight lines, closing 1/k + 1/H and opening 1/k; order 2 in time.

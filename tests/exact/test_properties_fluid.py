@@ -158,6 +158,7 @@ def test_density_and_stiffness_of_a_liquid_belong_together(liquid, p):
     assert K == pytest.approx(2.0 * d / (up - down), rel=1e-7)
 
 
+@pytest.mark.slow
 @examples(60)
 @given(log_range(1e-6, 1.0), log_range(2e3, 1e8))
 def test_memory_of_friction_fades_and_never_turns(tau, reynolds):

@@ -167,6 +167,7 @@ def test_a_load_that_stays_has_the_spectrum_of_its_change(series, share):
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-8 * np.abs(one).max())
 
 
+@pytest.mark.slow
 @examples(10)
 @given(
     st.floats(0.1, 1.5),

@@ -40,6 +40,7 @@ def test_gaps_of_a_sphere_over_a_cone(pair, placement):
     assert np.ptp(exact) > 2e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slave", ["a", "b"])
 def test_small_motions_move_the_gaps_as_the_rigid_modes_say(slave):
     """Traces of the six rigid modes: u = t + w x (x - c) in space, read by the half section.

@@ -55,6 +55,7 @@ def test_sections_follow_rigid_motions(pair, sections):
     assert sections.of_order(2).nnz == 0
 
 
+@pytest.mark.slow
 def test_rigid_modes_turn_and_shift_sections(stroke):
     """Rotation vectors of sections are those of the needle, with their signs."""
     model, points = stroke._reduced
@@ -66,6 +67,7 @@ def test_rigid_modes_turn_and_shift_sections(stroke):
         np.testing.assert_allclose(section[:3, :6], moved, atol=1e-9 * np.abs(moved).max())
 
 
+@pytest.mark.slow
 def test_a_section_yields_as_that_of_a_solid(pair):
     needle = pair.bodies[0].mesh
     (solid,) = needle.solids
@@ -80,6 +82,7 @@ def test_a_section_yields_as_that_of_a_solid(pair):
     np.testing.assert_allclose(found, expected, rtol=4e-3)  # 12 layers
 
 
+@pytest.mark.slow
 def test_ports_move_along_the_axis_as_before(stroke):
     for number, body in enumerate(stroke.bodies):
         alone = stroke.along_axis(number)

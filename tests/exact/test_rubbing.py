@@ -219,6 +219,7 @@ def test_impacts_on_one_point_stick_slip_reverse_and_jam(case):
     assert missed(case, 400) < 1e-4
 
 
+@pytest.mark.slow
 def test_errors_fall_with_the_square_of_the_step():
     coarse, fine = (np.median([missed(case, n) for case in CASES]) for n in (100, 400))
     assert coarse / fine > 12.0

@@ -135,6 +135,7 @@ def test_a_plastic_strain_beyond_small_strain_is_doubted():
     assert doubt.startswith("plastic strain reaches 20 % at the peak")
 
 
+@pytest.mark.slow
 def test_elastic_faces_say_that_all_impacts_are_alike():
     study = run_impact(_case("run_in: true", ""), levels=("reduced",), certify=False)
 

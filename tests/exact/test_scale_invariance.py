@@ -15,6 +15,8 @@ from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.case import read_case
 
+pytestmark = pytest.mark.slow
+
 METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
 
 SPHERE_ON_DISC = """
@@ -127,7 +129,6 @@ def test_units_of_a_drawing_change_nothing(reference, unit):
 
 
 @pytest.mark.parametrize("scale", [1e-3, 1e3])
-@pytest.mark.slow
 def test_larger_bodies_hit_longer_and_harder(reference, scale):
     """From 4 um to 4 m.
 

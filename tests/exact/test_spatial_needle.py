@@ -145,6 +145,7 @@ def test_a_needle_at_rest_stays_there(modes):
         assert run.channels["needle x"].values[0] == pytest.approx(1e-6, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [0, 1])
 def test_a_centred_stroke_is_the_axial_one(modes):
     """Equal springs under a ring: the law along the axis is their sum.
@@ -181,6 +182,7 @@ def test_a_centred_stroke_is_the_axial_one(modes):
         assert np.abs(runs[1].channels[name].values).max() < 1e-13, name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [False, True])
 def test_a_drop_is_that_of_the_interface_level(modes):
     """Off its axis and tilted, under a constant force, on feet unlike each other."""

@@ -25,6 +25,7 @@ def pull(*force: float, over: tuple[float, ...] = (0.0, 1.0)) -> ForceOverTime:
     return ForceOverTime(time=over, force=force)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [False, True])
 @pytest.mark.parametrize("mu", [0.1, 0.6, 1.5])
 def test_a_drop_is_that_of_the_interface_level(modes, mu):
@@ -99,6 +100,7 @@ def test_a_needle_on_a_cone_loses_what_springs_and_sliders_take(mu):
     assert abs(run.books.residual) < 1e-12 * run.books.scale
 
 
+@pytest.mark.slow
 def test_a_load_at_rest_sticks_slips_and_sticks_again():
     """The same springs and sliders under a load that rises and falls, in the steps of rest.
 

@@ -46,6 +46,7 @@ def test_half_sine_has_its_spectrum_with_and_without_preload(step, offset):
     np.testing.assert_allclose(np.abs(spectrum.values[1:]), expected, atol=2e-5 * expected[0])
 
 
+@pytest.mark.slow
 def test_both_ways_to_the_spectrum_agree_in_phase():
     series = half_sine()
     whole = impulse_spectrum(series, resolution=10.0)

@@ -62,6 +62,7 @@ def test_rectangle_has_the_tabulated_spectrum():
     np.testing.assert_allclose(ours, PULSES[:, 3], atol=2e-6)
 
 
+@pytest.mark.slow
 def test_simulated_hertz_impact_has_the_tabulated_spectrum():
     pair = ContactPair(
         body_a="sphere",

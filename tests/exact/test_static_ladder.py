@@ -10,6 +10,8 @@ from klack.assembling.problem import build_problem
 from klack.case.reader import load_case
 from klack.contact.statics import ReachError
 
+pytestmark = pytest.mark.slow
+
 RADIUS, YOUNG, POISSON = 20e-3, 210e9, 0.3
 CROWN = Path(__file__).parents[1] / "data" / "case" / "crown.yaml"
 

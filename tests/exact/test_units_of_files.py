@@ -80,6 +80,7 @@ def test_a_mesh_in_another_unit_has_the_same_nodes(mesh, unit, tmp_path):
         assert np.array_equal(a.connectivity, b.connectivity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", ["m", "inch"])
 def test_a_mesh_in_another_unit_hits_the_same(unit, tmp_path):
     """Mass, frequencies and the force of the impact, at round-off of the condensed stiffness."""

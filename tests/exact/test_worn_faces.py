@@ -72,6 +72,7 @@ def test_a_mesh_twice_as_fine_reads_the_same_faces():
     assert measures.restitution == pytest.approx(found.restitution[-1], abs=1e-3)
 
 
+@pytest.mark.slow
 def test_a_faster_impact_than_those_that_have_worn_the_faces_is_told():
     _, text = _run_in()
     study = _impact(_changed(text, ("speed: 0.3 m/s", "speed: 0.5 m/s")), "reduced")

@@ -72,6 +72,7 @@ def test_elastic_levels_are_doubted_and_the_law_is_measured_by_its_own_kind():
     assert sum("first impact on new faces: yield takes" in text for text in study.warnings) == 1
 
 
+@pytest.mark.slow
 def test_a_high_yield_stress_changes_no_bit():
     """Exact."""
     hard, elastic = _study(", yield: 4 GPa"), _study("")
@@ -84,6 +85,7 @@ def test_a_high_yield_stress_changes_no_bit():
     assert hard.reference == elastic.reference
 
 
+@pytest.mark.slow
 def test_yield_beside_friction_is_left_out_aloud():
     study = _study(YIELD, ("reduced",), ("  gap: 0 um", "  gap: 0 um\n  friction: 0.1"))
 

@@ -85,6 +85,7 @@ def test_faces_are_those_of_the_drawing(structures: tuple[Structure, ...]) -> No
     assert housing.axial_normals[bottom] == pytest.approx(np.full(bottom.sum(), -1.0), rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("computes")  # a stage that is served from the cache has another name
 def test_an_impact_stores_its_held_body(tmp_path: Path) -> None:
     path = find_case("sphere-on-rod")

@@ -51,6 +51,7 @@ def ended(jobs: Jobs) -> Job:
     raise AssertionError("it still runs")
 
 
+@pytest.mark.slow
 def test_a_run_tells_what_went_wrong_in_the_words_of_klack(folder):
     jobs = Jobs(folder)
     jobs.start("impact", "bad.yaml", "klack-results/bad")

@@ -120,6 +120,7 @@ def test_a_part_that_fails_is_named_and_the_run_goes_on(run, monkeypatch, capsys
     assert "failed: " in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_page_names_missed_goals_first_and_draws_what_it_can(tmp_path):
     Number = import_module("number").Number
     numbers = [

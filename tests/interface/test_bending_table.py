@@ -62,6 +62,7 @@ def test_frequencies_are_those_of_exact_elasticity(study):
     assert (short.rigid, long.rigid) == (2, 2)
 
 
+@pytest.mark.slow
 def test_a_held_rod_bends_as_a_cantilever(tmp_path):
     """Timoshenko lowers 1.8751^2 of Euler-Bernoulli by 2 % at length over diameter 7.5."""
     _, long = study_of(tmp_path, HELD).bending
@@ -92,6 +93,7 @@ def test_json_has_every_frequency(tmp_path, study):
     assert parts["short"]["rigid_modes_of_order_1"] == 2
 
 
+@pytest.mark.slow
 def test_command_prints_and_writes_them(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     Path("rods.yaml").write_text(LONG_30, encoding="utf-8")
@@ -131,6 +133,7 @@ def test_linear_elements_lock_and_are_told_of(tmp_path, family, least):
     assert least < deviation < 0.1
 
 
+@pytest.mark.slow
 def test_page_of_the_theory_prints_what_it_quotes(tmp_path, monkeypatch, capsys):
     """The example in Python, and the table of the shipped valve."""
     text = (Path(__file__).parents[2] / "docs" / "theory" / "elasticity.md").read_text("utf-8")

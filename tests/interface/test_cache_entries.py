@@ -60,6 +60,7 @@ NUMBERS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(array=NUMBERS, columns=st.booleans(), text=st.text(max_size=20))
 def test_an_entry_comes_back_bit_by_bit(tmp_path_factory, array, columns, text):
@@ -167,6 +168,7 @@ def canonical(value: object) -> str:
     return repr(value)
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(a=VALUES, b=VALUES)
 def test_keys_are_equal_for_equal_content_alone(a, b):

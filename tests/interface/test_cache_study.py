@@ -37,6 +37,8 @@ from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import write_step_revolved
 from klack.stages import stages_with_cached
 
+pytestmark = pytest.mark.slow
+
 TIMES = {"wall_time", "setup_time", "stage_times", "created"}
 PATH = find_case("demo-valve-axisymmetric")
 TEXT = PATH.read_text()

@@ -147,6 +147,7 @@ def test_the_flight_lasts_two_steps_from_any_placement():
         assert speed == 0.5
 
 
+@pytest.mark.slow
 def test_no_point_of_a_waving_ring_overlaps_at_the_start():
     """Between the nodes of 12 layers the faces wave: random points, not those that were sampled."""
     upper, lower, _ = needle_over_seat(size=25e-6, bulk=1e-3, layers=12)

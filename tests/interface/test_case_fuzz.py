@@ -62,6 +62,7 @@ def test_each_value_becomes_something_nasty(path: Path):
         outcome(lambda text=text: read_any_case(text, path.with_name("valve.yaml")))
 
 
+@pytest.mark.slow
 def test_each_key_goes_or_comes_twice():
     path = shipped_cases()["demo-stroke"]
     tree = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))

@@ -67,6 +67,7 @@ SPARE = with_parameters(
 )
 
 
+@pytest.mark.slow
 def test_a_case_with_parameters_is_that_with_numbers_to_the_bit():
     plain = read_valve_case(TEXT, SMALL)
     case = read_valve_case(PARAMETRIC, SMALL)
@@ -350,6 +351,7 @@ def test_parameters_without_effect_are_named():
     assert read_valve_case(PARAMETRIC, SMALL).parameter_notes == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [

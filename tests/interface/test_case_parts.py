@@ -87,6 +87,7 @@ def test_four_included_injectors_are_the_network_written_out():
     assert case.network.components == plain.network.components
 
 
+@pytest.mark.slow
 def test_and_their_strokes_are_the_same_to_the_bit():
     runs = [
         run_stroke(item, variants=("wet",)).variants["wet"].result
@@ -407,6 +408,7 @@ def outcome(path: Path) -> None:
         assert len(str(said)) < 3000, str(said)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_damaged_files_are_a_case_or_one_clear_error(seed, tmp_path):
     draw = random.Random(seed)
@@ -423,6 +425,7 @@ def test_damaged_files_are_a_case_or_one_clear_error(seed, tmp_path):
 VALUES = [*NASTY, "= 2", "= k", "'= 1 mm'", "'='", "'= ' ", "= (", "= 1/0", "left.tip", "'*'"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_nasty_values_in_case_and_part_are_a_case_or_one_clear_error(seed, tmp_path):
     draw = random.Random(seed)
@@ -466,6 +469,7 @@ def test_the_python_door_changes_an_argument(tmp_path):
     assert other.value("network.components.left_spring.stiffness") == 1e3
 
 
+@pytest.mark.slow
 def test_points_of_an_argument_are_those_of_cases_with_it(tmp_path):
     path = shutil.copytree(HOW_TO / "parts", tmp_path / "parts").parent / "four.yaml"
     text = FOUR.read_text(encoding="utf-8").replace("duration: 2 ms", "duration: 0.3 ms")

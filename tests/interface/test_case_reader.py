@@ -251,6 +251,7 @@ def test_further_mistakes_are_counted():
     assert str(complaint(text)).endswith("(2 more problems in this file.)")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "word"),
     [
@@ -325,6 +326,7 @@ def test_files_are_found_beside_the_case(tmp_path):
     assert case.name == tmp_path.name  # of the folder, as the file is just called case.yaml
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(data=st.data())
 def test_any_damage_gives_a_case_or_one_clear_error(data):
@@ -369,6 +371,7 @@ def test_levels_are_checked():
         bare.require_levels(["lumped"])
 
 
+@pytest.mark.slow
 def test_shipped_cases_can_all_be_read():
     cases = shipped_cases()
 

@@ -77,6 +77,7 @@ def test_a_run_leaves_its_files_and_its_progress(play, tmp_path):
     assert not (tmp_path / "run.frd").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("script", "kind", "words"),
     [

@@ -107,6 +107,7 @@ def files(folder: Path, kind: str = "*.code") -> list[Path]:
     return sorted((folder / "store" / "klack-compiled").glob(kind))
 
 
+@pytest.mark.slow
 def test_a_second_process_compiles_nothing(program):
     assert end(start(program)) == [7.0, 2, []]
     assert end(start(program)) == [7.0, 0, []]
@@ -134,6 +135,7 @@ def test_an_inner_function_from_the_store_is_linked_into_a_new_caller(compiled_p
     assert end(start(program)) == [8.0, 1, []]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", ["float, float", "float, int"])
 def test_fields_that_change_places_are_other_code(program, kinds):
     """Truth: the field that the function names; uniform named tuples are a type of their own."""
@@ -157,6 +159,7 @@ def test_only_entries_have_machine_code(compiled_program):
     assert b"\x7fELF" in entry
 
 
+@pytest.mark.slow
 def test_a_text_that_changes_compiles_nothing(program):
     write(program, text='"""One."""\n    ')
     assert end(start(program)) == [7.0, 2, []]
@@ -253,6 +256,7 @@ def test_a_full_disk_is_one_warning(program):
     assert end(start(program)) == [7.0, 2, []]
 
 
+@pytest.mark.slow
 def test_without_a_folder_everything_works(program):
     (program / "store").write_text("a file")
 
@@ -286,6 +290,7 @@ def test_a_killed_process_leaves_no_lock_behind(program, tmp_path):
     assert not lock.exists()
 
 
+@pytest.mark.slow
 def test_a_function_that_cannot_be_compiled_says_so_each_time(program):
     """The second try must not wait for the lock of the first."""
     (program / "run.py").write_text(f"""

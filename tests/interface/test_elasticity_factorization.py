@@ -39,6 +39,7 @@ def system(block):
         return A, B, factor.solve(B)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif("pardiso" not in BACKENDS, reason="needs MKL")
 @pytest.mark.parametrize("limited", ["solve", "factor"])
 def test_factor_and_solve_may_have_different_limits_of_threads(limited):
@@ -102,6 +103,7 @@ def test_one_by_one_and_integers(backend):
         assert factor.solve(np.array([2])) == pytest.approx([0.5], rel=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", BACKENDS)
 def test_two_factors_live_side_by_side_and_close_twice(system, backend):
     A, B, X = system

@@ -51,6 +51,7 @@ def test_frequencies_are_those_of_lapack(fixed):
     np.testing.assert_allclose(modes.omega, np.sqrt(squares), rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fixed", [False, True])
 def test_modes_for_an_estimate_stop_short_of_round_off(fixed):
     """Those asked for are as good as ever, and the rest costs fewer solutions."""

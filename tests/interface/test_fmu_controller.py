@@ -167,6 +167,7 @@ def test_a_case_without_a_controller_says_what_is_missing(case):
     assert "--controller" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_the_command_takes_it_and_the_record_names_it(case, spring_damper_fmu: Build, capsys):
     from klack.cli.main import main
 

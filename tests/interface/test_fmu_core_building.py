@@ -63,6 +63,7 @@ def test_sources_compile_without_warnings(name, fmi, tmp_path):
     subprocess.run([*command, *SOURCE_FILES[fmi]], cwd=tmp_path, check=True)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_static_sources_have_the_prefix_of_the_standard(tmp_path):
     for name, text in source_texts(MODELS["dry"], 2, "guid").items():

@@ -148,6 +148,7 @@ def test_variables_have_their_value_references(model, fmi, tmp_path):
     assert extra == ([] if fmi == 2 else ["time"])
 
 
+@pytest.mark.slow
 def test_states_and_derivatives_belong_together(model, fmi, tmp_path):
     found = read(model, fmi, tmp_path)
     if found.modelExchange is None:

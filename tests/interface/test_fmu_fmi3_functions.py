@@ -237,6 +237,7 @@ def difference(fmu, unit, unknowns, known, size):
     return (found[0] - found[1]) / size
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["pair", "body"])
 def test_directional_derivatives_are_differences(kind, request):
     unit = request.getfixturevalue(kind)

@@ -24,6 +24,7 @@ def pair():
     return case_models(load_case(find_case("demo-valve-axisymmetric"))).pair
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_example_prints_what_the_page_says(pair, tmp_path, monkeypatch):
     build_fmu(pair, tmp_path / f"{pair.name}.fmu", fmi=2, platforms=("linux64",))

@@ -12,6 +12,8 @@ from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
 from klack.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 LEVELS = "levels: [lumped, reduced-none, reduced-attachment, reduced, full]"
 
 
@@ -55,7 +57,6 @@ def test_so_they_do_with_less_and_more_of_it(tmp_path, friction):
 
 
 @pytest.mark.parametrize(("static", "doubted"), [(0.11, False), (0.5, True)])
-@pytest.mark.slow
 def test_jumps_that_depend_on_the_step_are_told(tmp_path, static, doubted):
     """A step shorter by the square root of 2 gives another restitution, or the same."""
     mine = case(tmp_path, friction=0.1, static_friction=static, stribeck_speed="0.02 m/s")
@@ -97,7 +98,6 @@ def test_page_shows_where_faces_stick_and_what_friction_costs(both, tmp_path):
     assert "Friction between the faces" not in titles
 
 
-@pytest.mark.slow
 def test_static_friction_holds_more_than_kinetic(tmp_path):
     plain = impact(case(tmp_path, friction=0.1)).levels["interface"]
     held = impact(case(tmp_path, friction=0.1, static_friction=0.3)).levels["interface"]
@@ -136,7 +136,6 @@ def test_a_seat_that_holds_the_needle_ends_with_an_answer(tmp_path):
     assert np.isfinite(level.measures.peak_force)
 
 
-@pytest.mark.slow
 def test_flat_faces_round_the_axis_rub_too(tmp_path):
     """A hat at the axis cannot slip; Poisson's ratio 0 and flat faces: there is nothing to lose."""
     text = find_case("two-rods").read_text().replace("contact:\n", "contact:\n  friction: 0.2\n", 1)

@@ -60,6 +60,7 @@ def test_matrices_of_a_motion_along_the_axis_are_no_body_in_three_dimensions(tmp
     assert "axial motion of 'pole'" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_wide_guide_names_the_stop_that_it_brings_to_the_axis():
     wide = COARSE.replace("clearance: 4 um", "clearance: 60 um")
     with pytest.raises(InputError, match="stop 'seat': points on rings") as caught:
@@ -67,6 +68,7 @@ def test_a_wide_guide_names_the_stop_that_it_brings_to_the_axis():
     assert "guide.clearance" in str(caught.value)
 
 
+@pytest.mark.slow
 def test_bodies_without_a_mode_of_order_1_are_named():
     few = COARSE.replace("needle: {count: 12}", "needle: {count: 1}")
     with warnings.catch_warnings(record=True) as caught:

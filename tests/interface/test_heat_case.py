@@ -281,6 +281,7 @@ def HEAT_LOG_KEYS(folder: Path) -> list[str]:
     return (folder / HEAT_LOG.file).read_text().splitlines()[1:]
 
 
+@pytest.mark.slow
 def test_a_notebook_soaks_a_valve(tmp_path):
     path = tmp_path / "small.yaml"
     path.write_text(SMALL, encoding="utf-8")

@@ -82,6 +82,7 @@ def test_an_accumulator_without_a_volume_beside_it_asks_for_a_chamber():
         network(parts, [["pump.b", "gas.fluid"]])
 
 
+@pytest.mark.slow
 def test_an_accumulator_at_a_prescribed_pressure_takes_what_it_holds():
     parts = {
         "rail": PressureSource(pressure=50e5, step={"to": 100e5, "at": 1e-4, "rise": 1e-4}),

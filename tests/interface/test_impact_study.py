@@ -104,6 +104,7 @@ def changed(case, record, i):
     return case
 
 
+@pytest.mark.slow
 def test_every_point_is_the_impact_of_the_changed_case(ball, tmp_path):
     record = klack.run_study(ball, write(tmp_path, STUDY)).record
     assert (record.count, record.variant, record.threads) == (2, "reduced", 1)
@@ -151,6 +152,7 @@ def test_any_key_and_any_level(ball, tmp_path, key, value, level):
         assert float(found[name]) == values[1]
 
 
+@pytest.mark.slow
 def test_many_points_of_your_own_program(ball):
     speeds = ["0.4 m/s", "0.5 m/s"]
     table = klack.run_many(ball, {SPEED: speeds}, ["peak_force", "restitution"], level="reduced")
@@ -161,6 +163,7 @@ def test_many_points_of_your_own_program(ball):
         assert table["restitution"][i] == float(single["restitution"])
 
 
+@pytest.mark.slow
 def test_points_of_the_same_bodies_build_them_once(ball, tmp_path, monkeypatch):
     """Speed, forces, damping and friction leave meshes and modes; a modulus does not."""
     built = []
@@ -210,6 +213,7 @@ def test_doubts_of_an_impact_are_notes_of_its_point(ball, tmp_path):
     assert "at 1 point" in record.model
 
 
+@pytest.mark.slow
 def test_a_level_that_is_not_the_answer_says_so_at_its_point(tmp_path):
     """A stiff spring in place of the consistent law: the interface level answers."""
     file = tmp_path / "stiff.yaml"
@@ -229,6 +233,7 @@ def test_a_level_that_is_not_the_answer_says_so_at_its_point(tmp_path):
     assert "Try: level: interface in the study" in record.notes[1]
 
 
+@pytest.mark.slow
 def test_a_point_that_fails_is_a_row(ball, tmp_path):
     text = """
   parameters: {contact.gap: {values: [1 um, 100 um]}}
@@ -312,6 +317,7 @@ def test_optimum_keeps_its_bound_and_exports_its_case(ball, tmp_path):
     assert float(found["peak_force"]) == columns(record)["peak_force"][best]
 
 
+@pytest.mark.slow
 def test_impacts_made_after_the_case_are_counted(ball, tmp_path):
     """Truth: the peak force rises with the speed, so that half of them are above that of today."""
     text = """
@@ -390,6 +396,7 @@ class TestDerivatives:
         assert record.variant == "reduced"
         assert all(item.deviation < 0.01 for item in record.measures)
 
+    @pytest.mark.slow
     def test_value_is_that_of_the_impact(self, ball):
         record = klack.sensitivities(ball, parameters=[SPEED], check=False)
         single = klack.run_impact(ball, ["reduced"]).measures["reduced"]
@@ -404,11 +411,13 @@ class TestDerivatives:
             assert item.predicted is not None
             assert item.secant is None
 
+    @pytest.mark.slow
     def test_jumps_are_told(self, ball):
         """The number of contacts does not change smoothly, and here not at all."""
         record = klack.sensitivities(ball, parameters=[SPEED], measures=["sub_contacts"])
         assert record.measures[0].slopes == (0.0,)
 
+    @pytest.mark.slow
     def test_command(self, ball, tmp_path, capsys):
         file = tmp_path / "ball.yaml"
         file.write_text(CASE)

@@ -69,6 +69,7 @@ def children() -> set[int]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("version", "fault", "words"),
     [(2, *item) for item in FAULTS.values()] + [(3, *FAULTS["crash"]), (3, *FAULTS["error"])],
@@ -93,6 +94,7 @@ def test_a_run_stops_with_name_and_time(
     assert children() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
@@ -208,6 +210,7 @@ if sys.argv[2] == "idle":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 @pytest.mark.parametrize("state", ["hangs", "idle", "ends"])
 def test_no_process_is_left_alone(state: str, spring_damper_fmu: Build):

@@ -173,6 +173,7 @@ def failing_at(variant: int, time: float) -> Callable[..., NetworkResult]:
     return run_variant
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("failed", [1, 2])
 def test_a_stroke_that_fails_late_is_written_and_marked(
     case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, failed
@@ -199,6 +200,7 @@ def test_a_stroke_that_fails_late_is_written_and_marked(
     assert any("is incomplete" in note for note in _notes(study.variants[name], None))
 
 
+@pytest.mark.slow
 def test_a_cut_fine_record_is_said_everywhere(
     case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ):

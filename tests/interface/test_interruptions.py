@@ -72,6 +72,7 @@ def test_a_crash_at_any_operation_leaves_the_old_files_or_the_new_ones(tmp_path:
     assert places == sorted(places, reverse=True)  # and nothing comes back
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("again", [1, 7])
 def test_ctrl_c_at_any_operation_leaves_no_stage(again: int, tmp_path: Path):
     """Also while the stage is made, while files move, and while it is removed; pressed twice."""

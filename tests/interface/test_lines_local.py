@@ -73,6 +73,7 @@ def test_keys_of_the_other_kind_are_refused(given, key):
         Line.model_validate(BORE | given)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings(TOLD)
 def test_cells_shorter_than_a_step_say_how_many_fit():
     rows = network(LOCAL | {"cells": 400})

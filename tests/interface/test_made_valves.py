@@ -51,6 +51,7 @@ def columns(record):
 
 
 class TestMade:
+    @pytest.mark.slow
     def test_valves_scatter_about_the_case(self, tmp_path):
         """Truth: the distribution that was asked for; strokes of changed cases."""
         file = write(tmp_path, STUDY + ROBUST)

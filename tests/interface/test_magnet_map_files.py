@@ -205,6 +205,7 @@ def test_a_table_and_a_file_exclude_each_other(tmp_path):
         ForceMapSolenoid.model_validate({"resistance": "1 ohm", "gap": "1 mm"})
 
 
+@pytest.mark.slow
 def test_random_maps_are_read(tmp_path):
     """A hundred sensible maps: other units, orders, separators and decimal signs."""
     rng = np.random.default_rng(7)

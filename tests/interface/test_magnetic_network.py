@@ -155,6 +155,7 @@ def random_network(rng):
     return MagneticNetwork.model_validate({"resistance": 1.0, "gap": 1e-4, "elements": parts})
 
 
+@pytest.mark.slow
 def test_a_hundred_random_networks_keep_their_energy():
     rng = np.random.default_rng(11)
     for _ in range(100):

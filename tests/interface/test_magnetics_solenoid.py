@@ -141,6 +141,7 @@ def map_of(solenoid, force_factor=1.0):
     )
 
 
+@pytest.mark.slow
 def test_map_of_a_solenoid_pulls_like_the_solenoid():
     solenoid = Solenoid(**INJECTOR)
 

@@ -126,6 +126,7 @@ def matrix(table: klack.PointTable) -> np.ndarray:
 
 
 class TestSameBits:
+    @pytest.mark.slow
     @pytest.mark.parametrize("variant", ["wet", "dry"])
     def test_threads_and_order_change_no_bit(self, small: klack.CaseOnHand, variant: str):
         points = drawn(8)
@@ -138,6 +139,7 @@ class TestSameBits:
             np.testing.assert_array_equal(matrix(table), truth[list(order)])
             assert not table.failed.any()
 
+    @pytest.mark.slow
     def test_geometry_and_damping_take_the_general_way(self, rod: klack.CaseOnHand):
         """A longer needle, another damping and other modes beside points of the given one."""
         points: list[Point] = [
@@ -175,6 +177,7 @@ class TestSameBits:
         assert PlainSpring.inside == [0, 1]
         sys.modules.pop("plain_spring_of_many")
 
+    @pytest.mark.slow
     def test_every_point_has_an_fmu_of_its_own(
         self, tmp_path: Path, spring_damper_fmu: Callable[..., Path]
     ):

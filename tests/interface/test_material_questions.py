@@ -46,6 +46,7 @@ def test_slips_of_units_are(slip: str):
     assert "check both units" in asked
 
 
+@pytest.mark.slow
 def test_the_note_is_shown_once_and_stands_in_the_numbers(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = (DATA / "tiny_rods.yaml").read_text()

@@ -104,6 +104,7 @@ def load(folder: Path, text: str, name: str = "case.yaml"):
     return load_case(folder / name)
 
 
+@pytest.mark.slow
 def test_the_case_of_the_page_gives_the_impact_of_klacks_own_matrices(folder):
     levels = ("reduced", "interface", "full")
     with warnings.catch_warnings():
@@ -122,6 +123,7 @@ def test_the_case_of_the_page_gives_the_impact_of_klacks_own_matrices(folder):
     assert "7854 kg/m^3" in needle.material  # straight edges
 
 
+@pytest.mark.slow
 def test_inspecting_the_case_shows_what_the_checks_found(folder, capsys):
     load(folder, page_case())
 
@@ -132,6 +134,7 @@ def test_inspecting_the_case_shows_what_the_checks_found(folder, capsys):
     assert "kg/m^3" in shown
 
 
+@pytest.mark.slow
 def test_a_leaning_body_takes_its_matrices_along(folder):
     lean = "motion: {speed: 0.5 m/s, placement: {tilt: 0.5 deg, eccentricity: 20 um}}"
     texts = [text.replace("motion: {speed: 0.5 m/s}", lean) for text in (page_case(), own_case())]
@@ -167,6 +170,7 @@ def test_wrong_units_stop_the_case_with_those_that_fit(folder):
     assert "with units: mm t s it would be 7854 kg/m^3" in str(error.value)
 
 
+@pytest.mark.slow
 def test_nodes_alone_make_a_body_with_sets(folder):
     mesh = block(0.0, 2e-3, True)
     rows = [

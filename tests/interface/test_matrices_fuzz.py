@@ -108,6 +108,7 @@ def test_text_with_windows_ends_other_letters_and_shuffled_lines(files):
         )
 
 
+@pytest.mark.slow
 def test_huge_counts_take_no_memory(files):
     data = files.stiffness.read_bytes()
     changed = []
@@ -140,6 +141,7 @@ def test_any_ending_meets_files_of_another_kind(ending, tmp_path):
             read_matrix(path, role="stiffness")
 
 
+@pytest.mark.slow
 def test_a_damaged_ansys_file_is_refused(tmp_path):
     package = pytest.importorskip("ansys.mapdl.reader")
     data = (Path(package.__file__).parent / "examples" / "file.full").read_bytes()

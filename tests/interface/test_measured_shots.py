@@ -140,6 +140,7 @@ def test_the_mean_of_the_highest_is_counted_out():
     assert mean_of_highest(*lost, 2) == pytest.approx(14 / 9)
 
 
+@pytest.mark.slow
 def test_drops_are_read_as_they_were_thrown(drops):
     found = compare_shots(shots(SAME), [drops], SECTION)
     restitution, risen = found.distributions
@@ -160,6 +161,7 @@ def test_drops_are_read_as_they_were_thrown(drops):
     assert "on average" in bias_sentence(found)
 
 
+@pytest.mark.slow
 def test_other_drops_are_told_apart(drops):
     found = compare_shots(shots(SAME - 0.12), [drops], SECTION)
     restitution, _ = found.distributions

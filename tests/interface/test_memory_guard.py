@@ -176,6 +176,7 @@ def test_the_estimate_follows_the_growth_of_nested_dissection():
     assert plane[1] / plane[0] == pytest.approx(2 * (1 + 1 / np.log2(10_000)), rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", [b for b in available_backends() if b != "ngsolve"])
 def test_the_estimate_is_near_what_the_solver_reports(backend):
     """In the plane, against the report of the solver: 0.7 to 1.5 of it (measured 1.0 to 1.2)."""
@@ -287,6 +288,7 @@ def test_a_size_by_mistake_is_refused_at_once(small_machine, sizing, blamed, fit
     assert f"Try: a 'mesh: {blamed}' of " in text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_the_estimate_of_elements_has_the_right_size(dimension):
     """Against netgen, without refinements: 0.5 to 1.5 of its elements (fewest in slim rods)."""
@@ -327,6 +329,7 @@ def limited(before: str, left: int, after: str, folder: Path) -> subprocess.Comp
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="RLIMIT_AS")
 def test_a_real_limit_is_seen_before_the_factor_is_computed(tmp_path):
     """46 656 rows take 0.2 GB; 100 MB are left.  The library is not driven into the limit."""

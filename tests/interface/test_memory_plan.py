@@ -106,6 +106,7 @@ def test_what_follows_counts_as_well(machine, block):
     assert "Try: elements" in text
 
 
+@pytest.mark.slow
 @needs_pardiso
 def test_a_body_too_slender_for_single_precision_names_what_double_takes(machine):
     """400 times as long as thick: rounding makes the single factor indefinite."""

@@ -219,6 +219,7 @@ def test_every_component_of_the_domains_is_registered():
     assert existing == registered
 
 
+@pytest.mark.slow
 def test_nothing_is_imported_before_it_is_asked_for():
     program = (
         "import sys, klack.network.declaration\n"

@@ -91,6 +91,7 @@ def test_the_half_section_of_a_step_file_is_the_drawing_it_was_turned_from(name,
     assert found.volume == pytest.approx(drawn[name].volume, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_parts_that_are_not_turned_stay_solids_and_say_why(tmp_path):
     from netgen.occ import Box, Cylinder, Pnt, Z
 

@@ -40,6 +40,7 @@ def interface(case):
     return run_impact(case, levels=["interface"], certify=False)
 
 
+@pytest.mark.slow
 def test_an_impact_off_axis_has_points_all_round(tmp_path):
     study = interface(case_of(tmp_path))
     level = study.levels["interface"]
@@ -57,6 +58,7 @@ def test_an_impact_off_axis_has_points_all_round(tmp_path):
     assert "centred bodies" in titles["Local contact law"].paragraphs[0]
 
 
+@pytest.mark.slow
 def test_direction_does_not_matter(tmp_path):
     """90 degrees are a whole number of 24 steps, 50 degrees are not."""
 
@@ -75,6 +77,7 @@ def test_direction_does_not_matter(tmp_path):
     assert peaks[2] == pytest.approx(peaks[0], rel=2e-3)
 
 
+@pytest.mark.slow
 def test_few_angles_that_carry_are_doubted(tmp_path):
     def coarse(case):
         case["contact"]["angles"] = 8
@@ -166,6 +169,7 @@ def test_a_touch_away_from_the_finest_mesh_is_told(tmp_path):
     assert any("away from its finest mesh" in text for text in study.warnings)
 
 
+@pytest.mark.slow
 def test_both_stops_stand_at_their_gap_from_the_tilted_body(tmp_path):
     """The gap of the upper stop counts from the body where it starts, as for solids."""
 

@@ -76,6 +76,7 @@ def test_one_node_costs_energy_and_the_port_does_not(study):
         assert abs(item.nodes.energy - 1.0) > 0.01  # the far end moves later
 
 
+@pytest.mark.slow
 def test_json_and_files_say_the_same(tmp_path):
     case = tmp_path / "rods.yaml"
     case.write_text(text_of("short: [2 mm, 0 mm]"), encoding="utf-8")

@@ -208,6 +208,7 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
 SHOTS = pytest.param("shots", marks=pytest.mark.slow)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["impact", "noise", SHOTS, "stroke", "calibrate", "compare"])
 def test_a_run_stopped_in_its_report_keeps_its_result(
     command: str, result: Path, bench: Path, tmp_path: Path, monkeypatch, capsys

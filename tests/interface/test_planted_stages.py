@@ -352,6 +352,7 @@ def klack(*words: str) -> "subprocess.CompletedProcess[str]":
     )
 
 
+@pytest.mark.slow
 def test_a_pipe_that_nobody_reads_is_one_error(tmp_path: Path):
     os.mkfifo(tmp_path / "pipe")
     done = klack("schema", "--json", str(tmp_path / "pipe"))

@@ -183,6 +183,7 @@ def block() -> tuple[object, np.ndarray]:
     return elastic_body("seat", mesh, {"block": steel}, fixed_nodes=foot), foot
 
 
+@pytest.mark.slow
 def test_matrices_with_nodes_alone(tmp_path):
     """Matrix Market in mm, t, s and a table of nodes against the body that they came from."""
     body, foot = block()

@@ -409,6 +409,7 @@ def test_damaged_files_are_refused_in_words(tmp_path, name, data, reader):
     assert refused > 15
 
 
+@pytest.mark.slow
 def test_short_lines_take_no_multiple_of_their_file(tmp_path):
     """One number per line: the text, the numbers and the matrices, nothing per line."""
     path = tmp_path / "m.csv"

@@ -81,6 +81,7 @@ def test_nothing_is_good_while_the_contact_is_in_doubt(impact_study: ImpactStudy
     assert "cannot be relied on, because it lies on a sharp edge" in estimate_sentence(study)
 
 
+@pytest.mark.slow
 def test_the_report_answers_first(impact_study: ImpactStudy) -> None:
     content = report_content(certified(impact_study, deviation(0.0031)))
 

@@ -91,6 +91,7 @@ def test_the_page_shows_the_numbers_of_the_study(impact_study: ImpactStudy, page
     assert "made-up study is coarse" in text
 
 
+@pytest.mark.slow
 def test_user_text_stays_text_on_the_page(impact_study: ImpactStudy) -> None:
     text = own_part(render_html(report_content(hostile(impact_study))))
 
@@ -150,6 +151,7 @@ def test_the_paper_has_pages_also_with_hostile_words(impact_study: ImpactStudy) 
     assert sizes == {(0, 0, 595, 842)}
 
 
+@pytest.mark.slow
 def test_a_single_level_without_extras_is_enough(lonely_study: ImpactStudy, tmp_path: Path) -> None:
     write_pdf(report_content(lonely_study), tmp_path / "report.pdf")
 
@@ -235,6 +237,7 @@ def test_bars_are_drawn_by_both_renderers(impact_study: ImpactStudy) -> None:
     assert svg_chart(bars).startswith(b"<?xml")
 
 
+@pytest.mark.slow
 def test_section_figure_leaves_the_closing_motion_out_of_the_shape(
     impact_study: ImpactStudy,
 ) -> None:

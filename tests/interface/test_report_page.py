@@ -39,6 +39,7 @@ def test_contents_lead_to_every_part(impact_content: Content):
     assert titles[-3:] == ["What the words mean", "Limits", "How to compute it again"]
 
 
+@pytest.mark.slow
 def test_next_steps_are_commands_that_exist(impact_study: ImpactStudy):
     levels = {"reduced": impact_study.levels["reduced"]}
     alone = replace(impact_study, levels=levels, reference="reduced", deviations={})

@@ -285,6 +285,7 @@ def test_numbers_of_a_ring_that_closes_slowly() -> None:
     assert "to" in rows["line load at the peak force"][1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "record", [ring(), spot((0.0, 0.0)), flat(ring(), RADIUS), flat(ring(), 0.0)]
 )
@@ -299,6 +300,7 @@ def test_one_run_and_two_runs_are_drawn(record: PressureRecord) -> None:
     assert draw_pressure([one, other]).startswith(b"<?xml")
 
 
+@pytest.mark.slow
 def test_the_report_shows_the_pressure_of_levels_that_have_it(impact_study: ImpactStudy) -> None:
     study = with_pressure(impact_study, ring())
 

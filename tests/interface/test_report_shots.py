@@ -285,6 +285,7 @@ def test_user_text_stays_text(study: ShotsStudy) -> None:
     assert unescape(page).count(HOSTILE) > 7
 
 
+@pytest.mark.slow
 def test_charts_are_drawn_on_paper(content: Content) -> None:
     for section in content.sections:
         for chart in section.charts:

@@ -76,6 +76,7 @@ def share(image: np.ndarray, wanted: tuple[float, float, float]) -> float:
 RED, GREEN = (0.784, 0.196, 0.122), (0.180, 0.420, 0.227)
 
 
+@pytest.mark.slow
 def test_a_picture_shows_contact_and_held_faces(solid_study: ImpactStudy) -> None:
     figure = solid_figure(solid_study)
 
@@ -88,6 +89,7 @@ def test_a_picture_shows_contact_and_held_faces(solid_study: ImpactStudy) -> Non
     assert "first touch" not in figure.note  # faces that touch all at once have no ring
 
 
+@pytest.mark.slow
 def test_nothing_is_red_or_striped_without_a_contact_face_or_a_support(
     solid_study: ImpactStudy,
 ) -> None:
@@ -107,6 +109,7 @@ def test_nothing_is_red_or_striped_without_a_contact_face_or_a_support(
     assert "held" not in figure.note
 
 
+@pytest.mark.slow
 def test_the_ring_of_first_touch_sets_the_enlarged_window(solid_study: ImpactStudy) -> None:
     turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     ring = np.column_stack([1e-4 * np.cos(turn), 1e-4 * np.sin(turn), 0 * turn])
@@ -120,6 +123,7 @@ def test_the_ring_of_first_touch_sets_the_enlarged_window(solid_study: ImpactStu
     assert "first touch" in figure.note
 
 
+@pytest.mark.slow
 def test_names_are_text_and_the_picture_is_xml(solid_study: ImpactStudy) -> None:
     study = replace(
         solid_study,
@@ -145,6 +149,7 @@ def test_long_names_are_shortened_in_the_legend(solid_study: ImpactStudy) -> Non
     assert b"n" * 33 not in image
 
 
+@pytest.mark.slow
 def test_html_and_paper_have_the_picture(solid_study: ImpactStudy) -> None:
     content = report_content(solid_study)
 
@@ -155,6 +160,7 @@ def test_html_and_paper_have_the_picture(solid_study: ImpactStudy) -> None:
     assert b"/Subtype/Image" in render_pdf(alone).replace(b" ", b"")
 
 
+@pytest.mark.slow
 def test_axisymmetric_bodies_have_their_section_instead(impact_study: ImpactStudy) -> None:
     titles = [section.title for section in report_content(impact_study).sections]
 
@@ -170,6 +176,7 @@ def test_a_result_without_surfaces_says_so(solid_study: ImpactStudy) -> None:
     assert "earlier versions" in section.paragraphs[0]
 
 
+@pytest.mark.slow
 def test_a_spot_of_first_touch_is_not_joined_to_a_ring(solid_study: ImpactStudy) -> None:
     """Nodes within a pitch round a dome, as a mesh gives them: points, not a star."""
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)

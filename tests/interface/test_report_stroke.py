@@ -348,6 +348,7 @@ def test_a_speed_before_the_film_is_not_told_as_that_of_the_touch(study: StrokeS
     assert "film began" not in stroke_answer(bare)
 
 
+@pytest.mark.slow
 def test_a_stored_study_gives_the_same_page(study: StrokeStudy, page: str, tmp_path: Path):
     STROKE.save(study, tmp_path)
 
@@ -573,6 +574,7 @@ def test_impacts_round_the_ring_have_their_figures(study: StrokeStudy):
     assert render_pdf(content).startswith(b"%PDF")
 
 
+@pytest.mark.slow
 def test_the_animation_shows_the_pressure_of_the_sectors(study: StrokeStudy):
     chart = film_charts(in_space(study, 1).reference)[0]
     truth = sector_pressure(ring_impact(1, 0.3e-3).film)
@@ -586,6 +588,7 @@ def test_the_animation_shows_the_pressure_of_the_sectors(study: StrokeStudy):
     assert np.all(np.diff(chart.time) > 0.0)
 
 
+@pytest.mark.slow
 def test_impacts_that_are_not_shown_are_counted(study: StrokeStudy):
     found = in_space(study, 11)
     picture = line_load_picture(found.reference)

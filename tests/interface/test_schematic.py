@@ -50,6 +50,7 @@ def test_cases_were_found():
     assert len(FILES) >= 8
 
 
+@pytest.mark.slow
 def test_no_random_network_breaks_a_rule():
     for seed in range(12):
         network = random_network(seed)

@@ -129,6 +129,7 @@ def test_the_static_coefficient_keeps_its_ratio():
 # --------------------------------------------------------------------------- physics
 
 
+@pytest.mark.slow
 def test_a_drawn_coefficient_is_that_of_the_contact(rubbing):
     """Truth: the coefficients of this shot written into the case, to the last bit."""
     setup, draws = rubbing
@@ -157,6 +158,7 @@ def test_friction_takes_energy_and_the_balance_closes(rubbing):
         assert numbers["friction_loss"] == pytest.approx(lost[0] / approach, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_little_friction_takes_twice_as_much_with_twice_the_coefficient(rubbing):
     """First order: the motion is that without friction, but for terms of the coefficient squared.
 
@@ -175,6 +177,7 @@ def test_little_friction_takes_twice_as_much_with_twice_the_coefficient(rubbing)
         assert none[key] == pytest.approx(without[key], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_a_coefficient_of_nought_has_the_bits_of_a_case_without_the_key():
     """Also where the case gives its contact a coefficient: the drawn one stands for it."""
     plain, (_, draw) = setup_of(case())
@@ -205,6 +208,7 @@ def test_two_processes_and_the_log_give_the_same_shots(rubbing, tmp_path):
 # --------------------------------------------------------------------------- results
 
 
+@pytest.mark.slow
 def test_the_columns_are_in_json_measures_and_report(study):
     data = shots_to_json(study)
     drawn = [shot["contact_friction"] for shot in data["shots"]]
@@ -236,6 +240,7 @@ def test_a_report_without_friction_says_frictionless(study):
     assert not [name for name, _ in content.definitions if "between the faces" in name]
 
 
+@pytest.mark.slow
 def test_results_of_before_open_without_the_columns(study, tmp_path):
     """As klack 0.1 wrote them: neither arrays nor names in the order of the group."""
     SHOTS.save(study, tmp_path)

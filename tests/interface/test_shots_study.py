@@ -151,6 +151,7 @@ def test_any_key(needle, tmp_path, key, values):
             assert found[i] == by_hand(single, name), (name, value)
 
 
+@pytest.mark.slow
 def test_designs_of_the_same_bodies_build_them_once(needle, tmp_path, monkeypatch):
     """Clearance, speed, force and draws leave meshes and modes; a modulus does not."""
     built = []
@@ -257,6 +258,7 @@ def test_the_rule_is_that_of_klack_shots():
     assert value("shots.rule.rank", found) == 2
 
 
+@pytest.mark.slow
 def test_a_point_of_unfinished_shots_says_so(needle, tmp_path):
     text = """
   parameters: {shots.duration: {values: [0.1 ms]}}
@@ -273,6 +275,7 @@ def test_a_point_of_unfinished_shots_says_so(needle, tmp_path):
     assert not record.notes[1]
 
 
+@pytest.mark.slow
 def test_a_point_whose_shots_fail_is_a_row(needle, tmp_path):
     case = needle.with_value("contact.reach", "3 um")
     text = """
@@ -390,6 +393,7 @@ def test_processes_resume_report_and_export(needle, tmp_path, capsys):
     assert "shots.restitution.mean" in table.read_text().splitlines()[0]
 
 
+@pytest.mark.slow
 def test_valves_made_after_the_case_scatter_by_their_clearance_alone(needle, tmp_path):
     """Truth: the same draws, scaled by the clearance, rock the more the farther off-axis they are.
 

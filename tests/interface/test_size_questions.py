@@ -73,6 +73,7 @@ def test_both_have_to_be_confirmed_where_they_differ():
         require_usual_sizes(rods(extent="40 mm"), sizes)
 
 
+@pytest.mark.slow
 def test_a_step_file_in_metres(tmp_path):
     """A part drawn as 20 mm, whose file counts them as metres; and its names come along."""
     from netgen.occ import Box, Pnt

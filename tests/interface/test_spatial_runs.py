@@ -13,6 +13,8 @@ from klack.network.rows import Book, Rows
 from klack.network.step_function import python_step
 from klack.simulation.network_result import IncompleteRunError
 
+pytestmark = pytest.mark.slow
+
 NEEDLE = Needle(seat=ring(8, 0.6e-3, BELOW), stop=ring(8, 2e-3, ABOVE)).with_modes()
 
 

@@ -81,6 +81,7 @@ def test_a_file_that_is_read_for_ever_is_an_error(tmp_path: Path, monkeypatch):
         require_readable_step(path, patience=0.2)
 
 
+@pytest.mark.slow
 def test_a_file_is_tried_once_until_it_changes(whole: bytes, tmp_path: Path, monkeypatch):
     """Truth = number of processes started, counted."""
     starts, run = [], subprocess.run

@@ -23,6 +23,8 @@ from klack.mesh.rigid import rigid_placement
 from klack.progress import silent
 from klack.simulation.spatial_path import SpatialPath
 
+pytestmark = pytest.mark.slow
+
 CASE = valve_case()
 
 
@@ -55,7 +57,6 @@ def same(columns, outcomes, numbers) -> None:
         np.testing.assert_array_equal(found, [numbers(one)[item.name] for one in outcomes])
 
 
-@pytest.mark.slow
 def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     """Truth: the valve run by itself with the placement that its case would give."""
     start, outcome = starts.drawn(1), alone[2]
@@ -88,7 +89,6 @@ def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     assert found == pytest.approx([x, y], abs=2e-9)
 
 
-@pytest.mark.slow
 def test_placements_decide_where_the_needle_touches(alone):
     centred, *others = alone
     for stop in ("seat", "opening"):
@@ -103,7 +103,6 @@ def test_placements_decide_where_the_needle_touches(alone):
     assert others[1].stops["opening"]["peak_force"] != centred.stops["opening"]["peak_force"]
 
 
-@pytest.mark.slow
 def test_strokes_keep_the_energy_balance(alone):
     for outcome in alone:
         assert abs(outcome.stroke["energy_residual"]) < 1e-9
@@ -124,7 +123,6 @@ def test_friction_of_the_guide_is_that_of_the_draw(setup, starts):
     assert 1.5 < rough.stroke["guide_loss"] / smooth.stroke["guide_loss"] < 8.0
 
 
-@pytest.mark.slow
 def test_drawn_friction_of_the_faces_is_that_of_the_stops(starts):
     """Truth: the same stroke of a case whose stops have that coefficient."""
     drawn = valve_case("shots: {count: 3, contact_friction: {uniform: [0.1, 0.3]}}")
@@ -177,7 +175,6 @@ def test_the_rebound_height_is_that_of_a_throw():
     assert np.isnan(rebound_height([rest], event(first), still, 1.0))
 
 
-@pytest.mark.slow
 def test_a_log_keeps_every_bit(tmp_path, alone):
     mark = strokes_mark(CASE, 1, None)
     with STROKE_LOG.open(tmp_path, mark) as log:
@@ -195,7 +192,6 @@ def test_a_log_keeps_every_bit(tmp_path, alone):
     assert strokes_mark(changed, 1, None) != mark
 
 
-@pytest.mark.slow
 def test_a_row_starts_where_it_has_ended(setup, starts):
     """Truth: the end of each stroke, and the draw that independent ones would have."""
     case = valve_case("shots: {count: 3, carry: true}")
@@ -241,7 +237,6 @@ def test_a_failed_stroke_costs_its_row_alone(setup, starts, monkeypatch):
         compute_strokes(setup, row, ("dry",), 2, 1, log, silent)
 
 
-@pytest.mark.slow
 def test_an_interrupted_study_goes_on_with_the_same_numbers(tmp_path, alone):
     """Bodies are built anew: their bits are the same, too."""
 
@@ -271,7 +266,6 @@ def test_an_interrupted_study_goes_on_with_the_same_numbers(tmp_path, alone):
     same(back.variants["dry"].strokes, alone[1:], lambda outcome: outcome.stroke)
 
 
-@pytest.mark.slow
 def test_two_processes_give_the_same_numbers(setup, starts, alone):
     log = STROKE_LOG.open(None, "")
     compute_strokes(setup, starts, ("dry",), 3, 2, log, silent)

@@ -33,6 +33,7 @@ def test_shots_arrive_in_si():
     assert valve_case("shots: {}").shots.count == 50
 
 
+@pytest.mark.slow
 def test_starts_fill_the_guide_and_depend_on_seed_and_number_alone():
     """Uniform over a disc of radius c: half of all within c/sqrt(2), none beyond c."""
     drawn = [starts().drawn(index) for index in range(200)]
@@ -66,6 +67,7 @@ def test_the_next_stroke_of_a_row_starts_where_the_last_one_ended():
     assert start.index == 3
 
 
+@pytest.mark.slow
 def test_friction_of_the_faces_is_drawn_beside_all_else():
     """In its range, with its mean in the centred stroke; other draws stay, and none is nan."""
     text = "shots: {count: 3, contact_friction: {uniform: [0.1, 0.3]}}"

@@ -233,6 +233,7 @@ def test_json_is_that_of_its_schema():
     assert dry["highest"]["seat"]["stroke"] == int(np.argmin(OFF))
 
 
+@pytest.mark.slow
 def test_the_report_says_what_the_numbers_say(tmp_path):
     content = STROKE_SHOTS.content(study())
     page = unescape(re.sub(r"<[^>]+>", " ", render_html(content)))
@@ -243,6 +244,7 @@ def test_the_report_says_what_the_numbers_say(tmp_path):
     assert render_pdf(content).startswith(b"%PDF")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("missing", ["rebound_height", "everything"])
 def test_strokes_without_an_impact_leave_a_report(missing):
     """A needle that never touches its seat, and one that never turns."""

@@ -49,6 +49,7 @@ def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place
     compare(QUOTED[place], capsys.readouterr().out, f"studies.md, block {place}")
 
 
+@pytest.mark.slow
 def test_surrogate_of_the_page(tmp_path, capsys, monkeypatch):
     """Round-off decides which of two close terms it takes: numbers to what its error tells."""
     monkeypatch.chdir(ROOT)

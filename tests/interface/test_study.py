@@ -149,6 +149,7 @@ class TestNumbers:
 
 
 class TestKept:
+    @pytest.mark.slow
     def test_more_points_and_other_measures_use_what_is_there(self, study, tmp_path):
         first = klack.run_study(SMALL, study, folder=tmp_path / "out").record
         assert (first.computed, first.kept) == (9, 0)
@@ -415,6 +416,7 @@ noise: {surfaces: [block.outside], mount: {stiffness: 10 N/um, loss_factor: 10 %
 run: {duration: 1 ms, step: 50 ns, variants: [dry]}
 """
 
+    @pytest.mark.slow
     def test_noise_of_a_point_is_that_of_its_stroke(self, tmp_path):
         case = tmp_path / "rod.yaml"
         case.write_text(self.ROD)
@@ -508,6 +510,7 @@ run: {{duration: 0.5 ms, variants: [dry]}}
 
 
 class TestSensitivity:
+    @pytest.mark.slow
     def test_what_has_no_effect_has_no_share_and_the_others_share_all(self, tmp_path):
         """Peak force of a rigid mass, sqrt(2 k x (F - P - c x / 2)): independent of its mass.
 
@@ -534,6 +537,7 @@ class TestSensitivity:
 
 
 class TestScreening:
+    @pytest.mark.slow
     def test_effects_have_the_size_of_the_change_over_a_range(self, tmp_path):
         """Truth: the two ends of a range, of a measure that is nearly linear; and no effect."""
         text = f"""
@@ -568,6 +572,7 @@ class TestScreening:
 class TestRobustness:
     """Truth: counting, and the exact binomial interval of one in 64 points."""
 
+    @pytest.mark.slow
     def test_missed_bounds_are_counted(self, tmp_path):
         text = STUDY.replace("  design: {points: 8}", "  design: {points: 64}").replace(
             "  design:",
@@ -605,6 +610,7 @@ OPTIMUM = f"""
 class TestOptimum:
     """Truth: definitions of the front, an exhaustive grid, and bounds by the case as it is."""
 
+    @pytest.mark.slow
     def test_nothing_that_was_computed_beats_the_front(self, tmp_path):
         file = write(tmp_path, OPTIMUM)
         record = klack.optimise(SMALL, file, folder=tmp_path / "out").record
@@ -695,6 +701,7 @@ class TestOptimum:
         assert main([*command, "--out", str(tmp_path / "other")]) == 0
         assert capsys.readouterr().err.count("no space left") == 1
 
+    @pytest.mark.slow
     @pytest.mark.parametrize(
         ("old", "new", "words"),
         [

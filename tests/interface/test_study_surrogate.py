@@ -89,6 +89,7 @@ def test_shares_are_those_of_saltelli_with_fewer_points(record, tmp_path):
     assert force.total[1] < 1e-3  # a rigid needle hits with the root of the work, not of its mass
 
 
+@pytest.mark.slow
 def test_points_stay_as_they_were_computed(record, tmp_path):
     plain = STUDY.replace("  surrogate: {kind: polynomial-chaos}\n", "")
     without = klack.run_study(SMALL, write(tmp_path, plain)).record
@@ -99,6 +100,7 @@ def test_points_stay_as_they_were_computed(record, tmp_path):
     assert residuals.shape == (40,)
 
 
+@pytest.mark.slow
 def test_command_result_report_and_json(tmp_path, capsys):
     text = STUDY.replace("opening.peak_force]", "opening.peak_force, end_time, seat.9.time]")
     text = text.replace(
@@ -219,6 +221,7 @@ def test_points_of_a_file_have_to_fill_the_ranges(tmp_path, capsys, change, word
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_drawn_points_of_a_file_serve(tmp_path):
     rows = drawn(40).tolist()
     record = klack.run_study(SMALL, points_file(tmp_path, [*rows, rows[3]])).record

@@ -156,6 +156,7 @@ def test_a_disk_that_fills_at_any_time(result: Path, small_disk: Path):
     assert refused >= 6
 
 
+@pytest.mark.slow
 def test_a_report_without_room_keeps_the_result(tmp_path: Path, monkeypatch, capsys):
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -201,6 +202,7 @@ def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypat
     assert "compiled functions cannot be cached" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_bytecode_is_kept_apart_from_sources_where_a_variable_forbids_it(tmp_path: Path):
     """Of a command alone, in a private folder that ``klack warm --clear`` empties."""
     from klack.compiling.compiled_folder import clear_folder
@@ -289,6 +291,7 @@ def test_terminals_without_umlauts_and_odd_names(result: Path, tmp_path: Path):
     assert "Traceback" not in long.stderr
 
 
+@pytest.mark.slow
 def test_a_result_folder_that_is_a_file_or_a_link(result: Path, tmp_path: Path, capsys):
     (tmp_path / "file").write_text("mine")
     assert main(["export", str(result), "--to", "csv", "--out", str(tmp_path / "file")]) == 2
@@ -306,6 +309,7 @@ def test_a_result_folder_that_is_a_file_or_a_link(result: Path, tmp_path: Path, 
     assert "Traceback" not in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_folder_that_goes_while_a_run_computes(tmp_path: Path, monkeypatch):
     """It is made again: what was computed is not lost."""
     import klack.analyses.impact.run as workflow

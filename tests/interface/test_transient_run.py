@@ -51,6 +51,7 @@ def rod(**changes) -> ElasticBody:
     return replace(rod_body("rod", STEEL, area=AREA, length=0.02, elements=20), **changes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [
@@ -134,6 +135,7 @@ def test_half_and_whole_solves_agree():
             np.testing.assert_allclose(got, wanted, rtol=1e-10, atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["contact-stabilised-newmark", "massless"])
 def test_points_that_close_unwatched_are_found(scheme, monkeypatch):
     """Watching almost nothing costs repeated steps, not accuracy."""
@@ -202,6 +204,7 @@ def known(bodies, space, count):
     return tuple(found)
 
 
+@pytest.mark.slow
 def test_run_ends_where_bodies_have_parted_for_good():
     """As the run to the end, whose last steps are free flight."""
     a, b, space = problem()
@@ -238,6 +241,7 @@ def struck_on_a_wall():
     return a, b, rod_contact(a, b, area=AREA, gap=0.0)
 
 
+@pytest.mark.slow
 def test_a_second_contact_is_not_missed():
     """The wave of the first one comes back from the wall while the rods are apart."""
     a, b, space = struck_on_a_wall()

@@ -131,6 +131,7 @@ def test_si_numbers_are_written_with_a_prefix(value, unit, text):
     assert format_si(value, unit) == text
 
 
+@pytest.mark.slow
 def test_pint_waits_until_a_rare_unit_is_read():
     case = Path(__file__).parents[1] / "data" / "tiny_rods.yaml"
     code = f"import sys; from klack.case import load_case; load_case({str(case)!r}); "

@@ -11,6 +11,8 @@ from klack.case.valve_reader import load_valve_case
 from klack.contact import local_law
 from klack.stages import collected_warnings
 
+pytestmark = pytest.mark.slow
+
 CASES = Path(__file__).parents[1] / "data" / "case"
 
 

@@ -54,6 +54,7 @@ def test_a_worker_that_dies_at_any_time_is_an_error(seconds: float, tmp_path: Pa
     assert done.stdout == "a worker process died by signal 9\n" * 2
 
 
+@pytest.mark.slow
 def test_every_item_is_computed_once_by_no_more_processes_than_items():
     with WorkerPool(2, None) as pool:
         assert dict(pool.completed(neg, [1])) == {1: -1}
@@ -64,6 +65,7 @@ def test_every_item_is_computed_once_by_no_more_processes_than_items():
     assert sorted(found) == [(i, -i) for i in range(20)]
 
 
+@pytest.mark.slow
 def test_an_error_of_the_work_names_its_place_and_answers_do_not_mix():
     """Those that were still on their way belong to what was given up."""
     with WorkerPool(2, None) as pool:

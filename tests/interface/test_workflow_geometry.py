@@ -107,6 +107,7 @@ def test_step_files_give_the_impact_of_the_profiles(tmp_path: Path):
     assert from_cad.restitution == pytest.approx(expected.restitution, abs=0.01)
 
 
+@pytest.mark.slow
 def test_welded_armature_has_the_mass_of_both_materials():
     case = read_case(WELDED, Path("welded.yaml"))
     profile = case.bodies["needle"].geometry.profile

@@ -33,6 +33,8 @@ from klack.case.placement import Placement
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.progress import silent
 
+pytestmark = pytest.mark.slow
+
 CASE = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")
 
 
@@ -130,7 +132,6 @@ def test_friction_in_the_guide_brakes(model, draws):
     assert energy.guide > 1e-3 * energy.initial
 
 
-@pytest.mark.slow
 def test_two_processes_give_the_same_numbers(model, draws, alone):
     log = shot_log(None, "")
     run_shots_on(2, model.setup, draws, log, silent)

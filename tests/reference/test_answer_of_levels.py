@@ -51,6 +51,7 @@ class Terminal:
         self.shown.append(line)
 
 
+@pytest.mark.slow
 def test_the_answer_comes_before_what_only_adds_to_it():
     terminal = Terminal()
     transfer = TransferSweep.model_validate({"from": "2 kHz", "to": "20 kHz", "points": 3})
@@ -75,6 +76,7 @@ def test_an_answer_so_far_is_told_only_where_more_is_to_come(levels):
     assert not any(line.startswith("Answer") for line in terminal.shown)
 
 
+@pytest.mark.slow
 def test_bodies_side_by_side_are_those_one_after_the_other():
     """But for round-off: their factors have other threads."""
     case = load_case(CASE)
@@ -84,6 +86,7 @@ def test_bodies_side_by_side_are_those_one_after_the_other():
         assert values[0] == pytest.approx(values[1], rel=1e-9), name
 
 
+@pytest.mark.slow
 def test_damping_is_that_of_the_case_at_every_level():
     """The deviation is that of the reduced model: the full order ignored damping."""
     study = both()
@@ -96,6 +99,7 @@ def test_damping_is_that_of_the_case_at_every_level():
     assert abs(full.energy_residual) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_full_order_in_coarse_steps_is_no_reference():
     study = run_impact(changed(full_step=1e-6), levels=("reduced", "full"), certify=False)
     assert study.reference == "reduced"
@@ -108,6 +112,7 @@ def test_a_full_order_in_coarse_steps_is_no_reference():
     assert data["levels"]["full"]["doubts"]
 
 
+@pytest.mark.slow
 def test_the_run_behind_the_estimate_is_the_answer_where_it_is_better():
     """A law far too soft; the interface level needs no law."""
     soft = with_contact(local_law=LinearLocalLaw(kind="linear", stiffness=1.2e7))
@@ -131,6 +136,7 @@ def test_without_disagreement_the_answer_stays_the_level_asked_for():
     assert both().warnings == ()
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_in_contact_has_no_estimate():
     study = run_impact(changed(duration=4e-6), levels=("reduced",))
     assert study.estimates == {}
@@ -156,6 +162,7 @@ def test_a_comparison_that_fails_is_a_note(error):
     assert for_comparison("a number", lambda: 3.0) == 3.0
 
 
+@pytest.mark.slow
 def test_what_is_only_for_comparison_never_stops_a_run(monkeypatch):
     def refuse(*args: object, **how: object) -> None:
         raise InputError("contact submodel: size", got="a zone of no node", expected="-", hint="-")
@@ -180,6 +187,7 @@ def lifted(distance: float) -> Case:
     return read_case(text.replace(", gap: 0 um", ""), CASE)
 
 
+@pytest.mark.slow
 def test_a_gap_that_is_only_drawn_is_flown_at_every_level():
     """0.5 um at 0.5 m/s take 1 us."""
     study: ImpactStudy = run_impact(lifted(0.0005), levels=("reduced", "interface"), certify=False)
@@ -188,6 +196,7 @@ def test_a_gap_that_is_only_drawn_is_flown_at_every_level():
     assert study.gap == pytest.approx(0.5e-6, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_closing_spring_acts_at_every_level():
     """The speed at first touch follows from the work on the way; the full order left it out."""
     gap, stiffness, preload = 0.5e-6, 2e6, 2.0

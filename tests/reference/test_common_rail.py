@@ -130,6 +130,7 @@ def test_turbulent_friction_changes_the_injected_masses_as_little_as_the_page_sa
     assert (change / masses).max() < 1e-2 * share
 
 
+@pytest.mark.slow
 def test_at_rest_the_relief_valve_passes_what_the_pump_delivers(tmp_path, monkeypatch):
     """Behind closed injectors nothing flows, which is no reason to find no operating point."""
     monkeypatch.chdir(tmp_path)

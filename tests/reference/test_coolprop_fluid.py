@@ -11,6 +11,7 @@ from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.liquid import ATMOSPHERE
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("celsius", [0.0, 40.0, 140.0])
 @pytest.mark.parametrize(
     ("fluid", "top"), [("n-Dodecane", 2000e5), ("n-Heptane", 1000e5), ("Water", 2500e5)]

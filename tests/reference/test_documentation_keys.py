@@ -29,6 +29,7 @@ def load(name: str):
 CASE_KEYS = load("case_keys")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(CASE_KEYS.PAGES))
 def test_the_page_is_fresh(name):
     title, about, schema = CASE_KEYS.PAGES[name]

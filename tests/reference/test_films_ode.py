@@ -9,6 +9,8 @@ from klack.verification.film_reference import film_by_ode
 from klack.verification.interface_motion import interface_motion
 from klack.verification.one_dimension import steel_rod
 
+pytestmark = pytest.mark.slow
+
 FILM = FilmRow(cubic=5e-17, linear=0.0, cut_off=1e-8, suction=1e9)
 SHEARED = FilmRow(cubic=5e-17, linear=2e-11, cut_off=1e-8, suction=1e9)
 

@@ -16,7 +16,7 @@ from klack.simulation.bodies import rigid_mass_body, rod_body
 from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = needs_compiler
+pytestmark = [pytest.mark.slow, needs_compiler]
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 STEP = 1e-9  # [s]

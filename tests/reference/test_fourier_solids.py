@@ -61,6 +61,7 @@ def cylindrical(points: np.ndarray) -> np.ndarray:
     return np.column_stack([np.hypot(x, y), z, np.arctan2(y, x)])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held", [False, True])
 def test_frequencies_are_the_double_ones_of_the_solid(held):
     """The solid is the stiffer one by its mesh: 2e-4 to 4e-4 with 16 layers, less with more."""
@@ -71,6 +72,7 @@ def test_frequencies_are_the_double_ones_of_the_solid(held):
         assert 0 < pair[0] / frequency - 1 < 5e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held", [False, True])
 def test_fields_span_the_same_two_shapes(held):
     """Both motions of a mode, put into space, are orthonormal in the mass of the solid."""
@@ -122,6 +124,7 @@ def test_traces_on_a_ring_are_those_of_the_solid():
         np.testing.assert_allclose(amounts.T @ amounts, np.eye(2), atol=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("held", [False, True])
 def test_static_answer_is_that_of_the_solid(held):
     """The side is pushed along x; the free peg answers with inertia relief.

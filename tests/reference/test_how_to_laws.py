@@ -14,6 +14,8 @@ from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
 from klack.contact.restitution import ImpactMeasures
 
+pytestmark = pytest.mark.slow
+
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 SHOWN = re.compile(r"```yaml\n(.*?)```", re.DOTALL)
 
@@ -78,7 +80,6 @@ def test_damping_lowers_the_restitution_as_the_page_says(tmp_path):
     assert found.restitution == pytest.approx(written, abs=2e-4)  # versions of the mesher
 
 
-@pytest.mark.slow
 def test_rough_rods_give_the_forces_that_the_page_says(tmp_path):
     page = "flat-faces.md"
     yaml = YAML(typ="safe")

@@ -84,6 +84,7 @@ def test_the_table_is_that_of_the_run():
     assert rail.min() < 0.8 * rail[0]  # why the later ones open faster
 
 
+@pytest.mark.slow
 def test_the_points_of_the_page():
     table = klack.run_many(
         FOUR,

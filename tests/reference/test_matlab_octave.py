@@ -152,6 +152,7 @@ printf('%.12g ', run.peak_force, max(run.film_force), run.output(end, 1:2), run.
 """
 
 
+@pytest.mark.slow
 def test_pair_without_film_runs_as_here(octave, tmp_path, rod_impact):
     impact = rod_impact(series=4e-10)
     write_matlab([impact.pair], tmp_path)
@@ -165,6 +166,7 @@ def test_pair_without_film_runs_as_here(octave, tmp_path, rod_impact):
     assert lift == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("series", [0.0, 4e-10])
 def test_pair_with_film_runs_as_here(octave, tmp_path, rod_impact, stepped, series):
     impact = rod_impact(series=series, film=FILM)

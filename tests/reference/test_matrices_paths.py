@@ -60,6 +60,7 @@ def frequencies_of(files: MatrixFiles, body: ElasticBody, numbers: np.ndarray) -
     return eigenmodes(given, count=20).frequency
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("form", ["Matrix Market, symmetric", *ROUNDED])
 def test_a_form_gives_the_same_frequencies(form, body, frequencies, tmp_path):
     """Every form is a check of ``klack verify``, group exchange."""

@@ -67,6 +67,7 @@ def four_point_mass(mesh: Mesh, density: float) -> csr_array:
     return csr_array(parts[0] + parts[1] + parts[2])
 
 
+@pytest.mark.slow
 @needs_calculix
 @pytest.mark.parametrize("held", [False, True])
 def test_matrices_of_calculix_give_its_frequencies(held, tmp_path):

@@ -70,6 +70,7 @@ def test_pair_without_film(rod_impact, law, series):
     assert found["m.lift"][-1] == pytest.approx(lift, rel=2e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("series", [0.0, 4e-10])
 @pytest.mark.parametrize("solver", ["rk-like", "bdf"])
 def test_pair_with_film(rod_impact, stepped, series, solver):
@@ -85,6 +86,7 @@ def test_pair_with_film(rod_impact, stepped, series, solver):
     assert found["m.lift"][-1] == pytest.approx(lift, rel=5e-5)
 
 
+@pytest.mark.slow
 def test_shipped_valve(stepped, tmp_path):
     pair = case_models(load_any_case(find_case("demo-valve-axisymmetric"))).pair
     (path,) = write_modelica([pair], tmp_path)

@@ -11,6 +11,8 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 STEPS = np.array([80e-9, 40e-9, 20e-9, 10e-9, 5e-9])
 
@@ -31,7 +33,6 @@ def compared(request, model):
     return wet, reference, [model.by_klack(rows, step=float(step))[0] for step in STEPS]
 
 
-@pytest.mark.slow
 def test_reference_does_not_depend_on_its_tolerance(model):
     loose, tight = (model.by_cvode(wet=True, rtol=rtol) for rtol in (1e-10, 1e-11))
 

@@ -12,6 +12,8 @@ from klack.analyses.impact.run import run_impact
 from klack.case import load_case
 from klack.verification.ring_bodies import NeedleOnRing, solid_over_ring_compliance
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def pair():
@@ -49,7 +51,6 @@ def coarse_case(folder, model, friction=0.0, eccentricity="0.5 um", tilt="0.02 d
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.2])
-@pytest.mark.slow
 def test_an_off_axis_impact_is_that_of_the_swept_solid(tmp_path, friction):
     """The solid tends to the rings with its layers.
 

@@ -91,6 +91,7 @@ def test_doubling_of_loudness_is_ten_phon():
     assert [t.level for t in tones] == pytest.approx([50.0, 70.0], abs=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["click", "ten clicks", "modulated noise"])
 def test_loudness_is_that_of_mosqito(name):
     """Silence at the end keeps its wrap-around (see below) out; the rest agrees to rounding."""

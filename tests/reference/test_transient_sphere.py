@@ -7,6 +7,8 @@ import pytest
 
 from klack.verification.impacts import STEEL, drop_sphere, zener_parameter
 
+pytestmark = pytest.mark.slow
+
 SPEED = 0.5
 ZENER = Path(__file__).parents[1] / "data" / "zener_lambda.csv"
 

@@ -102,6 +102,7 @@ def test_ranks_of_a_quantile_are_the_narrowest_that_binomials_allow(probability,
     assert found.coverage >= 0.9
 
 
+@pytest.mark.slow
 def test_quantiles_are_covered_as_often_as_stated():
     rng = np.random.default_rng(8)
     for probability, truth in ((0.5, np.log(2.0)), (0.9, np.log(10.0))):

@@ -80,6 +80,7 @@ def base_powers_of(found: Expression) -> tuple:
     return tuple(powers.get(base, 0) for base in ("m", "kg", "s"))
 
 
+@pytest.mark.slow
 def test_thousands_of_valid_expressions_have_their_exact_value_and_dimension():
     rng = random.Random(7)
     seen = 0

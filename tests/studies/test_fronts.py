@@ -31,6 +31,7 @@ def test_front_is_that_of_all_pairs(seed, count, columns, levels):
     assert find_front(points).points.tolist() == front_by_pairs(points)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("columns", [2, 3, 4, 6])
 @pytest.mark.parametrize("levels", [3, 30, None])
 def test_front_found_by_division_is_that_of_all_pairs(columns, levels):
@@ -41,6 +42,7 @@ def test_front_found_by_division_is_that_of_all_pairs(columns, levels):
     assert np.array_equal(find_front(points).points, front_by_blocks(points))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("column", [1, 2])
 def test_two_values_in_a_column_divide_once(column):
     points = np.random.default_rng(column).normal(size=(3000, 5))
@@ -58,6 +60,7 @@ def front_by_blocks(points):
     return np.flatnonzero(~less)
 
 
+@pytest.mark.slow
 def test_points_on_a_sphere_are_all_on_the_front():
     points = np.abs(np.random.default_rng(1).normal(size=(20_000, 4)))
     points = 2.0 - points / np.linalg.norm(points, axis=1)[:, None]

@@ -108,6 +108,7 @@ def test_effects_of_both_signs_cancel_in_mu_and_not_in_mu_star():
     assert found.scatter[0] == pytest.approx(0.25, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_standard_errors_are_the_scatter_of_repeated_screenings():
     def screened(seed):
         points = morris_design(3, 20, seed)

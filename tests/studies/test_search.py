@@ -110,6 +110,7 @@ def test_points_are_those_of_pymoo_run_alone(
     assert np.array_equal(points, alone(settings, values, constraints, algorithm(40)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("parameters", "values", "reference", "generations"),
     [(10, zdt1, [1.1, 1.1], 150), (2, bnh, [140.0, 50.0], 60)],
@@ -128,6 +129,7 @@ def test_fronts_have_the_hypervolume_of_pymoo_run_alone(parameters, values, refe
         assert volumes[0] == pytest.approx(1.1**2 - 1.0 / 3.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_four_objectives_have_the_hypervolume_of_pymoo_run_alone():
     settings = SearchSettings(7, 4, population=56, generations=60, seed=1)
     _, goals, _ = run(settings, lambda x: dtlz2(x, 4))

@@ -109,6 +109,7 @@ def test_a_polynomial_is_reproduced_exactly():
     assert effect == pytest.approx(3.0 + 2.0 * np.sqrt(3.0) * np.array([-1.0, 0.5]), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LONG)
 def test_indices_of_ishigami_are_within_the_stated_error(kind):
     found = fitted(kind, ishigami, 3, COUNTS[kind])
@@ -150,6 +151,7 @@ def test_residuals_are_those_of_refits_without_the_point(fit):
     assert own.residuals(y, chosen) == pytest.approx(np.array(refits), rel=1e-5, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fit", [ChaosFit, ProcessFit])
 def test_stated_residuals_have_not_seen_the_point(fit):
     """A value that changes moves its own residual by as much, and no choice made for it."""
@@ -171,6 +173,7 @@ def test_fresh_points_are_predicted_as_well_as_stated(kind, function, parameters
     assert 0.1 < np.sqrt(np.mean(apart**2)) / found.error < 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_noise_is_not_explained(kind):
     """The closed form with terms selected once claims 0.5 and more of it."""
@@ -192,6 +195,7 @@ def test_one_parameter(kind):
     assert found.total.value == pytest.approx(1.0, abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_fifteen_parameters(kind):
     """Truth: shares of a sum, 1 / k^2 over their sum."""
@@ -203,6 +207,7 @@ def test_fifteen_parameters(kind):
     assert found.total.value == pytest.approx(exact, abs=0.01)
 
 
+@pytest.mark.slow
 def test_analytic_parts_of_a_process_are_those_of_its_values():
     """Truth: Sobol's estimators over many values of the same surrogate."""
     found = fitted("gaussian-process", smooth, 3, 64)
@@ -236,6 +241,7 @@ def test_a_process_is_that_of_scikit_learn():
     assert own == pytest.approx(other.predict(at), rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_failed_and_repeated_points_are_left_out_and_counted(kind):
     u = sobol_sequence(40, 2, 1)
