@@ -1,4 +1,4 @@
-"""Truth: peaks of first impacts in steps eight times as short (convergence), half a sine (exact).
+"""Truth: first impacts in shorter steps, extrapolated or not (convergence), half a sine (exact).
 
 What the steps miss of a peak is estimated by ``klack.simulation.impact_doubts``; it is held against
 the same stroke in much shorter steps.
@@ -9,12 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from klack.errors import AccuracyWarning
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.surging_spring import SurgingSpring
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import FilmRow, Rows
@@ -182,3 +184,53 @@ def test_a_stop_that_was_swung_on_is_told_with_the_shift_of_its_first_impact():
 
 def test_a_stop_that_damps_the_swing_is_not():
     assert not stroke(loaded(0.5))[1]
+
+
+def first_impacts(of: Rows, duration: float, **steps: float) -> dict[str, NDArray[np.float64]]:
+    """Time [us], approach speed [m/s] and peak [N] of the first impact on each stop."""
+    result = simulate_network(of, duration=duration, **steps)
+    found: dict[str, NDArray[np.float64]] = {}
+    for event in result.events:
+        measures = np.array([event.time * 1e6, event.approach_speed, event.peak_force])
+        found.setdefault(event.stop, measures)
+    return found
+
+
+def extrapolated(of: Rows, duration: float) -> dict[str, NDArray[np.float64]]:
+    """The same in fine steps of everything together, from three of their sizes.
+
+    The error falls with the step; what the last halving changes is more than what is left.
+    """
+    halved = [first_impacts(of, duration, coarse=1, step=step) for step in (10e-9, 5e-9, 2.5e-9)]
+    truth = {}
+    for stop, finest in halved[2].items():
+        coarsest, middle = halved[0][stop], halved[1][stop]
+        truth[stop] = 2.0 * finest - middle
+        doubt = np.abs(truth[stop] - (2.0 * middle - coarsest))
+        assert doubt[0] < 0.01
+        assert np.all(doubt[1:] < 1e-4 * truth[stop][1:])
+    return truth
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("needle", "modes"), [(2e-3, 6), (1e-3, 6), (2e-3, 12)])
+def test_first_impacts_on_a_spring_whose_coils_surge_do_not_depend_on_the_step(needle, modes):
+    """Its coils ring through the whole stroke; a phase that is off shows at the seat."""
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=needle, points=("tip",)),
+        "spring": SurgingSpring(stiffness=2e4, preload=5.0, mass=0.6e-3, modes=modes, damping=0.01),
+        "seat": EndStop(gap=0.0, law={"kind": "linear", "stiffness": 2e8}),
+        "stop": EndStop(gap=100e-6, law={"kind": "linear", "stiffness": 5e8}, restitution=0.6),
+        "magnet": ForceOverTime(time=(10e-6, 40e-6, 0.5e-3, 0.55e-3), force=(0.0, 60.0, 60.0, 0.0)),
+    }
+    nodes = [
+        ["needle.tip", "spring.end", "seat.upper", "stop.lower", "magnet.end"],
+        ["seat.lower", "stop.upper", "ground"],
+    ]
+    of = Network(parts, nodes).rows()
+    truth, found = extrapolated(of, 1e-3), first_impacts(of, 1e-3)
+
+    for stop, (time, speed, peak) in truth.items():
+        assert found[stop][0] == pytest.approx(time, abs=0.05)
+        assert found[stop][1] == pytest.approx(speed, rel=5e-4)
+        assert found[stop][2] == pytest.approx(peak, rel=5e-4)

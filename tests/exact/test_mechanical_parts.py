@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import yaml
 from draws import each
+from scipy.linalg import expm
 
 from klack.analyses.stroke.run import run_stroke
 from klack.case.valve_reader import load_valve_case
@@ -128,14 +129,32 @@ def test_a_spring_without_motion_pushes_as_one_without_mass():
     assert place == pytest.approx(3.0 / 3e4, rel=1e-9)
 
 
-def test_no_step_is_longer_than_a_twentieth_of_a_surge_period():
-    spring = SurgingSpring(stiffness=1e6, preload=0.0, mass=0.2e-3, modes=10)
-    parts = {"mass": RigidMass(mass=3e-3), "spring": spring}
-    run = simulate_network(
-        Network(parts, [["mass.body", "spring.end"]]).rows(), duration=1e-5, start="free"
-    )
+@pytest.mark.parametrize("periods", [1e-4, 0.05, 0.7, 3.3, 200.0], ids=lambda n: f"{n} periods")
+@pytest.mark.parametrize("damping", [0.0, 0.01, 0.6])
+def test_coils_swing_exactly_between_ends_that_move_evenly(periods, damping):
+    """Truth: the matrix exponential of the oscillators; the mean force from their momentum."""
+    spring = SurgingSpring(stiffness=2e4, preload=5.0, mass=2e-3, modes=3, damping=damping)
+    parts = {"a": RigidMass(mass=1.0), "b": RigidMass(mass=1.0), "spring": spring}
+    row = Network(parts, [["a.body", "spring.end"], ["b.body", "spring.base"]]).rows().elements[0]
+    h, rng = periods / spring.frequencies()[-1], np.random.default_rng(3)
+    state = rng.uniform(-1e-4, 1e-4, len(row.state)) * np.where(np.arange(10) % 2, 1e4, 1.0)
+    end0, end1, base0, base1 = 3e-5, 8e-5, -2e-5, 1e-5
+    inputs = [0.0, h, end0, end1, base0, base1]
 
-    assert run.sizes.coarse * run.sizes.step <= 1.0 / (20.0 * spring.frequencies()[-1])
+    _, out = evaluate(row.step, row.parameters, state, inputs, 2 + len(state) + 2)
+
+    after, forces = [], np.array([-1.0, 1.0]) * (5.0 + 2e4 * (5.5e-5 + 0.5e-5))
+    for (k, c, m, sign), x, v in zip(spring.oscillators(), state[::2], state[1::2], strict=True):
+        s0, rate = end0 + sign * base0, (end1 - end0 + sign * (base1 - base0)) / h
+        # of x, v, the place and the speed of what they hang on
+        law = np.array([[0, 1, 0, 0], [-k / m, -c / m, k / m, c / m], [0, 0, 0, 1], [0, 0, 0, 0]])
+        x1, v1, _, _ = expm(law * h) @ [x, v, s0, rate]
+        after += [x1, v1]
+        forces -= np.array([1.0, sign]) * m * (v1 - v) / h
+    scale = np.where(np.arange(10) % 2, 1e5 * 1e-4, 1e-4)
+    # the exponential of a long step loses a few digits itself
+    assert np.abs((out[2:12] - after) / scale).max() < 1e-13 * max(10.0, 30.0 * periods)
+    assert out[:2] == pytest.approx(forces, rel=1e-10)
 
 
 @pytest.mark.parametrize("x", [0.0, 1e-9, 0.05, 0.0999, 0.1001, 3.0, 60.0, 1e6])

@@ -1,7 +1,7 @@
 """Coil spring with mass: waves run through its coils."""
 
 from collections.abc import Mapping
-from math import pi, sqrt
+from math import cos, expm1, pi, sin, sqrt
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -17,12 +17,11 @@ from klack.units import Force, Mass, Ratio, Stiffness
 __all__ = ["SurgingSpring"]
 
 _MOST_MODES = 40
-_STEPS_OF_PERIOD = 20.0  # of the highest mode: its phase error in a step is 0.8 %
 
 
 @step_function
 def surging_spring_step(par: Any, state: Any, inp: Any, out: Any) -> int:
-    """Spring between two ports with oscillators that both ports carry; implicit midpoint rule.
+    """Spring between two ports with oscillators that both carry, exact where these move evenly.
 
     par: stiffness, preload, oscillators n, then stiffness, damping, mass and sign of each.  State:
     displacement and velocity of each.
@@ -40,17 +39,21 @@ def surging_spring_step(par: Any, state: Any, inp: Any, out: Any) -> int:
         way, after = 0.0, v
         pull = k * (0.5 * (s0 + s1) - x)  # as it is for a step of no length
         if h > 0.0:
-            # m (v1 - v)/h = k (s - x) + c (s' - x') with means over the step, x1 - x = h (v + v1)/2
-            rate = (s1 - s0) / h
-            drive = k * (0.5 * (s0 + s1) - x - 0.5 * h * v) + c * (rate - v)
-            change = h * drive / (m + 0.5 * h * c + 0.25 * h * h * k)
+            # z = s - x swings freely while s moves evenly: z'' + 2 g z' + w^2 z = 0
+            rate, z, w2, g = (s1 - s0) / h, s0 - x, k / m, 0.5 * c / m
+            wd, lost = sqrt(w2 - g * g), -expm1(-g * h)
+            half = sin(0.5 * wd * h)
+            turn = 2.0 * (1.0 - lost) * half * cos(0.5 * wd * h) / wd
+            lost += 2.0 * (1.0 - lost) * half * half  # 1 less exp(-g h) cos(wd h)
+            change = (lost + g * turn) * (rate - v) + w2 * turn * z
             after = v + change
-            way = h * (v + 0.5 * change)
-            slip = (s1 - s0 - way) / h
-            pull = k * (0.5 * (s0 + s1) - x - 0.5 * way) + c * slip
-            loss += c * slip * slip * h
+            way = s1 - s0 + (lost - g * turn) * z - turn * (rate - v)
+            pull = m * change / h
         stretch = s1 - x - way
         store += 0.5 * k * stretch * stretch + 0.5 * m * after * after
+        if h > 0.0 and c > 0.0:
+            loss += pull * (s1 - s0) - 0.5 * m * (after * after - v * v)
+            loss -= 0.5 * k * (stretch * stretch - (s0 - x) * (s0 - x))
         on_end -= pull
         on_base -= sign * pull
         out[2 + 2 * i] = x + way
@@ -82,9 +85,8 @@ class SurgingSpring(Component):
     right up to the fourth power of the frequency: the whole mass is there, and a third of it at an
     end whose other end is held.
 
-    Steps follow the implicit midpoint rule, which keeps the energy at any step; no step is longer
-    than a twentieth of the period of the highest mode.  ``damping`` is a share of critical damping,
-    of each mode alike.
+    A step of any length is exact for ends that move evenly in it: :math:`s_i - x_i` then swings
+    freely.  ``damping`` is a share of critical damping, of each mode alike.
 
     Limits: linear, no contact between coils (coil bind) nor of the coils at their seats; the twist
     of the wire is in the axial stiffness.
@@ -154,5 +156,4 @@ class SurgingSpring(Component):
                 for i in range(len(table))
                 for k, (word, unit) in enumerate((("", "m"), (" velocity", "m/s")))
             },
-            longest=1.0 / (_STEPS_OF_PERIOD * float(self.frequencies()[-1])),
         )

@@ -144,9 +144,9 @@ class ElementRow:
     element has at the start once its ports rest at given displacements [m]; without it the states
     at the start are ``state`` wherever the ports are.  ``at_steady`` does so for an operating
     point, where they differ.  ``interval`` [s] is that of its exchange with something outside, in
-    whole steps; no step is longer than it, nor than ``longest`` [s].  ``state_names`` are name and
-    unit of states that no channel records, by index; ``component.name`` in a row that stands for
-    several.  ``inflows`` are inputs of its linear law.
+    whole steps; no step is longer than it.  ``state_names`` are name and unit of states that no
+    channel records, by index; ``component.name`` in a row that stands for several.  ``inflows``
+    are inputs of its linear law.
     """
 
     component: str
@@ -162,7 +162,6 @@ class ElementRow:
     at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     at_steady: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None
     interval: float | None = None
-    longest: float | None = None
     state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     inflows: tuple[StateInput, ...] = ()
 
@@ -576,7 +575,6 @@ class Rows:
         label: str = "",
         at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         interval: float | None = None,
-        longest: float | None = None,
         state_names: Mapping[int, tuple[str, str]] | None = None,
     ) -> None:
         """Add something that pushes ports; its forces are recorded by component and port."""
@@ -594,7 +592,6 @@ class Rows:
                 failures=failures or {},
                 at_rest=at_rest,
                 interval=interval,
-                longest=longest,
                 state_names=state_names or {},
             )
         )

@@ -50,9 +50,9 @@ def step_sizes(
 ) -> StepSizes:
     """Choose the steps for a network.
 
-    Macro steps are as long as the accuracy has them, but no longer than any segment of a line, nor
-    than what the rows say of themselves; and a whole number of them makes the exchange interval of
-    a row that has one, if there is such a number.
+    Macro steps are as long as the accuracy has them, but no longer than any segment of a line; and
+    a whole number of them makes the exchange interval of a row that has one, if there is such a
+    number.
 
     Parameters
     ----------
@@ -94,8 +94,7 @@ def _chosen(rows: Rows, macro: float, h: float) -> int:
     longest = min([longest, *(wave.crossing for wave in rows.waves)])
     intervals = [row.interval for row in rows.elements if row.interval is not None]
     intervals += [row.period for row in rows.controllers]
-    shortest = [row.longest for row in rows.elements if row.longest is not None]
-    longest = min([longest, *intervals, *shortest])
+    longest = min([longest, *intervals])
     most = min(int(longest / h * (1.0 + _WHOLE)), _MOST_COARSE)
     if most < 2:
         return 1

@@ -250,14 +250,14 @@ def _surging() -> list[Check]:
             "third surge mode between fixed ends, frequency [Hz]",
             omega * sqrt(1.0 - 0.02**2) / (2.0 * pi),
             ringing[0],
-            1e-5,
+            1e-8,
             ROD,
         ),
         _check(
             "third surge mode, decay per radian [-]",
             0.02 / sqrt(1.0 - 0.02**2),
             ringing[1],
-            1e-4,
+            2e-5,
             "damping ratio, closed form",
         ),
     ]
