@@ -21,6 +21,7 @@ from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import FilmRow, Rows
 from klack.simulation.impact_doubts import impact_doubts, late_by_swinging, missing_peak
+from klack.simulation.network_arrays import PARTS
 from klack.simulation.network_result import InterfaceRecord, NetworkResult
 from klack.simulation.network_run import simulate_network
 
@@ -210,6 +211,43 @@ def extrapolated(of: Rows, duration: float) -> dict[str, NDArray[np.float64]]:
         assert doubt[0] < 0.01
         assert np.all(doubt[1:] < 1e-4 * truth[stop][1:])
     return truth
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::klack.errors.AccuracyWarning")
+def test_a_touch_is_cut_where_everything_goes_in_fine_steps():
+    """Behind a film that is hardest at the touch; force and time extrapolated over three steps."""
+    film = FilmRow(cubic=1e-16, linear=0.0, cut_off=0.5e-6, suction=1e9)
+    parts: dict[str, Component] = {
+        "needle": RigidMass(mass=2e-4, points=("tip",), speed=-2.0),
+        "seat": EndStop(
+            gap=40.37e-6, law={"kind": "linear", "stiffness": 1.5e9}, restitution=0.665
+        ),
+    }
+    of = Network(parts, [["needle.tip", "seat.upper"], ["seat.lower", "ground"]]).rows()
+    of = replace(of, interfaces=[replace(of.interfaces[0], film=film)])
+
+    def touch(step: float) -> NDArray[np.float64]:
+        """Start [ns] of the closed contact and the last force [N] before it, then both at gap 0."""
+        run = simulate_network(of, duration=25e-6, coarse=1, step=step, start="free")
+        assert run.books.relative_residual < 1e-12
+        record = run.interfaces["seat"]
+        k = int(np.flatnonzero(record.contact_force > 0.0)[0])
+        before, begin = record.film_force[:k], record.time[k]
+        closes = begin + record.step[k] * record.gap[k - 1] / -np.diff(record.gap)[k - 1]
+        middle = record.time[k - 2 : k] + 0.5 * record.step[k - 2 : k]
+        rise = np.diff(before)[-1] / np.diff(middle)[0]
+        there = before[-1] + rise * (closes - middle[-1])
+        return np.array([begin * 1e9, before[-1], closes * 1e9, there])
+
+    halved = [touch(step)[2:] for step in (5e-9, 2.5e-9, 1.25e-9)]
+    truth = 2.0 * halved[2] - halved[1]
+    assert np.all(np.abs(truth - 2.0 * halved[1] + halved[0]) < [0.1, 0.5])
+    begin, force, _, _ = touch(20e-9)
+
+    part = 20.0 / PARTS  # [ns]; the mean force of one is half of its rise below that at its end
+    assert begin == pytest.approx(truth[0], abs=part)
+    assert force == pytest.approx(truth[1], abs=1.7 * 1.5 * part)  # it rises by 1.7 N a ns
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ impact by the phase of that swing.  Macro steps of length ``H`` follow a period 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import exp, floor, isfinite, log, log10, pi, sqrt
 
 import numpy as np
@@ -136,6 +137,7 @@ def missing_peak(
     step : float [s]
         Length of the step with the peak.
     """
+    record = _behind_nothing(record)
     middle = record.time + 0.5 * record.step
     k = int(np.searchsorted(middle, peak_time - 1e-3 * float(np.min(record.step, initial=1.0))))
     if not 0 < k < len(middle) - 1:
@@ -194,6 +196,19 @@ def late_by_swinging(
     k = int(np.argmax(each))
     late = float(each.sum())
     return late, round(0.5 * late / float(each[k] or 1.0)), float(periods[k])
+
+
+def _behind_nothing(record: InterfaceRecord) -> InterfaceRecord:
+    """The record behind a step without force, where a peak may be in its first one."""
+    first, none = record.step[:1], np.zeros(len(record.step[:1]))
+    return replace(
+        record,
+        time=np.concatenate([record.time[:1] - first, record.time]),
+        step=np.concatenate([first, record.step]),
+        contact_force=np.concatenate([none, record.contact_force]),
+        film_force=np.concatenate([none, record.film_force]),
+        gap=np.concatenate([record.gap[:1], record.gap]),
+    )
 
 
 def _adjacent(record: InterfaceRecord, k: int) -> bool:

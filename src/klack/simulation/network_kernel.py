@@ -5,7 +5,8 @@ One macro step ``H = M h`` while what elements and fluid do is slow beside it:
 1. **Guess** the forces of elements and fluid, constant over the macro step.
 2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far from
    each other or at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of
-   one where films change fast.  A sub-step in which a contact closes or opens is cut into parts.
+   one where films change fast.  A sub-step, or a fine step, in which a contact closes or opens is
+   cut into parts.
 3. **Answer**: elements, pressures and lines are asked once, for the way that their ports went.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
    are linear, so that adding the response is exact.  Elements, fluid and interfaces see the
@@ -223,6 +224,7 @@ def run_network(
                 smooth = smooth and smooth_films(contacts, near * h, R * h)
                 of_sub = MIDDLE if smooth else FINE
                 parts = near // R if smooth else near
+            whole = parts == 1 and not (of_sub == FINE and may_touch(contacts, h))
             begin = origin + now * h
             step = Step(level, steps, begin, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, begin, steps // parts * h, parts / (steps * h))
@@ -234,7 +236,7 @@ def run_network(
                 contacts, loop.accounts, recording, _interface_sums(loop), loop.peaks
             )
             begin_macro_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
-            if together:
+            if together or not whole:
                 keep_modes(bodies, of_sub)
             straight = level == last_level
             if not straight:
@@ -244,7 +246,7 @@ def run_network(
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
                 waves_incoming(loop.waves, step.H, loop.ends.c, loop.ends.Z)
-            status = _settle(step, sub, parts, flight, loop, first(clock), first(report))
+            status = _settle(step, sub, parts, whole, flight, loop, first(clock), first(report))
             if status > STATUS_DONE:
                 return status
             if status != STATUS_DONE:
@@ -262,7 +264,7 @@ def run_network(
                     smooth = apart = False
                 last_level, last_steps = level, steps  # forces so far are spaced like this now
                 continue
-            _end_step(step, of_sub, parts, loop)
+            _end_step(step, of_sub, whole, loop)
             last_level, last_steps = level, steps
             done += steps
             now += steps
@@ -351,9 +353,18 @@ def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _L
 
 @unfolded
 def _settle(
-    step: Step, sub: Step, parts: int, flight: bool, loop: Any, clock: Any, report: Any
+    step: Step,
+    sub: Step,
+    parts: int,
+    whole: bool,
+    flight: bool,
+    loop: Any,
+    clock: Any,
+    report: Any,
 ) -> int:
     """One step up to what it would change: again and again, until its guess missed nothing.
+
+    ``whole`` where what acts cannot be cut, so that its free motion is asked once.
 
     Returns
     -------
@@ -367,14 +378,14 @@ def _settle(
     share, energy = SETTLED[1 if fine else 0]
     for attempt in range(MOST_REPEATS if fine else MACRO_REPEATS):
         if attempt > 0:
-            take_back_ports(bodies, sub.level, parts > 1)
+            take_back_ports(bodies, sub.level, not whole)
             take_back_interfaces(
                 contacts, loop.accounts, loop.recording, _interface_sums(loop), loop.peaks
             )
             take_back_sliders(loop.sliding, loop.accounts, _slider_sums(loop))
             guess_answer(bodies)
             clock[7] += 1
-        status = _act(sub, parts, flight, fine, attempt == 0 or parts > 1, loop, report)
+        status = _act(sub, parts, whole, flight, fine, attempt == 0, loop, report)
         if status == STATUS_DONE:
             status = push_by_rows(step, bodies, loop.elements, loop.fluid, contacts, report)
         if status != STATUS_DONE:
@@ -398,9 +409,18 @@ def _settle(
 
 @unfolded
 def _act(
-    sub: Step, parts: int, flight: bool, fine: bool, move: bool, loop: Any, report: Any
+    sub: Step,
+    parts: int,
+    whole: bool,
+    flight: bool,
+    fine: bool,
+    first: bool,
+    loop: Any,
+    report: Any,
 ) -> int:
     """Modes, contacts and films over one step, or over all sub-steps of a macro step.
+
+    A step that may meet a touch, a release or a film that begins to cavitate is cut there.
 
     Returns
     -------
@@ -409,6 +429,7 @@ def _act(
         settle in a fine step.
     """
     bodies, contacts, sliding = loop.bodies, loop.contacts, loop.sliding
+    move = first or not whole
     done, cut, kept = 0, 0, False
     all_parts = PARTS * sub.steps
     while done < parts:
@@ -418,7 +439,7 @@ def _act(
             now = Step(CUT, 0, now.t + (all_parts - cut) * H, H, sub.rate * all_parts)
         elif move:
             keep_dissipation(contacts)
-            kept = parts > 1 and (now.level == FINE or may_touch(contacts, now.H))
+            kept = not whole and (now.level == FINE or may_touch(contacts, now.H))
             if kept:
                 keep_for_cut(bodies, now.level)
         G = shift(bodies.G, now.level * PORTS * PORTS)
@@ -434,7 +455,7 @@ def _act(
             return STATUS_FORCES if fine else STATUS_REFUSED
         if flight and not (coarse_step_holds(contacts) and sliders_hold(sliding)):
             return STATUS_MET
-        if parts > 1 and cut == 0 and not contacts_hold(contacts):
+        if not whole and cut == 0 and not contacts_hold(contacts):
             if not kept:
                 return STATUS_MET
             begin_cut(bodies, sub.level)
@@ -465,7 +486,7 @@ def _act(
 
 
 @unfolded
-def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
+def _end_step(step: Step, level: int, whole: bool, loop: Any) -> None:
     """Take over states, masses, waves and accounts; repair the bodies."""
     bodies, elements, fluid = loop.bodies, loop.elements, loop.fluid
     accounts, kind, H = loop.accounts, loop.kind, step.H
@@ -481,7 +502,7 @@ def _end_step(step: Step, level: int, parts: int, loop: Any) -> None:
     end_far_films(loop.contacts, step, accounts, loop.recording, _interface_sums(loop), loop.peaks)
     if step.level != FINE:  # fine steps owe nothing but round-off
         repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
-    catch_up(bodies, level, step.level, parts == 1)
+    catch_up(bodies, level, step.level, whole)
     bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at)
     bodies.at[EXCESS] += end_macro_sliders(loop.sliding, bodies.at)
     end_ports(bodies)
