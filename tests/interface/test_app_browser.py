@@ -184,6 +184,7 @@ def test_text_typed_while_the_server_is_away_comes_back(folder, browser):
     page.wait_for_function("!window.socket.connected")
     area = page.get_by_label("case file, YAML")
     area.fill(area.input_value().replace(speed, "0.36 m/s"))
+    page.goto("about:blank")  # it would load itself anew while the next address is opened
     with Served(folder, "--port", port) as again:
         context.new_page().goto(again.address)  # the token of the new server
         page.goto(f"{again.base}{query}")
