@@ -191,6 +191,19 @@ def test_the_highest_rebound_is_found_and_placed():
     assert highest_rebound(replace(shots, stops={"seat": none}), "seat") is None
 
 
+@pytest.mark.parametrize("known", [0, 1, 4, 5, COUNT])
+def test_a_correlation_of_few_or_equal_values_is_no_number(known):
+    """Truth: Spearman's coefficient of fewer than five values, or of equal ones, says nothing."""
+    shots = variant("dry", 1.0)
+    few = np.where(np.arange(COUNT) < known, shots.stops["seat"].rebound_height, NAN)
+    stops = {"seat": replace(shots.stops["seat"], rebound_height=few, tilt=np.ones(COUNT))}
+    item = {item.key: item for item in scattered(shots)}["seat.rebound_height_m"]
+    found = correlations(replace(shots, stops=stops), replace(item, values=few))
+
+    assert np.isfinite(found["eccentricity"]) == (known >= 5)
+    assert np.isnan(found["tilt"])
+
+
 def test_correlations_follow_the_position_at_touch():
     shots = variant("dry", 1.0)
     items = {item.key: item for item in scattered(shots)}

@@ -113,9 +113,12 @@ def moments(
 
 
 def rank_correlation(one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
-    """Spearman's coefficient over the values present in both samples; 0 where one is constant."""
+    """Spearman's coefficient over the values present in both samples.
+
+    Nan where nothing can be said: of fewer than five of them, and where one sample is constant.
+    """
     known = np.isfinite(one) & np.isfinite(other)
     first, second = scipy.stats.rankdata(one[known]), scipy.stats.rankdata(other[known])
     if known.sum() < _FEWEST or np.ptp(first) == 0 or np.ptp(second) == 0:
-        return 0.0
+        return float("nan")
     return float(np.corrcoef(first, second)[0, 1])

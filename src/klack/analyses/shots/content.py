@@ -86,8 +86,9 @@ def _rule(study: ShotsStudy) -> str:
         shown.label: rank_correlation(shown.of(study.shots), study.shots.rebound_height)
         for shown in _drawn_numbers(study)
     }
-    strongest = max(related, key=lambda label: abs(related[label]))
-    if abs(related[strongest]) > _RELATED:
+    related = {label: value for label, value in related.items() if abs(value) > _RELATED}
+    if related:
+        strongest = max(related, key=lambda label: abs(related[label]))
         grows = "rises" if related[strongest] > 0 else "falls"
         text += (
             f" Of the drawn quantities, the rebound height correlates most with the {strongest}: "

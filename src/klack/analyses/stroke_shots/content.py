@@ -51,7 +51,8 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
             title="What the scatter goes with",
             paragraphs=(
                 "Rank correlation over the strokes: +1 and \N{MINUS SIGN}1 for one that always "
-                "rises or falls with the other, about 0 without any connection. Measures of the "
+                "rises or falls with the other, about 0 without any connection, a dash where fewer "
+                "than five strokes have both values or one of them is constant. Measures of the "
                 "whole stroke are compared with the position at the first touch of "
                 f"'{stops[0]}'.",
             ),

@@ -1,6 +1,7 @@
 """Main numbers of many strokes for scripts and terminals."""
 
 from collections.abc import Iterator
+from math import isfinite
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -99,10 +100,11 @@ class StrokeVariantJson(TypedDict):
         ),
     ]
     correlation: Annotated[
-        dict[str, dict[str, float]],
+        dict[str, dict[str, Real]],
         Field(
             description="By measure: rank correlation with eccentricity and tilt at touch, and "
-            "with the friction in the guide and between the faces where they are drawn."
+            "with the friction in the guide and between the faces where they are drawn; null with "
+            "fewer than five strokes that have both values, or where one of them is constant."
         ),
     ]
     highest: Annotated[
@@ -162,7 +164,10 @@ def _variant(shots: Variant) -> StrokeVariantJson:
             for i in range(shots.strokes.count)
         ],
         "distribution": {item.key: _moments(item) for item in items},
-        "correlation": {item.key: correlations(shots, item) for item in items},
+        "correlation": {
+            item.key: {key: number_or_none(r) for key, r in correlations(shots, item).items()}
+            for item in items
+        },
         "highest": {stop: _highest(shots, stop) for stop in shots.stops},
     }
 
@@ -239,7 +244,7 @@ def correlation_rows(shots: Variant) -> tuple[tuple[str, ...], tuple[tuple[str, 
     }
     heads = ("measure", *(names[key] for key in found[0])) if found else ("measure",)
     rows = tuple(
-        (item.name, *(f"{value:+.2f}" for value in values.values()))
+        (item.name, *(f"{r:+.2f}" if isfinite(r) else "–" for r in values.values()))
         for item, values in zip(items, found, strict=True)
     )
     return heads, rows

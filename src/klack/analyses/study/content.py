@@ -1,5 +1,7 @@
 """Content of a study's report before its layout."""
 
+from math import isfinite, nan
+
 import numpy as np
 
 from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
@@ -51,7 +53,11 @@ def study_content(record: StudyRecord) -> Content:
     labels = short_labels(record)
     varying = [item for item in record.parameters if item.varies]
     related = {
-        item.name: {of.name: rank_correlation(item.values, of.values) for of in varying}
+        item.name: {
+            of.name: found
+            for of in varying
+            if isfinite(found := rank_correlation(item.values, of.values))
+        }
         for item in record.measures
         if record.count >= _FEWEST and record.optimum is None  # a search crowds about its front
     }
@@ -275,7 +281,7 @@ def _related_table(
     if not known or not varying:
         return ()
     rows = tuple(
-        (labels[of.name], *(signed(related[item.name].get(of.name, 0.0), 2) for item in known))
+        (labels[of.name], *(signed(related[item.name].get(of.name, nan), 2) for item in known))
         for of in varying
     )
     heads = ("rank correlation with", *(labels[item.name] for item in known))
