@@ -300,3 +300,17 @@ def test_a_valve_that_does_not_open_says_so(tmp_path, capsys, recwarn, quiet):
 
 def test_a_valve_that_opens_has_no_such_note(run):
     assert not any("never left" in note for note in STROKE.load(run / "out").warnings)
+
+
+@pytest.mark.parametrize(("record", "told"), [("640 ns", True), ("10 us", False), (None, False)])
+def test_records_that_are_further_apart_than_asked_are_told(record, told):
+    text = CASE.read_text("utf-8")
+    duration = "{duration: 200 us" + (f", record: {record}" if record else "")
+    text = re.sub(r"\{duration: [^,}]*", duration, text, count=1)
+    Path("valve.yaml").write_text(text, "utf-8")
+
+    assert main(["stroke", "valve.yaml", "--variant", "dry", "--no-report", "--out", "out"]) == 0
+    study = STROKE.load(Path("out"))
+    time = study.variants["dry"].result.time
+    note = f"records are {1e6 * (time[1] - time[0]):.3g} us apart, where run.record is {record}"
+    assert any(note in warning for warning in study.warnings) == told

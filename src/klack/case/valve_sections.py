@@ -114,7 +114,11 @@ class StrokeRun(Section):
         description="Fine steps in a macro step, taken far from the stops; 1 for none; by default "
         "as many as the accuracy and the parts of the network allow.",
     )
-    record: Time = Field(default=1e-6, gt=0, description="Spacing of the recorded channels.")
+    record: Time = Field(
+        default=1e-6,
+        gt=0,
+        description="Spacing of the recorded channels, in whole steps of the network.",
+    )
     variants: tuple[Variant, ...] = Field(
         default=("wet",),
         min_length=1,

@@ -1,7 +1,7 @@
 """``klack stroke``: one actuation of a whole valve, in the requested variants."""
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from time import perf_counter
@@ -59,6 +59,8 @@ __all__ = [
     "variant_network",
     "variant_of",
 ]
+
+_NEAR = 0.1  # share of what is asked that the spacing of records may be off by without a word
 
 
 @tells_place
@@ -131,7 +133,29 @@ def stroke_notes(
         if not any(note in other for other in warned)  # a warning already
     ]
     at_rest = [rest_note(name, variant.result, seat) for name, variant in variants.items()]
-    return (*controller_notes(case), *warned, *begun, *filter(None, at_rest))
+    return (
+        *controller_notes(case),
+        *warned,
+        *begun,
+        *filter(None, at_rest),
+        *_record_notes(case, variants),
+    )
+
+
+def _record_notes(case: ValveCase, variants: Mapping[str, StrokeVariant]) -> Iterator[str]:
+    """Where records are not as far apart as the case asks: macro steps are not divided."""
+    asked = case.run.record
+    if "record" not in case.run.model_fields_set:
+        return
+    for name, variant in variants.items():
+        spacing = float(variant.result.time[1] - variant.result.time[0])
+        if abs(spacing - asked) > _NEAR * asked:
+            yield (
+                f"'{name}': records are {format_si(spacing, 's')} apart, where run.record is "
+                f"{format_si(asked, 's')}: they hold whole steps of the network. Impacts do not "
+                "depend on it. Try: a whole multiple of what they are, or run.coarse: 1, which "
+                "takes many times as long."
+            )
 
 
 def variant_network(valve: Valve, variant: Variant) -> Network:
