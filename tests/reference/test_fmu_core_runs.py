@@ -1,6 +1,7 @@
 """Co-simulation against klack's own runs of the same bodies: impact kernel, interface, network.
 
-The C core repeats the same steps, so only round-off may differ.
+The C core repeats the same steps, so only round-off may differ; but for those in which a contact
+opens or closes, which the network cuts: there both converge to the same motion.
 """
 
 from dataclasses import replace
@@ -329,11 +330,19 @@ def test_film_repeats_the_interface_step(law, series, film, tmp_path):
     assert differ(own[:, 2], native.gap[20::20]) < ROUND_OFF
 
 
-def test_two_contacts_with_films_follow_the_network(tmp_path):
-    """Up against the stop, then, with the force turned round, down to the seat."""
+def test_two_contacts_with_films_converge_to_the_network(tmp_path):
+    """Truth: convergence with the step.  Up against the stop, then, turned round, to the seat."""
+    apart = [_apart_from_network(tmp_path / f"{share}", STEP / share) for share in (1, 4)]
+
+    assert apart[0] < 1e-4  # of the largest values; 3e-5 was seen
+    assert apart[1] < 0.5 * apart[0]
+
+
+def _apart_from_network(folder, step):
+    folder.mkdir()
     films = (FILM, FilmRow(cubic=9e-17, linear=0.0, cut_off=0.5e-6, suction=3.0))
     system = between_two(TABLE, (0.0, 2e-6), (2e-9, 1e-9))
-    unit = Unit(model_of(system, films=films), tmp_path, force=50.0)
+    unit = Unit(model_of(system, films=films, step=step), folder, force=50.0)
     half, span = 150, 1e-6
     forces = np.repeat([50.0, -50.0], half)
 
@@ -344,20 +353,18 @@ def test_two_contacts_with_films_follow_the_network(tmp_path):
         own[i] = unit.get("velocity", "mean_contact_force_stop_0", "mean_contact_force_stop_1")
 
     with allowed("simulate_network", 1e-6):  # stiff stops: what the forces do not settle, 2e-7
-        native = network_run(system, films, (50.0, -50.0), half * span, span)
-    for column, channel in enumerate(native):
-        assert np.max(np.abs(channel)) > 0.05
-        # the network's forces settle to 1e-12 m only
-        assert differ(own[:, column], channel) < 1e-6
+        native = network_run(system, films, (50.0, -50.0), half * span, span, step)
+    assert np.min(np.max(np.abs(native), axis=1)) > 0.05
+    return max(differ(own[:, column], channel) for column, channel in enumerate(native))
 
 
-def network_run(system, films, forces, half, span):
+def network_run(system, films, forces, half, span, step):
     """Velocity of the needle and both contact forces; the force acts over its mass."""
     rows, state, found = None, None, []
     for force in forces:
         rows = rows_of(system, films, force)
         result = simulate_network(
-            rows, duration=half, step=STEP, coarse=1, record=span, start="free", state=state
+            rows, duration=half, step=step, coarse=1, record=span, start="free", state=state
         )
         state = result.state
         found.append(

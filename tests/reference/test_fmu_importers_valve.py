@@ -38,7 +38,7 @@ def pair(case):
     return case_models(case).pair
 
 
-def native(case):
+def native(case, step):
     """Flexible bodies and end stops of the valve alone, pushed by a constant force."""
     valve = build_valve(case)
     parts = {
@@ -57,7 +57,7 @@ def native(case):
         fluid=valve.network.fluid,
     )
     return simulate_network(
-        network.rows(), duration=DURATION, step=case.run.step, coarse=1, record=1e-6, start="free"
+        network.rows(), duration=DURATION, step=step, coarse=1, record=1e-6, start="free"
     )
 
 
@@ -72,11 +72,15 @@ def by_fmu(path, kind, **more):
     )
 
 
-def test_co_simulation_with_films_is_the_native_network(case, pair, tmp_path):
-    run = native(case)
+@pytest.mark.parametrize("share", [1, 4])
+def test_co_simulation_with_films_is_the_native_network(case, pair, tmp_path, share):
+    """The same steps up to the release, which the network cuts and the FMU takes in one step."""
+    pair = replace(pair, step=pair.step / share)
+    run = native(case, pair.step)
     path = build_fmu(pair, tmp_path / "v.fmu", fmi=2, platforms=("linux64",))
     found = by_fmu(path, "CoSimulation", step_size=1e-6, output_interval=1e-6)
     record = run.interfaces["opening"]
+    leaving = run.time > record.time[record.contact_force.argmax()]
 
     assert record.contact_force.max() > 500.0  # the needle has hit its stop
     # the same steps with other sums of round-off, which an impact enlarges
@@ -84,9 +88,12 @@ def test_co_simulation_with_films_is_the_native_network(case, pair, tmp_path):
         record.contact_force.max(), rel=1e-9
     )
     velocity = run.channels["needle velocity"].values
-    np.testing.assert_allclose(found["velocity"], velocity, rtol=0.0, atol=1e-7)
     gap = run.channels["opening gap"].values
-    np.testing.assert_allclose(found["gap_opening"], gap, rtol=0.0, atol=1e-13)
+    # m/s, m; 6.4e-6 m/s was seen after it, which is a gap in the time that is left
+    for here, speed, way in ((~leaving, 1e-7, 1e-13), (leaving, 1.5e-5 / share, 5e-9 / share)):
+        pairs = (found["velocity"][here], velocity[here]), (found["gap_opening"][here], gap[here])
+        for two, left in zip(pairs, (speed, way), strict=True):
+            np.testing.assert_allclose(*two, rtol=0.0, atol=left)
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
