@@ -48,12 +48,12 @@ def event(rows, body, phase, share=1.0):
     ends = STEP * np.arange(1201)
     force = np.diff([impulse(t) for t in ends]) / STEP
     touches = (ends[:-1] > TOUCH - 0.5 * STEP) & (ends[:-1] < TOUCH + CONTACT - 0.5 * STEP)
-    steps = np.zeros((1200, 5))
+    steps = np.full((1200, 6), np.nan)
     steps[:, 0], steps[:, 1] = ends[:-1], STEP
     steps[:, 2], steps[:, 3] = np.where(touches, force, 0.0), np.where(touches, 0.0, force)
     times = STEP * np.arange(phase, 1201, LOOK)
     speeds = {body: np.array([rate(t, share) for t in times])}
-    finder = ImpactFinder(rows, 0.0)
+    finder = ImpactFinder(rows, 0.0, STEP)
     finder.feed(times, speeds, [steps[steps[:, 0] < times[-1] - 0.5 * STEP]])
     (found,) = finder.events()
     return found

@@ -21,7 +21,7 @@ __all__ = ["ImpactFinder"]
 
 Vector = NDArray[np.float64]
 
-_PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many steps
+_PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer
 _BEND = 0.25  # of what other forces do between two records: more from one to the next is a jump
 
@@ -30,8 +30,8 @@ _STATE = np.dtype(
     [
         (name, np.float64)
         for name in (
-            # the run: its start, the last step with a force and the last record
-            *("run_start", "row_time", "time", "rate"),
+            # the run: its start, the end of the last step with a force, and the last record
+            *("run_start", "row_end", "time", "rate"),
             # impulse of the interface since then; what all other forces did before it
             *("carried", "span", "trend", "bend"),
             # film that may lead into a contact
@@ -63,17 +63,20 @@ class ImpactFinder:
     highest ones while it presses, and within two of these periods while it pulls.  An impact whose
     last contact lasts until the bodies are at rest ends there; the stop is left later.
 
-    Between two records the speed of the gap follows from the impulse of the interface itself, step
-    by step: a film stops a body within less than their spacing.  All other forces change evenly.
+    Steps tell the speed of the gap at which they begin.  Where they do not, it follows between two
+    records from the impulse of the interface itself, step by step: a film stops a body within less
+    than their spacing.  All other forces change evenly.
 
     Parameters
     ----------
     rows : Rows
     start : float [s]
         Of the run; what is closed then was not hit.
+    step : float [s]
+        The shortest that the run is made of, but for parts of one that is cut.
     """
 
-    def __init__(self, rows: Rows, start: float) -> None:
+    def __init__(self, rows: Rows, start: float, step: float) -> None:
         owner = {handle: row for row in rows.bodies for handle in row.ports}
         self._stops = [row.component for row in rows.interfaces]
         self._bodies = [
@@ -90,9 +93,10 @@ class ImpactFinder:
             for row, bodies in zip(rows.interfaces, self._bodies, strict=True)
         ]
         self._state = np.zeros(len(self._stops), dtype=_STATE)
-        for name in ("row_time", "time"):
+        for name in ("row_end", "time"):
             self._state[name] = -np.inf
         self._state["run_start"] = start
+        self._pause = _PAUSE_STEPS * step
         self._found: list[ImpactEvent] = []
 
     @property
@@ -113,15 +117,16 @@ class ImpactFinder:
             After the last time that was fed.
         velocity : mapping of str to array, shape (n,) [m/s]
             Of the centre of mass of each body that moves, at these times, by component.
-        steps : sequence of array, shape (k, 5)
-            Per interface: start, length [s], contact force, film force [N], gap [m] of every step
-            in which it carried force, up to the last of these times.
+        steps : sequence of array, shape (k, 6)
+            Per interface: start, length [s], contact force, film force [N], gap [m], speed of the
+            gap at its start [m/s] of every step in which it carried force, up to the last of these
+            times.  The speed is asked where the contact is open or closes; nan where not known.
         """
         for c, rows in enumerate(steps):
             rate = self._gap_rate(c, time, velocity)
             closings = int(np.count_nonzero(rows[:, 2] > 0.0))
             out = np.empty((min(closings, len(rows) // 2 + 1) + 1, len(_EVENT)))
-            pause = _PAUSE_SHARE * self._rest[c]
+            pause = max(_PAUSE_SHARE * self._rest[c], self._pause)
             count = _feed(
                 *(self._state, c, self._period[c], self._rest[c], pause, self._mobility[c]),
                 *(rows, time, rate, out),
@@ -193,13 +198,15 @@ def _feed(
         while place < times.size and times[place] <= t:
             _record(s, period, mobility, times[place], rates[place])
             place += 1
+        closing = _closing(s, mobility, t, h, contact, film, rows[i, 5])
         if contact > 0.0:
-            _closed_step(s, rest, pause, mobility, t, h, contact + film)
+            _closed_step(s, rest, pause, t, h, contact + film, closing)
         else:
             if s.closed > 0.0:
                 count += _contact_over(s, period, mobility, t, out, count)
-            _open_step(s, period, pause, mobility, t, h, film)
-        s.row_time = t
+            _open_step(s, period, pause, t, h, film, closing)
+            s.carried += film * h
+        s.row_end = t + h
     while place < times.size:
         _record(s, period, mobility, times[place], rates[place])
         place += 1
@@ -240,6 +247,19 @@ def _rate_at(s: Any, mobility: float, time: float) -> float:
 
 
 @inner
+def _closing(
+    s: Any, mobility: float, t: float, h: float, contact: float, film: float, opening: float
+) -> float:
+    """Speed at which a gap closes at the start of a step, the highest in one that is open."""
+    if np.isfinite(opening):
+        return -opening  # the next step tells of its end
+    begin = _rate_at(s, mobility, t)
+    if contact > 0.0:
+        return -begin
+    return -min(begin, _rate_at(s, mobility, t + h) + mobility * film * h)
+
+
+@inner
 def _after_contact(s: Any, period: float, mobility: float, time: float, rate: float) -> None:
     """Speed of the gap after the last contact of an impact, and what it were without its film."""
     s.between_earlier = s.between
@@ -261,19 +281,18 @@ def _after_contact(s: Any, period: float, mobility: float, time: float, rate: fl
 
 @inner
 def _closed_step(
-    s: Any, rest: float, pause: float, mobility: float, t: float, h: float, force: float
+    s: Any, rest: float, pause: float, t: float, h: float, force: float, closing: float
 ) -> None:
     if s.closed == 0.0:
-        if not t - s.row_time < max(pause, _PAUSE_STEPS * h):
+        if not t - s.row_end < pause:
             s.lead = 0.0
         s.closed, s.begin = 1.0, t
         s.steps = s.rests = 0.0
         s.contact_impulse, s.contact_peak, s.contact_peak_time = 0.0, -np.inf, t
         s.from_start = 1.0 if t <= s.run_start + h else 0.0
-        speed = -_rate_at(s, mobility, t)
         if s.lead > 0.0:
-            speed = max(speed, s.lead_fastest)
-        s.before = -speed
+            closing = max(closing, s.lead_fastest)
+        s.before = -closing
         # the speed at the moment of touch is that of the approach
         s.opened = s.between_earlier if s.time == t else s.between
     s.until = t + h
@@ -356,10 +375,10 @@ def _add_tail(s: Any) -> None:
 
 @inner
 def _open_step(
-    s: Any, period: float, pause: float, mobility: float, t: float, h: float, film: float
+    s: Any, period: float, pause: float, t: float, h: float, film: float, closing: float
 ) -> None:
     """Film between two contacts: the end of one impact, the beginning of another, or both."""
-    gapless = t - s.row_time < max(pause, _PAUSE_STEPS * h)
+    gapless = t - s.row_end < pause
     if s.impact > 0.0 and s.impact_rests == 0.0:
         if not gapless:
             s.tail = 0.0
@@ -373,16 +392,14 @@ def _open_step(
             s.flight_impulse += film * h
             if film > s.flight_peak:
                 s.flight_peak, s.flight_peak_time = film, t + 0.5 * h
-    begin = _rate_at(s, mobility, t)
-    s.carried += film * h
     if film <= 0.0:
         s.lead = 0.0
         return
     if s.lead == 0.0 or not gapless:
         s.lead = 1.0
-        s.lead_fastest = -begin
+        s.lead_fastest = -np.inf
         s.lead_impulse, s.lead_peak = 0.0, -np.inf
-    s.lead_fastest = max(s.lead_fastest, -_rate_at(s, mobility, t + h))
+    s.lead_fastest = max(s.lead_fastest, closing)
     s.lead_impulse += film * h
     if film > s.lead_peak:
         s.lead_peak, s.lead_peak_time = film, t + 0.5 * h

@@ -347,6 +347,7 @@ class InterfaceTrial(NamedTuple):
     least: Vector  # force in this macro step and at its start
     most: Vector
     chi: Vector  # dissipation factor at the start of the step
+    opening: Vector  # speed at which the centres of mass part then, where it was asked
     first: Vector  # force in the first sub-step
     kept: Vector  # state at the start of the macro step
 
@@ -452,5 +453,6 @@ class Recording(NamedTuple):
     port_block0: Index
     port_block1: Index
     port_row: Index
-    fine: Cube  # (interfaces, most, 5): start, step, contact force, film force, gap
+    parting: Index  # (interfaces, 4): blocks of the upper and the lower body, none if it is held
+    fine: Cube  # (interfaces, most, 6): start, step, contact force, film force, gap, opening
     filled: Index  # (interfaces,)

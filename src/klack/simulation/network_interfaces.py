@@ -9,7 +9,6 @@ from klack.simulation.interface_step import solve_interface
 from klack.simulation.network_arrays import (
     AHEAD,
     BEGIN,
-    COARSE,
     FORCE,
     GUESS,
     KEPT,
@@ -17,7 +16,7 @@ from klack.simulation.network_arrays import (
     Recording,
     Step,
 )
-from klack.simulation.network_ports import move_body
+from klack.simulation.network_ports import move_body, port_speed
 from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
 from klack.simulation.rubbing_step import keep_sliders, slide, take_back_sliders
@@ -421,7 +420,7 @@ def end_macro_interfaces(contacts: Any, S: Any) -> float:
 @phase
 def end_interfaces(
     contacts: Any,
-    S: Any,
+    bodies: Any,
     step: Step,
     first: bool,
     accounts: Any,
@@ -436,11 +435,15 @@ def end_interfaces(
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
         if state.far[c] != 0.0:
+            if first and rows.dry[c] == 0:
+                trial.opening[c] = _opening(bodies, recording, c, step.level)
             continue
         acted = trial.contact[c] != 0.0 or trial.film[c] != 0.0 or trial.contact_loss[c] != 0.0
-        gap, settled = gap_between(rows, S, c), 0.0
+        gap, settled = gap_between(rows, bodies.at, c), 0.0
         if acted or state.since[c] < np.inf:
             gap = trial.gap[c]  # what the others move after that it sees in the next step
+            if state.since[c] == np.inf or trial.contact[c] == 0.0:
+                trial.opening[c] = _opening(bodies, recording, c, step.level)
             settled = end_force(contacts, c, step, gap, accounts, recording, sums, peaks)
             if first:
                 trial.first[c] = trial.force[c]
@@ -455,6 +458,17 @@ def end_interfaces(
             state.deepest[c] = max(state.deepest[c], -gap)
             if gap > SEPARATED * state.deepest[c]:
                 state.chi[c] = state.deepest[c] = 0.0
+
+
+@phase
+def _opening(bodies: Any, recording: Recording, c: int, level: int) -> float:
+    """Speed at which the centres of mass part where the step begins [m/s].
+
+    Modes have moved freely since, which leaves those of a body as a whole their speed.
+    """
+    at = recording.parting
+    upper = port_speed(bodies, level, at[c, 0], at[c, 1], -1)
+    return upper - port_speed(bodies, level, at[c, 2], at[c, 3], -1)
 
 
 @phase
@@ -501,22 +515,20 @@ def end_force(
     sums[2 * c] += step.H * contact
     sums[2 * c + 1] += step.H * film
     peaks[c] = max(peaks[c], trial.force[c])
-    felt = step.level != COARSE and abs(film) > rows.film_felt[c]
-    if felt or was_closed or contact > 0.0:
-        _record_step(recording, c, step, contact, film, gap)
+    if abs(film) > rows.film_felt[c] or was_closed or contact > 0.0:
+        _record_step(recording, c, step, trial, gap)
     return settled
 
 
 @phase
-def _record_step(
-    recording: Recording, c: int, step: Step, contact: float, film: float, gap: float
-) -> None:
+def _record_step(recording: Recording, c: int, step: Step, trial: Any, gap: float) -> None:
     """Keep one step in which an interface carried force, as long as there is room."""
     place = recording.filled[c]
     if place < recording.fine.shape[1]:
         recording.fine[c, place, 0] = step.t
         recording.fine[c, place, 1] = step.H
-        recording.fine[c, place, 2] = contact
-        recording.fine[c, place, 3] = film
+        recording.fine[c, place, 2] = trial.contact[c]
+        recording.fine[c, place, 3] = trial.film[c]
         recording.fine[c, place, 4] = gap
+        recording.fine[c, place, 5] = trial.opening[c]
     recording.filled[c] = place + 1

@@ -465,7 +465,7 @@ def _act(
         begins = done == 0 and (cut == 0 or cut == all_parts)
         end_interfaces(
             contacts,
-            bodies.at,
+            bodies,
             now,
             begins,
             loop.accounts,

@@ -28,7 +28,8 @@ Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 _MOST_FINE = 1_000_000  # recorded steps per interface that are kept
-_FINE = 5  # numbers of a recorded step
+_FINE = 6  # numbers of a recorded step
+_KEPT = 5  # of which these are kept; the speed at its start is for the impacts
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +122,7 @@ class Recorder:
             port_block0=blocks[owner].astype(np.int64),
             port_block1=blocks[[b + 1 for b in owner]].astype(np.int64),
             port_row=np.array([FIXED_ROWS + i for i in place], dtype=np.int64),
+            parting=_parting(rows, blocks),
             fine=np.empty((count, fine, _FINE)),
             filled=np.zeros(count, np.int64),
         )
@@ -196,7 +198,7 @@ class Recorder:
         for c, rows in enumerate(steps):
             kept = rows[: self._room[c]]
             if len(kept):
-                self._fine[c].append(kept.copy())
+                self._fine[c].append(kept[:, :_KEPT].copy())
             self._room[c] -= len(kept)
             self._complete[c] &= len(kept) == len(rows)
 
@@ -220,9 +222,9 @@ class Recorder:
         """Steps in which an interface carried force: see :class:`InterfaceRecord`."""
         result = {}
         for c, row in enumerate(self.network.rows.interfaces):
-            part = np.concatenate([np.empty((0, _FINE)), *self._fine[c]])
+            part = np.concatenate([np.empty((0, _KEPT)), *self._fine[c]])
             self._fine[c].clear()
-            columns = [part[:, i].copy() for i in range(_FINE)]
+            columns = [part[:, i].copy() for i in range(_KEPT)]
             result[row.component] = InterfaceRecord(
                 time=columns[0],
                 step=columns[1],
@@ -269,6 +271,19 @@ class Recorder:
         self._peaks[:, here] = np.maximum(self._peaks[:, here], peaks.T)
         ends = np.flatnonzero(np.arange(first, first + count) % looks == 0)
         self._points[:, record[ends]] = recording.points[ends].T
+
+
+def _parting(rows: Rows, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
+    """First and last block of the upper and of the lower body of each interface."""
+    free = {
+        port: (blocks[b], blocks[b + 1])
+        for b, row in enumerate(rows.bodies)
+        if row.body.rigid_count > 0
+        for port in row.ports
+    }
+    ends = [(row.upper, row.lower) for row in rows.interfaces]
+    found = [[*free.get(upper, (0, 0)), *free.get(lower, (0, 0))] for upper, lower in ends]
+    return np.array(found, dtype=np.int64).reshape(len(ends), 4)
 
 
 def recorded_columns(rows: Rows) -> int:

@@ -190,7 +190,7 @@ def simulate_network(
     elif network.moving is not None:
         network.moving.resume()
     first_step, done_before = int(clock[0]), clock[2:].copy()
-    finder = ImpactFinder(rows, step * first_step)
+    finder = ImpactFinder(rows, step * first_step, step)
     fresh = state is None or _IMPACTS not in state  # of an earlier version
     if state is not None and not fresh:
         finder.state = np.asarray(state[_IMPACTS], dtype=float)

@@ -174,7 +174,7 @@ class TangentRun:
             return np.asarray(values[..., 0] + amount * values[..., _FIRST + direction])
 
         time, points, fine = at(self._time), at(self._points), [at(part) for part in self._fine]
-        finder = ImpactFinder(self.rows, float(self._time[0, 0]))
+        finder = ImpactFinder(self.rows, float(self._time[0, 0]), self.sizes.step)
         moving = self._columns[2]
         speeds = {name: np.ascontiguousarray(points[:, i]) for name, i in moving.items()}
         finder.feed(time, speeds, fine)
@@ -504,7 +504,7 @@ class _Running:
 
     def _start(self) -> "_Part":
         """The state before the first step."""
-        none = np.zeros((0, 5, LANES))
+        none = np.zeros((0, self.recording.fine.shape[2], LANES))
         start_with_tangents(self.recording, moment_of(self.numbers))
         return _Part(
             time=np.zeros((1, LANES)),

@@ -120,6 +120,7 @@ class StopRecord:
         into[:, 2] = np.append(force, 0.0)[some]
         into[:, 3] = np.append(pressed, 0.0)[some]
         into[:, 4] = np.append(gaps, smallest)[some] / self._slope[c]
+        into[:, 5] = np.nan
         recording.filled[row] = place + len(rows)
         scratch.sums[first + 2 * row] += h * float(np.sum(force))
         scratch.peaks[row] = max(float(scratch.peaks[row]), float(force.max()))
