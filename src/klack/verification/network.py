@@ -265,14 +265,16 @@ def _reciprocity() -> Check:
 
 def _kernel() -> Check:
     a, b, law = steel_rod("a", 0.04, 20), steel_rod("b", 0.1, 40, clamped=True), LinearLaw(1e9)
+    # they touch just before a step ends: a network cuts this step there, the kernel does not
+    gap = 1e-6 - 1e-15
     history = simulate_impact(
-        one_contact(a, b, law, gap=1e-6, series=1e-9), speed=1.0, step=STEP, duration=40e-6
+        one_contact(a, b, law, gap=gap, series=1e-9), speed=1.0, step=STEP, duration=40e-6
     )
     parts: dict[str, Component] = {
         "a": FlexibleBody.of(a, speed=-1.0),
         "b": FlexibleBody.of(b),
         "stop": EndStop(
-            gap=1e-6,
+            gap=gap,
             law=LinearStopLaw(kind="linear", stiffness=1e9),
             series_compliance=1e-9,
         ),
