@@ -117,6 +117,7 @@ def test_the_gain_margin_of_a_pid_is_where_runs_in_time_begin_to_swing():
     assert growth[1] > 1.2
 
 
+@pytest.mark.slow
 def test_a_switching_controller_has_no_margins(capsys):
     Path("switched.yaml").write_text((HOW_TO / "controlled_valve.yaml").read_text(encoding="utf-8"))
 
@@ -141,6 +142,7 @@ def test_every_channel_of_a_gas_network_is_an_output_of_its_own():
     assert {"inlet.mass", "working.mass", "working.internal energy"} <= set(states)
 
 
+@pytest.mark.slow
 def test_a_boost_driver_is_told_to_be_no_part_of_the_model(capsys):
     path = HOW_TO / "boost_driver.yaml"
     assert linearise(str(path), "--no-report", "--quiet", "--out", "out") == 0

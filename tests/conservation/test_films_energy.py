@@ -10,6 +10,8 @@ from klack.simulation.interface_step import interface_store, solve_interface
 from klack.verification.interface_motion import interface_motion
 from klack.verification.one_dimension import steel_rod
 
+pytestmark = pytest.mark.slow
+
 DEPTH = 6e-6 * np.linspace(0.0, 1.0, 30)[1:]  # [m]
 LAWS = {
     "none": None,
@@ -65,7 +67,6 @@ def test_any_step_from_any_state(name):
     assert acted > 1000
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("step", [1e-6, 100e-9, 20e-9], ids=["1 us", "100 ns", "20 ns"])
 @pytest.mark.parametrize("suction", [0.6, 1e9], ids=["cavitating", "pulling"])
 def test_rods_with_film_asperities_and_compliance(step, suction):

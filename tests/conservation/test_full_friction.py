@@ -17,6 +17,8 @@ from klack.transient.result import FullOrderResult
 from klack.transient.rubbing import OPEN, SLIP, STICK
 from klack.verification.impacts import STEEL, needle_over_seat, sphere_over_cylinder
 
+pytestmark = pytest.mark.slow
+
 SCHEMES = ["contact-stabilised-newmark", "massless"]
 
 
@@ -70,7 +72,6 @@ def oblique(law, **options) -> FullOrderResult:
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_no_coefficient_is_no_friction(scheme):
     """To the bit."""
@@ -136,7 +137,6 @@ def restitution(law) -> float:
     return float(history.velocity_a[-1] / 0.3)
 
 
-@pytest.mark.slow
 def test_a_seat_of_rubbing_faces_returns_less_speed():
     """Until so much friction that the faces hold: half angle 45 degrees, sticking from mu = 1."""
     speeds = [restitution(mu) for mu in (None, 0.03, 0.1, 0.2)]
@@ -157,7 +157,6 @@ def momentum(body: ElasticBody, velocity: np.ndarray) -> np.ndarray:
     return (body.M @ velocity).reshape(-1, 3).sum(axis=0)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("mu", [0.1, 1.0])
 def test_an_oblique_impact_keeps_the_momentum_in_every_direction(mu):
     a, b, _ = balls()
@@ -172,7 +171,6 @@ def test_an_oblique_impact_keeps_the_momentum_in_every_direction(mu):
     assert np.min(np.diff(result.energy.friction)) >= 0.0
 
 
-@pytest.mark.slow
 def test_a_ball_that_slides_gains_mu_times_the_impulse():
     """Coulomb: the lateral impulse is mu times the normal one, against the motion."""
     _, b, _ = balls()
@@ -184,7 +182,6 @@ def test_a_ball_that_slides_gains_mu_times_the_impulse():
     np.testing.assert_allclose(given, wanted, rtol=1e-3)
 
 
-@pytest.mark.slow
 def test_direction_of_the_motion_does_not_matter():
     """Bodies swept in 8 layers: a turn by a quarter is a symmetry of both."""
     first, turned = oblique(0.1), oblique(0.1, sideways=(-0.2, 0.3))

@@ -14,6 +14,8 @@ from klack.analyses.impact.run import run_impact
 from klack.case.reader import load_case
 from klack.transient import interface_run
 
+pytestmark = pytest.mark.slow
+
 CASE = Path(__file__).parents[1] / "data" / "tiny_rods.yaml"
 
 

@@ -15,6 +15,8 @@ from klack.verification.interface_bodies import lateral_guide, reduce_bodies
 from klack.verification.interface_impacts import block_between_plates, free_blocks
 from klack.verification.rubbing_point import rubbing_faces
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def blocks():
@@ -76,7 +78,6 @@ def test_records_hold_the_sum_of_the_forces(blocks):
     assert segment.doing.shape == (len(axial), blocks.count)
 
 
-@pytest.mark.slow
 def test_faces_and_guide_rub_at_once(blocks):
     guide = lateral_guide(blocks, clearance=1e-6, stiffness=2e7, friction=0.2, heights=(0.5e-3,))
     result = hit(blocks, Friction.coulomb(0.2), guide=guide)
@@ -85,7 +86,6 @@ def test_faces_and_guide_rub_at_once(blocks):
     assert result.energy.friction > 0.0
 
 
-@pytest.mark.slow
 def test_two_stops_with_different_friction():
     bodies, contacts = block_between_plates(2e-6)
     names = {body.name: body for body in bodies}

@@ -165,6 +165,7 @@ def run(setup: Setup, system: ReducedSystem, **more: int) -> ImpactHistory:
     return simulate_impact(system, speed=setup.speed, step=step, duration=duration, **more)
 
 
+@pytest.mark.slow
 @examples(40)
 @given(SETUPS)
 def test_energy_and_momentum_balance_and_the_contact_never_pulls(setup):
@@ -214,6 +215,7 @@ def test_rigid_bodies_rebound_with_a_restitution_between_0_and_1(setup):
         assert m.restitution == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 @examples(40)
 @given(SETUPS, st.integers(-9, 9), st.integers(-9, 9), st.integers(-9, 9))
 def test_scaled_units_give_the_same_impact(setup, length, time, mass):

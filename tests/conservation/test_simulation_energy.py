@@ -140,6 +140,7 @@ def test_two_contacts_at_once_conserve_energy_and_momentum():
     )
 
 
+@pytest.mark.slow
 def test_two_parallel_contacts_share_the_force():
     """Two contacts at one place are one of the sum of the stiffnesses (stiff against the step)."""
     wall = fixed_body("seat", port="top")
@@ -159,6 +160,7 @@ def test_two_parallel_contacts_share_the_force():
     assert abs(double.ledger.residual) < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damping", [0.0, 0.01])
 @pytest.mark.parametrize("law", [*LAWS, HuntCrossley(LAWS[1], 0.2)], ids=[*IDS, "lossy"])
 def test_loops_for_one_and_for_several_contacts_agree(law, damping):

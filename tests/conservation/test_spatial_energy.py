@@ -15,6 +15,8 @@ from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
 from klack.simulation.network_result import NetworkResult
 
+pytestmark = pytest.mark.slow
+
 NEEDLE = Needle(
     seat=ring(8, 0.6e-3, BELOW),
     stop=ring(8, 2e-3, ABOVE),
@@ -37,10 +39,7 @@ def stroke(
     return move(needle.rows(joints), valve, duration, **more)
 
 
-@pytest.mark.parametrize(
-    ("step", "coarse"),
-    [(40e-9, 1), pytest.param(40e-9, None, marks=pytest.mark.slow), (20e-9, None)],
-)
+@pytest.mark.parametrize(("step", "coarse"), [(40e-9, 1), (40e-9, None), (20e-9, None)])
 def test_energy_of_a_stroke_off_its_axis_closes(step, coarse):
     run = stroke(330e-6, step=step, coarse=coarse)
 
@@ -54,7 +53,6 @@ def test_energy_of_a_stroke_off_its_axis_closes(step, coarse):
     assert abs(books.residual) < 1e-11 * books.scale
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mu", "step", "coarse"), [(0.1, 40e-9, 1), (0.3, 20e-9, None), (1.5, 40e-9, None)]
 )
@@ -67,7 +65,6 @@ def test_energy_of_faces_that_rub_closes(mu, step, coarse):
         assert books.losses[f"{stop} friction"] > 1e-3 * books.scale
 
 
-@pytest.mark.slow
 def test_a_needle_that_comes_to_rest_sticks_without_loss():
     """Its modes still ring: what pays the debts of the contact must not count as slip."""
     needle = Needle(
@@ -86,7 +83,6 @@ def test_a_needle_that_comes_to_rest_sticks_without_loss():
     assert run.books.losses["seat friction"] > 1e-3 * run.books.scale
 
 
-@pytest.mark.slow
 def test_a_run_in_two_parts_of_faces_that_rub():
     """The first part ends while the needle leaves its seat; then within its impact there."""
     for parts in ((1, 40), (200, 25)):
@@ -114,7 +110,6 @@ def test_a_shaft_that_does_not_rub_loses_next_to_nothing_in_its_guide():
     assert abs(books.losses["guide friction"]) < 1e-3 * books.scale
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("parts", [(40, 270), (120, 190), (163, 147)])
 def test_a_run_in_two_parts_is_the_run_in_one(parts):
     """Bit by bit up to the next contact; in contact the order of the points is another."""

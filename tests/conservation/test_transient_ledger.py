@@ -61,7 +61,7 @@ def test_impulse_is_the_change_of_momentum_of_both_bodies(scheme):
     assert total == pytest.approx(-history.mass_a * SPEED, rel=rel)
 
 
-@pytest.mark.parametrize("step", [20e-9, 100e-9, 400e-9])
+@pytest.mark.parametrize("step", [pytest.param(20e-9, marks=pytest.mark.slow), 100e-9, 400e-9])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_energy_balances_at_every_step(scheme, step):
     result = run(scheme, step)

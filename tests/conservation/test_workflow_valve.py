@@ -197,6 +197,7 @@ def rubbing(friction: float) -> ValveCase:
     )
 
 
+@pytest.mark.slow
 def test_friction_of_a_stop_raises_its_pressure_pattern_and_its_law(valve: Valve):
     """Truth: the same faces without friction, softer; the smooth stop keeps its bits."""
     rough = build_valve(rubbing(0.1))
@@ -212,6 +213,7 @@ def test_friction_of_a_stop_raises_its_pressure_pattern_and_its_law(valve: Valve
     assert rough.contacts["opening"].pattern_force == valve.contacts["opening"].pattern_force
 
 
+@pytest.mark.slow
 def test_a_report_names_the_friction_of_its_stops(study: StrokeStudy):
     rough = run_stroke(rubbing(0.1), variants=("dry",))
 
@@ -320,6 +322,7 @@ run: {duration: 60 us}
 """
 
 
+@pytest.mark.slow
 def test_a_stop_above_is_a_stop_below_upside_down():
     """Two meshes of the same bodies, one drawn upside down: equal within the mesh error."""
     valve = build_valve(read_valve_case(MIRRORED, Path("mirrored.yaml")))

@@ -14,7 +14,7 @@ from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu
 
 fmpy = pytest.importorskip("fmpy")
-pytestmark = needs_compiler
+pytestmark = [needs_compiler, pytest.mark.slow]
 
 STIFFNESS, PUSH, END = 50e3, 23.0, 160e-6  # [N/m], [N], [s] in free flight
 STEPS = (8e-6, 4e-6, 2e-6, 1e-6)

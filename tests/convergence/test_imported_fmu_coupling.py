@@ -62,6 +62,7 @@ def deviation(result: NetworkResult, native: NetworkResult) -> float:
     return float(np.abs(a - b).max() / np.abs(b).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize(
     ("extrapolation", "order", "damped", "finest"),
@@ -92,6 +93,7 @@ def test_the_motion_converges_to_that_of_the_native_part(
     assert errors[-1] < finest
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("extrapolation", "order"), [("hold", 1), ("linear", 2)])
 def test_the_energy_error_falls_with_the_coupling_step(
     extrapolation: str, order: int, spring_damper_fmu: Build

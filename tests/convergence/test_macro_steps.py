@@ -33,6 +33,7 @@ def first_impacts(result: NetworkResult, shift: float) -> Mapping[str, tuple[flo
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wet", "dry"])
 def test_first_impacts_do_not_depend_on_the_phase_of_the_grid(kind):
     """Truth: convergence, fine steps of 2.5 ns alone.  One run at one phase would be luck."""
@@ -55,6 +56,7 @@ def test_first_impacts_do_not_depend_on_the_phase_of_the_grid(kind):
         assert run.books.relative_residual < 1e-11
 
 
+@pytest.mark.slow
 def test_fine_accuracy_is_finer():
     exact = first_impacts(stroke("wet", 0.0, step=2.5e-9, coarse=1), 0.0)
     normal, fine = (

@@ -83,6 +83,7 @@ def order(steps, errors):
     return np.polyfit(np.log(steps), np.log(errors), 1)[0]
 
 
+@pytest.mark.slow
 def test_contact_scheme_is_of_second_order():
     reference = exact_end(STIFFNESS)
     steps = DURATION / np.array([750, 1500, 3000, 6000, 12000])
@@ -92,6 +93,7 @@ def test_contact_scheme_is_of_second_order():
     assert errors[-1] < 1e-4
 
 
+@pytest.mark.slow
 def test_series_spring_keeps_the_order():
     """Linear law and series spring are together one linear spring, which the reference has."""
     series = 0.03

@@ -9,6 +9,8 @@ from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
 from klack.verification.impacts import drop_rod, sphere_over_cylinder
 
+pytestmark = pytest.mark.slow
+
 STEPS = np.array([400e-9, 200e-9, 100e-9, 50e-9, 25e-9])
 
 
@@ -54,7 +56,6 @@ def test_peak_force_settles_with_the_step():
     assert error[0] > error[-1]
 
 
-@pytest.mark.slow
 def test_smeared_front_of_a_rod_sharpens_with_the_mesh():
     """A front smears over n^(1/3) of n elements, so 1 - e falls with the power 2/3 of h."""
     elements = np.array([50, 100, 200, 400])

@@ -73,6 +73,7 @@ def test_what_a_setting_cannot_use_goes_to_the_others():
     assert allotment([0.1, 0.2], 1.0) == np.inf  # all at their coarsest leave some over
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=40)
 @given(
     st.lists(st.tuples(st.floats(0.5, 4.0), st.floats(1e-6, 0.1)), min_size=1, max_size=6),

@@ -66,6 +66,7 @@ def test_what_is_computed_is_what_is_read(explorer):
     assert explorer.text_at({"motion.speed": 0.450049}) == explorer.text_at({"motion.speed": 0.45})
 
 
+@pytest.mark.slow
 def test_an_impact_that_is_cut_off_has_no_numbers_but_a_doubt():
     """As in the JSON of the command: no peak force, no contact time, no restitution."""
     found = Explorer()
@@ -244,6 +245,7 @@ def test_the_estimate_is_that_of_the_impact(explorer):
     assert "peak force" in found.words
 
 
+@pytest.mark.slow
 def test_hearing_follows(explorer):
     heard = explorer.listen({})
     louder = explorer.listen({"motion.speed": 0.6})

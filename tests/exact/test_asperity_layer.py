@@ -87,6 +87,7 @@ def test_a_point_on_a_spring_takes_the_series_of_both():
         assert -gap == pytest.approx([one.closure_at(force / area)], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_the_ladder_of_two_rods_is_bodies_and_layer_in_series(tmp_path):
     """Poisson's ratio 0 and matched faces: the pressure is even, its compliances add."""
     smooth = build_problem(rods(tmp_path), silent).static

@@ -94,6 +94,7 @@ def test_no_pair_of_points_has_a_smaller_mantle(kind):
             assert area == pytest.approx(known, rel=1e-2)  # the samples are up to 8 um apart
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("radius", [5e-6, 60e-6])
 def test_a_rounded_edge_opens_along_the_normal_from_nothing(radius):
     part = ConicalSeat(**EDGE, edge_radius=radius)
@@ -105,6 +106,7 @@ def test_a_rounded_edge_opens_along_the_normal_from_nothing(radius):
     assert part.opening(-1e-6) == part.opening(0.0)
 
 
+@pytest.mark.slow
 def test_a_wide_open_seat_is_its_bore():
     assert ConicalSeat(**EDGE).opening(1.0) == (pytest.approx(pi / 4 * 1e-6, rel=1e-15), 0.0)
 
@@ -174,6 +176,7 @@ def test_faces_that_do_not_meet_at_the_seal_are_refused(side, faces, text):
     floating(ConicalSeat(**EDGE), **sizes)  # without tip_side faces keep their diameters
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keys", [{}, {"edge_radius": 30e-6}, {"tip_half_angle": 0.53}])
 def test_the_acting_area_falls_from_the_seal_to_nothing(keys):
     seat = ConicalSeat(**EDGE | keys)
@@ -192,6 +195,7 @@ def told(pattern):
     return [float(number) for number in found.groups()]
 
 
+@pytest.mark.slow
 def test_the_page_shows_parts_of_its_case_and_its_python_prints_what_it_tells(capsys):
     whole = YAML(typ="safe").load(HOW_TO / "double_seat.yaml")["network"]["components"]
     for block in re.findall(r"```yaml-part\n(.*?)```", PAGE, re.DOTALL):
@@ -202,6 +206,7 @@ def test_the_page_shows_parts_of_its_case_and_its_python_prints_what_it_tells(ca
     assert capsys.readouterr().out == printed
 
 
+@pytest.mark.slow
 def test_the_double_seat_does_what_its_page_tells():
     case = load_valve_case(HOW_TO / "double_seat.yaml")
     network, run = case.network.network(), case.run

@@ -87,6 +87,7 @@ def test_groups_are_condensed_apart_and_together():
         np.testing.assert_allclose(C, expected, rtol=1e-11, atol=1e-14)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest", [2**29, 0], ids=["halves", "whole solutions"])
 def test_later_groups_change_no_bit_of_the_first(largest):
     factor, rng = Dense(1200, seed=8), np.random.default_rng(9)

@@ -100,6 +100,7 @@ def checked(asked: Case, force: float = 5.0) -> tuple[ContactCheck, list[str]]:
     return found, [str(w.message) for w in caught if issubclass(w.category, AccuracyWarning)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("needle", "seat", "size"),
     [
@@ -209,6 +210,7 @@ HALF = Profile(
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mesher", [mesh_meridian, mesh_revolved])
 def test_edges_of_a_drawing_come_back_from_its_mesh(mesher):
     """A tip that goes on smoothly without a name, and a top that ends at a right angle."""

@@ -10,6 +10,8 @@ import pytest
 from klack.contact.statics import size_over_half_width
 from klack.verification.indentation import STEEL, half_spaces, parabola
 
+pytestmark = pytest.mark.slow
+
 MODULUS = STEEL.plane_strain_modulus / 2.0  # 1/E* = 2 (1 - nu^2)/E
 WIDTH = 100e-6
 
@@ -51,7 +53,6 @@ def test_sphere_on_half_space(cells, family):
     np.testing.assert_allclose(pressure / p0, np.sqrt(1 - (r[inside] / a[-1]) ** 2), atol=0.02)
 
 
-@pytest.mark.slow
 def test_area_converges_from_below():
     """Only whole hats count: the error falls with the size of the elements."""
     error = []
@@ -85,7 +86,6 @@ def test_cone_on_half_space():
     assert edge == pytest.approx(2 * static.approach[-1] / (np.pi * slope), rel=0.05)
 
 
-@pytest.mark.slow
 def test_torus_on_half_space_is_a_line_contact():
     """Half width b = sqrt(4 P' R/(pi E*)), P' = P/(2 pi r); b/r = 1/50 leaves about a percent."""
     radius, ring = 2e-3, 50 * WIDTH / 4

@@ -123,6 +123,7 @@ def test_a_controlled_pressure_keeps_its_output():
         np.testing.assert_array_equal(joined[name], channel.values, err_msg=name)
 
 
+@pytest.mark.slow
 def test_a_stored_stroke_continues_from_its_folder(tmp_path):
     case = load_valve_case(CASE)
     part = case.model_copy(update={"run": case.run.model_copy(update={"duration": 0.5e-3})})

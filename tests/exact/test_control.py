@@ -203,6 +203,7 @@ def test_components_shown_on_the_page_are_valid():
             component_class(keys.pop("type")).model_validate(keys, context={"path": page})
 
 
+@pytest.mark.slow
 def test_a_controlled_pressure_fills_a_chamber_through_an_orifice():
     ambient, fluid = (
         Ambient(pressure=1e5, temperature=293.15),

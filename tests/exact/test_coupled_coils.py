@@ -132,6 +132,7 @@ def test_one_coil_keeps_the_step_of_one_coil():
     assert [row.step for row in two.elements] == [coupled_step]
 
 
+@pytest.mark.slow
 def test_a_run_continues_bit_for_bit():
     rows = joined(two_coils(iron=True), BOOST, PEAK, MOVING).rows()
     whole = simulate_network(rows, duration=1.2e-3, step=1e-6, record=1e-5)
@@ -246,6 +247,7 @@ def test_a_boost_driver_needs_one_capacitor():
         BoostDriver(**{**SHARING.model_dump(exclude_none=True), "capacitance": 20e-6})
 
 
+@pytest.mark.slow
 def test_coils_of_one_magnet_may_share_a_capacitor():
     parts = {"body": MOVING, "magnet": two_coils(iron=True), "one": SHARING, "two": SHARING}
     network = Network(
@@ -265,6 +267,7 @@ def test_coils_of_one_magnet_may_share_a_capacitor():
     assert np.min(run.channels["bank capacitor voltage"].values) > 0.0
 
 
+@pytest.mark.slow
 def test_constant_currents_need_no_capacitor():
     network = at_bank(SHARING, BANK, FEED)
 
@@ -287,6 +290,7 @@ def case_of(tmp_path, change=lambda parts: None):
     return load_valve_case(tmp_path / "case.yaml")
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_page_hold(tmp_path, page):
     stroke = run_stroke(case_of(tmp_path)).variants["dry"]
     opens = 1e6 * (stroke.opening_time - 0.1e-3)

@@ -244,6 +244,7 @@ def test_even_profile_is_two_point_control(level, band, freewheel, step):
     np.testing.assert_allclose(runs[1].current, runs[0].current, atol=1e-9 * upper)
 
 
+@pytest.mark.slow
 @settings(max_examples=40, deadline=None)
 @given(
     knots=st.lists(

@@ -19,6 +19,8 @@ from klack.hydraulics.tilted_film import (
 )
 from klack.simulation.interface_step import film_force
 
+pytestmark = pytest.mark.slow
+
 MU = 4e-4  # [Pa s]
 SHAPES = [(1.4e-3, 2e-3), (0.5e-3, 2e-3), (0.0, 2e-3), (1e-3, 1.001e-3)]
 NAMES = ["valve seat", "wide ring", "disc", "narrow"]
@@ -79,7 +81,6 @@ def by_grid(inner, outer, height, lift_rate, tilt_rate, rings, sectors):
     return np.array([np.sum(p * volume), np.sum(p * reach * volume)])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("inner", "outer"), SHAPES, ids=NAMES)
 @pytest.mark.parametrize(("sectors", "circles"), [(4, 1), (36, 1), (12, 3)])
 def test_parallel_faces_have_the_force_of_the_present_film(inner, outer, sectors, circles):
@@ -164,7 +165,6 @@ def test_a_narrow_tilted_land_is_a_row_of_strips(tilt):
     assert force == pytest.approx(strips, rel=2e-3)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("inner", "tilt", "circles", "left"),
     [(1.4e-3, 0.5, 2, 1e-5), (1.4e-3, 0.8, 3, 3e-4), (0.5e-3, 0.5, 5, 1e-6), (0.0, 0.5, 5, 3e-6)],
@@ -190,7 +190,6 @@ def test_a_land_that_is_tilted_much_against_a_grid(inner, tilt, circles, left):
         np.testing.assert_allclose(ours[1] + (ours[1] - ours[0]) / 3.0, exact, rtol=left)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("inner", [1.4e-3, 0.5e-3])
 def test_the_first_order_in_a_tilt(inner):
     r"""``p = p_0 + p_1 cos``, ``(r p_1')' - p_1/r = -(3 a/h) (r^2 p_0')'``: the moment per tilt."""

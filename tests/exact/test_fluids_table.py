@@ -28,6 +28,7 @@ def look_up(table, pressures) -> np.ndarray:
     return np.array(rows).T
 
 
+@pytest.mark.slow
 @each(
     "fluid", [*(f.at(293.15, gas_fraction=a) for f in FLUIDS.values() for a in (0.0, 2e-3)), USER]
 )

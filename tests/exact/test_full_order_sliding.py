@@ -59,6 +59,7 @@ def slide(law: Friction, duration: float, body: ElasticBody | None = None, **opt
     )
 
 
+@pytest.mark.slow
 def test_it_slows_down_by_mu_times_the_impulse_against_its_way():
     """Velocity times mass falls by mu times the normal impulse."""
     result = slide(Friction.coulomb(0.2), 50e-6)
@@ -84,6 +85,7 @@ def test_it_stops_where_its_energy_is_spent():
     assert result.energy.friction[-1] == pytest.approx(kinetic, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_coefficient_follows_the_speed_of_slip():
     """Stribeck's curve: m dv/dt = -mu(v) F, in a hundred parts of each step."""
     law = Friction(kinetic=0.1, static=0.4, speed=0.05)

@@ -178,6 +178,7 @@ def gauges(text: str, *levels: str):
     return {name: {g.name: g for g in level.gauges} for name, level in study.levels.items()}
 
 
+@pytest.mark.slow
 def test_a_struck_rod_carries_the_wave_of_st_venant():
     found = gauges(ROD, "full")["full"]
     strain = found["strain"]

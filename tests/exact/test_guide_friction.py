@@ -9,6 +9,8 @@ from klack.transient.guide_friction import stopping_force
 from klack.transient.interface_run import simulate_interface
 from klack.verification.interface_bodies import lateral_guide, rigid_body
 
+pytestmark = pytest.mark.slow
+
 MASS, INERTIA, STIFFNESS = 3e-3, (2.4e-7, 2.4e-7, 6e-9), 1e7
 RADIUS = sqrt(2.0 * INERTIA[2] / MASS)  # of a solid cylinder
 FRICTION, PRESSED, DEPTH = 0.2, 50.0, 5.0
@@ -103,7 +105,6 @@ def test_a_block_breaks_loose_at_mu_n(needle):
     assert loose.motion.velocity[-1, 2] == pytest.approx(-50.0 * h * MOST / MASS, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_slip_at_an_angle_brakes_along_its_direction(needle):
     """A straight path of v^2 m / (2 mu N), whatever the way of the slip."""
     h, v, guide = 10e-9, np.array([0.0, 0.03, -0.04]), squeezed(needle)

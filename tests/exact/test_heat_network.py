@@ -216,6 +216,7 @@ def test_nothing_determines_a_node_without_capacity_and_path():
         made({"part": HeatCapacity(capacity=0.0)}, [])
 
 
+@pytest.mark.slow
 def test_heat_that_jumps_with_the_temperature_is_said(monkeypatch):
     """A heat without a fixed point: above 300 K none, below it enough for 310 K."""
     monkeypatch.setattr("klack.thermal.slow_warm_up._MOST_POINTS", 100)

@@ -16,6 +16,8 @@ from klack.transient.impact_rows import (
     follow,
 )
 
+pytestmark = pytest.mark.slow
+
 H = 20e-9  # [s]
 PAUSE, REST = 1e-6, 1e-3  # [s]
 

@@ -63,7 +63,9 @@ def impact(kind: str, s: float) -> ImpactHistory:
 
 
 @pytest.mark.parametrize("s", SIZES)
-@pytest.mark.parametrize("kind", ["one stop", "two stops", "rod"])
+@pytest.mark.parametrize(
+    "kind", ["one stop", pytest.param("two stops", marks=pytest.mark.slow), "rod"]
+)
 def test_bounces_know_no_length(kind, s):
     """Several touches, each damped by its own speed; and the numbers of the first impact."""
     whole, scaled = impact(kind, 1.0), impact(kind, s)

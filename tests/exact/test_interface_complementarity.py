@@ -71,6 +71,7 @@ def test_cold_start(seed, n, conditioning):
     check(A, q, lam, gap, rtol=1e-8)
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(seed=st.integers(0, 10_000), n=st.integers(2, 80), jump=st.sampled_from([0.02, 0.3, 3.0]))
 def test_warm_start_over_a_sequence(seed, n, jump):

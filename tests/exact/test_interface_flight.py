@@ -232,6 +232,7 @@ def test_gaps_follow_the_geometry_over_many_impacts():
     assert run.motion.position[-1, 0] == pytest.approx(0.1 * run.motion.time[-1], rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flight", [False, True])
 def test_a_guided_body_meets_its_bore_in_flight(flight):
     """Lateral speed 0.1 m/s, clearance 4 um: the bore is met long before the seat."""

@@ -22,6 +22,8 @@ from klack.verification.impacts import STEEL, needle_over_seat
 from klack.verification.interface_bodies import lateral_guide, modal_model, rigid_body
 from klack.verification.lattice import lattice_mesh
 
+pytestmark = pytest.mark.slow
+
 MASS, INERTIA, STIFFNESS, CLEARANCE = 3e-3, (2.4e-7, 2.4e-7, 6e-9), 1e7, 4e-6
 PERIOD = 2 * pi * sqrt(MASS / STIFFNESS)
 
@@ -39,7 +41,6 @@ def move(model, guide, velocity, duration, **more):
     )
 
 
-@pytest.mark.slow
 def test_inside_of_the_clearance_nothing_happens(needle):
     guide = lateral_guide(needle, clearance=CLEARANCE, stiffness=STIFFNESS, friction=0.5)
 

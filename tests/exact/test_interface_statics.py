@@ -13,6 +13,8 @@ from klack.verification.indentation import STEEL, uniform_compression
 from klack.verification.interface_bodies import free_rod, reduce_bodies, rod_between_stops
 from klack.verification.interface_impacts import block_between_plates, free_blocks
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def blocks():
@@ -31,7 +33,6 @@ def modal_compliance(model):
     return shares @ shares.T
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("counts", [(0, 0), (1, 2), (12, 7)])
 def test_any_pressure_pattern_has_its_exact_static_answer(blocks, counts):
     a, b, space = blocks
@@ -53,7 +54,6 @@ def test_any_pressure_pattern_has_its_exact_static_answer(blocks, counts):
     assert np.sum(model.omega == 0) == 12  # both bodies are free
 
 
-@pytest.mark.slow
 def test_more_modes_leave_less_to_the_residual(blocks):
     a, b, space = blocks
     contact = InterfaceContact(name="face", upper="upper", lower="lower", space=space)
@@ -64,7 +64,6 @@ def test_more_modes_leave_less_to_the_residual(blocks):
     assert shares[0] < shares[1] < shares[2] < 1.0
 
 
-@pytest.mark.slow
 def test_rigid_modes_of_the_model_are_those_of_the_body(blocks):
     """A unit translation or rotation moves every gap as the geometry says."""
     a, b, space = blocks
@@ -88,7 +87,6 @@ def test_rigid_modes_of_the_model_are_those_of_the_body(blocks):
     np.testing.assert_allclose(rigid_motion(a), R)
 
 
-@pytest.mark.slow
 def test_uniform_pressure_passes_through_blocks_that_do_not_match():
     """Patch test: p = E d / (2 L) from modes and residual, whatever the number of modes.
 

@@ -306,6 +306,7 @@ def test_a_held_body_stays_and_its_fluid_moves_alone():
     assert "needle.force" not in [x.name for x in found.system.inputs]
 
 
+@pytest.mark.slow
 def test_each_gas_chamber_has_states_outputs_and_modes_of_its_own() -> None:
     """Two chambers that share nothing, one with twice the volume: twice the time constant."""
     parts: dict[str, Component] = needle(supply=GasSource(pressure=6e5))

@@ -136,6 +136,7 @@ def test_ring_and_surface_sizes_are_kept(body):
     assert mesh_summary(body).worst_quality > 0.05
 
 
+@pytest.mark.slow
 def test_step_keeps_names_solids_and_size(step):
     content = step_content(step)
     assert [solid.name for solid in content.solids] == ["pin", "cap"]
@@ -215,6 +216,7 @@ def test_solid_inside_out_is_refused(monkeypatch):
         mesh_revolved({"ring": pin()}, COARSE)
 
 
+@pytest.mark.slow
 def test_solids_that_overlap_or_lie_apart_are_refused():
     def disc(low: float) -> Profile:
         high = low + 2 * MM

@@ -21,6 +21,8 @@ from klack.verification.pulled_needle import (
 )
 from klack.verification.rigid_needle import INERTIA, MASS
 
+pytestmark = pytest.mark.slow
+
 CENTRED = (0.0,) * 6
 MIDDLE = ArmatureBore(height=0.0)
 RADIUS, OUTER, LENGTH = 5e-3, 5.1e-3, 3.5e-3
@@ -120,7 +122,6 @@ def test_an_eccentric_bore_pulls_a_centred_needle_to_its_nearer_wall():
     assert flux > 1.002 * centred
 
 
-@pytest.mark.slow
 def test_a_guided_needle_goes_to_the_wall_that_it_is_nearer_to():
     """A negative stiffness against a film, that only slows it: one side, ever further."""
     coil = held_coil(ArmatureBore(height=1.5e-3), current=20.0)  # in the middle of the guide
@@ -168,7 +169,6 @@ def test_reluctance_that_is_left_out_is_told():
 # ---------------------------------------------------------------------- seat
 
 
-@pytest.mark.slow
 def test_a_seat_in_a_run_has_the_area_and_the_force_of_its_placement():
     run = seat_off_axis((20e-6, -10e-6, 0, 2e-3, 1e-3, 0))
 

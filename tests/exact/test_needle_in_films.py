@@ -25,6 +25,8 @@ from klack.verification.rigid_needle import (
     needle_on_ring,
 )
 
+pytestmark = pytest.mark.slow
+
 ROW = FACE.film_row(4e-4, 3.0)
 BULK = 4e-9  # [m/N] of the 1e-8 of the springs
 STEP = 20e-9
@@ -42,7 +44,6 @@ def land(*, lean, step=STEP, series=BULK, sectors=36, speed=1.0, duration=26e-6)
     return v, fly_in_films(model, ROW, q, v, sectors=sectors, **options)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("series", [0.0, BULK])
 @pytest.mark.parametrize("lean", [0.0, 2e-4, 8e-4])
 @pytest.mark.parametrize("duration", [8e-6, 12e-6, 26e-6])
@@ -57,7 +58,6 @@ def test_energy_of_a_landing(lean, series, duration):
     assert np.any(ended.force > 0.0) or duration < 10e-6
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("series", "bound"), [(0.0, 2e-5), (BULK, 5e-3)])
 def test_a_landing_converges_with_the_step(series, bound):
     """Convergence: order 1, since film and contact change places within a step.
@@ -74,7 +74,6 @@ def test_a_landing_converges_with_the_step(series, bound):
     assert series > 0.0 or errors[1] < 0.4 * errors[0]
 
 
-@pytest.mark.slow
 def test_sectors_converge():
     """Convergence: 36 sectors within 0.5 % of 144, as the table of the issue of lands says."""
     _, many = land(lean=8e-4, sectors=144)
@@ -82,7 +81,6 @@ def test_sectors_converge():
     np.testing.assert_allclose(some.v, many.v, atol=5e-3 * np.abs(many.v).max())
 
 
-@pytest.mark.slow
 def test_a_film_rights_a_needle_that_leans():
     """Symmetry: two leans that mirror each other end mirrored, and the film turns them back."""
     model = needle_on_ring(8e-6)
@@ -117,7 +115,6 @@ def valve(*, placement=None, guide=False, curved=0.0):
     )
 
 
-@pytest.mark.slow
 def test_points_without_a_face_do_not_tilt_a_film():
     """Exact: where nothing faces a point its gap is some millimetres, which is no height of a film.
 
@@ -197,7 +194,6 @@ def test_centred_and_wet_as_along_the_axis():
     assert abs(space.books.relative_residual) < 1e-11
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("half_angle", [0.5 * pi, 0.25 * pi])
 def test_recorded_gaps_before_the_touch_are_those_of_the_bodies(half_angle):
     """Exact: the gap of the axial network, also where no point is looked at yet, and on a cone."""
@@ -225,7 +221,6 @@ def test_energy_of_a_wet_eccentric_run():
     assert found.events
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("first", [30e-6, 46e-6, 100e-6])
 def test_a_wet_run_in_two_parts_is_the_same(first):
     """Exact: cut in flight, in the contact and after it."""

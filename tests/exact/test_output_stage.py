@@ -63,6 +63,7 @@ def test_random_stages_balance_at_any_step(seed, step):
     assert np.all(run.capacitor >= 0.0)
 
 
+@pytest.mark.slow
 def test_a_capacitor_that_is_empty_at_the_start_leaves_the_boost_to_the_battery():
     driver = BoostDriver(**USUAL | {"start_voltage": 5.0, "recharge_power": 0.0})
 
@@ -73,6 +74,7 @@ def test_a_capacitor_that_is_empty_at_the_start_leaves_the_boost_to_the_battery(
     assert run.current[-1] == pytest.approx(13.3 / 0.5 * (1 - np.exp(-0.1e-3 * rate)), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_recuperation_may_raise_the_capacitor_above_its_nominal_voltage():
     late = (Shot(start=40e-3, end=41e-3),)
     driver = BoostDriver(**USUAL | {"shots": late})
@@ -152,6 +154,7 @@ MAP = """    coil:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("coil", ["hysteresis", "eddy", "map"])
 def test_other_coils_balance_behind_a_stage(coil):
     text = (HOW_TO / "boost_driver.yaml").read_text(encoding="utf-8")
@@ -173,6 +176,7 @@ def test_other_coils_balance_behind_a_stage(coil):
         assert run.books.losses["coil hysteresis"] > 0.0
 
 
+@pytest.mark.slow
 def test_a_run_in_two_parts_is_the_run_of_the_whole_time(case):
     rows, keys = case.network.network().rows(), {"record": 2e-6, "coarse": 10, "step": 20e-9}
 
@@ -192,6 +196,7 @@ def test_the_page_shows_the_driver_of_the_case():
     assert YAML(typ="safe").load(block)["driver"] == whole["driver"]
 
 
+@pytest.mark.slow
 def test_the_second_shot_is_late_as_the_page_says(result):
     assert result.books.relative_residual < 1e-11
     found = re.search(r"as in the case \| ([\d.]+) V \| ([\d.]+) us \| ([\d.]+) us", PAGE)

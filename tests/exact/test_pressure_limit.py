@@ -152,6 +152,7 @@ def test_three_impacts_of_a_mass_on_one_point(speed):
         worn = run.worn
 
 
+@pytest.mark.slow
 def test_a_limit_that_is_not_reached_changes_no_bit():
     """Definition: the same forces as of elastic points."""
     far = PressureLimit(set=np.array([0.0, 1e-6]), pressure=np.array([1e9, 2e9]))
@@ -243,6 +244,7 @@ def test_the_meridian_case_of_solids():
     assert meridian_case(case, 20e-6, 1.02).motion.speed == case.motion.speed
 
 
+@pytest.mark.slow
 @each("seed", range(12))
 def test_random_bodies_that_tilt_on_points_that_yield_keep_the_energy(seed):
     """Conservation: three impacts of a rigid body off its axis, each on the faces of the last."""

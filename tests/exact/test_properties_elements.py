@@ -46,6 +46,7 @@ def box(family: str, size: float, affine: np.ndarray) -> Mesh:
     return lattice_mesh(family, lines, lambda x: size * (x @ affine.T))
 
 
+@pytest.mark.slow
 @examples(25)
 @given(FAMILIES, SIZES, MAPS, MATERIALS)
 def test_matrices_are_symmetric_positive_and_hold_the_mass(family, size, affine, material):
@@ -84,6 +85,7 @@ def test_a_linear_field_has_constant_stress(family, size, affine, material, grad
     assert u @ (K @ u) == pytest.approx(energy, rel=1e-9, abs=1e-12 * scale)
 
 
+@pytest.mark.slow
 @examples(8)
 @given(FAMILIES, SIZES, MAPS, MATERIALS, SIZES, MATERIALS)
 def test_frequencies_and_compliance_scale(family, size, affine, material, other, another):

@@ -34,6 +34,7 @@ def test_plain_numbers_are_read_as_written(quantity):
     assert parse_quantity(text, kind) == pytest.approx(value, rel=1e-14)
 
 
+@pytest.mark.slow
 @examples(100)
 @given(QUANTITIES, st.integers(2, 9))
 def test_what_people_read_can_be_read_back(quantity, digits):
@@ -81,6 +82,7 @@ def test_any_number_can_be_written_for_people(value, kind, digits):
         assert read == pytest.approx(value, rel=0.501 * 10.0 ** (1 - min(digits, 14)))
 
 
+@pytest.mark.slow
 @examples(60)
 @given(st.text(max_size=12), st.sampled_from(KINDS))
 def test_any_text_is_a_finite_number_or_an_input_error(text, kind):

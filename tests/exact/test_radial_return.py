@@ -36,6 +36,7 @@ def test_shear_yields_at_the_yield_stress_over_root_three_and_hardens_on_a_line(
     assert state.equivalent[0] == pytest.approx((0.01 - tau / G) / np.sqrt(3), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_reversed_shear_yields_earlier_with_kinematic_hardening():
     """Exact: the elastic range is 2 tau of first yield (kinematic) or twice the last stress."""
     H, back = 20e9, np.linspace(0.01, -0.002, 4000)

@@ -20,6 +20,8 @@ from klack.transient.rough_points import layer_energy, solve_rough
 from klack.verification.interface_bodies import advance, free_rod, modal_model, rigid_body
 from klack.verification.rough_point import LAYER, MassOnLayer, rough_rod, time_above
 
+pytestmark = pytest.mark.slow
+
 
 def arrays(layer, area):
     return Layer(area, layer.closure, layer.pressure, layer.state(layer.closure)[2])

@@ -15,6 +15,8 @@ from klack.transient.active_set import solve_active
 from klack.transient.interface_arrays import ActiveSet, Closed
 from klack.transient.rubbing import OPEN, SLIP, STICK, solve_rubbing
 
+pytestmark = pytest.mark.slow
+
 TABLE = Path(__file__).parents[1] / "data" / "friction_one_point.csv"
 CASES = [row for row in csv.DictReader(line for line in TABLE.open() if not line.startswith("#"))]
 TOLERANCE = 1e-11
@@ -219,7 +221,6 @@ def test_impacts_on_one_point_stick_slip_reverse_and_jam(case):
     assert missed(case, 400) < 1e-4
 
 
-@pytest.mark.slow
 def test_errors_fall_with_the_square_of_the_step():
     coarse, fine = (np.median([missed(case, n) for case in CASES]) for n in (100, 400))
     assert coarse / fine > 12.0

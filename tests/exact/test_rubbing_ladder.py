@@ -25,7 +25,10 @@ from klack.exchange.case_models import case_models
 from klack.progress import silent
 from klack.transient.rubbing_ladder import rubbing_contact
 
-pytestmark = pytest.mark.filterwarnings("ignore::klack.errors.AccuracyWarning")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore::klack.errors.AccuracyWarning"),
+]
 
 CASE = """
 klack: 1
@@ -174,7 +177,6 @@ def test_the_law_has_the_loops_of_the_bodies(seat, share):
         assert np.abs(apart).max() < (0.03 if share > 0.4 else 0.01) * loop.force[0]
 
 
-@pytest.mark.slow
 @pytest.mark.filterwarnings("default::klack.errors.AccuracyWarning")
 def test_faces_that_lock_have_no_law_with_memory():
     """Steeper than the friction, and too stiff across the normal to stick from the start."""

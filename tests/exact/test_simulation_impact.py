@@ -246,6 +246,7 @@ def test_weight_and_port_force_accelerate_a_rigid_needle_alike():
     np.testing.assert_allclose(free[None], free["contact"], rtol=1e-15)
 
 
+@pytest.mark.slow
 def test_tilting_rigid_modes_do_not_matter_for_a_central_impact():
     """A body with six rigid modes and one with the axial mode alone move alike along the axis."""
     rod = rod_body("needle", length=0.04, area=AREA, elastic_modes=5, **STEEL)

@@ -77,6 +77,7 @@ def test_free_flight_keeps_momentum_and_its_moment():
     assert abs(run.books.residual) < 1e-14 * run.books.scale
 
 
+@pytest.mark.slow
 def test_a_push_on_one_foot_gives_momentum_and_spin():
     """One point at x = a: e' = 2 / (1 + m a^2 / I) - 1, and I omega = -a P."""
     a = 1e-3
@@ -105,6 +106,7 @@ def test_a_push_on_one_foot_gives_momentum_and_spin():
     assert rate == pytest.approx(-a * impulse / INERTIA[1], rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("load", [(0.0, 0.0), (0.15e-3, -0.1e-3)])
 def test_three_feet_share_a_load_by_statics(load):
     """Sum of forces and both moments: three equations for three feet."""
@@ -126,6 +128,7 @@ def test_three_feet_share_a_load_by_statics(load):
     assert run.channels["needle tilt y"].values[0] == pytest.approx(-plane[2], rel=1e-6, abs=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("modes", [False, True])
 def test_a_needle_at_rest_stays_there(modes):
     needle = ROUND.with_modes() if modes else ROUND
@@ -220,6 +223,7 @@ def test_what_the_network_and_space_must_share():
             move(needle.rows({}), needle.valve(**wrong), 10e-6)
 
 
+@pytest.mark.slow
 def test_a_needle_that_nothing_holds_is_told():
     """Two feet under an eccentric load, and a stop that does not hold the tilt."""
     needle = Needle(

@@ -16,6 +16,8 @@ from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
 from klack.transient.interface_run import simulate_interface
 
+pytestmark = pytest.mark.slow
+
 ROUND = Needle(seat=ring(8, 0.6e-3, BELOW), stop=ring(8, 2e-3, ABOVE))
 CONE, MU = 0.25 * pi, 0.1
 
@@ -25,7 +27,6 @@ def pull(*force: float, over: tuple[float, ...] = (0.0, 1.0)) -> ForceOverTime:
     return ForceOverTime(time=over, force=force)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("modes", [False, True])
 @pytest.mark.parametrize("mu", [0.1, 0.6, 1.5])
 def test_a_drop_is_that_of_the_interface_level(modes, mu):
@@ -100,7 +101,6 @@ def test_a_needle_on_a_cone_loses_what_springs_and_sliders_take(mu):
     assert abs(run.books.residual) < 1e-12 * run.books.scale
 
 
-@pytest.mark.slow
 def test_a_load_at_rest_sticks_slips_and_sticks_again():
     """The same springs and sliders under a load that rises and falls, in the steps of rest.
 

@@ -48,6 +48,7 @@ def at(spectrum, frequency):
     return np.abs(np.interp(frequency, spectrum.frequency, spectrum.values))
 
 
+@pytest.mark.slow
 def test_half_sine_has_the_tabulated_spectrum():
     spectrum = impulse_spectrum(pulse(half_sine), resolution=20.0)
     ours = at(spectrum, PULSES[:, 0] / LENGTH) / (PEAK * LENGTH)

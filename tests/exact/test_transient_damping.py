@@ -85,6 +85,7 @@ def stepped(state: np.ndarray, omega: np.ndarray, zeta: np.ndarray, steps: int) 
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", DAMPINGS)
 def test_every_mode_decays_as_its_damping_says(name):
     """Kept modes with their ratio, the others without; Rayleigh damping all of them."""

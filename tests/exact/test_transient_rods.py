@@ -41,6 +41,7 @@ def test_rod_on_rigid_wall(scheme):
     assert run.history.velocity_a[-1] < SPEED
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("ratio", [1.0, 2.0])
 def test_two_rods_part_with_the_ratio_of_their_lengths(ratio, scheme):
@@ -56,6 +57,7 @@ def test_two_rods_part_with_the_ratio_of_their_lengths(ratio, scheme):
     assert parting == pytest.approx(1.0 / ratio, rel=2e-2)
 
 
+@pytest.mark.slow
 def test_rods_of_unequal_section():
     """F = v Z1 Z2 / (Z1 + Z2) with Z2 = 3 Z1."""
     length = 0.02
@@ -66,6 +68,7 @@ def test_rods_of_unequal_section():
     assert force == pytest.approx(0.75 * IMPEDANCE * SPEED, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_bar_without_lateral_strain_carries_the_bulk_wave():
     """Axisymmetric elements: F = rho c_p A v, over hats of different areas."""
     length = 0.03

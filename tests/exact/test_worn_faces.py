@@ -136,6 +136,7 @@ def test_the_command_writes_a_case_that_it_reads_again(tmp_path):
     assert not (tmp_path / "c" / "worn.yaml").exists()
 
 
+@pytest.mark.slow
 def test_the_written_case_says_where_it_comes_from():
     found, text = _run_in()
 

@@ -89,6 +89,7 @@ def test_opening_begins_where_closing_ended(loops):
         assert opening.approach[-1] == pytest.approx(state.approach, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_bodies_that_do_not_yield_have_no_states():
     """Exact: a yield stress beyond the stresses of the impact."""
     text = SPHERES.read_text("utf-8").replace("yield: 280 MPa", "yield: 4 GPa")

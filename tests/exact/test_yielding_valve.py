@@ -141,6 +141,7 @@ def test_a_film_lies_beside_faces_that_yield():
     )  # faces and bulk apart
 
 
+@pytest.mark.slow
 def test_friction_and_yield_are_not_had_together():
     """Bad input: the law has one of the two; a warning names what is left out."""
     study = _study(("speed: 0.1 m/s}", "speed: 0.1 m/s, friction: 0.1}"))
@@ -150,6 +151,7 @@ def test_friction_and_yield_are_not_had_together():
     assert any("yields before" in text for text in study.warnings)
 
 
+@pytest.mark.slow
 def test_a_high_yield_stress_changes_no_bit():
     """Exact."""
     hard = _study(("yield: 280 MPa", "yield: 4 GPa")).variants["dry"].result

@@ -360,6 +360,7 @@ def test_what_is_offered_are_numbers_of_the_case_and_measures_of_the_valve():
     assert "wall_time" not in {item.name for item in offer.measures}
 
 
+@pytest.mark.slow
 def test_a_value_of_a_million_digits_is_refused_as_a_text():
     text, path = CASE.read_text("utf-8"), str(CASE)
     place = ("network", "components", "spring", "preload")

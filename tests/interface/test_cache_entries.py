@@ -89,6 +89,7 @@ def whole(tmp_path_factory) -> bytes:
     return written(tmp_path_factory.mktemp("whole") / "entry", entry).read_bytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(data=st.data())
 def test_any_changed_byte_is_noticed(tmp_path_factory, whole, data):
@@ -103,6 +104,7 @@ def test_any_changed_byte_is_noticed(tmp_path_factory, whole, data):
         read_entry(path, KEY)
 
 
+@pytest.mark.slow
 def test_any_cut_or_addition_is_noticed(tmp_path, whole):
     path = tmp_path / "entry"
     for length in range(len(whole)):

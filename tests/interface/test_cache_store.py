@@ -81,6 +81,7 @@ def test_a_result_is_computed_once(tmp_path):
     assert first.tobytes() == again.tobytes() == none.tobytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(data=st.data())
 def test_damage_is_repaired(tmp_path_factory, data):
@@ -173,6 +174,7 @@ def test_unfinished_files_of_killed_runs_go_after_an_hour(tmp_path):
     assert new.exists()  # somebody may be writing it
 
 
+@pytest.mark.slow
 def test_two_processes_on_one_empty_cache(tmp_path):
     """Both meet the same empty folder at once; both are right, nothing unfinished is left."""
     processes = [started(tmp_path / "deep" / "cache", 3) for _ in range(2)]

@@ -252,6 +252,7 @@ def built(witness, monkeypatch):
     monkeypatch.setattr(calculix_case, "build_bodies", lambda case, progress: witness)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("built")
 def test_a_guide_is_left_out_with_a_note():
     case = load_case(find_case("witness"))
@@ -260,6 +261,7 @@ def test_a_guide_is_left_out_with_a_note():
         calculix_impact(case.model_copy(update={"guide": guide}), silent)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("built")
 @pytest.mark.parametrize(
     ("contact", "words"),

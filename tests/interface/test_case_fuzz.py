@@ -47,11 +47,8 @@ def outcome(read: Any) -> None:
     assert time.process_time() - begin < PATIENCE
 
 
-@pytest.mark.parametrize(
-    "path",
-    [*CASES[:4], *(pytest.param(path, marks=pytest.mark.slow) for path in CASES[4:])],
-    ids=lambda path: f"{path.parent.name}-{path.stem}",
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("path", CASES, ids=lambda path: f"{path.parent.name}-{path.stem}")
 def test_each_value_becomes_something_nasty(path: Path):
     """Not all pairs of value and place in every run: another ten for each case."""
     tree = YAML(typ="safe", pure=True).load(path.read_text(encoding="utf-8"))
@@ -79,9 +76,8 @@ def test_each_key_goes_or_comes_twice():
             outcome(lambda w=whole: read_any_case(json.dumps(w), path.with_name("valve.yaml")))
 
 
-@pytest.mark.parametrize(
-    "batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", range(4))
 def test_mutated_cases(batch: int, tmp_path: Path):
     """Bytes, lines, values, numbers, units, keys, references, types; see mutated_cases.py."""
     draw = random.Random(f"{SEED}-{batch}")

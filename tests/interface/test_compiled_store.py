@@ -150,6 +150,7 @@ def test_fields_that_change_places_are_other_code(program, kinds):
         assert end(start(program)) == [2.0 if fields[0] == "a" else 5.0, 1, []]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the machine code of Linux")
 def test_only_entries_have_machine_code(compiled_program):
     program = compiled_program
@@ -169,6 +170,7 @@ def test_a_text_that_changes_compiles_nothing(program):
     assert end(start(program)) == [7.0, 0, []]
 
 
+@pytest.mark.slow
 def test_two_processes_that_start_together_compile_each_function_once(program):
     both = [start(program), start(program)]
     (one, compiled, _), (other, also_compiled, _) = (end(process) for process in both)
@@ -190,15 +192,8 @@ def test_code_of_another_processor_is_not_run(compiled_program):
 NOT_PICKLED = b"klack code 1\n" + hashlib.sha256(b"code").digest() + b"code"
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        b"",
-        *(pytest.param(x, marks=pytest.mark.slow) for x in (b"klack code 1\n", b"klack code 0\n")),
-        NOT_PICKLED,
-        None,
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("damage", [b"", b"klack code 1\n", b"klack code 0\n", NOT_PICKLED, None])
 def test_damaged_code_is_compiled_again(compiled_program, damage):
     program = compiled_program
     for file in files(program):

@@ -88,6 +88,7 @@ def test_every_number_survives_the_header():
     assert [float(x) for x in line.split(",")] == list(MODELS["film"].omega)
 
 
+@pytest.mark.slow
 @needs_gcc
 def test_same_model_gives_the_same_file(tmp_path):
     a = build_fmu(MODELS["dry"], tmp_path / "a.fmu", fmi=2)

@@ -122,15 +122,20 @@ def test_every_point_is_the_impact_of_the_changed_case(ball, tmp_path):
 @pytest.mark.parametrize(
     ("key", "value", "level"),
     [
-        ("contact.gap", "{values: [1 um, 2 um]}", "reduced"),
-        ("bodies.rod.mesh.contact.size", "{values: [0.025 mm, 0.03 mm]}", "reduced"),
-        (YOUNG, "{values: [190 GPa, 200 GPa]}", "interface"),
-        ("reduction.modes.ball.count", "{values: [8, 9]}", "reduced"),
-        ("contact.friction", "{values: [0, 0.2]}", "reduced"),
-        ("contact.friction", "{values: [0.2, 0]}", "interface"),
         ("lumped.stiffness", "{values: [2e8 N/m, 3e8 N/m]}", "lumped"),
-        ("run.reduced_step", "{values: [10 ns, 15 ns]}", "reduced-none"),
-        pytest.param(SPEED, "{values: [0.4 m/s, 0.5 m/s]}", "full", marks=pytest.mark.slow),
+        *(
+            pytest.param(*point, marks=pytest.mark.slow)
+            for point in (
+                ("contact.gap", "{values: [1 um, 2 um]}", "reduced"),
+                ("bodies.rod.mesh.contact.size", "{values: [0.025 mm, 0.03 mm]}", "reduced"),
+                (YOUNG, "{values: [190 GPa, 200 GPa]}", "interface"),
+                ("reduction.modes.ball.count", "{values: [8, 9]}", "reduced"),
+                ("contact.friction", "{values: [0, 0.2]}", "reduced"),
+                ("contact.friction", "{values: [0.2, 0]}", "interface"),
+                ("run.reduced_step", "{values: [10 ns, 15 ns]}", "reduced-none"),
+                (SPEED, "{values: [0.4 m/s, 0.5 m/s]}", "full"),
+            )
+        ),
     ],
 )
 def test_any_key_and_any_level(ball, tmp_path, key, value, level):

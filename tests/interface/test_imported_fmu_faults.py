@@ -148,6 +148,7 @@ run: {{duration: 50 us, step: 0.2 us, coarse: 8, record: 2 us, variants: [dry]}}
 """
 
 
+@pytest.mark.slow
 def test_the_command_ends_with_1_and_one_message(spring_damper_fmu: Build, tmp_path, capsys):
     path = spring_damper_fmu(fault="exit(0)")
     case = tmp_path / "case.yaml"

@@ -21,6 +21,8 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.errors import ConvergenceError, InputError
 from klack.transient import full_order, interface_run
 
+pytestmark = pytest.mark.slow
+
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 SAID = "level 'full' failed and has no results: simulate_full_order: step"
 
@@ -52,7 +54,6 @@ def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
 def test_levels_that_did_not_fail_are_kept_to_the_last_bit(stored):
     study = IMPACT.load(stored)
     healthy = run_impact(load_case(CASE), levels=("reduced", "interface"))
@@ -77,7 +78,6 @@ def test_numbers_name_the_level_that_failed(stored):
     assert said["warnings"][0].startswith(SAID)
 
 
-@pytest.mark.slow
 def test_terminal_and_exit_code(capsys, tmp_path):
     with impatience():
         code = main(["impact", str(CASE), "--no-report", "--out", str(tmp_path / "out")])
@@ -90,7 +90,6 @@ def test_terminal_and_exit_code(capsys, tmp_path):
     assert (tmp_path / "out" / "result.zarr").is_dir()
 
 
-@pytest.mark.slow
 def test_report_of_an_incomplete_result(stored, tmp_path, capsys):
     assert main(["report", str(stored), "--out", str(tmp_path)]) == 0
 
@@ -132,7 +131,6 @@ def test_noise_says_what_speaks_against_the_contact(stored):
     assert source.notes[-1] == said
 
 
-@pytest.mark.slow
 def test_a_level_that_fails_costs_no_later_one(monkeypatch):
     monkeypatch.setattr(interface_run, "march", lambda steps, *_: (0, interface_run.FAILED))
 
@@ -143,7 +141,6 @@ def test_a_level_that_fails_costs_no_later_one(monkeypatch):
     assert (list(study.levels), list(study.failures)) == (["full"], ["interface"])
 
 
-@pytest.mark.slow
 def test_without_any_level_the_error_is_a_plain_one():
     with impatience(), pytest.raises(ConvergenceError, match="step") as caught:
         run_impact(load_case(CASE), levels=("full",))

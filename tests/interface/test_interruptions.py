@@ -296,6 +296,7 @@ def test_a_calibration_goes_on_after_kill_9_at_any_time(tmp_path: Path):
     assert {**after, **clocks} == {**undisturbed, **clocks}
 
 
+@pytest.mark.slow
 def test_a_log_cut_at_any_byte_gives_back_whole_strokes(tmp_path: Path):
     """What a process leaves that is killed while it writes; the next one appends to whole lines."""
     motion = Motion(

@@ -104,6 +104,7 @@ def test_derivatives_are_refused():
         run_tangents(network(LOCAL), (), duration=1e-5)
 
 
+@pytest.mark.slow
 def test_a_linear_state_space_is_refused():
     rows = network(LOCAL)
     compiled = compile_network(rows, step_sizes(rows, "normal", step=40e-9))
@@ -112,6 +113,7 @@ def test_a_linear_state_space_is_refused():
         linear_network(compiled, 1e-9)
 
 
+@pytest.mark.slow
 def test_a_steady_flow_that_boils_in_the_line_is_refused():
     narrow = network(LOCAL | {"diameter": 0.5e-3, "friction": "none", "length": 0.02}, hole=2e-3)
 
@@ -119,6 +121,7 @@ def test_a_steady_flow_that_boils_in_the_line_is_refused():
         run(narrow)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings(TOLD)
 @pytest.mark.parametrize("friction", ["none", "steady", "kagawa", "turbulent"])
 def test_a_line_begins_in_its_steady_flow_and_stays_there(friction):
@@ -129,6 +132,7 @@ def test_a_line_begins_in_its_steady_flow_and_stays_there(friction):
     assert np.max(np.abs(p / p[0] - 1.0)) < 1e-4  # the cells resolve the profile to this
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings(TOLD)
 def test_mass_and_energy_balance_and_a_run_continues_to_the_same_bits():
     rows = network(LOCAL | {"friction": "turbulent"}, to=500e5)
@@ -145,6 +149,7 @@ def test_mass_and_energy_balance_and_a_run_continues_to_the_same_bits():
     assert np.array_equal(after[: same.size], same)
 
 
+@pytest.mark.slow
 def test_the_warning_of_fixed_properties_names_local_ones():
     (text,) = [x for x in told(network({"friction": "none"}, to=700e5)) if "range" in x]
 
@@ -152,6 +157,7 @@ def test_the_warning_of_fixed_properties_names_local_ones():
     assert not [x for x in told(network(LOCAL | {"friction": "none"}, to=700e5)) if "range" in x]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [{}, LOCAL])
 def test_laminar_flow_beyond_its_range_is_told_with_line_number_time_and_option(kind):
     steady = network(kind, to=300e5)
@@ -177,6 +183,7 @@ def test_laminar_flow_beyond_its_range_is_told_with_line_number_time_and_option(
     )  # two digits, properties at a stated pressure
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [{}, LOCAL])
 def test_turbulent_and_slow_flow_say_nothing_of_it(kind):
     fast = told(network(kind | {"friction": "turbulent"}))
@@ -185,6 +192,7 @@ def test_turbulent_and_slow_flow_say_nothing_of_it(kind):
     assert not [x for x in fast + slow if "Reynolds" in x]
 
 
+@pytest.mark.slow
 def test_steep_fronts_are_told_and_smooth_waves_are_not():
     jump = told(network(LOCAL | {"friction": "none"}, to=700e5, rise=1e-7, hole=0.02e-3))
     smooth = told(network(LOCAL | {"friction": "none"}, to=310e5, rise=1e-4))
@@ -194,6 +202,7 @@ def test_steep_fronts_are_told_and_smooth_waves_are_not():
     assert not [x for x in smooth if "steep fronts" in x]
 
 
+@pytest.mark.slow
 def test_a_macro_step_lasts_no_longer_than_a_wave_needs_for_a_cell():
     rows = network(LOCAL)
     sizes = step_sizes(rows, "normal", step=40e-9)

@@ -90,6 +90,7 @@ class TestMade:
         record = klack.run_study(SMALL, write(tmp_path, text), made=4).record
         assert any("'Today' of a bound" in note for note in record.warnings)
 
+    @pytest.mark.slow
     def test_seed_and_number_of_points_are_those_of_the_design(self, tmp_path):
         text = STUDY + ROBUST
         one = write(tmp_path, text.replace("variant: dry", "design: {seed: 5}"), "a.yaml")

@@ -151,6 +151,7 @@ def test_map_of_a_solenoid_pulls_like_the_solenoid():
     assert from_map[0] == pytest.approx(from_circuit[0], rel=5e-3)  # 11 gaps
 
 
+@pytest.mark.slow
 def test_map_with_a_wrong_force_warns():
     with pytest.warns(AccuracyWarning, match="the linkage gives"):
         map_of(Solenoid(**INJECTOR), force_factor=1.5)

@@ -309,6 +309,7 @@ class TestFailures:
 
 
 class TestInterruption:
+    @pytest.mark.slow
     def test_rows_so_far_are_kept(self, small: klack.CaseOnHand):
         points = drawn(8)
 

@@ -102,6 +102,7 @@ class TestResults:
         for number in rods.measures["reduced"].values():
             assert level[number.measure.json_key] == number.value
 
+    @pytest.mark.slow
     def test_curves_carry_units(self, rods: klack.Result):
         data = rods.to_xarray()
         history = rods.record.levels["reduced"].history
@@ -112,6 +113,7 @@ class TestResults:
         with pytest.raises(InputError, match="one of: reduced"):
             rods.to_xarray("full")
 
+    @pytest.mark.slow
     def test_noise_as_a_dataset(self):
         """Truth = the record, and Parseval: the bands hold the energy of the sound."""
         case = klack.load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")

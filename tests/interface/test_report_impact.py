@@ -100,6 +100,7 @@ def test_user_text_stays_text_on_the_page(impact_study: ImpactStudy) -> None:
     assert unescape(text).count(HOSTILE) > 10
 
 
+@pytest.mark.slow
 def test_every_chart_on_the_page_is_one_that_plotly_accepts(page: str, content: Content) -> None:
     found = re.findall(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)
 

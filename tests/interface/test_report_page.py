@@ -21,6 +21,8 @@ from klack.report.html import render_html
 from klack.report.page import Content, NextStep, Section, Table
 from klack.report.pdf import render_pdf
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def impact_content(impact_study: ImpactStudy) -> Content:
@@ -39,7 +41,6 @@ def test_contents_lead_to_every_part(impact_content: Content):
     assert titles[-3:] == ["What the words mean", "Limits", "How to compute it again"]
 
 
-@pytest.mark.slow
 def test_next_steps_are_commands_that_exist(impact_study: ImpactStudy):
     levels = {"reduced": impact_study.levels["reduced"]}
     alone = replace(impact_study, levels=levels, reference="reduced", deviations={})

@@ -274,6 +274,7 @@ def test_a_point_without_a_rectangle_gives_its_force_to_its_column() -> None:
 # --------------------------------------------------------------------------- words and pictures
 
 
+@pytest.mark.slow
 def test_numbers_of_a_ring_that_closes_slowly() -> None:
     """First touch at 0 degrees, closed all round when 180 degrees begin, 10 us later."""
     rows = {row[0]: row[1:] for row in pressure_rows([view(ring()), view(ring(late=10e-6))])}

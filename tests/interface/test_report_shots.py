@@ -220,6 +220,7 @@ def test_the_distribution_counts_every_shot(study: ShotsStudy) -> None:
     assert [mark.label for mark in histogram.marks] == ["highest rebound", "centred impact"]
 
 
+@pytest.mark.slow
 def test_a_shot_without_a_rebound_height_keeps_its_restitution(study: ShotsStudy) -> None:
     heights = study.shots.rebound_height.copy()
     heights[3] = np.nan
@@ -266,6 +267,7 @@ def test_points_say_which_shot_they_are(content: Content) -> None:
     assert figure["data"][0]["text"][17] == "shot 17"
 
 
+@pytest.mark.slow
 def test_user_text_stays_text(study: ShotsStudy) -> None:
     hostile = replace(
         study,

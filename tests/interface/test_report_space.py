@@ -139,6 +139,7 @@ def test_names_are_text_and_the_picture_is_xml(solid_study: ImpactStudy) -> None
     assert "<b>x</b>" not in render_html(content)
 
 
+@pytest.mark.slow
 def test_long_names_are_shortened_in_the_legend(solid_study: ImpactStudy) -> None:
     upper, lower = solid_study.pictures
     study = replace(solid_study, pictures=(replace(upper, body="n" * 200), lower))

@@ -305,6 +305,7 @@ def test_user_text_stays_text_on_the_page(study: StrokeStudy):
     assert unescape(text).count(HOSTILE) > 10
 
 
+@pytest.mark.slow
 def test_every_chart_is_one_that_plotly_accepts(study: StrokeStudy, page: str):
     found = re.findall(r'<script type="application/json">(.*?)</script>', page, re.DOTALL)
 
@@ -453,6 +454,7 @@ def test_short_and_broken_curves_stay_as_they_are():
     assert (inside[0], inside[-1]) == (10.0, 20.0)
 
 
+@pytest.mark.slow
 def test_a_doubtful_contact_is_said_with_its_stop(study: StrokeStudy, tmp_path: Path):
     doubts = ("it lies on a sharp edge", "2 contact points across are too few")
     seat = replace(study.stops[1], points_across=2, doubts=doubts)

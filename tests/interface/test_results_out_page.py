@@ -34,6 +34,7 @@ def test_a_stored_result_goes_out_as_the_page_says(
     assert (tmp_path / "stroke.nc").is_file()
 
 
+@pytest.mark.slow
 def test_the_film_of_the_page_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
 

@@ -102,6 +102,7 @@ def test_solids_and_mixed_elements_share_a_grid(tmp_path: Path):
     assert [values.ravel().tolist() for values in read.cell_data["solid"]] == [[0], [1]]
 
 
+@pytest.mark.slow
 def test_large_arrays_go_out_in_several_pieces(tmp_path: Path):
     """More than 1 MiB of points; also one that ends exactly at the end of a piece."""
     for count in (2**17 // 2 + 1, 2**18):

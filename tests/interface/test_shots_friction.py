@@ -142,6 +142,7 @@ def test_a_drawn_coefficient_is_that_of_the_contact(rubbing):
     assert setup.model.friction == (Friction.coulomb(0.125),)
 
 
+@pytest.mark.slow
 def test_friction_takes_energy_and_the_balance_closes(rubbing):
     """Of both shots and of the centred one, whose faces slip while they are pressed together."""
     setup, draws = rubbing
@@ -232,6 +233,7 @@ def test_the_columns_are_in_json_measures_and_report(study):
     assert "frictionless" not in limits
 
 
+@pytest.mark.slow
 def test_a_report_without_friction_says_frictionless(study):
     smooth = replace(study, faces="", pressures={})
     content = shots_content(smooth)

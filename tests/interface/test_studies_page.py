@@ -30,13 +30,14 @@ def test_the_study_of_the_page_is_the_file_beside_it():
     assert not left.split()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("place", "command", "design"),
     [
         (0, "study", "sobol"),
-        pytest.param(1, "study", "saltelli", marks=pytest.mark.slow),
-        pytest.param(3, "sensitivities", "sobol", marks=pytest.mark.slow),
-        pytest.param(4, "optimise", "sobol", marks=pytest.mark.slow),
+        (1, "study", "saltelli"),
+        (3, "sensitivities", "sobol"),
+        (4, "optimise", "sobol"),
     ],
 )
 def test_commands_print_what_the_page_shows(tmp_path, capsys, monkeypatch, place, command, design):

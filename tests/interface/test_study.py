@@ -59,6 +59,7 @@ def columns(record, kind="measures"):
 
 
 class TestNumbers:
+    @pytest.mark.slow
     def test_every_point_is_the_stroke_of_the_changed_case(self, study):
         record = klack.run_study(SMALL, study, threads=2).record
         case = klack.load_case(SMALL)
@@ -165,6 +166,7 @@ class TestKept:
             np.testing.assert_array_equal(columns(again)[name], values)
             np.testing.assert_array_equal(columns(second)[name][:8], values)
 
+    @pytest.mark.slow
     def test_another_case_finds_nothing_and_destroys_nothing(self, study, tmp_path):
         klack.run_study(SMALL, study, folder=tmp_path / "out")
         heavier = klack.load_case(SMALL).with_value("network.components.needle.mass", "4 g")
@@ -184,9 +186,8 @@ class TestKept:
         (tmp_path / "a.inp").write_text("2")
         assert point_key(tree, "dry", {"bodies.needle.geometry.mesh.file": "a.inp"}) != before
 
-    @pytest.mark.parametrize(
-        "lines", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (3, 6))]
-    )
+    @pytest.mark.slow
+    @pytest.mark.parametrize("lines", [1, 3, 6])
     def test_killed_at_any_point_it_resumes_to_the_same_numbers(self, study, tmp_path, lines):
         """The signal cannot be caught; a line that was cut off is computed again."""
         whole = klack.run_study(SMALL, study).record

@@ -132,6 +132,7 @@ def test_command_result_report_and_json(tmp_path, capsys):
     assert "Shares of the variance of end_time" not in told
 
 
+@pytest.mark.slow
 def test_few_points_are_doubted(tmp_path):
     text = STUDY.replace("points: 40", "points: 16")
     record = klack.run_study(SMALL, write(tmp_path, text)).record

@@ -68,6 +68,7 @@ def test_every_way_of_solving_gives_the_same_impact(options):
     assert other.history.velocity_a[-1] == pytest.approx(reference.history.velocity_a[-1], rel=1e-9)
 
 
+@pytest.mark.slow
 @needs_pardiso
 def test_single_precision_changes_the_force_by_a_millionth():
     """Only increments of one step pass through the factor: 1.2e-7 measured on 62k unknowns.

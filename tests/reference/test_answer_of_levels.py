@@ -69,6 +69,7 @@ def test_the_answer_comes_before_what_only_adds_to_it():
     assert len(study.transfer) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("levels", [("reduced",), ("full",)])
 def test_an_answer_so_far_is_told_only_where_more_is_to_come(levels):
     terminal = Terminal()
@@ -129,6 +130,7 @@ def test_the_run_behind_the_estimate_is_the_answer_where_it_is_better():
     assert found.peak_force == pytest.approx(truth.peak_force, rel=0.005)
 
 
+@pytest.mark.slow
 def test_without_disagreement_the_answer_stays_the_level_asked_for():
     assert both().estimates
     assert list(both().levels) == ["reduced", "interface", "full"]

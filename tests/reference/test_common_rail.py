@@ -47,6 +47,7 @@ def test_the_page_shows_the_include_of_the_case():
     assert YAML(typ="safe").load(block) == {"include": whole["include"]}
 
 
+@pytest.mark.slow
 def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result):
     assert result.books.relative_residual <= 1e-11
     pump, relief, leak = told(
@@ -62,6 +63,7 @@ def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result)
         )
 
 
+@pytest.mark.slow
 def test_the_first_wave_is_that_of_joukowsky_and_takes_its_time(case, result):
     """Before any echo; the chamber at the seat delays the front by some 0.05 ms."""
     speed = float(case.network.network().fluid.sound_speed(START))
@@ -99,6 +101,7 @@ def injected(result) -> np.ndarray:
     return np.array(masses)
 
 
+@pytest.mark.slow
 def test_each_injector_injects_once_in_each_cycle(result):
     least, most = told(r"between ([\d.]+) mg and ([\d.]+) mg: the mass")
     masses = injected(result)

@@ -34,6 +34,7 @@ def test_the_isentrope_is_that_of_the_equation_of_state(fluid, top, celsius):
     assert ours.vapour_pressure == pytest.approx(CP.PropsSI("P", "T", T, "Q", 0, fluid), rel=1e-9)
 
 
+@pytest.mark.slow
 def test_it_is_the_fluid_of_the_library_where_both_hold():
     pytest.importorskip("CoolProp")
     T, p = 293.15, 100e5

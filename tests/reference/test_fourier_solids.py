@@ -90,6 +90,7 @@ def test_fields_span_the_same_two_shapes(held):
         np.testing.assert_allclose(cosines, 1.0, atol=3e-4)  # error of the mesh squared
 
 
+@pytest.mark.slow
 def test_traces_on_a_ring_are_those_of_the_solid():
     """Displacement along the outward normal of the taper, at all nodes of one ring of it."""
     bending, modes, body, of_solid = peg(False)

@@ -96,6 +96,7 @@ def test_rows_without_places_are_x_y_z_of_node_after_node(body, frequencies, tmp
     np.testing.assert_allclose(frequencies_of(files, body, numbers), frequencies, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_the_ansys_file_of_the_reader_package_is_read_as_there():
     package = pytest.importorskip("ansys.mapdl.reader")
     path = Path(package.__file__).parent / "examples" / "file.full"

@@ -11,6 +11,8 @@ from klack.case import find_case, load_case
 from klack.errors import InputError
 from klack.exchange.results.vtk_series import write_impact_series
 
+pytestmark = pytest.mark.slow
+
 FRAMES = 12
 Film = dict[str, list[tuple[float, meshio.Mesh]]]
 
@@ -33,7 +35,6 @@ def films(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Film]:
     }
 
 
-@pytest.mark.slow
 def test_both_bodies_are_there_at_every_instant(films: dict[str, Film]):
     for film in films.values():
         assert list(film) == ["needle", "housing"]

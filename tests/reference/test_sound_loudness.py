@@ -133,6 +133,7 @@ def test_a_click_decays_at_once_and_a_long_sound_slowly():
     assert 5.0e-3 * np.log(10.0) < fall[1] <= 15e-3 * np.log(10.0) + 0.5e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", [0, 6, 13, 19])
 def test_narrow_bands_have_the_sharpness_of_the_standard(row):
     """Noise one critical band wide at 4 sone; the standard's tolerance is 0.05 acum."""

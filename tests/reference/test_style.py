@@ -85,7 +85,10 @@ def test_the_table_is_read():
     assert found("bookshelf, off-axis, ```\nbooks\n```\n") == []
 
 
-@pytest.mark.parametrize("texts", [pages, strings], ids=["pages", "source"])
+@pytest.mark.parametrize(
+    "texts",
+    [pytest.param(pages, id="pages"), pytest.param(strings, id="source", marks=pytest.mark.slow)],
+)
 def test_texts_use_the_vocabulary(texts):
     wrong = [
         f"{where}: {phrase!r}, use {term!r}"

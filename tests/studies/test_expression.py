@@ -58,6 +58,7 @@ def arithmetic(draw, depth=4):
     return form.format(left, right)
 
 
+@pytest.mark.slow
 @given(arithmetic())
 def test_value_is_that_of_python_to_the_bit(text):
     assume(len(text) < 500)

@@ -19,6 +19,7 @@ def front_by_pairs(points):
     return kept
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),

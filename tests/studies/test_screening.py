@@ -35,6 +35,7 @@ def morris_function(x, seed):
     return y
 
 
+@pytest.mark.slow
 @each("seed", range(5))
 @each("candidates", [None, 100])
 def test_groups_of_the_function_of_morris_are_found(seed, candidates):
@@ -67,6 +68,7 @@ def test_a_linear_function_is_exact(levels, bounded):
     assert found.reasons == ("",) * 5
 
 
+@pytest.mark.slow
 def test_moments_of_an_interaction_are_those_of_its_levels():
     """The effect of a on a * b is b, which takes the levels 0, 1/3, 2/3, 1 alike.
 

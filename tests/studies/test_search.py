@@ -143,6 +143,7 @@ def test_four_objectives_have_the_hypervolume_of_pymoo_run_alone():
     assert np.all(front.max(axis=0) > 0.9)  # all four ends of it
 
 
+@pytest.mark.slow
 def test_sizes_of_four_objectives_do_not_matter():
     settings = SearchSettings(7, 4, population=56, generations=40, seed=1)
     sizes = np.array([2.0**-40, 1.0, 2.0**30, 2.0**-20])  # powers of two: no rounding

@@ -66,6 +66,7 @@ def test_intervals_hold_the_exact_indices(case):
     assert all(f.rows == 1024 and f.discarded == 0 and f.reason == "" for f in found)
 
 
+@pytest.mark.slow
 def test_few_rows_are_doubted_where_intervals_hold_less_than_they_claim():
     """The worst index of the G-function at 64 rows: what few_rows warns of."""
     function, parameters, exact = CASES["g-function"]
@@ -91,6 +92,7 @@ def test_many_rows_give_the_exact_indices(case):
     assert np.abs(found.total.value - exact[1]).max() < 3e-3
 
 
+@pytest.mark.slow
 def test_intervals_of_independent_rows_are_missed_as_often_as_claimed():
     """Truth: a sum of coordinates with weights 1, 2, 3 has the indices 1/14, 4/14, 9/14."""
     weights = np.array([1.0, 2.0, 3.0])
@@ -168,6 +170,7 @@ def test_a_failed_point_discards_its_row_and_no_other(failure):
         assert np.array_equal(mine.high, theirs.high)
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_exact_indices_where_points_fail_by_chance():
     hits = []
     for seed in range(20):

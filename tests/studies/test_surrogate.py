@@ -121,6 +121,7 @@ def test_indices_of_ishigami_are_within_the_stated_error(kind):
         assert estimates.value == pytest.approx(exact, abs=apart)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LONG)
 def test_indices_of_the_g_function_are_within_the_stated_error(kind):
     """A function with kinks; as those of Saltelli's design with 30 times as many points."""
@@ -164,6 +165,7 @@ def test_stated_residuals_have_not_seen_the_point(fit):
     assert after[7] - before[7] == pytest.approx(0.02, rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", LONG)
 @pytest.mark.parametrize(("function", "parameters"), [(smooth, 3), (g_function, 4)])
 def test_fresh_points_are_predicted_as_well_as_stated(kind, function, parameters):
