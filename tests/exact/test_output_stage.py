@@ -214,6 +214,7 @@ def test_the_second_shot_is_late_as_the_page_says(result):
     assert 1e6 * (second - first) == pytest.approx(late, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_energies_are_those_of_the_page(result):
     found = re.search(
         r"Of ([\d.]+) mJ from the battery ([\d.]+) mJ become heat in the coil, ([\d.]+) mJ in "

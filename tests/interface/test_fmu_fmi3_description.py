@@ -102,7 +102,14 @@ def fmi(request):
     return request.param
 
 
-@pytest.fixture(params=MODELS, ids=lambda name: name.replace(" ", "-"))
+def quick(name):
+    return name in ("body", "pair with film", "pair for co-simulation only")
+
+
+@pytest.fixture(
+    params=[pytest.param(n, marks=() if quick(n) else pytest.mark.slow) for n in MODELS],
+    ids=lambda name: name.replace(" ", "-"),
+)
 def model(request):
     return MODELS[request.param]
 

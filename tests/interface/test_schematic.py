@@ -39,6 +39,7 @@ def drawn(network: Network) -> Schematic:
     return with_legend(schematic_of(network), network, "A title")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", FILES, ids=[f"{p.parent.name}/{p.stem}" for p in FILES])
 def test_no_case_of_the_project_breaks_a_rule(path):
     network = load_any_case(path).network.network()

@@ -10,8 +10,9 @@ from klack.errors import InputError, MissingExtraError
 from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.liquid import ATMOSPHERE
 
+pytestmark = pytest.mark.slow
 
-@pytest.mark.slow
+
 @pytest.mark.parametrize("celsius", [0.0, 40.0, 140.0])
 @pytest.mark.parametrize(
     ("fluid", "top"), [("n-Dodecane", 2000e5), ("n-Heptane", 1000e5), ("Water", 2500e5)]
@@ -34,7 +35,6 @@ def test_the_isentrope_is_that_of_the_equation_of_state(fluid, top, celsius):
     assert ours.vapour_pressure == pytest.approx(CP.PropsSI("P", "T", T, "Q", 0, fluid), rel=1e-9)
 
 
-@pytest.mark.slow
 def test_it_is_the_fluid_of_the_library_where_both_hold():
     pytest.importorskip("CoolProp")
     T, p = 293.15, 100e5
