@@ -314,3 +314,16 @@ def test_records_that_are_further_apart_than_asked_are_told(record, told):
     time = study.variants["dry"].result.time
     note = f"records are {1e6 * (time[1] - time[0]):.3g} us apart, where run.record is {record}"
     assert any(note in warning for warning in study.warnings) == told
+
+
+@pytest.mark.slow
+def test_steps_are_checked_on_request(tmp_path, capsys):
+    words = ["--check-steps", "--variant", "dry", "--step", "100 ns", "--duration", "300 us"]
+
+    assert main(["stroke", str(CASE), *words, "--out", "out"]) == 0
+
+    text = capsys.readouterr().out
+    assert "dry: what changes when all time steps are doubled" in text
+    assert re.search(r"opening 1 +[+-]0\.\d{4} +-0\.\d{4} ", text)
+    assert "impact 1 on 'opening' changes by -0." in " ".join(text.split())
+    assert "change of peak force" in (tmp_path / "out" / "report.html").read_text()

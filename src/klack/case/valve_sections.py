@@ -114,6 +114,11 @@ class StrokeRun(Section):
         description="Fine steps in a macro step, taken far from the stops; 1 for none; by default "
         "as many as the accuracy and the parts of the network allow.",
     )
+    check_steps: bool = Field(
+        default=False,
+        description="Whether to run each variant again with all steps twice as long, and tell what "
+        "that changes in each impact.",
+    )
     record: Time = Field(
         default=1e-6,
         gt=0,

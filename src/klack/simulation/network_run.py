@@ -100,6 +100,7 @@ def simulate_network(
     accuracy: Accuracy = "normal",
     step: float | None = None,
     coarse: int | None = None,
+    sizes: StepSizes | None = None,
     record: float = 0.5e-6,
     start: Literal["rest", "free"] = "rest",
     state: State | None = None,
@@ -123,6 +124,8 @@ def simulate_network(
         Fine steps of a macro step in flight, in place of what
         :func:`klack.simulation.step_sizes.step_sizes` chooses; 1 switches macro steps off: bodies,
         elements and fluid take every fine step together.
+    sizes : StepSizes, optional
+        All steps, in place of what the three above choose.
     record : float [s]
         Spacing of the records; rounded to whole macro steps.  Impacts do not depend on it: they
         are found during the run, at most 1.5 us (or a macro step) apart.  The memory of a
@@ -161,7 +164,7 @@ def simulate_network(
     for name, value in (("duration", duration), ("step", step), ("record", record)):
         if value is not None:
             require_positive(f"simulate_network: {name}", value, "s")
-    sizes = step_sizes(rows, accuracy, step=step, coarse=coarse)
+    sizes = sizes or step_sizes(rows, accuracy, step=step, coarse=coarse)
     network = compile_network(rows, sizes)
     grid = grid_of(duration, sizes, record)
     if rows.controllers and grid.look > 1:  # instants may lie at any macro step

@@ -1,6 +1,6 @@
 """Sizes of the steps of a network, from the accuracy that is wanted and what its parts allow."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, sqrt
 
 from klack.errors import InputError
@@ -8,8 +8,9 @@ from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
 from klack.network.rows import LineRow, Rows
 from klack.simulation.network_arrays import PARTS
 from klack.simulation.rest import bounce_time
+from klack.units import format_si
 
-__all__ = ["StepSizes", "largest_divisor", "step_sizes"]
+__all__ = ["StepSizes", "doubled", "largest_divisor", "step_sizes"]
 
 _MOST_COARSE = 256
 _MIDDLE = 4  # fine steps of a sub-step while films are smooth
@@ -88,12 +89,37 @@ def step_sizes(
     return StepSizes(step=h, coarse=chosen, near=near, middle=_middle(rows, h, near))
 
 
+def doubled(rows: Rows, sizes: StepSizes) -> StepSizes:
+    """Return sizes of steps that are all twice as long, whatever parts of the network ask for.
+
+    Raises
+    ------
+    InputError
+        Where an exchange interval would no longer hold whole steps.
+    """
+    macro = sizes.coarse * sizes.step
+    for interval in _intervals(rows):
+        if _is_whole(interval / macro) and not _is_whole(0.5 * interval / macro):
+            raise InputError(
+                "steps twice as long",
+                got=f"an exchange every {format_si(interval, 's')}",
+                expected=f"whole steps of {format_si(2.0 * macro, 's')} in it",
+                hint="choose run.coarse so that an even number of macro steps makes the interval.",
+            )
+    return replace(sizes, step=2.0 * sizes.step)
+
+
+def _intervals(rows: Rows) -> list[float]:
+    """Intervals of the exchange with FMUs [s]."""
+    found = [row.interval for row in rows.elements if row.interval is not None]
+    return found + [row.period for row in rows.controllers]
+
+
 def _chosen(rows: Rows, macro: float, h: float) -> int:
     """Fine steps of a macro step: a power of two, unless an exchange interval asks for another."""
     longest = min([macro, *(_segment(line) for line in rows.lines)])
     longest = min([longest, *(wave.crossing for wave in rows.waves)])
-    intervals = [row.interval for row in rows.elements if row.interval is not None]
-    intervals += [row.period for row in rows.controllers]
+    intervals = _intervals(rows)
     longest = min([longest, *intervals])
     most = min(int(longest / h * (1.0 + _WHOLE)), _MOST_COARSE)
     if most < 2:

@@ -86,7 +86,7 @@ class SteadyAsked:
         ------
         InputError
         """
-        names = {"continued": "continue"}
+        names = {"continued": "continue", "check_steps": "check-steps"}
         if self.steady:
             given = [f"--{names.get(name, name)}" for name, x in others.items() if x is not None]
             if given:

@@ -11,6 +11,7 @@ from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.store import RecordFormat
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.step_check import CHANGE_MEASURES
 from klack.analyses.stroke.summary import StrokeJson, stroke_measured, stroke_to_json, stroke_told
 from klack.reduction.structure import STRUCTURE_UNITS
 from klack.simulation.flow_channels import present_name, with_present_names
@@ -71,13 +72,17 @@ STROKE = StoredAnalysis(
             "shape_marks": "1/sqrt(kg)",
             **{measure.key: measure.unit for measure in EVENT_MEASURES},
         },
-        tables=("events",),
+        tables=("events", "changes"),
     ),
     page="stroke.content:stroke_content",
     json=StrokeJson,
     to_json=stroke_to_json,
     told=stroke_told,
-    measures={"stroke variant": VARIANT_MEASURES, "impact of a stroke": EVENT_MEASURES},
+    measures={
+        "stroke variant": VARIANT_MEASURES,
+        "impact of a stroke": EVENT_MEASURES,
+        "impact of a stroke whose steps were doubled": CHANGE_MEASURES,
+    },
     measured=stroke_measured,
     renewed=_renewed,
 )

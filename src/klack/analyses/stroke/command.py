@@ -46,6 +46,15 @@ _Accuracy = Annotated[
         help="normal, or fine with steps a quarter to half as long. [default: as in the case]",
     ),
 ]
+_CheckSteps = Annotated[
+    bool,
+    Parameter(
+        name="--check-steps",
+        negative="",
+        help="Run again with all steps twice as long and tell what changes in each impact; takes "
+        "half as long again to as long again. [default: as in the case]",
+    ),
+]
 _Continue = Annotated[
     Path | None,
     Parameter(
@@ -72,6 +81,7 @@ def stroke(
     duration: _Duration = None,
     step: _Step = None,
     accuracy: _Accuracy = None,
+    check_steps: _CheckSteps = False,
     continued: _Continue = None,
     component: Components = None,
     controller: _Controllers = None,
@@ -82,7 +92,13 @@ def stroke(
 
     With --steady: the operating point instead, or characteristic curves of it.
     """
-    at_rest.require_fitting(duration=duration, step=step, accuracy=accuracy, continued=continued)
+    at_rest.require_fitting(
+        duration=duration,
+        step=step,
+        accuracy=accuracy,
+        check_steps=check_steps or None,
+        continued=continued,
+    )
     if at_rest.steady:
         from klack.analyses.operating_point.command import show_operating_points
 
@@ -91,7 +107,9 @@ def stroke(
 
     with show_progress(asked.quiet):
         case_file, components = find_case(case), imported(component)
-        checked = _checked_case(case_file, duration, step, accuracy, components)
+        checked = _checked_case(
+            case_file, duration, step, accuracy, components, check_steps=check_steps
+        )
         if controller:
             from klack.analyses.stroke.controllers import controller_files, with_controllers
 
@@ -127,6 +145,8 @@ def _checked_case(
     step: str | None,
     accuracy: Accuracy | None,
     components: "tuple[type[Component], ...]",
+    *,
+    check_steps: bool = False,
 ) -> "ValveCase":
     """Read the case; duration, step and accuracy of the command line replace its own."""
     from klack.case.valve_reader import load_valve_case
@@ -139,6 +159,8 @@ def _checked_case(
     }
     if accuracy is not None:
         changes["accuracy"] = accuracy
+    if check_steps:
+        changes["check_steps"] = True
     if not changes:
         return case
 

@@ -6,7 +6,7 @@ from math import isfinite
 import numpy as np
 
 from klack.analyses.impact.content import body_table, size_verdict
-from klack.analyses.measures import Measure, glossary
+from klack.analyses.measures import Measure, glossary, page_cells, page_heads
 from klack.analyses.page import page_of
 from klack.analyses.schematic_section import schematic_section
 from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
@@ -26,9 +26,12 @@ from klack.analyses.stroke.loop_figure import loop_chart
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
+from klack.analyses.stroke.step_check import CHANGE_MEASURES
 from klack.analyses.stroke.summary import (
     AXIS_COLUMNS,
+    CHANGES,
     TIME_COLUMNS,
+    change_name,
     first_impact,
     start_text,
     time_rows,
@@ -223,6 +226,11 @@ def _impacts(study: StrokeStudy) -> Section:
         columns = (variant.name, *(measure.title or measure.name for measure in _SHOWN))
         columns += AXIS_COLUMNS if moves_in_space(study, variant) else ()
         tables.append(Table(columns=columns, rows=tuple(rows)))
+        if variant.changes:
+            shown = zip(events[:_MOST_IMPACTS], variant.changes, strict=False)
+            changes = tuple((change_name(e, c), *page_cells(CHANGE_MEASURES, c)) for e, c in shown)
+            columns = (f"{variant.name}: {CHANGES}", *page_heads(CHANGE_MEASURES))
+            tables.append(Table(columns=columns, rows=changes))
     return Section(title="All impacts", paragraphs=tuple(paragraphs), tables=tuple(tables))
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
+from klack.analyses.stroke.step_check import ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
 from klack.errors import ConvergenceError
@@ -196,6 +197,8 @@ class StrokeVariant:
     result : NetworkResult
     setup_time : float [s]
         Wall time of everything before the time loop that is this variant's own.
+    changes : tuple of ImpactChange
+        Of each impact when all steps are doubled; empty where that was not asked for.
     """
 
     name: str
@@ -208,6 +211,7 @@ class StrokeVariant:
     result: NetworkResult
     setup_time: float
     times: tuple[LiftTimes, ...] = ()
+    changes: tuple[ImpactChange, ...] = ()
 
     @property
     def needle_times(self) -> LiftTimes:

@@ -1,5 +1,6 @@
 """``klack stroke``: one actuation of a whole valve, in the requested variants."""
 
+import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -22,6 +23,7 @@ from klack.analyses.stroke.record import (
     StrokeVariant,
 )
 from klack.analyses.stroke.rest import rest_note
+from klack.analyses.stroke.step_check import ImpactChange, impact_changes, no_changes, told
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
@@ -32,7 +34,7 @@ from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
-from klack.errors import ConvergenceError, InputError
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.magnetics.driver import Driver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
@@ -43,7 +45,8 @@ from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
 from klack.simulation.spatial_motion import SpatialMotion
-from klack.stages import StageClock, collected_warnings
+from klack.simulation.step_sizes import StepSizes, doubled
+from klack.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
 __all__ = [
@@ -253,10 +256,11 @@ def run_variant(
     *,
     state: State | None = None,
     spatial: SpatialMotion | None = None,
+    sizes: StepSizes | None = None,
 ) -> NetworkResult:
     """Run rows for the duration and steps of the case, from rest or a state.
 
-    ``spatial`` are the bodies of a motion in three dimensions.
+    ``spatial`` are the bodies of a motion in three dimensions, ``sizes`` other steps.
     """
     return simulate_network(
         rows,
@@ -264,6 +268,7 @@ def run_variant(
         accuracy=case.run.accuracy,
         step=case.run.step,
         coarse=case.run.coarse,
+        sizes=sizes,
         record=case.run.record,
         state=state,
         spatial=spatial,
@@ -339,7 +344,44 @@ def one_variant(
         result, failure = error.result, error
     setup_time = perf_counter() - begin - result.wall_time
     variant = variant_of(valve, roles, name, rows, result, setup_time)
+    if valve.case.run.check_steps:
+        stage = f"check steps of {name}"
+        changes, doubt = _changes(valve, name, result, state, lambda done: progress(stage, done))
+        variant = replace(variant, changes=changes)
+        if doubt:
+            warnings.warn(f"'{name}': {doubt}", AccuracyWarning, stacklevel=2)
     return VariantRun(variant=variant, rows=rows, failure=failure)
+
+
+def _changes(
+    valve: Valve,
+    name: Variant,
+    result: NetworkResult,
+    state: State | None,
+    progress: Callable[[float], None],
+) -> tuple[tuple[ImpactChange, ...], str]:
+    """Change of each impact when the variant is run again with all steps doubled, and doubts."""
+    longer, reason = None, ""
+    if state is not None:
+        reason = "continued: the state belongs to its steps"
+    elif result.failure:
+        reason = "the run ended early"
+    else:
+        rows = variant_network(valve, name).rows()
+        try:
+            with trial():  # its warnings are of steps that nobody asked for
+                sizes = doubled(rows, result.sizes)
+                longer = run_variant(valve.case, rows, progress, spatial=valve.spatial, sizes=sizes)
+        except (ConvergenceError, InputError) as error:
+            reason = f"no run with longer steps: {' '.join(str(error).split())}"
+    accuracy = valve.case.run.accuracy
+    if longer is None:
+        changes = no_changes(result.events, reason)
+        return changes, told(result.events, changes, accuracy)
+    end = min(float(run.time[-1]) for run in (result, longer))
+    changes = impact_changes(result.events, longer.events)
+    others = [event for event in longer.events if event.time < end]
+    return changes, told(result.events, changes, accuracy, others)
 
 
 def study_of_run(

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import zip_longest
 from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field
@@ -20,6 +21,7 @@ from klack.analyses.stroke.measures import (
 )
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.step_check import CHANGE_MEASURES, NOTICED, ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.simulation.network_result import ImpactEvent
 from klack.terminal.tables import TextTable
@@ -27,8 +29,10 @@ from klack.units import format_si
 
 __all__ = [
     "AXIS_COLUMNS",
+    "CHANGES",
     "TIME_COLUMNS",
     "StrokeJson",
+    "change_name",
     "first_impact",
     "start_text",
     "stroke_measured",
@@ -53,10 +57,10 @@ TIME_COLUMNS = (
 AXIS_COLUMNS = ("axis at seat x, y [um]", "tilt x, y [mrad]")
 """Place of the axis at a touch."""
 
+CHANGES = "what changes when all time steps are doubled"
+
 _TOLD = 20
 """Impacts of a variant on a terminal."""
-_NOTICED = 0.02
-"""Share of the fastest impact on a stop from which an impact counts as the first one."""
 
 
 class AxisJson(TypedDict):
@@ -68,6 +72,16 @@ class AxisJson(TypedDict):
     tilt_y_rad: float
 
 
+@with_measures(CHANGE_MEASURES)
+class ChangeJson(TypedDict):
+    """Change of an impact when all time steps are doubled; null where it cannot be compared."""
+
+    promised: Annotated[
+        bool, Field(description="Whether klack promises its accuracy: first to third on a stop.")
+    ]
+    reason: Annotated[str | None, Field(description="Why a number is missing.")]
+
+
 @with_measures(EVENT_MEASURES)
 class EventJson(TypedDict):
     """One impact of a stroke."""
@@ -75,6 +89,9 @@ class EventJson(TypedDict):
     stop: Annotated[str, Field(description="Name of the end stop.")]
     axis: Annotated[
         AxisJson | None, Field(description="At first touch; null for a motion along the axis.")
+    ]
+    doubled_steps: Annotated[
+        ChangeJson | None, Field(description="With run.check_steps; null without.")
     ]
 
 
@@ -193,6 +210,7 @@ def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
             title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
         events = variant.result.events[:_TOLD]
         yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
+        yield from _changes_told(variant)
         yield from _axis_told(study, variant)
         yield from yield_told(variant)
     for stop in study.stops:
@@ -230,6 +248,23 @@ def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
         for times in variant.times
         for way, passage in times.in_order
     )
+
+
+def change_name(event: ImpactEvent, change: ImpactChange) -> str:
+    """Which impact changes so, and what is not promised of it, or why it has no numbers."""
+    number = f" {change.number}" if change.number else ""
+    later = change.number and not change.promised and not change.reason
+    note = change.reason or ("not promised" if later else "")
+    return f"{event.stop}{number}{f' ({note})' if note else ''}"
+
+
+def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
+    """What doubled steps change; nothing where that was not asked for."""
+    if variant.changes:
+        pairs = zip(variant.result.events[:_TOLD], variant.changes, strict=False)
+        named = ((change_name(event, change), change) for event, change in pairs)
+        title = f"{variant.name}: {CHANGES}"
+        yield text_table(title, "impact", CHANGE_MEASURES, named)
 
 
 def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable]:
@@ -289,7 +324,7 @@ def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
     """
     events = variant.impacts(stop)
     fastest = max((event.approach_speed for event in events), default=0.0)
-    return next((event for event in events if event.approach_speed > _NOTICED * fastest), None)
+    return next((event for event in events if event.approach_speed > NOTICED * fastest), None)
 
 
 def start_text(variant: StrokeVariant) -> str:
@@ -325,9 +360,10 @@ def _numbers(study: StrokeStudy, variant: StrokeVariant) -> VariantJson:
             {
                 "stop": event.stop,
                 "axis": _axis(axis_place(study, variant, event.time)),
+                "doubled_steps": _change(change),
                 **json_of(EVENT_MEASURES, event),
             }
-            for event in result.events
+            for event, change in zip_longest(result.events, variant.changes)
         ],
         **json_of(VARIANT_MEASURES, variant),
         **_times(variant.needle_times),
@@ -339,6 +375,13 @@ def _numbers(study: StrokeStudy, variant: StrokeVariant) -> VariantJson:
         },
     }
     return cast(VariantJson, found)
+
+
+def _change(change: ImpactChange | None) -> ChangeJson | None:
+    if change is None:
+        return None
+    about = {"promised": change.promised, "reason": change.reason or None}
+    return cast(ChangeJson, about | json_of(CHANGE_MEASURES, change))
 
 
 def _start(variant: StrokeVariant) -> StartJson | None:

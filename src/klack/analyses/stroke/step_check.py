@@ -1,0 +1,227 @@
+"""How much impacts depend on the time steps: against a run with all steps twice as long.
+
+An error of first order in the steps doubles with them, and one of second order becomes four times
+as large: the difference of the two runs is the error of the shorter steps, or three times that,
+where errors fall so evenly.  It is no bound: an error that depends on where a step happens to lie
+may differ less, and what both runs share, the model and what counts as an impact, is not seen.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from math import isfinite, nan
+from operator import attrgetter
+
+from klack.analyses.measures import Column, Measure, described_in
+from klack.network.accuracy import PROMISED, Accuracy
+from klack.simulation.network_result import ImpactEvent
+
+__all__ = ["CHANGE_MEASURES", "NOTICED", "ImpactChange", "impact_changes", "no_changes", "told"]
+
+NOTICED = 0.02
+"""Share of the fastest impact on a stop from which an impact counts as one."""
+
+_PROMISED = 3  # impacts on each stop
+_SHARE = 0.5  # of what is promised; differences of that size went with errors above the promise
+_TOLD = 3  # impacts in a sentence
+_LATE = 0.75  # of a contact that is not over: a peak after that may still grow
+_SLOW = "slower than 2 % of the fastest impact on this stop"
+_OPEN = "not over when the run ends"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ImpactChange:
+    """Change of one impact when all steps are doubled.
+
+    Parameters
+    ----------
+    number : int
+        On its stop, from 1; 0 for a touch too slow to be counted.
+    time : float [s]
+        Of the first touch, above zero where it comes later; nan, as those below, where there is
+        none.
+    approach_speed, peak_force, impulse : float [-]
+        Relative.
+    reason : str
+        Why a number is missing; empty where all are there.
+    """
+
+    number: int
+    time: float = nan
+    approach_speed: float = nan
+    peak_force: float = nan
+    impulse: float = nan
+    reason: str = ""
+
+    @property
+    def promised(self) -> bool:
+        """Whether klack promises the accuracy of this impact: the first three on each stop."""
+        return 1 <= self.number <= _PROMISED
+
+    def doubtful(self, accuracy: Accuracy) -> bool:
+        """Whether it changes by more than half of what the accuracy promises, or has no pair."""
+        peak, time = PROMISED[accuracy]
+        large = abs(self.peak_force) > _SHARE * peak or abs(self.time) > _SHARE * time
+        return self.promised and (large or self.reason not in ("", _OPEN))
+
+
+CHANGE_MEASURES: tuple[Measure[ImpactChange], ...] = described_in(
+    "theory/stroke",
+    Measure(
+        key="time_change",
+        name="change of first touch",
+        unit="s",
+        definition="How much later the first touch is with all steps twice as long.",
+        read=attrgetter("time"),
+        column=Column("us", 1e6, "+.4f", "touch"),
+        digits=2,
+        page=True,
+    ),
+    *(
+        Measure(
+            key=f"{key}_change",
+            name=f"change of {name}",
+            definition=f"Relative change of the {name} with all steps twice as long.",
+            read=attrgetter(key),
+            column=Column("%", 100.0, "+.4f", head),
+            form="signed share",
+            digits=4,
+            page=True,
+        )
+        for key, name, head in (
+            ("peak_force", "peak force", "peak force"),
+            ("approach_speed", "approach speed", "speed"),
+            ("impulse", "impulse", "impulse"),
+        )
+    ),
+)
+"""Of an impact whose steps were checked."""
+
+
+def impact_changes(
+    events: Sequence[ImpactEvent], others: Sequence[ImpactEvent]
+) -> tuple[ImpactChange, ...]:
+    """Change of each impact of a run to that of another, on each stop in order and near in time."""
+    found: dict[int, ImpactChange] = {}
+    for counted, of_other in _by_stop(events, others).values():
+        found |= {
+            id(event): change
+            for event, change in zip(counted, _pairs(counted, of_other), strict=True)
+        }
+    return tuple(found.get(id(e), ImpactChange(number=0, reason=_SLOW)) for e in events)
+
+
+def _by_stop(*runs: Sequence[ImpactEvent]) -> dict[str, tuple[list[ImpactEvent], ...]]:
+    """Impacts of each run on each stop, without touches that are slow beside the fastest one."""
+    fastest: dict[str, float] = {}
+    for event in chain(*runs):
+        fastest[event.stop] = max(fastest.get(event.stop, 0.0), event.approach_speed)
+    return {
+        stop: tuple(
+            [e for e in run if e.stop == stop and e.approach_speed > NOTICED * speed]
+            for run in runs
+        )
+        for stop, speed in fastest.items()
+    }
+
+
+def no_changes(events: Sequence[ImpactEvent], reason: str) -> tuple[ImpactChange, ...]:
+    """None for any impact: there is nothing to compare with."""
+    changes = impact_changes(events, events)
+    return tuple(ImpactChange(number=change.number, reason=reason) for change in changes)
+
+
+def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator[ImpactChange]:
+    """Changes on one stop; none from the first impact on that has no counterpart."""
+    reason = ""
+    for k, event in enumerate(run):
+        if not reason:
+            reason = _unlike(run, other, k)
+        if reason:
+            yield ImpactChange(number=k + 1, reason=reason)
+            reason = "an impact before it has no counterpart"
+        else:
+            yield _change(event, other[k], k + 1)
+
+
+def _change(event: ImpactEvent, other: ImpactEvent, number: int) -> ImpactChange:
+    """Change of one impact, without what the end of the runs cuts off."""
+    both = (event, other)
+    over = all(isfinite(e.restitution) for e in both)
+    grows = not over and any(e.peak_time - e.time > _LATE * e.contact_time for e in both)
+    return ImpactChange(
+        number=number,
+        time=other.time - event.time,
+        approach_speed=other.approach_speed / event.approach_speed - 1.0,
+        peak_force=nan if grows else other.peak_force / event.peak_force - 1.0,
+        impulse=other.impulse / event.impulse - 1.0 if over else nan,
+        reason=_OPEN if grows else "",
+    )
+
+
+def _unlike(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent], k: int) -> str:
+    """Why impacts ``k`` of two runs are not the same one; empty if they are."""
+    if k >= len(other):
+        return "missing with longer steps"
+    if not _near(run, other, k):
+        return "at another time with longer steps"
+    if not _near(run, other, k + 1):
+        for one, two in ((run, other), (other, run)):
+            # what comes next in one run falls into the impact of the other, or nan: into its rest
+            if k + 1 < len(one) and not one[k + 1].time > two[k].separation_time:
+                return "one impact in one run, several in the other"
+    return ""
+
+
+def _near(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent], k: int) -> bool:
+    """Whether impacts ``k`` are the nearest to each other, and nearer than they last."""
+    if k >= min(len(run), len(other)):
+        return False
+    apart = abs(run[k].time - other[k].time)
+    beside = [
+        abs(one[j].time - two[k].time)
+        for one, two in ((run, other), (other, run))
+        for j in (k - 1, k + 1)
+        if 0 <= j < len(one)
+    ]
+    return apart < min([max(run[k].contact_time, other[k].contact_time), *beside])
+
+
+def told(
+    events: Sequence[ImpactEvent],
+    changes: Sequence[ImpactChange],
+    accuracy: Accuracy,
+    others: Sequence[ImpactEvent] = (),
+) -> str:
+    """Sentence on the promised impacts that depend on the steps; empty if none does.
+
+    ``others`` are those with longer steps, as long as both runs last.
+    """
+    found = [
+        f"impact {change.number} on '{event.stop}' {_words(change)}"
+        for event, change in zip(events, changes, strict=True)
+        if change.doubtful(accuracy)
+    ]
+    found += [
+        f"there is an impact {len(counted) + 1} on '{stop}'"
+        for stop, (counted, of_other) in _by_stop(events, others).items()
+        if len(counted) < min(len(of_other), _PROMISED)
+    ]
+    if not found:
+        return ""
+    peak, time = PROMISED[accuracy]
+    more = f"; and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
+    finer = "accuracy: fine" if accuracy == "normal" else "a shorter run.step"
+    return (
+        f"with all time steps twice as long {'; '.join(found[:_TOLD])}{more}. The steps are short "
+        f"enough for accuracy: {accuracy} where that changes less than {100 * _SHARE * peak:g} % "
+        f"and {1e6 * _SHARE * time:g} us. Try: {finer}; or run.coarse: 1, which takes many times "
+        "as long."
+    )
+
+
+def _words(change: ImpactChange) -> str:
+    if change.reason:
+        return f"cannot be compared ({change.reason})"
+    peak, touch = 100.0 * change.peak_force, 1e6 * change.time
+    return f"changes by {peak:+.2g} % of its peak force and {touch:+.2g} us"

@@ -1,0 +1,212 @@
+"""Changes of impacts when all steps are doubled.
+
+Truth: errors against fine steps alone, extrapolated from three lengths; definition for the pairs.
+"""
+
+from dataclasses import fields, replace
+from math import isnan, nan
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.record import StrokeVariant
+from klack.analyses.stroke.run import run_stroke
+from klack.analyses.stroke.step_check import ImpactChange, impact_changes, told
+from klack.analyses.stroke.summary import stroke_to_json
+from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.errors import InputError
+from klack.network.accuracy import PROMISED
+from klack.simulation.network_result import ImpactEvent
+from klack.simulation.step_sizes import StepSizes, doubled
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+
+
+def impact(time: float, speed: float = 1.0, lasts: float = 5e-6, **more: float) -> ImpactEvent:
+    """An impact on the seat of unit peak and impulse."""
+    values = {field.name: 1.0 for field in fields(ImpactEvent)} | {
+        "stop": "seat",
+        "time": time,
+        "approach_speed": speed,
+        "peak_time": time + 0.5 * lasts,
+        "contact_time": lasts,
+        "separation_time": time + lasts,
+    }
+    return ImpactEvent(**values | more)
+
+
+def test_changes_are_those_of_the_longer_steps_to_the_shorter_ones():
+    run = (impact(1e-3), impact(2e-3, speed=0.01), impact(3e-3, speed=0.5))
+    other = (impact(1.0001e-3), impact(3e-3, speed=0.51, peak_force=0.9, impulse=1.2))
+
+    first, slow, second = impact_changes(run, (other[0], other[1]))
+
+    assert (first.number, slow.number, second.number) == (1, 0, 2)
+    assert first.time == pytest.approx(1e-7, rel=1e-9, abs=0.0)
+    assert "slower than 2 %" in slow.reason
+    assert isnan(slow.peak_force)
+    changes = (second.approach_speed, second.peak_force, second.impulse)
+    assert changes == pytest.approx((0.02, -0.1, 0.2), rel=1e-9, abs=0.0)
+
+
+@pytest.mark.parametrize(
+    ("run", "other", "reasons"),
+    [
+        ([1e-3, 2e-3, 3e-3], [1e-3, 2e-3], ["", "", "missing with longer steps"]),
+        ([1e-3, 3e-3], [1e-3, 2e-3, 3e-3], ["", "at another time with longer steps"]),
+        ([1e-3, 1.004e-3], [1e-3], ["one impact in one run, several in the other", "before it"]),
+        ([1e-3], [1e-3, 1.004e-3], ["one impact in one run, several in the other"]),
+        ([1e-3, 2e-3], [1.01e-3, 2e-3], ["at another time with longer steps", "before it"]),
+    ],
+    ids=["missing", "one more between", "split", "split by longer steps", "too far apart"],
+)
+def test_impacts_without_a_pair_have_a_reason_and_no_number(run, other, reasons):
+    events, others = ([impact(time) for time in times] for times in (run, other))
+
+    changes = impact_changes(events, others)
+
+    for change, reason in zip(changes, reasons, strict=True):
+        assert bool(reason) == isnan(change.peak_force) == bool(change.reason)
+        assert reason in change.reason
+    assert ("cannot be compared" in told(events, changes, "normal")) == any(reasons)
+
+
+def test_an_impact_of_the_longer_steps_alone_is_told():
+    assert "there is an impact 1 on 'seat'" in told([], (), "normal", [impact(1e-3)])
+    seen = [impact(1e-3)]
+    assert "there is an impact 2 on 'seat'" in told(
+        seen, impact_changes(seen, seen), "normal", [*seen, impact(2e-3)]
+    )
+
+
+def test_the_end_of_a_run_cuts_off_what_still_grows():
+    (change,) = impact_changes([impact(1e-3)], [impact(1e-3, restitution=nan)])
+    assert (change.peak_force, isnan(change.impulse), change.reason) == (0.0, True, "")
+
+    rising = impact(1e-3, restitution=nan, peak_time=1.005e-3)
+    (change,) = impact_changes([impact(1e-3)], [rising])
+    assert isnan(change.peak_force)
+    assert change.time == 0.0
+    assert change.reason == "not over when the run ends"
+
+
+@pytest.mark.parametrize("accuracy", ["normal", "fine"])
+def test_more_than_half_of_the_promise_is_told_of_three_impacts(accuracy):
+    peak, time = PROMISED[accuracy]
+    for number, share, doubtful in ((1, 0.49, False), (3, 0.51, True), (4, 10.0, False)):
+        for change in (
+            ImpactChange(number=number, peak_force=-share * peak),
+            ImpactChange(number=number, time=share * time),
+        ):
+            assert change.doubtful(accuracy) == doubtful
+
+
+def dry(**run: Any) -> StrokeVariant:
+    """Dry stroke of a rigid needle: three impacts and more on each stop."""
+    case = load_valve_case(HOW_TO / "small_valve.yaml")
+    changed = case.run.model_copy(update={"check_steps": True} | run)
+    return run_stroke(case.model_copy(update={"run": changed}), variants=("dry",)).reference
+
+
+@pytest.fixture(scope="module")
+def truth() -> list[tuple[float, float]]:
+    """Time and peak force of each impact, extrapolated from fine steps alone.
+
+    What halves from one length to the next vanishes.  Of the first three impacts on each stop, the
+    faster ones, the two extrapolations are within 0.001 us and 0.001 %.
+    """
+    three = [dry(check_steps=False, coarse=1, step=h).result.events for h in (1e-8, 5e-9, 2.5e-9)]
+    found = []
+    for a, b, c in zip(*three, strict=True):
+        before, last = (
+            (2.0 * y.time - x.time, 2.0 * y.peak_force - x.peak_force) for x, y in ((a, b), (b, c))
+        )
+        if b.approach_speed > 0.2:
+            assert last == pytest.approx(before, abs=1e-9, rel=1e-5)
+        found.append(last)
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("run", [{}, {"accuracy": "fine", "step": None}], ids=["normal", "fine"])
+def test_changes_cover_the_error(run, truth):
+    variant = dry(**run)
+
+    counted = [
+        (event, change, true)
+        for event, change, true in zip(variant.result.events, variant.changes, truth, strict=True)
+        if change.promised
+    ]
+    assert len(counted) == 6
+    for event, change, (time, peak) in counted:
+        # beside what the truth is good for
+        assert abs(event.time - time) < abs(change.time) + 1e-9
+        assert abs(event.peak_force / peak - 1.0) < abs(change.peak_force) + 1e-5
+
+
+@pytest.mark.slow
+def test_errors_of_coarse_steps_are_told(truth):
+    variant = dry(step=1e-7)
+
+    wrong = 0
+    for event, change, (time, peak) in zip(
+        variant.result.events, variant.changes, truth, strict=True
+    ):
+        error, late = abs(event.peak_force / peak - 1.0), abs(event.time - time)
+        if change.promised and (error > 5e-4 or late > 5e-8):
+            assert change.doubtful("normal")
+            wrong += 1
+    assert wrong == 6
+
+
+@pytest.mark.slow
+def test_changes_vanish_with_the_square_of_the_step():
+    """Errors of rebounds are of second order; later impacts add them up as lateness."""
+    variants = {step: dry(step=step, coarse=1) for step in (2e-7, 1e-7, 5e-8)}
+    late = {
+        step: {
+            event.stop: change.time
+            for event, change in zip(variant.result.events, variant.changes, strict=True)
+            if change.number == 3
+        }
+        for step, variant in variants.items()
+    }
+    for longer, shorter in ((2e-7, 1e-7), (1e-7, 5e-8)):
+        for stop in ("opening", "seat"):
+            # touches are located to an eighth of a step: 6 ns of 56, the third power adds 5 %
+            assert late[longer][stop] / late[shorter][stop] == pytest.approx(4.0, rel=0.15)
+
+
+@pytest.mark.slow
+def test_a_stroke_tells_its_changes_after_storing(tmp_path):
+    text = (HOW_TO / "small_valve.yaml").read_text().replace("duration: 2 ms", "duration: 300 us")
+    text = text.replace("step: 20 ns", "step: 100 ns, check_steps: true")
+    made = run_stroke(read_valve_case(text, tmp_path / "valve.yaml"), variants=("dry",))
+    STROKE.save(made, tmp_path)
+    loaded = STROKE.load(tmp_path)
+
+    (change,) = made.reference.changes
+    assert loaded.reference.changes == made.reference.changes
+    (event,) = stroke_to_json(loaded)["events"]
+    assert event["doubled_steps"]["peak_force_change"] == change.peak_force
+    assert event["doubled_steps"]["promised"]
+    assert any("impact 1 on 'opening' changes by" in line for line in made.warnings)
+    without = replace(loaded.reference, changes=())
+    plain = replace(loaded, variants={"dry": without})
+    assert stroke_to_json(plain)["events"][0]["doubled_steps"] is None
+
+
+def test_an_exchange_that_would_no_longer_hold_whole_steps_is_refused():
+    row = SimpleNamespace(interval=30e-6)
+    rows: Any = SimpleNamespace(elements=[row], controllers=[])
+    sizes = StepSizes(step=20e-9, coarse=50, near=25, middle=1)
+
+    assert doubled(rows, sizes) == replace(sizes, step=40e-9)
+    row.interval = 31e-6
+    with pytest.raises(InputError, match="exchange every 31 us"):
+        doubled(rows, sizes)
+    row.interval = 30.5e-6  # between steps already
+    assert doubled(rows, sizes).step == 40e-9
