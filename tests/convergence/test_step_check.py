@@ -210,3 +210,17 @@ def test_an_exchange_that_would_no_longer_hold_whole_steps_is_refused():
         doubled(rows, sizes)
     row.interval = 30.5e-6  # between steps already
     assert doubled(rows, sizes).step == 40e-9
+
+
+@pytest.mark.slow
+def test_a_continued_run_has_a_reason_and_no_number():
+    case = load_valve_case(HOW_TO / "small_valve.yaml")
+    run = case.run.model_copy(update={"duration": 3e-4, "check_steps": True})
+    case = case.model_copy(update={"run": run})
+
+    after = run_stroke(case, variants=("dry",), after=run_stroke(case, variants=("dry",)))
+
+    assert {change.reason for change in after.reference.changes} == {"no other run"}
+    assert all(isnan(change.time) for change in after.reference.changes)
+    (note,) = after.warnings
+    assert "the time steps were not checked: the run continues another one" in note

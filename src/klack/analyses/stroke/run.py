@@ -361,9 +361,9 @@ def _changes(
     progress: Callable[[float], None],
 ) -> tuple[tuple[ImpactChange, ...], str]:
     """Change of each impact when the variant is run again with all steps doubled, and doubts."""
-    longer, reason = None, ""
+    longer = None
     if state is not None:
-        reason = "continued: the state belongs to its steps"
+        reason = "the run continues another one, whose state belongs to its steps"
     elif result.failure:
         reason = "the run ended early"
     else:
@@ -373,15 +373,13 @@ def _changes(
                 sizes = doubled(rows, result.sizes)
                 longer = run_variant(valve.case, rows, progress, spatial=valve.spatial, sizes=sizes)
         except (ConvergenceError, InputError) as error:
-            reason = f"no run with longer steps: {' '.join(str(error).split())}"
-    accuracy = valve.case.run.accuracy
+            reason = f"no run with longer steps. {' '.join(str(error).split())}"
     if longer is None:
-        changes = no_changes(result.events, reason)
-        return changes, told(result.events, changes, accuracy)
+        return no_changes(result.events), f"the time steps were not checked: {reason}"
     end = min(float(run.time[-1]) for run in (result, longer))
     changes = impact_changes(result.events, longer.events)
     others = [event for event in longer.events if event.time < end]
-    return changes, told(result.events, changes, accuracy, others)
+    return changes, told(result.events, changes, valve.case.run.accuracy, others)
 
 
 def study_of_run(

@@ -125,10 +125,10 @@ def _by_stop(*runs: Sequence[ImpactEvent]) -> dict[str, tuple[list[ImpactEvent],
     }
 
 
-def no_changes(events: Sequence[ImpactEvent], reason: str) -> tuple[ImpactChange, ...]:
-    """None for any impact: there is nothing to compare with."""
-    changes = impact_changes(events, events)
-    return tuple(ImpactChange(number=change.number, reason=reason) for change in changes)
+def no_changes(events: Sequence[ImpactEvent]) -> tuple[ImpactChange, ...]:
+    """None for any impact: there is no other run."""
+    numbers = [change.number for change in impact_changes(events, events)]
+    return tuple(ImpactChange(number=number, reason="no other run") for number in numbers)
 
 
 def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator[ImpactChange]:

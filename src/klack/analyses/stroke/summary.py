@@ -225,9 +225,12 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
     for name, variant in study.variants.items():
         yield name, variant, VARIANT_MEASURES
         counts: Counter[str] = Counter()
-        for event in variant.result.events:
+        for event, change in zip_longest(variant.result.events, variant.changes):
             counts[event.stop] += 1
-            yield f"{name}, {event.stop} {counts[event.stop]}", event, EVENT_MEASURES
+            called = f"{name}, {event.stop} {counts[event.stop]}"
+            yield called, event, EVENT_MEASURES
+            if change is not None:
+                yield f"{called}, steps doubled", change, CHANGE_MEASURES
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
