@@ -35,6 +35,7 @@ __all__ = [
     "ROW_P1",
     "ROW_P2",
     "ROW_Q",
+    "ROW_R1",
     "ROW_V",
     "advance",
     "apply_forces",
@@ -51,7 +52,8 @@ ROW = 128
 ROW_Q, ROW_V = 0, 1
 ROW_A11, ROW_A12, ROW_A21, ROW_A22 = 2, 3, 4, 5
 ROW_P1, ROW_P2, ROW_B1, ROW_B2, ROW_F, ROW_K = 6, 7, 8, 9, 10, 11
-FIXED_ROWS = 12
+ROW_R1 = 12
+FIXED_ROWS = 14
 """Rows before the port shapes."""
 
 _N = ROW
@@ -215,7 +217,7 @@ def apply_forces(W: Any, n: int, F: Any, port0: int, port1: int) -> None:
 
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy", forceinline=True)
-def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> float:
+def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int, row: int) -> float:
     """Add the response to forces that acted over a whole step of another size, with its matrices.
 
     Parameters
@@ -224,6 +226,8 @@ def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> float:
         Block whose state changes, and the same block for the step of these forces.
     n, F, port0, port1
         As of :func:`advance`.
+    row : int
+        ``ROW_B1`` for constant forces, ``ROW_R1`` for ones that rise by ``F`` about no mean.
 
     Returns
     -------
@@ -235,7 +239,7 @@ def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int) -> float:
     for i in range(n):
         f = of[10 * _N + i]
         q, v = W[i], W[_N + i]
-        dq, dv = of[8 * _N + i] * f, of[9 * _N + i] * f
+        dq, dv = of[row * _N + i] * f, of[(row + 1) * _N + i] * f
         energy += of[11 * _N + i] * dq * (q + 0.5 * dq) + dv * (v + 0.5 * dv)
         W[i] = q + dq
         W[_N + i] = v + dv

@@ -34,10 +34,14 @@ __all__ = [
     "PENDING",
     "PENDING_BEGIN",
     "PORTS",
+    "RISE",
+    "RISE_MISSED",
     "ROWS_AT",
     "SEEN",
     "STORE",
     "SUPPLY",
+    "WITHIN",
+    "WITHIN_BEGIN",
     "WORK",
     "WORK_BEGIN",
     "Y0",
@@ -105,8 +109,11 @@ BEGIN = 14 * PORTS  # displacements at the start of the macro step
 WORK_BEGIN = 15 * PORTS
 PENDING_BEGIN = 16 * PORTS
 EXCESS = 17 * PORTS  # one number: energy [J] that bodies got beyond what was given to them
+WITHIN, WITHIN_BEGIN = EXCESS + 1, EXCESS + 2  # energy [J] that bodies got by RISE
 LAST = 18 * PORTS  # forces of elements and fluid in the last macro step
-ROWS_AT = 19
+RISE = 19 * PORTS  # change of the guessed forces over the macro step
+RISE_MISSED = 20 * PORTS  # what is missing of it
+ROWS_AT = 21
 
 
 class Bodies(NamedTuple):
@@ -127,6 +134,7 @@ class Bodies(NamedTuple):
     course0: Index  # (driven,) where their course begins
     course: Vector
     G: Vector  # (SIZES, PORTS, PORTS) displacement at the end of a step per unit force during it
+    Gr: Vector  # the same per force that rises evenly by one during it and has no mean
     at: Vector  # (ROWS_AT, PORTS) what the ports do, row by row: see ``Y0`` and the following names
 
 

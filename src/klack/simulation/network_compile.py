@@ -24,6 +24,7 @@ from klack.simulation.modal_step import (
     ROW_K,
     ROW_P1,
     ROW_Q,
+    ROW_R1,
     ROW_V,
 )
 from klack.simulation.moving_bodies import MovingBodies
@@ -238,7 +239,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
             expected=f"fewer than {PORTS}",
             hint="leave out unconnected ports of bodies.",
         )
-    G = np.zeros((len(steps), PORTS, PORTS))
+    G, Gr = np.zeros((2, len(steps), PORTS, PORTS))
     for row in rows:
         body, own = row.body, len(row.ports)
         height = FIXED_ROWS + own + 1
@@ -264,14 +265,16 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
                 )
                 W[ROW_B1 : ROW_B1 + 2, :used] = P.B1, P.B2
                 W[ROW_K, :used] = body.omega[part] ** 2
+                W[ROW_R1 : ROW_R1 + 2, :used] = P.R1, P.R2
                 if row.course is not None:  # no force moves it, a speed does
-                    W[ROW_A11 : ROW_K + 1] = 0.0
+                    W[ROW_A11:FIXED_ROWS] = 0.0
                     W[ROW_A11, 0], W[ROW_A11 + 1, 0], W[ROW_A11 + 3, 0] = 1.0, h, 1.0
                 shapes = np.asarray(body.port_shapes)[part].T
                 W[FIXED_ROWS:-1, :used] = shapes
                 W[-1, :used] = cm[part]
                 if row.course is None:
                     G[level, here, here] += (shapes * P.B1) @ shapes.T
+                    Gr[level, here, here] += (shapes * P.R1) @ shapes.T
                 target.append(W.ravel())
             start.append(start[-1] + height * ROW)
             count.append(4 * ceil(used / 4))
@@ -299,6 +302,7 @@ def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bod
         course0=np.array(course0, dtype=np.int64),
         course=np.concatenate([*course, np.zeros(1)]),
         G=G.ravel(),
+        Gr=Gr.ravel(),
         at=np.zeros(ROWS_AT * PORTS),
     )
     return bodies, np.array(blocks, dtype=np.int64)

@@ -14,6 +14,7 @@ from klack.simulation.network_arrays import (
     SEEN,
     STORE,
     SUPPLY,
+    WITHIN,
     WORK,
     Y0,
 )
@@ -22,7 +23,10 @@ from klack.simulation.network_gas import dissolution_energy
 from klack.simulation.network_result import BODY_STORE, EnergyBooks
 from klack.simulation.wave_rows import wave_store
 
-__all__ = ["balance_since", "energy_stores", "reset_accounts"]
+__all__ = ["WITHIN_STEPS", "balance_since", "energy_stores", "reset_accounts"]
+
+WITHIN_STEPS = "forces that change within steps"
+"""Supply [J]: work that they do beyond that of their mean over a macro step, of either sign."""
 
 
 def reset_accounts(network: CompiledNetwork) -> None:
@@ -30,6 +34,7 @@ def reset_accounts(network: CompiledNetwork) -> None:
     for account in network.accounts:
         account[:] = 0.0
     network.bodies.at[WORK : WORK + PORTS] = _unseen_work(network)
+    network.bodies.at[WITHIN] = 0.0
     if network.moving is not None:
         network.moving.forget_losses()
 
@@ -151,6 +156,7 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
             stores_before=dict(before),
             stores_after=after,
         )
+    supplies[WITHIN_STEPS] = float(network.bodies.at[WITHIN])
     works = network.bodies.at[WORK : WORK + PORTS] - _unseen_work(network)
     place = 0
     for row in rows.bodies:

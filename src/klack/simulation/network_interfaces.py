@@ -12,6 +12,7 @@ from klack.simulation.network_arrays import (
     FORCE,
     GUESS,
     KEPT,
+    RISE,
     Y1,
     Recording,
     Step,
@@ -114,11 +115,14 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
 
 
 @phase
-def push_by_guess(contacts: Any, sliding: Any, bodies: Any) -> None:
-    """Forces of the ports: the guess of elements and fluid, and those of the sub-step so far."""
+def push_by_guess(contacts: Any, sliding: Any, bodies: Any, late: float) -> None:
+    """Forces of the ports: the guess of elements and fluid, and those of the sub-step so far.
+
+    ``late`` is where in the macro step the middle of the sub-step is, of its length, -1/2 to 1/2.
+    """
     rows, force, S = contacts.rows, contacts.trial.force, bodies.at
     for p in range(bodies.ports + 1):
-        S[FORCE + p] = S[GUESS + p]
+        S[FORCE + p] = S[GUESS + p] + late * S[RISE + p]
     for c in range(rows.interfaces):
         if force[c] != 0.0:
             S[FORCE + rows.upper[c]] += force[c]

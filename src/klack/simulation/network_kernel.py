@@ -2,7 +2,7 @@
 
 One macro step ``H = M h`` while what elements and fluid do is slow beside it:
 
-1. **Guess** the forces of elements and fluid, constant over the macro step.
+1. **Guess** the forces of elements and fluid, their mean over the macro step and an even rise.
 2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far from
    each other or at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of
    one where films change fast.  A sub-step, or a fine step, in which a contact closes or opens is
@@ -86,17 +86,20 @@ from klack.simulation.network_ports import (
     finite,
     guess_answer,
     guess_forces,
+    guess_rise,
     keep_for_cut,
     keep_modes,
     largest_missed,
     matters,
     miss,
+    miss_rise,
     move_free,
     move_ports_by_guess,
     repay,
     respace_forces,
     row_length,
     take_back_ports,
+    turn_ports,
 )
 from klack.simulation.network_pressures import (
     begin_fluid,
@@ -242,6 +245,7 @@ def run_network(
             if not straight:
                 respace_forces(bodies, steps / last_steps)
             guess_forces(bodies)
+            guess_rise(bodies, steps > 1)
             guess_pressures(loop.fluid, step.t + step.H, step.H, straight)
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
@@ -391,6 +395,8 @@ def _settle(
         if status != STATUS_DONE:
             return status
         miss(bodies, G)
+        if step.steps > 1:
+            miss_rise(bodies, step.level)
         left, work = cost_of_catching_up(contacts, bodies.at)
         late, rubbed = cost_of_late_sliders(loop.sliding, bodies.at)
         if not matters(bodies, step.level, share, energy, left + late, work + rubbed):
@@ -448,8 +454,13 @@ def _act(
                 drive_bodies(bodies, now.level, now.t, now.H)
             move_free(bodies, now.level)
             begin_sub_sliders(sliding, bodies, now.level)
-        push_by_guess(contacts, sliding, bodies)
+        late = 0.0
+        if not whole:
+            late = ((now.t - sub.t) + 0.5 * now.H) / (sub.H * parts) - 0.5
+        push_by_guess(contacts, sliding, bodies, late)
         move_ports_by_guess(bodies, G)
+        if whole:
+            turn_ports(bodies, now.level)
         if not solve_interfaces(contacts, sliding, bodies, G, now):
             report[0], report[2] = 0.0, now.t
             return STATUS_FORCES if fine else STATUS_REFUSED
@@ -474,7 +485,7 @@ def _act(
             loop.peaks,
         )
         end_sliders(sliding, now, begins, loop.accounts, _slider_sums(loop))
-        end_sub_step(bodies)
+        end_sub_step(bodies, late)
         if cut == 0:
             done += 1
         else:

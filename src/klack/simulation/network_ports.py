@@ -5,7 +5,17 @@ from typing import Any
 import numpy as np
 
 from klack.network.step_function import shift
-from klack.simulation.modal_step import ROW, ROW_V, advance, apply_forces, copy_state, kick, watch
+from klack.simulation.modal_step import (
+    ROW,
+    ROW_B1,
+    ROW_R1,
+    ROW_V,
+    advance,
+    apply_forces,
+    copy_state,
+    kick,
+    watch,
+)
 from klack.simulation.network_arrays import (
     AHEAD,
     ANSWER,
@@ -25,7 +35,11 @@ from klack.simulation.network_arrays import (
     PENDING,
     PENDING_BEGIN,
     PORTS,
+    RISE,
+    RISE_MISSED,
     SEEN,
+    WITHIN,
+    WITHIN_BEGIN,
     WORK,
     WORK_BEGIN,
     Y0,
@@ -45,11 +59,13 @@ __all__ = [
     "finite",
     "guess_answer",
     "guess_forces",
+    "guess_rise",
     "keep_for_cut",
     "keep_modes",
     "largest_missed",
     "matters",
     "miss",
+    "miss_rise",
     "move_body",
     "move_free",
     "move_ports_by_guess",
@@ -58,6 +74,7 @@ __all__ = [
     "respace_forces",
     "row_length",
     "take_back_ports",
+    "turn_ports",
 ]
 
 _LONGER = 4.0  # times the steps before
@@ -125,11 +142,11 @@ def keep_for_cut(bodies: Any, level: int) -> None:
 
 
 @phase
-def _kick_block(bodies: Any, k: int, level: int, of: int, forces: int) -> float:
+def _kick_block(bodies: Any, k: int, level: int, of: int, forces: int, row: int) -> float:
     """Let the forces of a row have acted over a step of size ``of``; the energy that this adds."""
     block, step = block_of(bodies, k, level), block_of(bodies, k, of)
     port0, port1 = bodies.port0[k], bodies.port1[k]
-    return kick(block, step, bodies.modes[k], shift(bodies.at, forces), port0, port1)
+    return kick(block, step, bodies.modes[k], shift(bodies.at, forces), port0, port1, row)
 
 
 @phase
@@ -137,7 +154,7 @@ def begin_cut(bodies: Any, level: int) -> None:
     """Begin a sub-step once more, in parts, with the forces that were pending."""
     S = bodies.at
     for k in range(bodies.blocks):
-        _kick_block(bodies, k, CUT, level, PENDING)
+        _kick_block(bodies, k, CUT, level, PENDING, ROW_B1)
     for i in range(row_length(bodies)):
         S[PENDING + i] = 0.0
 
@@ -150,6 +167,7 @@ def begin_macro_step(bodies: Any) -> None:
         S[BEGIN + i] = S[Y0 + i]
         S[WORK_BEGIN + i] = S[WORK + i]
         S[PENDING_BEGIN + i] = S[PENDING + i]
+    S[WITHIN_BEGIN] = S[WITHIN]
 
 
 @phase
@@ -160,6 +178,7 @@ def take_back_ports(bodies: Any, level: int, kept: bool) -> None:
         S[Y0 + i] = S[BEGIN + i]
         S[WORK + i] = S[WORK_BEGIN + i]
         S[PENDING + i] = S[PENDING_BEGIN + i]
+    S[WITHIN] = S[WITHIN_BEGIN]
     if kept:
         _copy_state(bodies, _kept_at(level), level)
 
@@ -183,6 +202,15 @@ def guess_forces(bodies: Any) -> None:
     for i in range(row_length(bodies)):
         S[GUESS + i] = 3.0 * (S[BEFORE + i] - S[BEFORE_2 + i]) + S[BEFORE_3 + i]
     S[GUESS + bodies.ports] = 0.0  # what pushes the ground moves nothing
+
+
+@phase
+def guess_rise(bodies: Any, long: bool) -> None:
+    """Forces rise over a ``long`` step as they did before; in a fine one they do not."""
+    S = bodies.at
+    for i in range(row_length(bodies)):
+        S[RISE + i] = S[BEFORE + i] - S[BEFORE_2 + i] if long else 0.0
+        S[RISE_MISSED + i] = 0.0
 
 
 @phase
@@ -211,6 +239,7 @@ def guess_answer(bodies: Any) -> None:
     S = bodies.at
     for i in range(row_length(bodies)):
         S[GUESS + i] = S[ANSWER + i]
+        S[RISE + i] += S[RISE_MISSED + i]
 
 
 @phase
@@ -232,6 +261,20 @@ def move_ports_by_guess(bodies: Any, G: Any) -> None:
     S = bodies.at
     for p in range(bodies.ports):
         S[Y1 + p] = S[FREE + p] + _port_end(bodies, G, p, FORCE)
+
+
+@phase
+def _turned(bodies: Any, level: int, p: int, rise: int) -> float:
+    """Displacement of a port by forces of row ``rise``, whose mean over the step is none."""
+    return _port_end(bodies, shift(bodies.Gr, level * PORTS * PORTS), p, rise)
+
+
+@phase
+def turn_ports(bodies: Any, level: int) -> None:
+    """Add what the rise of the guessed forces does in one step of this size."""
+    S = bodies.at
+    for p in range(bodies.ports):
+        S[Y1 + p] += _turned(bodies, level, p, RISE)
 
 
 @phase
@@ -261,13 +304,19 @@ def port_speed(bodies: Any, level: int, block0: int, block1: int, row: int) -> f
 
 
 @phase
-def end_sub_step(bodies: Any) -> None:
-    """Take over displacements and the work of interfaces; the forces stay pending."""
+def end_sub_step(bodies: Any, late: float) -> None:
+    """Take over displacements and the work of interfaces; the forces stay pending.
+
+    ``late`` as in ``push_by_guess``: the share of the rise is taken out of the forces.
+    """
     S = bodies.at
     for p in range(bodies.ports):
-        S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * (S[Y1 + p] - S[Y0 + p])
+        way, rise = S[Y1 + p] - S[Y0 + p], late * S[RISE + p]
+        S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * way
+        S[WITHIN] += rise * way
         S[Y0 + p] = S[Y1 + p]
         S[PENDING + p] = S[FORCE + p]
+        S[FORCE + p] -= rise
 
 
 @phase
@@ -281,6 +330,20 @@ def miss(bodies: Any, G: Any) -> None:
         S[MISSED + p] = S[ANSWER + p] - S[GUESS + p]
     for p in range(bodies.ports):
         S[AHEAD + p] = _port_end(bodies, G, p, MISSED)
+
+
+@phase
+def miss_rise(bodies: Any, level: int) -> None:
+    """What the guess missed of the rise over the macro step, and the displacements that it makes.
+
+    Means of three steps of one length give the slope at the middle of the last one.
+    """
+    S = bodies.at
+    for p in range(bodies.ports):
+        rise = 1.5 * S[ANSWER + p] - 2.0 * S[BEFORE + p] + 0.5 * S[BEFORE_2 + p]
+        S[RISE_MISSED + p] = rise - S[RISE + p]
+    for p in range(bodies.ports):
+        S[AHEAD + p] += _turned(bodies, level, p, RISE_MISSED)
 
 
 @phase
@@ -370,28 +433,46 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
     it only joins the forces that are pending.  Counted are the work on the bodies, and the energy
     that they got beyond what is given to them: elements and fluid are behind by what was missed
     before, interfaces will be by what is missed now.
+
+    The rise of the forces acts after that, all of it in ``one_step``, else what is missing of it.
+    Parts see the displacement that it makes, under the mean forces, and so give a work that
+    differs from what bodies get: this is no excess, since a force that rises while a body speeds
+    up does more than its mean.
     """
     S = bodies.at
-    excess = 0.0
+    excess, rise = 0.0, RISE_MISSED
     if one_step:
+        rise = RISE
         for p in range(bodies.ports):
+            S[RISE + p] += S[RISE_MISSED + p]
+        for p in range(bodies.ports):
+            turned = _turned(bodies, macro, p, RISE)
             S[PENDING + p] += S[MISSED + p]
-            way = S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p]
+            way = S[Y1 + p] + S[AHEAD + p] - S[BEGIN + p] - turned
             S[WORK + p] += (S[GUESS + p] + S[MISSED + p]) * way
-            S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * S[AHEAD + p]
+            S[WORK + p] += (S[FORCE + p] - S[GUESS + p]) * (S[AHEAD + p] - turned)
+            S[WITHIN] -= (S[FORCE + p] + S[MISSED + p]) * turned
     else:
         bring(bodies, level, level)
         for k in range(bodies.blocks):
-            energy = _kick_block(bodies, k, level, macro, MISSED)
+            energy = _kick_block(bodies, k, level, macro, MISSED, ROW_B1)
             if bodies.driven > 0 and _response(bodies, macro, bodies.port0[k]) == 0.0:
                 for p in range(bodies.port0[k], bodies.port1[k]):  # no speed, but work
                     energy += S[MISSED + p] * (S[Y1 + p] - S[BEGIN + p])
             S[WORK + bodies.port0[k]] += energy
             excess += energy
         for p in range(bodies.ports):
-            way, d = S[Y1 + p] - S[BEGIN + p], S[AHEAD + p]
+            turned = _turned(bodies, macro, p, RISE_MISSED)
+            way, d = S[Y1 + p] - S[BEGIN + p], S[AHEAD + p] - turned
             S[WORK + p] += S[GUESS + p] * way
             excess -= S[MISSED + p] * (way + d) + S[FORCE + p] * d
+            S[WITHIN] -= (S[FORCE + p] + S[MISSED + p]) * turned
+    if macro != FINE:
+        bring(bodies, level, level)
+        for k in range(bodies.blocks):
+            energy = _kick_block(bodies, k, level, macro, rise, ROW_R1)
+            S[WORK + bodies.port0[k]] += energy
+            S[WITHIN] += energy
     for p in range(bodies.ports):
         excess += (S[LAST + p] - S[ANSWER + p]) * (S[BEGIN + p] - S[SEEN + p])
         S[SEEN + p] = S[Y1 + p]

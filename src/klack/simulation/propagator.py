@@ -33,6 +33,8 @@ class Propagator:
         State ``(q, q')`` at the end of the step from the state at its start.
     B1, B2 : array [s^2], [s]
         ``q`` and ``q'`` at the end of the step from a unit modal force during the step.
+    R1, R2 : array [s^2], [s]
+        The same from a modal force that rises evenly by one over the step and has no mean.
     """
 
     step: float
@@ -42,6 +44,8 @@ class Propagator:
     A22: NDArray[np.float64]
     B1: NDArray[np.float64]
     B2: NDArray[np.float64]
+    R1: NDArray[np.float64]
+    R2: NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -85,13 +89,17 @@ def modal_propagator(
             expected="as many of both, none below zero",
             hint="give one damping ratio per mode.",
         )
-    A11, A12, A21, A22, B1, B2 = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()
-    return Propagator(step=float(step), A11=A11, A12=A12, A21=A21, A22=A22, B1=B1, B2=B2)
+    A11, A12, A21, A22, B1, S = _matrices(w.tobytes(), z.tobytes(), float(step)).copy()
+    # a force f(t) makes q(h) = int A12(h - t) f(t) dt; by parts with f = t/h - 1/2
+    R1, R2 = S / step - 0.5 * B1, B1 / step - 0.5 * A12
+    return Propagator(
+        step=float(step), A11=A11, A12=A12, A21=A21, A22=A22, B1=B1, B2=A12.copy(), R1=R1, R2=R2
+    )
 
 
 @lru_cache(maxsize=100)
 def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
-    """Rows of :class:`Propagator`; kept, because strokes of one valve share them."""
+    """``A11`` to ``B1``, and its integral; kept, because strokes of one valve share them."""
     w, z = np.frombuffer(omega), np.frombuffer(damping)
     A11, A12, A22 = np.ones(w.size), np.full(w.size, h), np.ones(w.size)
     B1 = np.full(w.size, 0.5 * h * h)
@@ -100,8 +108,11 @@ def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
         if np.any(part):
             A11[part], A12[part], A22[part], B1[part] = formula(w[part], z[part], h)
     small = (w > 0.0) & (np.maximum(z, 1.0) * w * h < TAYLOR_BELOW)
-    B1[small] = _series_B1(w[small] * h, z[small]) * h * h
-    return np.array([A11, A12, -(w**2) * A12, A22, B1, A12])
+    # the integral of q'' = 1 - 2 z w q' - w^2 q over the step
+    S = (h - A12 - 2.0 * z * w * B1) / np.where(w > 0.0, w**2, 1.0)
+    S[w == 0.0] = h**3 / 6.0
+    B1[small], S[small] = _series(w[small] * h, z[small]) * np.array([[h * h], [h**3]])
+    return np.array([A11, A12, -(w**2) * A12, A22, B1, S])
 
 
 def damping_loss(
@@ -178,11 +189,11 @@ def _overdamped(
     return A11, A12, A22, (-np.expm1(slow * h) + slow * A12) / w**2
 
 
-def _series_B1(x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """B1/h^2 as Taylor series of q'' = 1 - 2 z x q' - x^2 q at unit time."""
+def _series(x: NDArray[np.float64], z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """B1/h^2 and its integral/h^3 as Taylor series of q'' = 1 - 2 z x q' - x^2 q at unit time."""
     before, now = np.zeros(x.size), np.full(x.size, 0.5)
-    total = now.copy()
+    total = np.array([now, now / 3.0])
     for n in range(1, TAYLOR_TERMS):
         before, now = now, -(2.0 * z * x * (n + 1) * now + x**2 * before) / ((n + 1) * (n + 2))
-        total += now
+        total += np.array([now, now / (n + 3)])
     return total
