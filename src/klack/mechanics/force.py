@@ -127,4 +127,5 @@ class ForceOverTime(Component):
             parameters=(len(self.time), *self.time, *self.force),
             state=(0.0,),
             books=(Book("work", "supply"),),
+            table=(self.time, self.force),
         )

@@ -146,7 +146,8 @@ class ElementRow:
     point, where they differ.  ``interval`` [s] is that of its exchange with something outside, in
     whole steps; no step is longer than it.  ``state_names`` are name and unit of states that no
     channel records, by index; ``component.name`` in a row that stands for several.  ``inflows``
-    are inputs of its linear law.
+    are inputs of its linear law.  ``table`` are times [s] and forces [N] that it follows, whatever
+    its ports do.
     """
 
     component: str
@@ -164,6 +165,7 @@ class ElementRow:
     interval: float | None = None
     state_names: Mapping[int, tuple[str, str]] = field(default_factory=dict)
     inflows: tuple[StateInput, ...] = ()
+    table: tuple[Sequence[float], Sequence[float]] = ((), ())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -576,6 +578,7 @@ class Rows:
         at_rest: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
         interval: float | None = None,
         state_names: Mapping[int, tuple[str, str]] | None = None,
+        table: tuple[Sequence[float], Sequence[float]] = ((), ()),
     ) -> None:
         """Add something that pushes ports; its forces are recorded by component and port."""
         self.elements.append(
@@ -593,6 +596,7 @@ class Rows:
                 at_rest=at_rest,
                 interval=interval,
                 state_names=state_names or {},
+                table=table,
             )
         )
 

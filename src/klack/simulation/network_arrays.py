@@ -300,6 +300,7 @@ class NetworkArrays(NamedTuple):
     slider_state: SliderState
     accounts: Accounts
     account_kind: Index
+    kinks: Vector  # times [s] at which a table bends sharply, then infinity
 
 
 class NodeTrial(NamedTuple):

@@ -50,7 +50,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_gas import require_chambers, settle_gas
 from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
-from klack.simulation.step_sizes import StepSizes
+from klack.simulation.step_sizes import StepSizes, kinks
 from klack.simulation.wave_rows import WAVE_THROUGHPUT, Waves, compile_waves, start_wave
 from klack.simulation.yielding_step import settle
 
@@ -95,6 +95,8 @@ class CompiledNetwork:
     accounts : Accounts
     account_kind : array of int
         ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.rows``.
+    kinks : array [s]
+        Of :func:`klack.simulation.step_sizes.kinks`.
     account_names : tuple of str
     ports : tuple of PortName
     node_order : tuple of int
@@ -120,6 +122,7 @@ class CompiledNetwork:
     slider_state: SliderState
     accounts: Accounts
     account_kind: Index
+    kinks: Vector
     account_names: tuple[str, ...]
     ports: tuple[PortName, ...]
     port_of: Mapping[int, int]
@@ -192,6 +195,7 @@ def compile_network(rows: Rows, sizes: StepSizes) -> CompiledNetwork:
             friction=np.zeros(sliders.sliders),
         ),
         account_kind=np.array(accounts.kinds, dtype=np.int64),
+        kinks=kinks(rows, sizes.coarse * sizes.step),
         account_names=tuple(accounts.names),
         ports=names,
         port_of=port_of,

@@ -206,9 +206,11 @@ def run_network(
     bodies, contacts = loop.bodies, loop.contacts
     now, last_level, at = clock[0], clock[1], FINE
     last_steps = _steps_of(last_level, M, near)
-    in_record, record, record_time = 0, 0, 0.0
+    in_record, record, record_time, kink = 0, 0, 0.0, 0
     for _macro in range(macros):
-        together = allow_macro
+        while network.kinks[kink] <= origin + now * h:
+            kink += 1
+        together = allow_macro and network.kinks[kink] >= origin + (now + M) * h
         flight = together and may_fly(contacts, origin + now * h, M * h)
         smooth, apart = R > 1, True
         done = 0
@@ -465,6 +467,8 @@ def _act(
             report[0], report[2] = 0.0, now.t
             return STATUS_FORCES if fine else STATUS_REFUSED
         if flight and not (coarse_step_holds(contacts) and sliders_hold(sliding)):
+            return STATUS_MET
+        if now.level == MIDDLE and not sliders_hold(sliding):
             return STATUS_MET
         if not whole and cut == 0 and not contacts_hold(contacts):
             if not kept:

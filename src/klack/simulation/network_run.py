@@ -31,6 +31,8 @@ from klack.simulation.network_arrays import (
     PORTS,
     SEEN,
     STORE,
+    WITHIN,
+    WITHIN_BEGIN,
     WORK,
     WORK_BEGIN,
     Y0,
@@ -723,6 +725,7 @@ def saved_state(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str,
     saved = {name: array.copy() for name, array in _changing(network, clock).items()}
     for row in (WORK, WORK_BEGIN):  # count from the start of each run
         saved["bodies.at"][row : row + PORTS] = 0.0
+    saved["bodies.at"][[WITHIN, WITHIN_BEGIN]] = 0.0
     return saved
 
 

@@ -149,12 +149,17 @@ def slip_seen_late(sliding: Any, S: Any) -> tuple[float, float]:
 
 @phase
 def sliders_hold(sliding: Any) -> bool:
-    """Whether friction changed so little in a coarse step that nothing turned or came to rest."""
+    """Whether friction changed so little in a step that nothing turned or came to rest.
+
+    In a step in which slip turns, friction is anything up to its largest value.
+    """
     rows, state, trial = sliding.rows, sliding.state, sliding.trial
     holds = True
     for s in range(rows.sliders):
         most = rows.coulomb[s] + rows.excess[s]
         if abs(trial.force[s] - state.force[s]) > _SHAKEN * max(most, abs(trial.force[s])):
+            holds = False
+        if state.force[s] != 0.0 and state.force[s] * trial.force[s] <= 0.0:
             holds = False
     return holds
 

@@ -3,6 +3,9 @@
 from dataclasses import dataclass, replace
 from math import inf, sqrt
 
+import numpy as np
+from numpy.typing import NDArray
+
 from klack.errors import InputError
 from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
 from klack.network.rows import LineRow, Rows
@@ -10,12 +13,14 @@ from klack.simulation.network_arrays import PARTS
 from klack.simulation.rest import bounce_time
 from klack.units import format_si
 
-__all__ = ["StepSizes", "doubled", "largest_divisor", "step_sizes"]
+__all__ = ["StepSizes", "doubled", "kinks", "largest_divisor", "step_sizes"]
 
 _MOST_COARSE = 256
 _MIDDLE = 4  # fine steps of a sub-step while films are smooth
 _OF_BOUNCE = 0.01  # such a sub-step over the time of an impact: 4e-5 of the peak force
 _WHOLE = 1e-6  # of a step
+_SHARP = 0.005  # of the range of a table: what a bend changes in it within a macro step
+_MOST_KINKS = 32  # of a table; a noisy one has no steps of its own at each point
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,7 +90,7 @@ def step_sizes(
         )
     h = fine_step(accuracy, step)
     chosen = _chosen(rows, ACCURACIES[accuracy][1], h) if coarse is None else coarse
-    near = largest_divisor(chosen, max(1, chosen // 2))
+    near = largest_divisor(chosen, max(1, chosen // 4))
     return StepSizes(step=h, coarse=chosen, near=near, middle=_middle(rows, h, near))
 
 
@@ -128,6 +133,25 @@ def _chosen(rows: Rows, macro: float, h: float) -> int:
         if intervals and all(_is_whole(interval / (count * h)) for interval in intervals):
             return count
     return 1 << (most.bit_length() - 1)
+
+
+def kinks(rows: Rows, macro: float) -> NDArray[np.float64]:
+    """Times [s] at which a table of forces or pressures bends sharply, then infinity.
+
+    The macro steps, of ``macro`` [s], that hold one of them are divided: a force within a step is a
+    straight line.
+    """
+    tables = [row.table for row in rows.elements]
+    tables += [(node.time, node.pressure) for node in rows.nodes.values() if node.prescribed]
+    found = [np.array([inf])]
+    for points, values in tables:
+        if len(points) > 1:
+            slope = np.concatenate([[0.0], np.diff(values) / np.diff(points), [0.0]])
+            bend = np.abs(np.diff(slope)) * macro
+            sharpest = np.argsort(-bend, kind="stable")[:_MOST_KINKS]
+            sharp = sharpest[bend[sharpest] > _SHARP * np.ptp(values)]
+            found.append(np.asarray(points, dtype=float)[sharp])
+    return np.unique(np.concatenate(found))
 
 
 def _segment(line: LineRow) -> float:
