@@ -242,6 +242,7 @@ class InterfaceState(NamedTuple):
     pulled: Vector  # 1 of a film that pulls as much as it can
     force_before: Vector  # force at the end of the macro step before the last
     far: Vector  # 1 of an interface whose film acts among elements
+    calm: Vector  # time since when its force has changed little
 
 
 class Sliders(NamedTuple):

@@ -527,6 +527,7 @@ def _interfaces(
         film_before=np.zeros(count),
         pulled=np.zeros(count),
         force_before=np.zeros(count),
+        calm=np.full(count, -np.inf),
         far=np.zeros(count),
     )
     return interfaces, state

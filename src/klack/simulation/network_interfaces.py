@@ -79,9 +79,9 @@ def forget_interfaces(contacts: Any) -> None:
 
 
 @phase
-def _steady(before: float, now: float) -> bool:
-    """Whether a contact at rest carries a force that macro steps follow."""
-    return abs(now - before) <= _SHAKEN * max(abs(now), abs(before))
+def _steady(before: float, now: float, share: float = 1.0) -> bool:
+    """Whether a contact at rest carries a force that macro steps follow, in a ``share`` of one."""
+    return abs(now - before) <= share * _SHAKEN * max(abs(now), abs(before))
 
 
 @phase
@@ -98,9 +98,8 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
     for c in range(rows.interfaces):
         rate = abs(state.rate[c])
         if state.since[c] < np.inf:
-            if now - state.since[c] < rows.rest[c]:
-                quiet = False
-            if not _steady(state.force_before[c], state.force[c]):
+            # a swing is steady for a moment at its crests
+            if now - max(state.since[c], state.calm[c]) < rows.rest[c]:
                 quiet = False
             continue
         x = state.gap[c] - 3.0 * rate * length
@@ -400,8 +399,8 @@ def cost_of_catching_up(contacts: Any, S: Any) -> tuple[float, float]:
 
 
 @phase
-def end_macro_interfaces(contacts: Any, S: Any) -> float:
-    """End a macro step of interfaces.
+def end_macro_interfaces(contacts: Any, S: Any, step: Step, longest: float) -> float:
+    """End a macro step of interfaces, one of ``longest`` [s] at most.
 
     Returns
     -------
@@ -414,6 +413,8 @@ def end_macro_interfaces(contacts: Any, S: Any) -> float:
     for c in range(rows.interfaces):
         begin = trial.kept[KEPT * c + 3]
         state.force_before[c] = begin
+        if not _steady(begin, state.force[c], step.H / longest):
+            state.calm[c] = step.t + step.H
         behind = rows.gap0[c] + S[BEGIN + rows.upper[c]] - S[BEGIN + rows.lower[c]]
         if rows.kind[c] == LAW_YIELDING:
             behind -= settled_since(contacts.laws, rows.law0[c])

@@ -76,6 +76,7 @@ from klack.simulation.network_interfaces import (
     take_back_interfaces,
 )
 from klack.simulation.network_ports import (
+    begin_course,
     begin_cut,
     begin_macro_step,
     begin_ports,
@@ -84,6 +85,7 @@ from klack.simulation.network_ports import (
     end_ports,
     end_sub_step,
     finite,
+    fresh,
     guess_answer,
     guess_forces,
     guess_rise,
@@ -252,7 +254,9 @@ def run_network(
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
                 waves_incoming(loop.waves, step.H, loop.ends.c, loop.ends.Z)
-            status = _settle(step, sub, parts, whole, flight, loop, first(clock), first(report))
+            status = _settle(
+                step, sub, parts, whole, flight, last_steps, loop, first(clock), first(report)
+            )
             if status > STATUS_DONE:
                 return status
             if status != STATUS_DONE:
@@ -270,7 +274,9 @@ def run_network(
                     smooth = apart = False
                 last_level, last_steps = level, steps  # forces so far are spaced like this now
                 continue
-            _end_step(step, of_sub, whole, loop)
+            if fresh(steps / last_steps):
+                begin_course(bodies)
+            _end_step(step, of_sub, whole, loop, M * h)
             last_level, last_steps = level, steps
             done += steps
             now += steps
@@ -364,13 +370,15 @@ def _settle(
     parts: int,
     whole: bool,
     flight: bool,
+    last_steps: int,
     loop: Any,
     clock: Any,
     report: Any,
 ) -> int:
     """One step up to what it would change: again and again, until its guess missed nothing.
 
-    ``whole`` where what acts cannot be cut, so that its free motion is asked once.
+    ``whole`` where what acts cannot be cut, so that its free motion is asked once; ``last_steps``
+    are the fine steps of the step before.
 
     Returns
     -------
@@ -398,7 +406,7 @@ def _settle(
             return status
         miss(bodies, G)
         if step.steps > 1:
-            miss_rise(bodies, step.level)
+            miss_rise(bodies, step.level, fresh(step.steps / last_steps))
         left, work = cost_of_catching_up(contacts, bodies.at)
         late, rubbed = cost_of_late_sliders(loop.sliding, bodies.at)
         if not matters(bodies, step.level, share, energy, left + late, work + rubbed):
@@ -501,7 +509,7 @@ def _act(
 
 
 @unfolded
-def _end_step(step: Step, level: int, whole: bool, loop: Any) -> None:
+def _end_step(step: Step, level: int, whole: bool, loop: Any, longest: float) -> None:
     """Take over states, masses, waves and accounts; repair the bodies."""
     bodies, elements, fluid = loop.bodies, loop.elements, loop.fluid
     accounts, kind, H = loop.accounts, loop.kind, step.H
@@ -518,7 +526,7 @@ def _end_step(step: Step, level: int, whole: bool, loop: Any) -> None:
     if step.level != FINE:  # fine steps owe nothing but round-off
         repay(bodies, shift(bodies.G, step.level * PORTS * PORTS))
     catch_up(bodies, level, step.level, whole)
-    bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at)
+    bodies.at[EXCESS] += end_macro_interfaces(loop.contacts, bodies.at, step, longest)
     bodies.at[EXCESS] += end_macro_sliders(loop.sliding, bodies.at)
     end_ports(bodies)
 

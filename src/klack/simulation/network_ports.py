@@ -48,6 +48,7 @@ from klack.simulation.network_arrays import (
 from klack.simulation.phase import phase
 
 __all__ = [
+    "begin_course",
     "begin_cut",
     "begin_macro_step",
     "begin_ports",
@@ -57,6 +58,7 @@ __all__ = [
     "end_ports",
     "end_sub_step",
     "finite",
+    "fresh",
     "guess_answer",
     "guess_forces",
     "guess_rise",
@@ -214,6 +216,12 @@ def guess_rise(bodies: Any, long: bool) -> None:
 
 
 @phase
+def fresh(ratio: float) -> bool:
+    """Whether a step is so much longer than the ones before that it begins with the last force."""
+    return ratio > _LONGER
+
+
+@phase
 def respace_forces(bodies: Any, ratio: float) -> None:
     """Forces of the last three steps as if they had been longer by ``ratio``.
 
@@ -224,7 +232,7 @@ def respace_forces(bodies: Any, ratio: float) -> None:
     for i in range(row_length(bodies)):
         a, b, c = S[BEFORE + i], S[BEFORE_2 + i], S[BEFORE_3 + i]
         first, second = b - a, 0.5 * (c - 2.0 * b + a)
-        if ratio > _LONGER:
+        if fresh(ratio):
             first, second = 0.0, 0.0
         # x steps before the last one: a + first x + second x (x - 1)
         x1, x2, x3 = 0.5 * ratio - 0.5, 1.5 * ratio - 0.5, 2.5 * ratio - 0.5
@@ -333,14 +341,17 @@ def miss(bodies: Any, G: Any) -> None:
 
 
 @phase
-def miss_rise(bodies: Any, level: int) -> None:
+def miss_rise(bodies: Any, level: int, fresh: bool) -> None:
     """What the guess missed of the rise over the macro step, and the displacements that it makes.
 
-    Means of three steps of one length give the slope at the middle of the last one.
+    Means of three steps of one length give the slope at the middle of the last one; after shorter
+    ones, in a ``fresh`` step, the force at its start and its mean do.
     """
     S = bodies.at
     for p in range(bodies.ports):
-        rise = 1.5 * S[ANSWER + p] - 2.0 * S[BEFORE + p] + 0.5 * S[BEFORE_2 + p]
+        rise = 2.0 * (S[ANSWER + p] - S[BEFORE + p])
+        if not fresh:
+            rise = 1.5 * S[ANSWER + p] - 2.0 * S[BEFORE + p] + 0.5 * S[BEFORE_2 + p]
         S[RISE_MISSED + p] = rise - S[RISE + p]
     for p in range(bodies.ports):
         S[AHEAD + p] += _turned(bodies, level, p, RISE_MISSED)
@@ -478,6 +489,16 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
         S[SEEN + p] = S[Y1 + p]
         S[Y1 + p] += S[AHEAD + p]
     S[EXCESS] += excess
+
+
+@phase
+def begin_course(bodies: Any) -> None:
+    """Put the forces before a fresh step on the straight line through its start and its mean."""
+    S = bodies.at
+    for i in range(row_length(bodies)):
+        rise = 2.0 * (S[ANSWER + i] - S[BEFORE + i])
+        S[BEFORE + i] = S[ANSWER + i] - rise
+        S[BEFORE_2 + i] = S[ANSWER + i] - 2.0 * rise
 
 
 @phase
