@@ -10,8 +10,8 @@ A peak force is the largest mean of a step.  Two things make it too low:
   closes the contact tells how far away the touch is.
 
 A stop on which the needle swings without leaving it, until a load is taken away, has its first
-impact by the phase of that swing.  Macro steps of length ``H`` follow a period ``T`` late by
-``(2 pi H / T)^2 / 12`` of it, each time anew; of small swings little of that is seen.
+impact by the phase of that swing.  Steps of length ``h`` follow a period ``T`` late by
+``(2 pi h / T)^2 / 12`` of it, each time anew; of small swings little of that is seen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -41,12 +41,10 @@ def impact_doubts(
     events: Sequence[ImpactEvent],
     interfaces: Mapping[str, InterfaceRecord],
     step: float,
-    near: float,
 ) -> Iterator[str]:
     """Sentences on the first complete impact on each stop, where the peak misses 0.05 % or more.
 
-    Also where it begins late or early by 0.05 us or more, because the stop swung before; ``near``
-    is a macro step about a touch [s].
+    Also where it begins late or early by 0.05 us or more, because the stop swung before.
     """
     seen = set[str]()
     for event in events:
@@ -54,14 +52,14 @@ def impact_doubts(
             continue
         seen.add(event.stop)
         record = interfaces[event.stop]
-        late, times, period = late_by_swinging(record, event.time, near, _last(events, event.time))
+        late, times, period = late_by_swinging(record, event.time, _last(events, event.time))
         if late > _LATE:
-            way = "run.coarse: 1" if near > 1.5 * step else "a shorter run.step"
+            shorter = min(_rounded_down(step * sqrt(_AIM * _LATE / late)), step)
             yield (
                 f"{_named(event)} depends on the steps: before it left the stop the needle swung "
-                f"on it {times} times, each {format_si(period, 's', 2)} long, which steps of "
-                f"{format_si(near, 's', 2)} shift by about {format_si(late, 's', 1)} in all. "
-                f"Try: {way}; or the restitution of the stop, which damps it."
+                f"on it {times} times, each {format_si(period, 's', 2)} long, which its steps "
+                f"shift by about {format_si(late, 's', 1)} in all. Try: run.step: "
+                f"{format_si(shorter, 's', 3)}; or the restitution of the stop, which damps it."
             )
         if event.contact_time < _FEWEST * _step_at(record, event.peak_time):
             yield _unresolved(event, _step_at(record, event.peak_time))
@@ -156,7 +154,7 @@ def missing_peak(
 
 
 def late_by_swinging(
-    record: InterfaceRecord, time: float, near: float, since: float = 0.0
+    record: InterfaceRecord, time: float, since: float = 0.0
 ) -> tuple[float, int, float]:
     """By how much the swings of the last contact before some time are late, how many, and how long.
 
@@ -167,18 +165,16 @@ def late_by_swinging(
     record : InterfaceRecord
     time : float [s]
         Of a first touch.
-    near : float [s]
-        Macro step about a touch.
 
     Returns
     -------
     late : float [s]
     swings : int
-        Within that contact, as many as are like the one that counts most.
+        Of more than half of the largest, within that contact.
     period : float [s]
-        Of that one.
+        Their mean.
     """
-    force = record.contact_force[record.time + record.step <= time + 1e-3 * near]
+    force = record.contact_force[: np.searchsorted(record.time, time)]
     closed = np.flatnonzero(force > 0.0)
     if not closed.size or record.time[closed[-1]] < since:
         return 0.0, 0, 0.0
@@ -188,14 +184,16 @@ def late_by_swinging(
     force, middle = force[part], (record.time + 0.5 * record.step)[part]
     turns = np.sign(np.diff(force))
     ends = np.flatnonzero(turns[1:] * turns[:-1] < 0.0) + 1
-    if len(ends) < 2:
+    if len(ends) < 3:
         return 0.0, 0, 0.0
     share = np.abs(np.diff(force[ends])) / (force[ends[1:]] + force[ends[:-1]])
+    share = np.minimum(share, np.append(0.0, share[:-1]))  # rest before it is no swing
     periods = 2.0 * np.diff(middle[ends])
-    each = 0.5 * share * periods * (2.0 * pi * near / periods) ** 2 / 12.0
-    k = int(np.argmax(each))
-    late = float(each.sum())
-    return late, round(0.5 * late / float(each[k] or 1.0)), float(periods[k])
+    each = 0.5 * share * periods * (pi / np.diff(ends)) ** 2 / 12.0  # in steps per half a swing
+    if not share.any():
+        return 0.0, 0, 0.0
+    swings = round(0.5 * float(np.sum(share > 0.5 * share.max())))
+    return float(each.sum()), swings, float(np.average(periods, weights=share))
 
 
 def _behind_nothing(record: InterfaceRecord) -> InterfaceRecord:

@@ -269,7 +269,7 @@ def simulate_network(
     for doubt in line_doubts(network, step * first_step):
         warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if network.moving is None:
-        for doubt in impact_doubts(result.events, result.interfaces, step, sizes.near * step):
+        for doubt in impact_doubts(result.events, result.interfaces, step):
             warnings.warn(doubt, AccuracyWarning, stacklevel=2)
     if failure is not None:
         raise IncompleteRunError(str(failure), result) from failure
