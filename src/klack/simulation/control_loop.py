@@ -15,6 +15,7 @@ from klack.input.problem import CaseProblem, nearest
 from klack.network.protocols import RunningController
 from klack.network.rows import ControllerRow
 from klack.simulation.flow_channels import present_name
+from klack.simulation.network_arrays import BEFORE, BEFORE_2, BEFORE_3
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_recorder import Recorder
 from klack.units import KINDS, format_si, parse_quantity
@@ -35,6 +36,7 @@ class _Running:
     scale: tuple[float, ...]  # SI per unit of a signal
     target: NDArray[np.float64]  # what the output is written to, at this place
     place: int
+    pushed: tuple[tuple[int, float], ...]  # ports that feel it at once, and the force per unit
     least: float  # smallest output that has a meaning
     output: RunningController
 
@@ -86,7 +88,11 @@ class ControlLoop:
                     expected="a finite number" + (" above 0 Pa" if running.least == 0.0 else ""),
                     hint="check its law or function, and what it does with its signals.",
                 )
+            change = found - running.target[running.place]
             running.target[running.place] = found
+            for port, share in running.pushed:  # no rise: it held before, and holds from now on
+                for row in (BEFORE, BEFORE_2, BEFORE_3):
+                    self._network.bodies.at[row + port] += share * change
 
     def memory(self) -> dict[str, NDArray[np.generic]]:
         """What a run needs to continue: outputs, and the memory of all that can be stored."""
@@ -150,7 +156,7 @@ class ControlLoop:
                 hint="choose one, or another run.step, run.coarse or run.record.",
             )
         places = [self._column(row, i) for i in range(len(row.channels))]
-        target, place = self._actuator(row)
+        target, place, pushed = self._actuator(row)
         return _Running(
             row,
             looks,
@@ -158,6 +164,7 @@ class ControlLoop:
             tuple(scale for _, scale in places),
             target,
             place,
+            pushed,
             0.0 if row.actuator == "pressure" else -inf,
             row.begin(),
         )
@@ -191,19 +198,24 @@ class ControlLoop:
             )
         return column, size
 
-    def _actuator(self, row: ControllerRow) -> tuple[NDArray[np.float64], int]:
-        """Array that the output is written to, and the place in it."""
+    def _actuator(
+        self, row: ControllerRow
+    ) -> tuple[NDArray[np.float64], int, tuple[tuple[int, float], ...]]:
+        """Array that the output is written to, the place in it, and whom it pushes at once."""
         network = self._network
         elements, parameters = network.elements, network.elements.parameters
         if row.actuator == "force":
-            return parameters, int(elements.parameter0[row.handle])
+            port = int(elements.ports[elements.port0[row.handle]])
+            return parameters, int(elements.parameter0[row.handle]), ((port, 1.0),)
         if row.actuator == "pressure":
             nodes = network.nodes
             k = network.node_order.index(row.handle) - nodes.volumes
-            return nodes.pressure, int(nodes.table0[k])
+            walls = np.flatnonzero(nodes.wall_node[: nodes.walls] == nodes.volumes + k)
+            areas = tuple((int(nodes.wall_port[w]), float(nodes.wall_area[w])) for w in walls)
+            return nodes.pressure, int(nodes.table0[k]), areas
         k, program = network.rows.coils[row.handle]
         first = int(elements.parameter0[k])
         drive = first + int(parameters[first + program])
         block = drive + int(parameters[drive + 1])
         source = block + 3 + 4 * int(parameters[block + 2])
-        return parameters, source
+        return parameters, source, ()
