@@ -149,6 +149,7 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
     for k, wave in enumerate(rows.waves):
         for j, what in enumerate(wave.losses):
             losses[f"{wave.component} {what}"] = float(accounts.waves[k, j])
+    supplies[WITHIN_STEPS] = float(network.bodies.at[WITHIN])
     if network.moving is not None:
         return EnergyBooks(
             supplies=supplies | network.moving.supplies(),
@@ -156,7 +157,6 @@ def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> Ener
             stores_before=dict(before),
             stores_after=after,
         )
-    supplies[WITHIN_STEPS] = float(network.bodies.at[WITHIN])
     works = network.bodies.at[WORK : WORK + PORTS] - _unseen_work(network)
     place = 0
     for row in rows.bodies:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from math import inf, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 from klack.network.accuracy import ACCURACIES, Accuracy, fine_step
@@ -141,16 +141,16 @@ def kinks(rows: Rows, macro: float) -> NDArray[np.float64]:
     The macro steps, of ``macro`` [s], that hold one of them are divided: a force within a step is a
     straight line.
     """
-    tables = [row.table for row in rows.elements]
+    tables: list[tuple[ArrayLike, ArrayLike]] = [row.table for row in rows.elements]
     tables += [(node.time, node.pressure) for node in rows.nodes.values() if node.prescribed]
     found = [np.array([inf])]
-    for points, values in tables:
+    for points, values in (map(np.asarray, table) for table in tables):
         if len(points) > 1:
             slope = np.concatenate([[0.0], np.diff(values) / np.diff(points), [0.0]])
             bend = np.abs(np.diff(slope)) * macro
             sharpest = np.argsort(-bend, kind="stable")[:_MOST_KINKS]
             sharp = sharpest[bend[sharpest] > _SHARP * np.ptp(values)]
-            found.append(np.asarray(points, dtype=float)[sharp])
+            found.append(points[sharp])
     return np.unique(np.concatenate(found))
 
 
