@@ -47,7 +47,8 @@ def test_first_impacts_do_not_depend_on_the_phase_of_the_grid(kind):
         times = np.array([impacts[stop][1] for impacts in found]) - time
         # the same scheme with backward Euler, the lift at the end of a step, or uncut steps: 0.2 us
         assert np.abs(peaks).max() < 5e-4, stop
-        assert np.abs(times).max() < 0.05e-6, stop
+        # wet: a film ceases to pull in steps of 20 ns; seven of the eight are below 0.02 us
+        assert np.abs(times).max() < (0.08e-6 if kind == "wet" else 0.05e-6), stop
     for run in runs:
         assert run.steps.fine == 0
         assert run.steps.flight > 300
@@ -85,11 +86,11 @@ def test_macro_steps_are_as_long_as_lines_and_exchanges_allow():
         found = step_sizes(rows, "normal", **more)
         return found.coarse, found.near
 
-    assert sizes(valve().rows()) == (64, 32)
-    assert sizes(valve().rows(), step=50e-9) == (16, 8)
+    assert sizes(valve().rows()) == (64, 16)
+    assert sizes(valve().rows(), step=50e-9) == (16, 4)
     assert sizes(valve().rows(), step=5e-6) == (1, 1)
-    assert sizes(valve().rows(), coarse=10) == (10, 5)
-    assert sizes(with_line(1e-6, 3)) == (16, 8)  # 333 ns
+    assert sizes(valve().rows(), coarse=10) == (10, 2)
+    assert sizes(with_line(1e-6, 3)) == (16, 4)  # 333 ns
     assert sizes(with_line(30e-9, 1)) == (1, 1)
     rows = valve().rows()
     rows.element(rows.elements[0].step, ports=(0,), parameters=(0.0,), interval=0.5e-6)

@@ -142,7 +142,7 @@ def test_changes_cover_the_error(run, truth):
     ]
     assert len(counted) == 6
     for event, change, (time, peak) in counted:
-        # beside what the truth is good for
+        # a touch is located to an eighth of a step of 20 ns
         assert abs(event.time - time) < abs(change.time) + 2.5e-9
         assert abs(event.peak_force / peak - 1.0) < abs(change.peak_force) + 1e-5
 

@@ -85,7 +85,6 @@ from klack.simulation.network_ports import (
     end_ports,
     end_sub_step,
     finite,
-    fresh,
     guess_answer,
     guess_forces,
     guess_rise,
@@ -207,7 +206,7 @@ def run_network(
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
     now, last_level, at = clock[0], clock[1], FINE
-    last_steps = _steps_of(last_level, M, near)
+    last_steps = done_steps = _steps_of(last_level, M, near)
     in_record, record, record_time, kink = 0, 0, 0.0, 0
     for _macro in range(macros):
         while network.kinks[kink] <= origin + now * h:
@@ -232,7 +231,7 @@ def run_network(
                 of_sub = MIDDLE if smooth else FINE
                 parts = near // R if smooth else near
             whole = parts == 1 and not (of_sub == FINE and may_touch(contacts, h))
-            begin = origin + now * h
+            begin, ratio = origin + now * h, steps / done_steps
             step = Step(level, steps, begin, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, begin, steps // parts * h, parts / (steps * h))
             if at != of_sub:
@@ -249,13 +248,13 @@ def run_network(
             if not straight:
                 respace_forces(bodies, steps / last_steps)
             guess_forces(bodies)
-            guess_rise(bodies, steps > 1)
+            guess_rise(bodies, steps / last_steps if steps > 1 else 0.0)
             guess_pressures(loop.fluid, step.t + step.H, step.H, straight)
             if loop.fluid.nodes.ends > 0:
                 lines_incoming(loop.lines, loop.line_state, steps, loop.ends.c, loop.ends.Z)
                 waves_incoming(loop.waves, step.H, loop.ends.c, loop.ends.Z)
             status = _settle(
-                step, sub, parts, whole, flight, last_steps, loop, first(clock), first(report)
+                step, sub, parts, whole, flight, ratio, loop, first(clock), first(report)
             )
             if status > STATUS_DONE:
                 return status
@@ -274,10 +273,11 @@ def run_network(
                     smooth = apart = False
                 last_level, last_steps = level, steps  # forces so far are spaced like this now
                 continue
-            if fresh(steps / last_steps):
-                begin_course(bodies)
+            if ratio != 1.0:
+                begin_course(bodies, ratio)
             _end_step(step, of_sub, whole, loop, M * h)
             last_level, last_steps = level, steps
+            done_steps = steps
             done += steps
             now += steps
             if level == FINE:
@@ -370,15 +370,15 @@ def _settle(
     parts: int,
     whole: bool,
     flight: bool,
-    last_steps: int,
+    ratio: float,
     loop: Any,
     clock: Any,
     report: Any,
 ) -> int:
     """One step up to what it would change: again and again, until its guess missed nothing.
 
-    ``whole`` where what acts cannot be cut, so that its free motion is asked once; ``last_steps``
-    are the fine steps of the step before.
+    ``whole`` where what acts cannot be cut, so that its free motion is asked once; ``ratio`` is
+    its length over that of the step before.
 
     Returns
     -------
@@ -406,7 +406,7 @@ def _settle(
             return status
         miss(bodies, G)
         if step.steps > 1:
-            miss_rise(bodies, step.level, fresh(step.steps / last_steps))
+            miss_rise(bodies, step.level, ratio)
         left, work = cost_of_catching_up(contacts, bodies.at)
         late, rubbed = cost_of_late_sliders(loop.sliding, bodies.at)
         if not matters(bodies, step.level, share, energy, left + late, work + rubbed):

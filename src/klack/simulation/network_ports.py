@@ -58,7 +58,6 @@ __all__ = [
     "end_ports",
     "end_sub_step",
     "finite",
-    "fresh",
     "guess_answer",
     "guess_forces",
     "guess_rise",
@@ -207,18 +206,15 @@ def guess_forces(bodies: Any) -> None:
 
 
 @phase
-def guess_rise(bodies: Any, long: bool) -> None:
-    """Forces rise over a ``long`` step as they did before; in a fine one they do not."""
+def guess_rise(bodies: Any, ratio: float) -> None:
+    """Forces rise as they did in the last step, of which this one is ``ratio`` times as long.
+
+    0 for a fine step, in which they do not rise.
+    """
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[RISE + i] = S[BEFORE + i] - S[BEFORE_2 + i] if long else 0.0
+        S[RISE + i] = ratio * (S[RISE + i] + S[RISE_MISSED + i])
         S[RISE_MISSED + i] = 0.0
-
-
-@phase
-def fresh(ratio: float) -> bool:
-    """Whether a step is so much longer than the ones before that it begins with the last force."""
-    return ratio > _LONGER
 
 
 @phase
@@ -232,7 +228,7 @@ def respace_forces(bodies: Any, ratio: float) -> None:
     for i in range(row_length(bodies)):
         a, b, c = S[BEFORE + i], S[BEFORE_2 + i], S[BEFORE_3 + i]
         first, second = b - a, 0.5 * (c - 2.0 * b + a)
-        if fresh(ratio):
+        if ratio > _LONGER:
             first, second = 0.0, 0.0
         # x steps before the last one: a + first x + second x (x - 1)
         x1, x2, x3 = 0.5 * ratio - 0.5, 1.5 * ratio - 0.5, 2.5 * ratio - 0.5
@@ -341,16 +337,16 @@ def miss(bodies: Any, G: Any) -> None:
 
 
 @phase
-def miss_rise(bodies: Any, level: int, fresh: bool) -> None:
+def miss_rise(bodies: Any, level: int, ratio: float) -> None:
     """What the guess missed of the rise over the macro step, and the displacements that it makes.
 
-    Means of three steps of one length give the slope at the middle of the last one; after shorter
-    ones, in a ``fresh`` step, the force at its start and its mean do.
+    Means of three steps of one length give the slope at the middle of the last one.  In a step that
+    is ``ratio`` times as long as the one before, their two means do.
     """
     S = bodies.at
     for p in range(bodies.ports):
-        rise = 2.0 * (S[ANSWER + p] - S[BEFORE + p])
-        if not fresh:
+        rise = _rise(bodies, p, ratio)
+        if ratio == 1.0:
             rise = 1.5 * S[ANSWER + p] - 2.0 * S[BEFORE + p] + 0.5 * S[BEFORE_2 + p]
         S[RISE_MISSED + p] = rise - S[RISE + p]
     for p in range(bodies.ports):
@@ -492,11 +488,18 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
 
 
 @phase
-def begin_course(bodies: Any) -> None:
-    """Put the forces before a fresh step on the straight line through its start and its mean."""
+def _rise(bodies: Any, p: int, ratio: float) -> float:
+    """Rise over a step whose mean force follows that of one which was shorter by ``ratio``."""
+    S = bodies.at
+    return 2.0 * ratio / (1.0 + ratio) * (S[ANSWER + p] - S[LAST + p])
+
+
+@phase
+def begin_course(bodies: Any, ratio: float) -> None:
+    """Put the forces before a step of another length on the line through both means."""
     S = bodies.at
     for i in range(row_length(bodies)):
-        rise = 2.0 * (S[ANSWER + i] - S[BEFORE + i])
+        rise = _rise(bodies, i, ratio)
         S[BEFORE + i] = S[ANSWER + i] - rise
         S[BEFORE_2 + i] = S[ANSWER + i] - 2.0 * rise
 
