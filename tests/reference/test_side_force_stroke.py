@@ -76,8 +76,8 @@ def test_a_centred_stroke_is_that_without_side_forces():
     assert "restriction side force x" not in plain.reference.result.channels
     assert first.time == pytest.approx(same.time, rel=1e-10)
     # 1e-12 N more preload changes the peak by 5e-7 without them, 1e-10 N by 1.4e-5
-    assert first.peak_force == pytest.approx(same.peak_force, rel=5e-5)
-    assert first.restitution == pytest.approx(same.restitution, rel=5e-5)
+    assert first.peak_force == pytest.approx(same.peak_force, rel=1e-4)
+    assert first.restitution == pytest.approx(same.restitution, rel=1e-4)
     assert "off_axis and tilts" in dict(stroke_content(plain).limits)["Contact"]
 
 
