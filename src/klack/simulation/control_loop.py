@@ -15,7 +15,7 @@ from klack.input.problem import CaseProblem, nearest
 from klack.network.protocols import RunningController
 from klack.network.rows import ControllerRow
 from klack.simulation.flow_channels import present_name
-from klack.simulation.network_arrays import BEFORE, BEFORE_2, BEFORE_3
+from klack.simulation.network_arrays import BEFORE, BEFORE_2, BEFORE_3, MEAN
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_recorder import Recorder
 from klack.units import KINDS, format_si, parse_quantity
@@ -91,7 +91,7 @@ class ControlLoop:
             change = found - running.target[running.place]
             running.target[running.place] = found
             for port, share in running.pushed:  # no rise: it held before, and holds from now on
-                for row in (BEFORE, BEFORE_2, BEFORE_3):
+                for row in (BEFORE, BEFORE_2, BEFORE_3, MEAN):
                     self._network.bodies.at[row + port] += share * change
 
     def memory(self) -> dict[str, NDArray[np.generic]]:

@@ -27,6 +27,7 @@ __all__ = [
     "KEPT_SLIDER",
     "LAST",
     "LOSS",
+    "MEAN",
     "MIDDLE",
     "MISSED",
     "NEAR",
@@ -113,7 +114,8 @@ WITHIN, WITHIN_BEGIN = EXCESS + 1, EXCESS + 2  # energy [J] that bodies got by R
 LAST = 18 * PORTS  # forces of elements and fluid in the last macro step
 RISE = 19 * PORTS  # change of the guessed forces over the macro step
 RISE_MISSED = 20 * PORTS  # what is missing of it
-ROWS_AT = 21
+MEAN = 21 * PORTS  # LAST, with what acts at once since then
+ROWS_AT = 22
 
 
 class Bodies(NamedTuple):

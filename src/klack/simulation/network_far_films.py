@@ -18,6 +18,7 @@ from klack.simulation.network_arrays import (
     BEFORE_2,
     BEFORE_3,
     LAST,
+    MEAN,
     Recording,
     Step,
 )
@@ -72,7 +73,7 @@ def _take_turns(contacts: Any, S: Any, c: int, far: bool) -> None:
     force = state.force[c] if far else -state.force[c]
     if force != 0.0:
         u, low = rows.upper[c], rows.lower[c]
-        for row in (BEFORE, BEFORE_2, BEFORE_3, LAST):
+        for row in (BEFORE, BEFORE_2, BEFORE_3, LAST, MEAN):
             S[row + u] += force
             S[row + low] -= force
 

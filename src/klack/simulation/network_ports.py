@@ -31,6 +31,7 @@ from klack.simulation.network_arrays import (
     FREE,
     GUESS,
     LAST,
+    MEAN,
     MISSED,
     PENDING,
     PENDING_BEGIN,
@@ -491,7 +492,7 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
 def _rise(bodies: Any, p: int, ratio: float) -> float:
     """Rise over a step whose mean force follows that of one which was shorter by ``ratio``."""
     S = bodies.at
-    return 2.0 * ratio / (1.0 + ratio) * (S[ANSWER + p] - S[LAST + p])
+    return 2.0 * ratio / (1.0 + ratio) * (S[ANSWER + p] - S[MEAN + p])
 
 
 @phase
@@ -512,4 +513,4 @@ def end_ports(bodies: Any) -> None:
         S[Y0 + i] = S[Y1 + i]
         S[BEFORE_3 + i] = S[BEFORE_2 + i]
         S[BEFORE_2 + i] = S[BEFORE + i]
-        S[BEFORE + i] = S[LAST + i] = S[ANSWER + i]
+        S[BEFORE + i] = S[LAST + i] = S[MEAN + i] = S[ANSWER + i]

@@ -30,6 +30,7 @@ from klack.simulation.network_arrays import (
     BEFORE_2,
     BEFORE_3,
     EXCESS,
+    MEAN,
     PARTS,
     PORTS,
     SEEN,
@@ -652,7 +653,7 @@ def _begin_course(network: CompiledNetwork) -> None:
     pressure = network.node_state.p[nodes.wall_node] - nodes.ambient
     np.add.at(force, nodes.wall_port, nodes.wall_area * pressure)
     force[len(network.ports) :] = 0.0  # of the ground
-    for row in (BEFORE, BEFORE_2, BEFORE_3):
+    for row in (BEFORE, BEFORE_2, BEFORE_3, MEAN):
         network.bodies.at[row : row + PORTS] = force
 
 

@@ -45,6 +45,7 @@ from klack.simulation.network_arrays import (
     BEFORE_2,
     BEFORE_3,
     LAST,
+    MEAN,
     SEEN,
     Y0,
 )
@@ -954,7 +955,7 @@ class _Balance:
         at, ports = bodies.at, self.ports
         for row in (Y0, SEEN):
             at[row : row + ports] = state.y[:-1]
-        for row in (LAST, BEFORE, BEFORE_2, BEFORE_3):
+        for row in (LAST, MEAN, BEFORE, BEFORE_2, BEFORE_3):
             at[row : row + ports] = self.elements[:-1]
         sliders = network.sliders
         network.slider_state.seen[:] = state.y[sliders.upper] - state.y[sliders.lower]
