@@ -214,7 +214,8 @@ def guess_rise(bodies: Any, ratio: float) -> None:
     """
     S = bodies.at
     for i in range(row_length(bodies)):
-        S[RISE + i] = ratio * (S[RISE + i] + S[RISE_MISSED + i])
+        rise = ratio * (S[RISE + i] + S[RISE_MISSED + i])
+        S[RISE + i] = rise if ratio > 0.0 and abs(rise) < np.inf else 0.0  # of a step that failed
         S[RISE_MISSED + i] = 0.0
 
 
