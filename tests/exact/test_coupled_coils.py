@@ -297,5 +297,7 @@ def test_the_numbers_of_the_page_hold(tmp_path, page):
     voltage = stroke.result.channels["magnet holding voltage"]
 
     assert f"after {opens:.0f} us" in page
-    assert f"{np.interp(0.15e-3, stroke.result.time, voltage.values):.0f} V" in page
+    # 37.4 V in fine steps alone; the voltage of the last piece of a step shows its length
+    assert "induces 37 V" in page
+    assert np.interp(0.15e-3, stroke.result.time, voltage.values) == pytest.approx(37.4, abs=0.3)
     assert abs(stroke.result.books.relative_residual) < 1e-12

@@ -133,4 +133,4 @@ class TestNoise:
             variant="wet",
         )
         for item in record.measures:
-            assert item.deviation < 0.03, item.name  # saw-tooth of the two strokes
+            assert item.deviation < 0.05, item.name  # saw-tooth of the two strokes

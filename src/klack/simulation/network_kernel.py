@@ -206,7 +206,8 @@ def run_network(
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
     now, last_level, at = clock[0], clock[1], FINE
-    last_steps = done_steps = _steps_of(last_level, M, near)
+    last_steps = _steps_of(last_level, M, near)
+    done_steps = last_steps if last_level >= 0 else 0
     in_record, record, record_time, kink = 0, 0, 0.0, 0
     for _macro in range(macros):
         while network.kinks[kink] <= origin + now * h:
@@ -231,7 +232,7 @@ def run_network(
                 of_sub = MIDDLE if smooth else FINE
                 parts = near // R if smooth else near
             whole = parts == 1 and not (of_sub == FINE and may_touch(contacts, h))
-            begin, ratio = origin + now * h, steps / done_steps
+            begin, ratio = origin + now * h, steps / done_steps if done_steps > 0 else 0.0
             step = Step(level, steps, begin, steps * h, 1.0 / (steps * h))
             sub = Step(of_sub, steps // parts, begin, steps // parts * h, parts / (steps * h))
             if at != of_sub:
@@ -378,7 +379,7 @@ def _settle(
     """One step up to what it would change: again and again, until its guess missed nothing.
 
     ``whole`` where what acts cannot be cut, so that its free motion is asked once; ``ratio`` is
-    its length over that of the step before.
+    its length over that of the step before, 0 where there was none.
 
     Returns
     -------

@@ -491,7 +491,7 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
 
 @phase
 def _rise(bodies: Any, p: int, ratio: float) -> float:
-    """Rise over a step whose mean force follows that of one which was shorter by ``ratio``."""
+    """Rise over a step, ``ratio`` times as long as the one before; none known without one (0)."""
     S = bodies.at
     return 2.0 * ratio / (1.0 + ratio) * (S[ANSWER + p] - S[MEAN + p])
 

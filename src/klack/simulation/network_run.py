@@ -26,11 +26,7 @@ from klack.simulation.limits import Limits
 from klack.simulation.line_doubts import line_doubts
 from klack.simulation.network_arrays import (
     AHEAD,
-    BEFORE,
-    BEFORE_2,
-    BEFORE_3,
     EXCESS,
-    MEAN,
     PARTS,
     PORTS,
     SEEN,
@@ -211,8 +207,6 @@ def simulate_network(
         short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()
         read_rows(network, -short, short, speeds)
         recorder.first(*values_now(network, speeds, short))
-        if start == "free":
-            _begin_course(network)
     elif _LAST in state:
         recorder.first(np.asarray(state[_LAST], dtype=float))
     limits = Limits(network, [column.name for column in recorder.points])
@@ -640,21 +634,6 @@ def read_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row:
         failed, code = call_rows(rows, t, h, at, speeds, p, rho)
         if failed >= 0:
             raise _failure(network, status, np.array([float(failed), float(code), 0.0]))
-
-
-def _begin_course(network: CompiledNetwork) -> None:
-    """Let the forces that all rows were just read with have acted before."""
-    nodes, force = network.nodes, np.zeros(PORTS)
-    for rows in (network.elements, network.branches):
-        for k in range(rows.rows):
-            ports = rows.ports[rows.port0[k] : rows.port0[k + 1]]
-            place = rows.output0[k] + rows.head
-            np.add.at(force, ports, rows.outputs[place : place + len(ports)])
-    pressure = network.node_state.p[nodes.wall_node] - nodes.ambient
-    np.add.at(force, nodes.wall_port, nodes.wall_area * pressure)
-    force[len(network.ports) :] = 0.0  # of the ground
-    for row in (BEFORE, BEFORE_2, BEFORE_3, MEAN):
-        network.bodies.at[row : row + PORTS] = force
 
 
 def _read_stores(network: CompiledNetwork) -> None:

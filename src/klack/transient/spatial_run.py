@@ -612,7 +612,9 @@ class _Moving:
             elif points and self.flags[_AT_REST]:  # what is left of the record is shorter
                 self._rest_on(rest=False)
             taken = self.steps[level]
-            status = self._step(run, level, points, row if left == taken else -1, time)
+            status = STATUS_REFUSED
+            if not self._bends(clock, taken):
+                status = self._step(run, level, points, row if left == taken else -1, time)
             if status == STATUS_REFUSED:
                 if level == COARSE:
                     flies = False
@@ -633,6 +635,11 @@ class _Moving:
         self.write()
         record_moment(run.recording, row, moment_of(self.arrays))
         return STATUS_DONE
+
+    def _bends(self, clock: Index, steps: int) -> bool:
+        """Whether a table bends sharply within a macro step of so many fine ones."""
+        at = self.arrays.kinks / self.sizes.step - float(clock[0])
+        return steps > 1 and bool(np.any((at > 0.0) & (at < steps)))
 
     def _step(self, run: _Run, level: int, points: bool, record: int, record_time: float) -> int:
         """One macro step, with bodies in fine steps; at rest in one."""
