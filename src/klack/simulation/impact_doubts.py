@@ -21,6 +21,7 @@ from math import exp, floor, isfinite, log, log10, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.network.accuracy import PROMISED
 from klack.simulation.network_result import ImpactEvent, InterfaceRecord
 from klack.units import format_si
 
@@ -28,12 +29,11 @@ __all__ = ["impact_doubts", "late_by_swinging", "missing_peak"]
 
 Vector = NDArray[np.float64]
 
-_PEAK = 5e-4  # of a peak force: what is promised of a first impact
+_PEAK, _LATE = PROMISED["normal"]  # of a peak force, and of the time [s] of a first impact
 _AIM = 0.7  # of that, for the step that is advised
 _SHORTEST = 1e-9  # [s] shorter ones take too long
 _FEWEST = 8  # steps of a contact; in fewer there is no peak to speak of
 _RESOLVED = 100  # steps of a contact that is as short as those tell
-_LATE = 5e-8  # [s] what is promised of the time of a first impact
 _TRUSTED = 0.02  # of a narrow peak; where more is missing, three steps do not tell how much
 
 
