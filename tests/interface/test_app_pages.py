@@ -1,6 +1,7 @@
 """Every page in a browser: axe-core, rules of layout, the Tab key, nothing from elsewhere."""
 
 import re
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,16 @@ def page(context: Any, server: Served) -> Iterator[Any]:
     assert said == []
 
 
+def lasting_findings(page: Any) -> list[str]:
+    """What still breaks a rule after ten seconds: charts and scenes follow the window later."""
+    until = time.monotonic() + 10.0
+    while found := layout_findings(page) + (axe_findings(page) if HAS_AXE else []):
+        if time.monotonic() > until:
+            break
+        settle(page)
+    return found
+
+
 def findings_everywhere(page: Any) -> tuple[dict[str, list[str]], list[str], int]:
     """What breaks a rule, with where; what does not show the focus; how many places have it."""
     said: dict[str, list[str]] = {}
@@ -59,8 +70,7 @@ def findings_everywhere(page: Any) -> tuple[dict[str, list[str]], list[str], int
         for width in WIDTHS:
             page.set_viewport_size({"width": width, "height": 900})
             settle(page)
-            found = layout_findings(page) + (axe_findings(page) if HAS_AXE else [])
-            for sentence in found:
+            for sentence in lasting_findings(page):
                 said.setdefault(sentence, []).append(f"{width} px {scheme}")
 
     page.set_viewport_size({"width": 1000, "height": 900})
