@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from klack.contact.restitution import find_contacts, measure_impact
+from klack.simulation.propagator import modal_propagator
 from klack.transient.interface_kernel import safe_flight
 from klack.transient.interface_run import simulate_interface
 from klack.verification.beam_impact import sphere_on_beam
@@ -272,3 +273,23 @@ def test_a_body_that_flies_away_has_no_impacts():
 
     assert run.impacts == ()
     assert run.motion.position[-1, 2] == pytest.approx(0.3 * run.motion.time[-1], rel=1e-12)
+
+
+def test_in_steps_the_bodies_move_as_by_the_trapezoidal_rule():
+    """A step as defined, (2/h)^2 (u1 - u0 - h v0) + w^2 (u0 + u1) = 2 f; equal to round-off."""
+    h, model = 2e-7, free_rod(10, stiffness=1e9)
+    rng = np.random.default_rng(3)
+    rule = model.in_steps(h)
+    P = modal_propagator(rule.omega, rule.damping, h)
+    u, v = np.zeros((2, model.mode_count))
+    q, p = np.zeros((2, model.mode_count))
+
+    for force in rng.uniform(0.0, 100.0, 200):
+        f = model.traces[0] * force
+        u1 = (2 * f + 4 / h**2 * (u + h * v) - model.omega**2 * u) / (4 / h**2 + model.omega**2)
+        v, u = 2 / h * (u1 - u) - v, u1
+        f = rule.traces[0] * force
+        q, p = P.A11 * q + P.A12 * p + P.B1 * f, P.A21 * q + P.A22 * p + P.B2 * f
+
+        assert rule.traces @ q == pytest.approx(model.traces @ u, rel=1e-10, abs=0.0)
+    assert model.omega[-1] * h > 0.2  # far from the exact motion

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.run import run_impact
 from klack.assembling.reduced_pair import impact_system
 from klack.case.reader import read_case
@@ -55,8 +56,8 @@ def test_levels_with_yield_keep_the_energy(level):
 
 
 @pytest.mark.slow
-def test_elastic_levels_are_doubted_and_the_law_is_measured_by_its_own_kind():
-    """Exact: the estimate of the elastic case; the port's pattern is that of another peak, 1e-5."""
+def test_elastic_levels_are_doubted_and_the_law_is_measured_with_yield():
+    """Truth: the interface level, whose points yield too, as far as its modes leave it open."""
     lumped = ("contact:\n", "lumped: {stiffness: 1e8 N/m}\ncontact:\n")
     study, elastic = _study(YIELD, ("lumped", "reduced", "interface"), lumped), _study("")
 
@@ -65,10 +66,12 @@ def test_elastic_levels_are_doubted_and_the_law_is_measured_by_its_own_kind():
         assert study.levels[level].measures.restitution < 0.99 * (
             elastic.levels[level].measures.restitution
         )
-    found, known = study.estimates["reduced"], elastic.estimates["reduced"]
-    assert found.peak_force == pytest.approx(known.peak_force, abs=1e-5)
-    assert found.history_l2 == pytest.approx(known.history_l2, abs=1e-5)
-    assert "both with elastic bodies" in study.estimate_basis
+    found, margin = study.estimates["reduced"], study.estimate_margins["reduced"]
+    points, law = (study.levels[name].history for name in ("interface", "reduced"))
+    apart = compare_histories(points, law)
+    assert found.peak_force == pytest.approx(apart.peak_force, abs=2.0 * margin.peak_force)
+    assert found.history_l2 > 2.0 * elastic.estimates["reduced"].history_l2
+    assert study.estimate_basis.endswith("yield by a pressure limit")
     assert sum("first impact on new faces: yield takes" in text for text in study.warnings) == 1
 
 

@@ -11,6 +11,7 @@ from klack.analyses.impact.estimate_wording import (
     estimate_sentence,
 )
 from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.summary import estimate_lines
 from klack.analyses.impact.wording import answer
 from klack.contact.restitution import Deviation
 
@@ -29,7 +30,9 @@ def deviation(peak: float, restitution: float = 0.0) -> Deviation:
 
 def certified(study: ImpactStudy, estimate: Deviation) -> ImpactStudy:
     basis = "interface level, 80 + 80 modes, 834 contact points"
-    return replace(study, estimates={"reduced": estimate}, estimate_basis=basis)
+    return replace(
+        study, estimates={"reduced": estimate}, estimate_margins={}, estimate_basis=basis
+    )
 
 
 def plain(text: str) -> str:
@@ -57,6 +60,19 @@ def test_without_the_full_order_there_is_no_truth(impact_study: ImpactStudy) -> 
     assert "true" not in "".join(estimate_rows(study)[0])
     assert "full order" not in estimate_sentence(study)
     assert "Estimated error of this level: +0.31 % in peak force" in plain(answer(study))
+
+
+def test_an_estimate_stands_with_how_far_it_may_be_off(impact_study: ImpactStudy) -> None:
+    margin = replace(deviation(0.0004, restitution=0.0002), contact_time=0.02)
+    study = certified(impact_study, deviation(0.0031))
+    study = replace(study, estimate_margins={"reduced": margin})
+
+    assert plain(estimate_rows(study)[0][1]).startswith("+0.31 % ± 0.04 %\n")
+    (line,) = estimate_lines(study)
+    assert "peak force +0.31 ± 0.04 %, contact time -0.10 ± 2.00 %" in line
+    assert "restitution +0.0000 ± 0.0002 (" in line
+    # 0.1 % of the contact time would be good, 2.1 % are not
+    assert "not for the last per cent" in estimate_sentence(study)
 
 
 @pytest.mark.parametrize(

@@ -84,7 +84,8 @@ def test_scalar_law_is_wrong_there_and_its_estimate_says_so(eccentric: ImpactStu
     true = eccentric.deviations["reduced"]
     assert max(abs(true.peak_force), abs(true.contact_time), abs(true.restitution)) > 0.01
     require_within_a_factor_of_two(eccentric.estimates["reduced"], true)
-    (line,) = estimate_lines(eccentric)
+    line, of_steps = estimate_lines(eccentric)
+    assert of_steps.startswith("Estimated error of the steps of 'full'")
     assert "peak force" in line
     assert "restitution" in line
     numbers = study_to_json(eccentric)["estimated_error"]["reduced"]

@@ -322,10 +322,9 @@ class _Impacts:
     def judged(self, case: Case) -> tuple[str, str]:
         """Compare with one run at the interface level."""
         study = self._study(case, certify=True)
-        estimate = study.estimates.get(self.run)
-        if estimate is None:
+        if self.run not in study.estimates:
             return "none", study.estimate_doubt or "There is no estimate for this case."
-        worst = worst_error(estimate)
+        worst = worst_error(study, self.run)
         is_out = worst > FAIR or study.contact.doubts or study.reference != self.run
         grade = "out" if is_out else "good" if worst <= GOOD else "fair"
         return grade, estimate_sentence(study)

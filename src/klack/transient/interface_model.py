@@ -249,6 +249,21 @@ class InterfaceModel:
         """Return the same bodies with points that do not yield."""
         return replace(self, limit=None)
 
+    def in_steps(self, step: float) -> "InterfaceModel":
+        r"""Return the bodies as the trapezoidal rule moves them in steps of this length [s].
+
+        Its angle per step is :math:`2 \arctan(\omega h / 2)`; a constant force deflects as ever.
+        """
+        angle = 0.5 * step * self.omega
+        slower = np.divide(np.arctan(angle), angle, out=np.ones_like(angle), where=angle > 0.0)
+        return replace(
+            self,
+            omega=slower * self.omega,
+            traces=slower * self.traces,
+            tangents=slower * self.tangents if self.ways else self.tangents,
+            observed=slower * self.observed if self.observed.size else self.observed,
+        )
+
     @property
     def count(self) -> int:
         """Number of contact points."""

@@ -436,7 +436,10 @@ def _definitions_point_by_point(study: ImpactStudy) -> tuple[tuple[str, str], ..
                 "estimated error",
                 "Deviation of a reduced level from one interface-level run at the same condition, "
                 "with more modes than the reduced level keeps. It includes the error of the "
-                "local law and of the omitted modes, not that of the mesh.",
+                "local law and of the omitted modes, not that of the mesh. Behind the ± stands "
+                "how far that run is from one with half the modes in longer steps. The steps of "
+                "the full order have an error of their own: that of the same run with the "
+                "periods and steps of the full order.",
             )
         )
     if any(result.pressure is not None for result in study.levels.values()):

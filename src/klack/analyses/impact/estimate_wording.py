@@ -1,6 +1,5 @@
 """Accuracy of a reduced level: its estimated error, and the true one where known."""
 
-from collections.abc import Sequence
 from math import isfinite
 
 from klack.analyses.impact.measures import DEVIATION_MEASURES
@@ -24,10 +23,13 @@ GOOD, FAIR = 0.01, 0.05
 
 
 def estimate_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
-    """One row per reduced level; the true deviation from the full order in small letters."""
+    """One row per level, and how far it may be off; the true deviation from the full order."""
     rows = []
     for name, estimate in study.estimates.items():
         cells = _numbers(estimate)
+        if within := study.estimate_margins.get(name):
+            margins = (text.removeprefix("+") for text in _numbers(within))
+            cells = [f"{cell} ± {margin}" for cell, margin in zip(cells, margins, strict=True)]
         true = _true(study, name)
         if true is not None:
             pairs = zip(cells, _numbers(true), strict=True)
@@ -45,10 +47,12 @@ def estimate_sentence(study: ImpactStudy) -> str:
     estimate, true = study.estimates[name], _true(study, name)
     text = (
         f"Compared with one run of the {study.estimate_basis}, at the same condition, the "
-        f"'{name}' level is off by {_off(estimate)}: {_verdict(estimate, study.contact.doubts)}."
+        f"'{name}' level is off by {_off(estimate)}: {_verdict(study, name)}."
     )
     if true is not None:
         text += f" Compared with the full order, which was run too, it is off by {_off(true)}."
+    if "full" in study.estimates:
+        text += f" The steps of the full order put it off by {_off(study.estimates['full'])}."
     return text
 
 
@@ -68,25 +72,24 @@ def _off(deviation: Deviation) -> str:
     )
 
 
-def worst_error(deviation: Deviation) -> float:
-    """Largest of the errors in peak force, contact time, impulse and restitution [-]."""
-    errors = (
-        deviation.peak_force,
-        deviation.contact_time,
-        deviation.impulse,
-        deviation.restitution,
-    )
-    return max((abs(value) for value in errors if isfinite(value)), default=0.0)
+def worst_error(study: ImpactStudy, level: str) -> float:
+    """Largest error in peak force, contact time, impulse and restitution, at worst [-]."""
+    known = (study.estimates[level], study.estimate_margins.get(level))
+    parts = [
+        [abs(getattr(one, key)) for one in known if one is not None]
+        for key in ("peak_force", "contact_time", "impulse", "restitution")
+    ]
+    return max(sum(size for size in sizes if isfinite(size)) for sizes in parts)
 
 
-def _verdict(deviation: Deviation, doubts: Sequence[str]) -> str:
+def _verdict(study: ImpactStudy, level: str) -> str:
     """Judge the largest of the four errors, unless the contact itself is in doubt."""
-    if doubts:
+    if doubts := study.contact.doubts:
         return (
             "both share the same contact, which cannot be relied on, because "
             f"{' and '.join(doubts)}"
         )
-    worst = worst_error(deviation)
+    worst = worst_error(study, level)
     if worst <= GOOD:
         return "good enough to rely on"
     if worst <= FAIR:

@@ -349,12 +349,16 @@ class ImpactStudy(CaseRecord):
     deviations : mapping of level to Deviation
         From the reference; none where that has doubts itself.
     estimates : mapping of level to Deviation
-        Estimated error of reduced levels: their deviation from one interface-level run.
+        Estimated error of reduced levels: their deviation from one interface-level run.  With the
+        full order also that of its steps: of the same run with its periods and steps.
     estimate_basis : str
         What that run was, in words; empty without one.
+    estimate_margins : mapping of level to Deviation
+        So far may each estimate be off, no signs: what half the modes in longer steps do to
+        that run, and what its steps leave open.  None in results of earlier versions.
     estimate_spread : float [-]
-        Difference of its force history (as ``history_l2``) from a run with half as many modes.
-        Above :data:`SETTLED` the run is no reference, and the estimates say little.
+        That of the force history.  Above :data:`SETTLED` the run is no reference, and the
+        estimates say little.
     estimate_doubt : str
         Why there is no estimate, although one was asked for.
     structures : tuple of Structure
@@ -381,6 +385,7 @@ class ImpactStudy(CaseRecord):
     sections: tuple[SectionPicture, ...] = ()
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     estimate_basis: str = ""
+    estimate_margins: Mapping[str, Deviation] = field(default_factory=dict)
     estimate_spread: float = 0.0
     structures: tuple[Structure, ...] = ()
     estimate_doubt: str = ""

@@ -46,7 +46,13 @@ from klack.analyses.impact.running_in import asks_for_more, points_running_in, r
 from klack.analyses.impact.section import section_picture
 from klack.analyses.impact.summary import answer_so_far
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
-from klack.analyses.impact.trust import DISAGREEMENT, best_level, disagreement, trust_notes
+from klack.analyses.impact.trust import (
+    DISAGREEMENT,
+    STEPS_PER_CONTACT,
+    best_level,
+    disagreement,
+    trust_notes,
+)
 from klack.analyses.impact.yielding_level import (
     YieldingFaces,
     doubt_elastic_levels,
@@ -90,7 +96,7 @@ from klack.closing import Closing
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import LinearLaw
 from klack.contact.pressure_limit import PressureLimit
-from klack.contact.restitution import Deviation
+from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.statics import ReachError, StaticContact, static_contact
 from klack.contact.submodel import LocalStiffness
 from klack.elasticity.eigen import Modes
@@ -115,6 +121,8 @@ __all__ = ["ImpactBodies", "impact_bodies", "impact_of_bodies", "run_impact"]
 
 # What a reduced level needs before it can run, beyond meshes and matrices.
 _SET_UP = ("factorise", "static contact", "modes", "reduced")
+_COARSER = 2.0**0.5  # a step that adds to an error of order two as much as it was
+_KNOWN_ENDS = 0.25  # of a step: both ends of a contact together
 _CORRECTIONS: Mapping[str, Correction] = {
     "reduced-participation": "consistent",
     "reduced-attachment": "attachment",
@@ -283,7 +291,7 @@ def _study(
         work.reduce(wanted, certify, clock)
         work.run_levels(wanted, clock)
         if certify and _has_reduced(wanted):
-            work.estimate(clock)
+            work.estimate(wanted, clock)
         work.check_contact()
         if is_last and work.results and (set(wanted) & {"full"} or case.run.transfer is not None):
             for line in answer_so_far(work.study((), begin, clock)):
@@ -391,13 +399,16 @@ class _Work:
             assert loops is not None
             self.results[level] = doubt_large_strain(self.results[level], loops)
 
-    def estimate(self, clock: StageClock) -> None:
-        """Errors of the reduced levels."""
-        limit = None if self.twins else self.yielding.limit
+    def estimate(self, wanted: Sequence[Level], clock: StageClock) -> None:
+        """Errors of the reduced levels, and of the steps of the full order to come."""
+        limit = self.yielding.limit
+        twins = self.twins if limit is None else {}
         richer = {name: pool.richer or pool for name, pool in self.pools.items()}
         found = for_comparison(
             "the error estimate",
-            lambda: _certificate(self.problem, richer, self.results, self.twins, limit, clock),
+            lambda: _certificate(
+                self.problem, richer, self.results, twins, limit, "full" in wanted, clock
+            ),
         )
         self.certificate = found or self.certificate
 
@@ -494,6 +505,7 @@ class _Work:
             running_in=self.ran,
             estimates=certificate.estimates,
             estimate_basis=certificate.basis,
+            estimate_margins=certificate.margins,
             estimate_spread=certificate.spread,
             estimate_doubt=certificate.doubt,
             structures=self.structures,
@@ -557,6 +569,7 @@ class _Certificate:
 
     estimates: Mapping[str, Deviation] = field(default_factory=dict)
     basis: str = ""
+    margins: Mapping[str, Deviation] = field(default_factory=dict)
     spread: float = 0.0
     doubt: str = ""
     level: LevelResult | None = None
@@ -568,49 +581,78 @@ def _certificate(
     results: Mapping[str, LevelResult],
     twins: Mapping[str, ImpactHistory],
     limit: PressureLimit | None,
+    full: bool,
     clock: StageClock,
 ) -> _Certificate:
     """Deviation of every reduced level from one interface-level run with more modes.
 
-    The same run with half as many modes tells whether it can serve as a reference.  Levels with a
-    law of faces that yield are measured by ``twins`` without it, and that run has no limit then.
+    The same run with half as many modes, in longer steps, tells how good a reference it is.
+    With ``full``, it once more with the periods and steps of the full order gives what these do.
+    Levels with a law of faces that yield are measured by ``twins`` without it where that run has
+    no limit of the pressure.
     """
     clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
     if not whole:
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
-    count = certificate_modes(problem.case)
+    count, steps = certificate_modes(problem.case), problem.case.run
+    histories = {name: twins.get(name, results[name].history) for name in whole}
 
     def run(model: InterfaceModel) -> tuple[InterfaceModel, LevelResult]:
         setup = clock.spent((*_SET_UP[:-1], "error estimate"))
         return model, run_interface(problem, model, None, setup_time=setup)
 
-    def run_again(model: InterfaceModel) -> ImpactHistory:
-        return simulate_case(problem.case, model).history
+    def run_coarser(model: InterfaceModel) -> ImpactHistory:
+        return simulate_case(problem.case, model, step=_COARSER * steps.interface_step).history
+
+    def run_as_full(model: InterfaceModel) -> ImpactHistory:
+        stepped = model.in_steps(steps.full_step)
+        return simulate_case(problem.case, stepped, step=steps.full_step).history
 
     with warnings_of(f"error estimate, {count} modes"):
         model, level = within_reach(problem, pools, run, count=count, limit=limit)
+        if full and level.measures.contact_time >= STEPS_PER_CONTACT * steps.full_step:
+            histories["full"] = within_reach(problem, pools, run_as_full, count=count, limit=limit)
     history = level.history
     clock("error estimate", 0.5)
     with warnings_of(f"error estimate, {count // 2} modes"):
-        fewer = within_reach(problem, pools, run_again, count=count // 2, limit=limit)
+        fewer = within_reach(problem, pools, run_coarser, count=count // 2, limit=limit)
     names = (problem.pair.upper.name, problem.pair.lower.name)
     richer = (Modes(pools[n].omega[:count], pools[n].shapes[:, :count]) for n in names)
     elastic = model.omega > 0
     counts = [int(np.sum(elastic & (model.owner == body))) for body in (0, 1)]
     clock("error estimate", 1.0)
-    histories = {name: twins.get(name, results[name].history) for name in whole}
     basis = f"interface level, {counts[0]} + {counts[1]} modes, {model.count} contact points"
     if twins:
         basis += ", both with elastic bodies"
     if limit is not None:
         basis += ", yield by a pressure limit"
+    apart = compare_histories(history, fewer)
     return _Certificate(
         estimates={name: compare_histories(history, one) for name, one in histories.items()},
         basis=basis,
-        spread=compare_histories(history, fewer).history_l2,
+        margins={name: _margin(apart, history, one) for name, one in histories.items()},
+        spread=apart.history_l2,
         doubt=next(iter(level.doubts), flat_for_modes(problem, richer)),
         level=level,
+    )
+
+
+def _margin(apart: Deviation, reference: ImpactHistory, other: ImpactHistory) -> Deviation:
+    """How well two runs can be compared, by how far the reference is apart from a coarser one.
+
+    Peaks may agree by chance while the histories do not: a peak is known no better than these.
+    Contact begins and ends within a step.
+    """
+    open_ends = _KNOWN_ENDS * max(reference.step, other.step)
+    return replace(
+        apart,
+        peak_force=max(abs(apart.peak_force), apart.history_l2),
+        contact_time=max(
+            abs(apart.contact_time), open_ends / measure_impact(reference).contact_time
+        ),
+        impulse=abs(apart.impulse),
+        restitution=abs(apart.restitution),
     )
 
 
@@ -619,7 +661,7 @@ def _take_better(results: dict[str, LevelResult], certificate: _Certificate) -> 
     level, best = certificate.level, best_level(results)
     if level is None or certificate.doubt or certificate.spread > SETTLED:
         return
-    if best not in certificate.estimates:
+    if best == "full" or best not in certificate.estimates:
         return
     if disagreement(certificate.estimates[best]) > DISAGREEMENT:
         results["interface"] = replace(level, label=f"{level.label}, run for the estimate")

@@ -100,7 +100,13 @@ class ImpactJson(TypedDict):
     ]
     estimated_error: Annotated[
         dict[str, DeviationJson | None],
-        Field(description="Of every reduced level, by a run at the interface level."),
+        Field(
+            description="Of every reduced level, and of the steps of the full order, by a run at "
+            "the interface level."
+        ),
+    ]
+    estimate_margin: Annotated[
+        dict[str, DeviationJson], Field(description="So far may each be off; no signs.")
     ]
     contact: Annotated[ContactJson, Field(description="All levels but lumped share it.")]
     running_in: Annotated[
@@ -119,8 +125,9 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
         whose numbers to take; ``levels``: per level the numbers of the impact, with ``doubts`` that
         make it no reference; ``deviation``: of ``reduced`` against the reference, None when there
         is nothing to compare; ``deviations``: of every level that is not the reference;
-        ``estimated_error``: of every reduced level, by an interface-level run, None where that is
-        no reference; ``contact``: its mesh, with ``doubts`` that concern all levels; ``warnings``.
+        ``estimated_error``: of every reduced level and of the steps of the full order, by an
+        interface-level run, None where that is no reference; ``estimate_margin``: how far these
+        may be off; ``contact``: its mesh, with ``doubts`` that concern all levels; ``warnings``.
         Numbers that do not exist (nan) are None, and so are peak force, contact time and impulse of
         a run that ends in contact (``cut_off``): ``highest_force_N`` is what it had reached.
     """
@@ -138,6 +145,7 @@ def study_to_json(study: ImpactStudy) -> ImpactJson:
             name: _deviation(item) if study.estimates_settled else None
             for name, item in study.estimates.items()
         },
+        "estimate_margin": {n: _deviation(item) for n, item in study.estimate_margins.items()},
         "contact": contact_to_json(study.contact),
         "running_in": None if study.running_in is None else _running_in(study.running_in),
         "warnings": list(study.warnings),
@@ -232,35 +240,46 @@ def no_estimate(study: ImpactStudy) -> str:
     if study.estimates and not study.estimates_settled:
         return (
             "No error estimate: the interface level itself has not converged "
-            f"(its force history changes by {100 * study.estimate_spread:.0f} % when the modes "
-            "are doubled), as when flat faces meet all at once. Compare with --level full."
+            f"(its force history changes by {100 * study.estimate_spread:.0f} % with half the "
+            "modes in longer steps), as when flat faces meet all at once. Compare with --level "
+            "full."
         )
     return ""
 
 
 def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
-    """Error of every reduced level, one line each."""
+    """Error of every reduced level and of the steps of the full order, one line each."""
     if reason := no_estimate(study):
         return (reason,)
-    return tuple(
-        f"Estimated error of '{name}': peak force {_percent(item.peak_force)}, contact time "
-        f"{_percent(item.contact_time)}, impulse {_percent(item.impulse)}, restitution "
-        f"{_signed(item.restitution, 4)} (against the {study.estimate_basis})."
-        for name, item in study.estimates.items()
+    return tuple(_estimate_line(study, name) for name in study.estimates)
+
+
+def _estimate_line(study: ImpactStudy, name: str) -> str:
+    item, within = study.estimates[name], study.estimate_margins.get(name)
+    peak, time, impulse, restitution = (
+        (getattr(item, key), None if within is None else getattr(within, key))
+        for key in ("peak_force", "contact_time", "impulse", "restitution")
+    )
+    return (
+        f"Estimated error of {'the steps of ' * (name == 'full')}'{name}': peak force "
+        f"{_percent(*peak)}, contact time {_percent(*time)}, impulse {_percent(*impulse)}, "
+        f"restitution {_signed(*restitution, 4)} (against the {study.estimate_basis})."
     )
 
 
-def _percent(value: float) -> str:
+def _percent(value: float, within: float | None) -> str:
     """Two significant digits, but nothing below a hundredth of a per cent."""
-    if not abs(value) < float("inf"):
-        return "unknown"
     size = abs(100.0 * value)
     digits = 2 if size < 1.0 else 1 if size < 10.0 else 0
-    return _signed(100.0 * value, digits) + " %"
+    text = _signed(100.0 * value, None if within is None else 100.0 * within, digits)
+    return text if text == "unknown" else f"{text} %"
 
 
-def _signed(value: float, digits: int) -> str:
-    return f"{value:+.{digits}f}" if abs(value) < float("inf") else "unknown"
+def _signed(value: float, within: float | None, digits: int) -> str:
+    if not abs(value) < float("inf"):
+        return "unknown"
+    text = f"{value:+.{digits}f}"
+    return text if within is None or within != within else f"{text} ± {within:.{digits}f}"
 
 
 def _level(result: LevelResult) -> Any:

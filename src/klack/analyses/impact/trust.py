@@ -19,6 +19,7 @@ from klack.units import format_si
 
 __all__ = [
     "DISAGREEMENT",
+    "STEPS_PER_CONTACT",
     "best_level",
     "disagreement",
     "doubts_of",
@@ -29,7 +30,9 @@ __all__ = [
 DISAGREEMENT = 0.02
 """Largest difference of two levels [-] up to which they say the same."""
 
-_STEPS_PER_CONTACT = 100
+STEPS_PER_CONTACT = 100
+"""Fewest steps of a contact whose force is known."""
+
 _STEPS_OF_RISE = 5  # from a tenth to half of the peak; a half sine of 100 steps takes 13
 _STEPS_PER_PERIOD = 2.0 * np.pi / sqrt(12.0 * 0.005)
 _CARRIES = 0.05  # share of the impulse from which a contact has to be resolved
@@ -160,11 +163,11 @@ def doubts_of_history(
             "run.duration, two to three times the contact time.",
         )
     shortest = _shortest_contact(history, measures)
-    if shortest < _STEPS_PER_CONTACT * step:
+    if shortest < STEPS_PER_CONTACT * step:
         return (
             f"the time step is too coarse: {shortest / step:.3g} steps of {format_si(step, 's')} "
-            f"in a contact of {format_si(shortest, 's', 3)}; {_STEPS_PER_CONTACT} keep the peak "
-            f"force within 0.5 %. Try: {key}: {_rounded(shortest / _STEPS_PER_CONTACT)}.",
+            f"in a contact of {format_si(shortest, 's', 3)}; {STEPS_PER_CONTACT} keep the peak "
+            f"force within 0.5 %. Try: {key}: {_rounded(shortest / STEPS_PER_CONTACT)}.",
         )
     period = float(np.min(periods, initial=np.inf))
     if period < _STEPS_PER_PERIOD * step:
