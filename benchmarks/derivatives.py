@@ -30,7 +30,7 @@ __all__ = ["Compared", "compared", "main"]
 
 HOW_TO = Path(__file__).parents[1] / "docs" / "how-to"
 
-_CHANGES = (1e-2, 1e-3, 1e-5)
+_CHANGES = (1e-3, 1e-5, 1e-2)
 """Of a number; the best one counts.  Small ones show the saw-tooth of a controller that switches
 at the ends of steps, large ones the bend of a law."""
 _NOISE = 1e-12  # of the largest value of a unit: how well differences of two runs are known
@@ -70,9 +70,17 @@ class Compared:
 
 
 def compared(
-    path: str | Path, *, duration: float = 1e-3, only: str = "", variant: str | None = None
+    path: str | Path,
+    *,
+    duration: float = 1e-3,
+    only: str = "",
+    variant: str | None = None,
+    enough: float = 0.0,
 ) -> Iterator[Compared]:
-    """Compare all numbers of the network of a case, or those with ``only`` in their path."""
+    """Compare all numbers of the network of a case, or those with ``only`` in their path.
+
+    A number whose channels all deviate by less than ``enough`` is not changed any further.
+    """
     tree = read_case_tree(find_case(str(path)), [])
     case = tree.any_case()
     if not isinstance(case, ValveCase):
@@ -87,11 +95,17 @@ def compared(
         except KlackError as error:
             yield Compared(key=key, refused=_reason(error))
     for first in range(0, len(kept), DIRECTIONS):
-        yield from _together(case, tree, kept[first : first + DIRECTIONS], duration, variant)
+        keys = kept[first : first + DIRECTIONS]
+        yield from _together(case, tree, keys, duration, variant, enough)
 
 
 def _together(
-    case: ValveCase, tree: CaseTree, keys: Sequence[str], duration: float, variant: str | None
+    case: ValveCase,
+    tree: CaseTree,
+    keys: Sequence[str],
+    duration: float,
+    variant: str | None,
+    enough: float,
 ) -> Iterator[Compared]:
     """Numbers that one run carries; each alone where one of them is refused."""
     name = case.one_variant(variant)
@@ -109,20 +123,20 @@ def _together(
         directions = [runner._direction(item) for item in space.varied]
         found = run_tangents(runner.rows({}), directions, **given)
         for k, item in enumerate(space.varied):
-            ends = [
-                [
-                    simulate_network(runner.rows({item.name: way * share * item.size}), **given)
-                    for way in (1.0, -1.0)
-                ]
-                for share in _CHANGES
-            ]
-            yield _worst(found, k, item, ends)
+            ends: list[list[NetworkResult]] = []
+            for share in _CHANGES:
+                changes = ({item.name: way * share * item.size} for way in (1.0, -1.0))
+                ends.append([simulate_network(runner.rows(one), **given) for one in changes])
+                worst = _worst(found, k, item, ends)
+                if worst.deviation < enough:
+                    break
+            yield worst
     except KlackError as error:
         if len(keys) == 1:
             yield Compared(key=keys[0], refused=_reason(error))
             return
         for key in keys:
-            yield from _together(case, tree, [key], duration, variant)
+            yield from _together(case, tree, [key], duration, variant, enough)
 
 
 def _worst(
@@ -142,7 +156,7 @@ def _worst(
         if name not in ends[0][0].channels or not at.size:
             continue
         size = max(largest[channel.unit], _LEAST.get(channel.unit, 0.0), 1e-30)
-        pairs = zip(_CHANGES, ends, strict=True)
+        pairs = zip(_CHANGES, ends, strict=False)
         of_shares = [
             _deviation(
                 (channel.values * item.size)[at],
