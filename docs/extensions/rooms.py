@@ -5,6 +5,7 @@ its modules list in ``__all__``: first a table of names, then their docstrings.
 """
 
 import ast
+from functools import cache
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -50,6 +51,7 @@ def _read(app: Sphinx, page: str, content: list[str]) -> None:
         content[0] += "\n" + "\n".join(_section(module) for module in modules(room))
 
 
+@cache
 def _statements(module: str) -> list[ast.stmt]:
     path = PACKAGE.parent.joinpath(*module.split("."))
     file = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
