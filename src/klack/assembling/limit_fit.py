@@ -79,11 +79,11 @@ def fitted_limit(loops: YieldingLoops, space: ContactSpace, C: Floats) -> Pressu
 def _chosen(loops: YieldingLoops) -> list[int]:
     """States to fit: resolved ones, each with so much more force than the one before."""
     chosen: list[int] = []
-    least = 0.0
+    loss, least = loops.loss, 0.0
     for j in reversed(range(len(loops.states))):
         state = loops.states[j]
         resolved = np.count_nonzero(state.pressures) >= _FEWEST_POINTS or not chosen
-        if loops.loss[j] > 0.0 and resolved and (not chosen or state.force * _GROWTH <= least):
+        if loss[j] > 0.0 and resolved and (not chosen or state.force * _GROWTH <= least):
             chosen.append(j)
             least = state.force
     return chosen[::-1]
@@ -93,7 +93,7 @@ class _Bed:
     """The contact of static loops with points that yield for themselves."""
 
     def __init__(self, space: ContactSpace, C: Floats, loops: YieldingLoops) -> None:
-        self.space, self.C, self.loops = space, C, loops
+        self.space, self.C, self.loops, self.loss = space, C, loops, loops.loss
         self.start = min(space.clearance, space.touch)
         solver = ComplementaritySolver(C)
         gaps = [self._gap(state.approach) for state in loops.states]
@@ -126,6 +126,6 @@ class _Bed:
         self.set = worn.set
         softer = self.elastic[j] - float(self.space.axial @ self.lam)
         wanted = self.elastic[j] - state.force
-        of_loss = loss / float(self.loops.loss[j]) - 1.0
+        of_loss = loss / float(self.loss[j]) - 1.0
         of_force = softer / wanted - 1.0 if wanted > 0.0 else of_loss
         return of_loss, of_force
