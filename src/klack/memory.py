@@ -10,7 +10,7 @@ from pathlib import Path
 
 from klack.errors import InputError
 
-__all__ = ["AvailableMemory", "available_memory", "in_words", "require_memory"]
+__all__ = ["AvailableMemory", "available_memory", "fits", "in_words", "require_memory"]
 
 _SHARE = 0.95  # of what is there; the rest is for the small things beside a large one
 _WORTH_A_LOOK = 50e6  # bytes that are always there
@@ -41,6 +41,11 @@ def available_memory() -> AvailableMemory:
     return min(found, key=lambda item: item.size)
 
 
+def fits(needed: float) -> bool:
+    """Whether so much memory [byte] can be taken on top of what is taken now."""
+    return needed < _WORTH_A_LOOK or needed <= _SHARE * available_memory().size
+
+
 def require_memory(where: str, needed: float, *, what: str, hint: str) -> None:
     """Refuse what would not fit.
 
@@ -59,11 +64,9 @@ def require_memory(where: str, needed: float, *, what: str, hint: str) -> None:
     InputError
         With the estimate, what is there, and the way out.
     """
-    if needed < _WORTH_A_LOOK:
+    if fits(needed):
         return
     there = available_memory()
-    if needed <= _SHARE * there.size:
-        return
     raise InputError(
         where,
         got=f"{what} that takes about {in_words(needed)} of memory",

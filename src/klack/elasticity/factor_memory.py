@@ -9,7 +9,7 @@ valves: bulky ones in space, since slim ones fill less.
 from math import log2
 
 from klack.errors import InputError
-from klack.memory import available_memory, in_words, require_memory
+from klack.memory import available_memory, fits, in_words, require_memory
 
 __all__ = ["FactorMemoryError", "fill_memory", "out_of_memory", "require_factor_memory"]
 
@@ -60,6 +60,8 @@ def require_factor_memory(
         With the element size that would fit: the memory grows with h^-4 in space and with h^-2 in
         the plane.
     """
+    if fits(needed):  # the words take longer than a small factorisation
+        return
     what, hint = _words(backend, size, nonzeros, needed)
     if precision == "single":
         what += ", in single precision"
