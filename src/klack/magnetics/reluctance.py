@@ -262,7 +262,7 @@ def _two_sided_rows(x: Vector, y: Vector, dy: Vector) -> Vector:
 
 
 def _locate(rows: Vector, x: Vector) -> tuple[NDArray[np.int64], Vector]:
-    i: NDArray[np.int64] = np.clip(np.searchsorted(rows[:, 0], x, side="right") - 1, 0, None)
+    i: NDArray[np.int64] = np.maximum(np.searchsorted(rows[:, 0], x, side="right") - 1, 0)
     return i, x - rows[i, 0]
 
 
