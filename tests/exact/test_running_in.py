@@ -21,8 +21,6 @@ from klack.errors import ConvergenceError
 from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
 
-pytestmark = pytest.mark.usefixtures("computes")  # some end the loops of the same spheres early
-
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 YIELD = ", yield: 280 MPa, hardening: {isotropic: 1 GPa}"
 KEYS = "run: {levels: [reduced]"
@@ -80,7 +78,8 @@ def test_running_in_follows_the_recursion_of_two_energies():
 
 
 def _fails_above(monkeypatch, force):
-    """Let the ladder find no state above a force [N]."""
+    """Let the ladder find no state above a force [N], and keep nothing from here on."""
+    monkeypatch.setenv("KLACK_CACHE", "off")
     load = YieldingContact.load
 
     def limited(self, approach):

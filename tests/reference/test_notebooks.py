@@ -45,7 +45,6 @@ class TestNotebook:
     def test_every_cell_shows_the_same_again(
         self, path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setenv("KLACK_CACHE", str(tmp_path / "cache"))
         monkeypatch.syspath_prepend(str(DOCS))
         from run_notebooks import executed
 
