@@ -1,5 +1,6 @@
 """A small FMU that the tests of several folders need."""
 
+import gc
 import os
 import re
 import shutil
@@ -61,6 +62,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     files = {item.path for item in items}
     first = {path for path in files if STROKES.search(path.read_text("utf-8"))}
     items.sort(key=lambda item: item.path not in first)
+
+
+def pytest_collection_finish() -> None:
+    """Let the garbage collector leave alone what was imported, which stays."""
+    gc.freeze()
+    gc.set_threshold(20_000)
 
 
 def pytest_unconfigure() -> None:
