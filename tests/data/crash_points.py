@@ -269,9 +269,9 @@ def main(arguments: list[str]) -> None:
 
 
 def warm() -> None:
-    """Load what takes long, once for all children.
+    """Load what takes long, once for all children: modules, and the code of both time loops.
 
-    Nothing is computed: threads, such as those of OpenCASCADE, do not come along into a child.
+    No mesh is made: threads, such as those of OpenCASCADE, do not come along into a child.
     """
     import importlib
 
@@ -287,6 +287,9 @@ def warm() -> None:
     modules += [f"klack.analyses.{analysis}.analysis" for analysis in stored]
     for name in modules:
         importlib.import_module(name)
+    small = importlib.import_module("klack.warming.small_impact")
+    small.plain_impacts()
+    importlib.import_module("klack.warming.groups").GROUPS["rest"].compute()
 
 
 if __name__ == "__main__":
