@@ -118,7 +118,7 @@ def test_set_off_axis_against_plastic_flow_in_three_dimensions(tmp_path):
     loops = ring_loops(plane, 150.0)
     pair = ring_pair(**MESH, layers=SECTORS, reach=2.5e-6, hard_seat=True)
     limit = loops.pressure_limit
-    states = press(pair, limit, eccentricity=0.5e-6, approaches=np.linspace(0.5e-6, 1.5e-6, 4))
+    states = press(pair, limit, eccentricity=0.5e-6, approaches=(0.5e-6, 1.5e-6))
     forces = [state.forces for state in states]
     soft = pair.materials[0]
     solid = _opened(tmp_path / "solid", pair.bodies[0], pair.space.G_a, soft, forces)[-1]
