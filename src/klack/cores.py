@@ -4,9 +4,15 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-__all__ = ["available_cores", "share_of", "side_by_side"]
+__all__ = ["FEW_UNKNOWNS", "available_cores", "share_of", "side_by_side"]
 
 _T = TypeVar("_T")
+
+FEW_UNKNOWNS = 100_000
+"""Of all bodies, up to which several threads for each cost more than they save.
+
+They take one: their bits are then the same on any number of threads.
+"""
 
 
 def available_cores() -> int:
@@ -32,7 +38,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
     tasks : sequence of callable
         What takes long in them runs outside of the interpreter: solves and products.
     at_once : bool
-        One after the other if not, with all threads of BLAS.
+        Each with one thread of BLAS; if not, one after the other with all that there are.
     """
     if not at_once:
         return [task() for task in tasks]
@@ -41,7 +47,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
     from threadpoolctl import threadpool_limits
 
     with (
-        threadpool_limits(limits=share_of(None, len(tasks)), user_api="blas"),
+        threadpool_limits(limits=1, user_api="blas"),
         ThreadPoolExecutor(max_workers=len(tasks)) as workers,
     ):
         jobs = [workers.submit(task) for task in tasks]

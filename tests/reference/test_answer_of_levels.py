@@ -7,7 +7,9 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits
 
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact import run as impact
@@ -80,13 +82,20 @@ def test_an_answer_so_far_is_told_only_where_more_is_to_come(levels):
 
 
 @pytest.mark.slow
-def test_bodies_side_by_side_are_those_one_after_the_other():
-    """But for round-off: their factors have other threads."""
-    case = load_case(CASE)
-    one, two = (run_impact(case, levels=("reduced",), threads=n) for n in (1, 2))
-    for name in ("peak_force", "contact_time", "restitution"):
-        values = [getattr(study.levels["reduced"].measures, name) for study in (one, two)]
-        assert values[0] == pytest.approx(values[1], rel=1e-9), name
+@pytest.mark.usefixtures("computes")
+def test_the_number_of_threads_changes_no_bit():
+    """Exact: bodies of few unknowns side by side or one after the other, with any BLAS threads."""
+    case, levels, found = load_case(CASE), ("reduced", "interface", "full"), []
+    for threads, blas in ((1, 1), (1, 2), (2, 1), (None, 2)):
+        with threadpool_limits(blas, user_api="blas"):
+            found.append(run_impact(case, levels=levels, threads=threads))
+
+    for other in found[1:]:
+        for level in levels:
+            one, two = found[0].levels[level].history, other.levels[level].history
+            assert np.array_equal(one.force, two.force), level
+            assert np.array_equal(one.velocity_a, two.velocity_a), level
+        assert other.estimates == found[0].estimates
 
 
 @pytest.mark.slow

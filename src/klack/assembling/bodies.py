@@ -84,6 +84,11 @@ class BodyPair:
         """Translation of the upper body along z from where it was drawn [m]."""
         return float(self.pose.shift[2])
 
+    @property
+    def unknowns(self) -> int:
+        """Of both bodies."""
+        return self.upper.dof_count + self.lower.dof_count
+
     @cached_property
     def solids(self) -> tuple[str, str]:
         """Solids that the upper and the lower surface belong to."""

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from functools import cached_property, partial
 
+from threadpoolctl import threadpool_limits
+
 from klack.assembling.bodies import BodyPair, build_bodies
 from klack.assembling.candidates import Candidates, CondensedSpace
 from klack.assembling.ladder import (
@@ -21,7 +23,7 @@ from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
 from klack.contact.worn_faces import opened_by
-from klack.cores import share_of, side_by_side
+from klack.cores import FEW_UNKNOWNS, side_by_side
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
@@ -34,7 +36,6 @@ from klack.transient.rubbing_ladder import RubbingContact
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]
 
 _USUAL_MODES = 50  # of a case that asks for a frequency
-_AT_ONCE = 150_000  # degrees of freedom of two bodies whose factors are small beside the memory
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -69,6 +70,11 @@ class PlacedBodies(Closing):
         """Write no more static solutions to the cache: each of many impacts asks for others."""
         for flexibility in self._flexibilities:
             flexibility.cache = None
+
+    @property
+    def threads(self) -> int | None:
+        """Threads of BLAS: one, or all that there are."""
+        return 1 if self.pair.unknowns <= FEW_UNKNOWNS else None
 
     def close(self) -> None:
         """Free the factorisations."""
@@ -187,21 +193,23 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
     progress("factorise", 0.0)
     bodies = (pair.upper, pair.lower)
     # large ones take the memory that is left one after the other, as its plan says
-    at_once = threads != 1 and sum(len(body.free) for body in bodies) <= _AT_ONCE
-    upper, lower = side_by_side(
-        [
-            partial(
-                Flexibility,
-                body,
-                threads=share_of(threads, len(bodies)) if at_once else threads,
-                cache=result_cache(),
-                budget=_budget(case, body, progress),
-                at_once=at_once,
-            )
-            for body in bodies
-        ],
-        at_once=at_once,
-    )
+    few = pair.unknowns <= FEW_UNKNOWNS
+    at_once = threads != 1 and few
+    with threadpool_limits(1 if few else None, user_api="blas"):
+        upper, lower = side_by_side(
+            [
+                partial(
+                    Flexibility,
+                    body,
+                    threads=1 if few else threads,
+                    cache=result_cache(),
+                    budget=_budget(case, body, progress),
+                    at_once=at_once,
+                )
+                for body in bodies
+            ],
+            at_once=at_once,
+        )
     progress("factorise", 1.0)
     return PlacedBodies(
         case=case,
@@ -209,7 +217,7 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
         flexibility_upper=upper,
         flexibility_lower=lower,
         candidates=Candidates(pair, upper, lower),
-        opposite=build_opposite(case, pair, upper, progress, threads=threads),
+        opposite=build_opposite(case, pair, upper, progress, threads=1 if few else threads),
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.body_picture import body_pictures, with_peak_stress
@@ -99,6 +100,7 @@ from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.statics import ReachError, StaticContact, static_contact
 from klack.contact.submodel import LocalStiffness
+from klack.cores import available_cores
 from klack.elasticity.eigen import Modes
 from klack.elasticity.near_loads import NearLoads
 from klack.errors import AccuracyWarning, InputError
@@ -219,7 +221,7 @@ def _with_modes(
     certify: bool,
     progress: Progress,
 ) -> ImpactBodies:
-    with collected_warnings() as notes:
+    with collected_warnings() as notes, threadpool_limits(placed.threads, user_api="blas"):
         pools = mode_pools(
             placed,
             at_least=_modes_needed(placed.case, levels),
@@ -286,7 +288,8 @@ def _study(
     near: Mapping[str, NearLoads] | None = None,
 ) -> ImpactStudy:
     """One impact of these bodies; the last one frees them, and compares its model with others."""
-    with collected_warnings() as notes:
+    blas = bodies.placed.threads
+    with collected_warnings() as notes, threadpool_limits(blas, user_api="blas"):
         work = _Work(contact_problem(case, bodies.placed, clock), bodies)
         work.reduce(wanted, certify, clock)
         work.run_levels(wanted, clock)
@@ -301,7 +304,8 @@ def _study(
             work.compare(clock)
             work.problem.close()
         if "full" in wanted:
-            work.run_full(threads, clock)
+            share = threads if blas is None else min(2, threads or available_cores())
+            work.run_full(share, clock)
         work.attempts.require_one(work.results)
         work.check_ends()
     study = work.study(notes, begin, clock)
