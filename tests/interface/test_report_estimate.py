@@ -75,6 +75,16 @@ def test_an_estimate_stands_with_how_far_it_may_be_off(impact_study: ImpactStudy
     assert "not for the last per cent" in estimate_sentence(study)
 
 
+def test_the_full_order_alone_tells_what_its_steps_do(impact_study: ImpactStudy) -> None:
+    study = replace(
+        certified(impact_study, deviation(0.0031)), estimates={"full": deviation(-2e-3)}
+    )
+
+    assert plain(estimate_sentence(study)).startswith("The steps of the full order put it off by")
+    assert plain(estimate_sentence(study)).count("-0.20 %".replace("-", "\N{MINUS SIGN}")) == 1
+    assert report_content(study).sections[0].title == "Accuracy of the full order"
+
+
 @pytest.mark.parametrize(
     ("error", "words"),
     [

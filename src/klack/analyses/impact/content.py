@@ -242,7 +242,8 @@ def _computed(study: ImpactStudy) -> Section:
 
 
 def _estimates(study: ImpactStudy) -> Section:
-    title = "Accuracy of the reduced level"
+    only_full = set(study.estimates) == {"full"}
+    title = f"Accuracy of the {'full order' if only_full else 'reduced level'}"
     if reason := no_estimate(study):
         return Section(title=title, paragraphs=(sentence(reason),))
     if not study.estimates:

@@ -43,7 +43,13 @@ def estimate_sentence(study: ImpactStudy) -> str:
     """Sentence on whether the reduced level can be used here; empty without an estimate."""
     if not study.estimates:
         return ""
-    name = "reduced" if "reduced" in study.estimates else next(iter(study.estimates))
+    steps = ""
+    if "full" in study.estimates:
+        steps = f"The steps of the full order put it off by {_off(study.estimates['full'])}."
+    reduced = [name for name in study.estimates if name != "full"]
+    if not reduced:
+        return f"{steps} So says the {study.estimate_basis}."
+    name = "reduced" if "reduced" in reduced else reduced[0]
     estimate, true = study.estimates[name], _true(study, name)
     text = (
         f"Compared with one run of the {study.estimate_basis}, at the same condition, the "
@@ -51,9 +57,7 @@ def estimate_sentence(study: ImpactStudy) -> str:
     )
     if true is not None:
         text += f" Compared with the full order, which was run too, it is off by {_off(true)}."
-    if "full" in study.estimates:
-        text += f" The steps of the full order put it off by {_off(study.estimates['full'])}."
-    return text
+    return f"{text} {steps}".rstrip()
 
 
 def _true(study: ImpactStudy, name: str) -> Deviation | None:

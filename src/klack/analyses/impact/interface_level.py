@@ -31,6 +31,7 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
+from klack.reduction.damping import RayleighDamping
 from klack.reduction.ports import Port
 from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.transient.guide import Guide, guide_of_shaft
@@ -123,7 +124,9 @@ def build_interface(
             body=body,
             flexibility=flexibility,
             modes=(modes := _kept(problem, body, pools[body.name], ports, count)),
-            damping=damping_of(problem.case.bodies[body.name].damping).ratios(modes.omega),
+            damping=_ratios(
+                problem, body, _kept(problem, body, pools[body.name], ports, None), modes
+            ),
             observers=np.array(
                 [gauge.row for gauge in problem.pair.gauges if gauge.body == body.name]
             ).reshape(-1, body.dof_count),
@@ -301,6 +304,17 @@ def _kept(
     load = _load(problem, body, ports)
     chosen = select(choice, pool.omega, pool.shapes.T @ load)
     return Modes(pool.omega[chosen], pool.shapes[:, chosen])
+
+
+def _ratios(
+    problem: ContactProblem, body: ElasticBody, kept: Modes, modes: Modes
+) -> NDArray[np.float64]:
+    """Damping ratios; that of a case acts on the modes that it keeps, as at the full order."""
+    damping = damping_of(problem.case.bodies[body.name].damping)
+    ratios = damping.ratios(modes.omega)
+    if isinstance(damping, RayleighDamping):
+        return ratios
+    return np.where(np.isin(modes.omega, kept.omega), ratios, 0.0)
 
 
 def _load(

@@ -149,8 +149,8 @@ def run_impact(
     levels : sequence of str
         Among :data:`klack.case.levels.LEVELS`.
     certify : bool
-        Estimate the error of reduced levels by one interface-level run with twice as many modes;
-        bodies without surfaces have no such level.
+        Estimate the error of reduced levels, and of the steps of the full order, by one
+        interface-level run with twice as many modes; bodies without surfaces have no such level.
     progress : callable
         Called with stage and fraction.
     threads : int, optional
@@ -225,7 +225,9 @@ def _with_modes(
         pools = mode_pools(
             placed,
             at_least=_modes_needed(placed.case, levels),
-            rough=certificate_modes(placed.case) if certify and _has_reduced(levels) else 0,
+            rough=certificate_modes(placed.case)
+            if certify and _estimated(placed.case, levels)
+            else 0,
             progress=progress,
         )
     return ImpactBodies(placed=placed, pools=pools, notes=(*before, *notes))
@@ -293,7 +295,7 @@ def _study(
         work = _Work(contact_problem(case, bodies.placed, clock), bodies)
         work.reduce(wanted, certify, clock)
         work.run_levels(wanted, clock)
-        if certify and _has_reduced(wanted):
+        if certify and _estimated(case, wanted):
             work.estimate(wanted, clock)
         work.check_contact()
         if is_last and work.results and (set(wanted) & {"full"} or case.run.transfer is not None):
@@ -516,6 +518,11 @@ class _Work:
         )
 
 
+def _estimated(case: Case, levels: Sequence[str]) -> bool:
+    endless = any(body.non_reflecting is not None for body in case.bodies.values())
+    return _has_reduced(levels) or ("full" in levels and not endless)
+
+
 def _has_reduced(levels: Sequence[str]) -> bool:
     return any(level.startswith("reduced") for level in levels)
 
@@ -597,7 +604,7 @@ def _certificate(
     """
     clock("error estimate", 0.0)
     whole = [n for n in results if n.startswith("reduced") and not results[n].measures.cut_off]
-    if not whole:
+    if not whole and _has_reduced(tuple(results)):
         return _Certificate(doubt="the reduced level is cut off by the end of the run")
     count, steps = certificate_modes(problem.case), problem.case.run
     histories = {name: twins.get(name, results[name].history) for name in whole}

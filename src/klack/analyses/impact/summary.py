@@ -238,11 +238,11 @@ def no_estimate(study: ImpactStudy) -> str:
     if study.estimate_doubt:
         return f"No error estimate: {study.estimate_doubt}"
     if study.estimates and not study.estimates_settled:
+        advice = "" if "full" in study.levels else " Compare with --level full."
         return (
             "No error estimate: the interface level itself has not converged "
             f"(its force history changes by {100 * study.estimate_spread:.0f} % with half the "
-            "modes in longer steps), as when flat faces meet all at once. Compare with --level "
-            "full."
+            f"modes in longer steps), as when flat faces meet all at once.{advice}"
         )
     return ""
 
