@@ -5,7 +5,9 @@ tip on a conical seat, a rounded edge or a flat one, 0.1 to 20 mm in radius, of 
 polymer or copper, at 0.01 to 10 m/s, on meshes from coarse to fine.  Each runs at the reduced and
 the interface level on one mesh.  A line of JSON per draw says what came: failures, energy
 residuals, the deviation of the two levels, warnings, and how wide the contact was over what Hertz's
-law expects.  ``--finer EVERY`` repeats every so-many-th draw on a mesh of half the size.
+law expects.  ``--finer EVERY`` repeats every so-many-th draw on a mesh of half the size;
+``--full`` runs the full order too, at 150 steps of the expected contact and at 900, against which
+estimated errors and their margins are to hold.
 """
 
 import argparse
@@ -39,6 +41,7 @@ MATERIALS: Mapping[str, tuple[float, float, float]] = {
 
 _DEVIATION = ("peak_force", "contact_time", "history_l2")
 _STEPS = (150, 500)  # of the contact time; the usual number is 500
+_FULL_STEPS, _FINER = 150, 6  # of the full order, and how much finer its truth is
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +134,8 @@ def draw(seed: int, index: int) -> dict[str, Any]:
         "reduction": {"modes": {"needle": {"count": int(rng.integers(4, 40))},
                                 "housing": {"count": int(rng.integers(4, 60))}}},
         "run": {"duration": f"{duration:.6g} s", "reduced_step": f"{step:.6g} s",
-                "interface_step": f"{step:.6g} s", "levels": ["reduced", "interface"]},
+                "interface_step": f"{step:.6g} s",
+            "full_step": f"{time / _FULL_STEPS:.6g} s", "levels": ["reduced", "interface"]},
     }  # fmt: skip
 
 
@@ -277,6 +281,28 @@ def numbers(study: ImpactStudy) -> dict[str, Any]:
     }
 
 
+def beside_full(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Estimated errors of the reduced level and of the full order, their margins, and the truth."""
+    run = data["run"]
+    step = float(run["full_step"].removesuffix(" s")) / _FINER
+    fine = {**data, "run": {**run, "full_step": f"{step:.6g} s"}}
+    try:
+        study = run_impact(case_of(data), levels=("reduced", "full"))
+        truth = run_impact(case_of(fine), levels=("full",), certify=False).levels["full"].history
+    except KlackError as error:
+        return {"error": f"{type(error).__name__}: {error}"}
+    of = {name: compare_histories(truth, one.history) for name, one in study.levels.items()}
+    names = ("peak_force", "contact_time", "restitution")
+    return {
+        what: {name: [getattr(one, key) for key in names] for name, one in found.items()}
+        for what, found in (
+            ("true", of),
+            ("estimate", study.estimates),
+            ("margin", study.estimate_margins),
+        )
+    } | {"settled": study.estimates_settled}
+
+
 def main() -> None:
     """Run the series and write a line per draw."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -284,6 +310,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0)
     parser.add_argument("--seed", type=int, default=17)
     parser.add_argument("--finer", type=int, default=10, metavar="EVERY")
+    parser.add_argument("--full", action="store_true")
     parser.add_argument("--out", type=Path, default=Path("random_impacts.jsonl"))
     asked = parser.parse_args()
     with asked.out.open("a", encoding="utf-8") as stream:
@@ -292,6 +319,8 @@ def main() -> None:
             line = {"index": index, "title": data["title"], **outcome(data)}
             if asked.finer and index % asked.finer == 0 and "error" not in line:
                 line["finer"] = outcome(finer(data))
+            if asked.full and "error" not in line:
+                line["beside_full"] = beside_full(data)
             stream.write(json.dumps(line) + "\n")
             stream.flush()
             print(index, line["title"], line.get("error", line.get("deviation")), flush=True)
