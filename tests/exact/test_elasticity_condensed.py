@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.sparse import random_array
 
+from klack.cache.result_cache import ResultCache
 from klack.elasticity.body import elastic_body
 from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.factorization import available_backends
@@ -46,6 +47,21 @@ def test_condensed_compliance_is_that_of_whole_solves(family, held, backend):
 
     np.testing.assert_array_equal(C, C.T)
     np.testing.assert_allclose(C, exact, rtol=0.0, atol=1e-11 * np.abs(exact).max())
+
+
+def test_a_coupling_is_that_of_whole_solves_and_kept(tmp_path, monkeypatch):
+    """Either way round; what is kept has the same bits."""
+    rod = body("tet10", held=False)
+    G, H = loads(70, rod.dof_count)[:50], loads(70, rod.dof_count)[50:]
+    with Flexibility(rod, cache=ResultCache(tmp_path, 10**9)) as flexibility:
+        exact = G @ flexibility.solve(H.toarray().T)
+        C = flexibility.coupling(G, H)
+        monkeypatch.setattr(Flexibility, "solve", None)
+        again, turned = flexibility.coupling(G, H), flexibility.coupling(H, G)
+
+    np.testing.assert_allclose(C, exact, rtol=0.0, atol=1e-11 * np.abs(exact).max())
+    np.testing.assert_array_equal(again, C)
+    np.testing.assert_array_equal(turned, C.T)
 
 
 def test_a_rigid_load_does_not_deform_a_free_body():

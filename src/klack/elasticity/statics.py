@@ -212,6 +212,21 @@ class Flexibility(Closing):
             lambda entry: entry.arrays["C"],
         )
 
+    def coupling(self, G: csr_array, H: csr_array) -> NDArray[np.float64]:
+        """Opening of each row of G [m] per force [N] on each row of H, G F H^T; kept in the cache.
+
+        Solved for the fewer rows: by reciprocity H F G^T is its transpose.
+        """
+        if G.shape[0] < H.shape[0]:
+            return self.coupling(H, G).T
+        return self.remembered(
+            "coupling of two contacts",
+            (G, H),
+            lambda: np.asarray(G @ self.solve(H.T.toarray())),
+            lambda C: Entry(arrays={"C": C}),
+            lambda entry: entry.arrays["C"],
+        )
+
     def deflections(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
         """Displacements under loads as of :meth:`solve`, kept in the cache: for ports."""
         return self.remembered(

@@ -23,6 +23,7 @@ compliance holds all directions: unlike bodies slip sideways where they are pres
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from math import inf
 
 import numpy as np
@@ -651,15 +652,13 @@ def _static_compliance(
             ]
             C = contact_compliance(contact.space, pair[0], pair[1], faces=contact.faces)
         total[np.ix_(place, place)] = C
-    for i, one in enumerate(contacts):
-        for j, other in enumerate(contacts):
-            if i == j:
-                continue
-            for item in bodies:
-                G, H = one.rows(item.body.name), other.rows(item.body.name)
-                if G is not None and H is not None:
-                    part = G @ item.flexibility.solve(H.T.toarray())
-                    total[np.ix_(places[i], places[j])] += part
+    for (one, here), (other, there) in combinations(zip(contacts, places, strict=True), 2):
+        for item in bodies:
+            G, H = one.rows(item.body.name), other.rows(item.body.name)
+            if G is not None and H is not None:
+                part = item.flexibility.coupling(G, H)
+                total[np.ix_(here, there)] += part
+                total[np.ix_(there, here)] += part.T
     return 0.5 * (total + total.T)
 
 
