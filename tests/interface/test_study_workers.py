@@ -565,7 +565,7 @@ class TestChoice:
 def started(folder: Path) -> subprocess.Popen[str]:
     """``klack study`` on two workers, in a process of its own."""
     study = folder / "study.yaml"
-    study.write_text(STUDY.replace("points: 32", "points: 256"))
+    study.write_text(STUDY.replace("points: 32", "points: 128"))
     words = ["study", str(SMALL), "--workers", "2", "--study", str(study)]
     return subprocess.Popen(
         [sys.executable, "-m", "klack", *words, "-q", "--no-report", "--out", str(folder / "out")],
