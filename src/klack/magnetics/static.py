@@ -75,17 +75,19 @@ def static_state(
     def gradient(phi: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(C.T @ circuit.mmf(C @ phi, gap) - drive, dtype=float)
 
+    here = gradient(phi)
     for _ in range(_MOST_ITERATIONS):
-        here = gradient(phi)
         step = -np.linalg.solve((C.T * circuit.slope(C @ phi, gap)) @ C, here)
         if np.max(np.abs(step)) <= _SETTLED * np.max(np.abs(phi)):
             return _state(circuit, phi + step, current, gap, linked)
         # of a convex function the slope along the step is enough, which round-off spares: it
         # starts at -downhill, and a step is too long where it has risen well above zero
         downhill, share = abs(float(here @ step)), 1.0
-        while float(gradient(phi + share * step) @ step) > 0.5 * downhill and share > 1e-9:
+        while float((there := gradient(phi + share * step)) @ step) > 0.5 * downhill:
+            if share <= 1e-9:
+                break
             share *= 0.5
-        phi = phi + share * step
+        phi, here = phi + share * step, there
     raise ConvergenceError(
         f"static magnetic circuit at {current:g} A and a gap of {gap:g} m: the last flux step was "
         f"{np.max(np.abs(step)):.2g} Wb after {_MOST_ITERATIONS} iterations.\n"
