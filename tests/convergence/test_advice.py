@@ -177,11 +177,12 @@ def test_a_case_that_rubs_is_advised_with_its_friction(case):
     rubbing = read_case(cone.replace("reach:", "friction: 0.2, reach:"), Path("cone.yaml"))
     told = advise_impact(rubbing, confirm=False)
     (pattern,) = told.fixed
-    lossless = history_error(told, reduced(rubbing), reduced(case))
+    now = reduced(rubbing)
+    lossless = history_error(told, now, reduced(case))
 
     assert lossless > 0.1
     assert pattern.errors[HISTORY] < 0.2 * lossless
-    true = history_error(told, reduced(rubbing, step=100e-9 / 32), reduced(rubbing))
+    true = history_error(told, reduced(rubbing, step=100e-9 / 32), now)
     assert counsel(told, STEP).now[HISTORY] == pytest.approx(true, rel=0.5)
 
 
