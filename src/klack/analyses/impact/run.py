@@ -124,7 +124,7 @@ __all__ = ["ImpactBodies", "impact_bodies", "impact_of_bodies", "run_impact"]
 # What a reduced level needs before it can run, beyond meshes and matrices.
 _SET_UP = ("factorise", "static contact", "modes", "reduced")
 _COARSER = 2.0**0.5  # a step that adds to an error of order two as much as it was
-_KNOWN_ENDS = 0.25  # of a step: both ends of a contact together
+_KNOWN_ENDS, _FULL_ENDS = 0.25, 0.5  # of a step, both ends of a contact together
 _CORRECTIONS: Mapping[str, Correction] = {
     "reduced-participation": "consistent",
     "reduced-attachment": "attachment",
@@ -642,20 +642,26 @@ def _certificate(
     return _Certificate(
         estimates={name: compare_histories(history, one) for name, one in histories.items()},
         basis=basis,
-        margins={name: _margin(apart, history, one) for name, one in histories.items()},
+        margins={
+            name: _margin(apart, history, one, is_full=name == "full")
+            for name, one in histories.items()
+        },
         spread=apart.history_l2,
         doubt=next(iter(level.doubts), flat_for_modes(problem, richer)),
         level=level,
     )
 
 
-def _margin(apart: Deviation, reference: ImpactHistory, other: ImpactHistory) -> Deviation:
+def _margin(
+    apart: Deviation, reference: ImpactHistory, other: ImpactHistory, *, is_full: bool
+) -> Deviation:
     """How well two runs can be compared, by how far the reference is apart from a coarser one.
 
     Peaks may agree by chance while the histories do not: a peak is known no better than these.
-    Contact begins and ends within a step.
+    Contact begins and ends within a step; points of the full order (``is_full``) only at its end.
     """
-    open_ends = _KNOWN_ENDS * max(reference.step, other.step)
+    ends = _FULL_ENDS if is_full else _KNOWN_ENDS
+    open_ends = max(_KNOWN_ENDS * reference.step, ends * other.step)
     return replace(
         apart,
         peak_force=max(abs(apart.peak_force), apart.history_l2),
