@@ -114,10 +114,12 @@ class StrokeRun(Section):
         description="Fine steps in a macro step, taken far from the stops; 1 for none; by default "
         "as many as the accuracy and the parts of the network allow.",
     )
-    check_steps: bool = Field(
-        default=False,
-        description="Whether to run each variant again with all steps twice as long, and tell what "
-        "that changes in each impact.",
+    check_steps: bool | None = Field(
+        default=None,
+        description="Whether to run each variant again with all steps twice as long, tell what "
+        "that changes in each impact, and halve all steps, at most three times, until the first "
+        "three impacts on each stop change by less than half of what the accuracy promises; by "
+        "default in single strokes, not in points of studies and shots.",
     )
     record: Time = Field(
         default=1e-6,

@@ -13,7 +13,7 @@ from klack.simulation.network_arrays import PARTS
 from klack.simulation.rest import bounce_time
 from klack.units import format_si
 
-__all__ = ["StepSizes", "doubled", "kinks", "largest_divisor", "step_sizes"]
+__all__ = ["StepSizes", "kinks", "largest_divisor", "scaled", "step_sizes"]
 
 _MOST_COARSE = 256
 _MIDDLE = 4  # fine steps of a sub-step while films are smooth
@@ -94,8 +94,8 @@ def step_sizes(
     return StepSizes(step=h, coarse=chosen, near=near, middle=_middle(rows, h, near))
 
 
-def doubled(rows: Rows, sizes: StepSizes) -> StepSizes:
-    """Return sizes of steps that are all twice as long, whatever parts of the network ask for.
+def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
+    """Return sizes of steps that are all longer by a factor, whatever parts of the network ask for.
 
     Raises
     ------
@@ -104,14 +104,14 @@ def doubled(rows: Rows, sizes: StepSizes) -> StepSizes:
     """
     macro = sizes.coarse * sizes.step
     for interval in _intervals(rows):
-        if _is_whole(interval / macro) and not _is_whole(0.5 * interval / macro):
+        if _is_whole(interval / macro) and not _is_whole(interval / (factor * macro)):
             raise InputError(
                 "steps twice as long",
                 got=f"an exchange every {format_si(interval, 's')}",
-                expected=f"whole steps of {format_si(2.0 * macro, 's')} in it",
+                expected=f"whole steps of {format_si(factor * macro, 's')} in it",
                 hint="choose run.coarse so that an even number of macro steps makes the interval.",
             )
-    return replace(sizes, step=2.0 * sizes.step)
+    return replace(sizes, step=factor * sizes.step)
 
 
 def _intervals(rows: Rows) -> list[float]:

@@ -47,12 +47,11 @@ _Accuracy = Annotated[
     ),
 ]
 _CheckSteps = Annotated[
-    bool,
+    bool | None,
     Parameter(
         name="--check-steps",
-        negative="",
-        help="Run again with all steps twice as long and tell what changes in each impact; takes "
-        "half as long again to as long again. [default: as in the case]",
+        help="Run again with all steps twice as long; halve them where that changes first impacts "
+        "by more than half of what the accuracy promises. [default: as in the case, or yes]",
     ),
 ]
 _Continue = Annotated[
@@ -81,7 +80,7 @@ def stroke(
     duration: _Duration = None,
     step: _Step = None,
     accuracy: _Accuracy = None,
-    check_steps: _CheckSteps = False,
+    check_steps: _CheckSteps = None,
     continued: _Continue = None,
     component: Components = None,
     controller: _Controllers = None,
@@ -96,7 +95,7 @@ def stroke(
         duration=duration,
         step=step,
         accuracy=accuracy,
-        check_steps=check_steps or None,
+        check_steps=check_steps,
         continued=continued,
     )
     if at_rest.steady:
@@ -146,7 +145,7 @@ def _checked_case(
     accuracy: Accuracy | None,
     components: "tuple[type[Component], ...]",
     *,
-    check_steps: bool = False,
+    check_steps: bool | None = None,
 ) -> "ValveCase":
     """Read the case; duration, step and accuracy of the command line replace its own."""
     from klack.case.valve_reader import load_valve_case
@@ -159,8 +158,8 @@ def _checked_case(
     }
     if accuracy is not None:
         changes["accuracy"] = accuracy
-    if check_steps:
-        changes["check_steps"] = True
+    if check_steps is not None:
+        changes["check_steps"] = check_steps
     if not changes:
         return case
 

@@ -25,6 +25,9 @@ def steps_told(variant: StrokeVariant) -> str:
     """Number and size of the steps of each kind, in words."""
     done, sizes = variant.result.steps, variant.result.sizes
     fine = format_si(sizes.step, "s", 3)
+    if variant.halvings:
+        times = {1: "once", 2: "twice"}.get(variant.halvings, f"{variant.halvings} times")
+        fine += f"; all of them halved {times}, since impacts depended on them"
     if sizes.coarse == 1:
         return f"{count(done.fine)} of {fine}"
     flight, near = (format_si(sizes.step * steps, "s", 3) for steps in (sizes.coarse, sizes.near))

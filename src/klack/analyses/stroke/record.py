@@ -199,6 +199,8 @@ class StrokeVariant:
         Wall time of everything before the time loop that is this variant's own.
     changes : tuple of ImpactChange
         Of each impact when all steps are doubled; empty where that was not asked for.
+    halvings : int
+        How often the check of the steps halved all of them.
     """
 
     name: str
@@ -212,6 +214,7 @@ class StrokeVariant:
     setup_time: float
     times: tuple[LiftTimes, ...] = ()
     changes: tuple[ImpactChange, ...] = ()
+    halvings: int = 0
 
     @property
     def needle_times(self) -> LiftTimes:

@@ -3,16 +3,18 @@
 import warnings
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from math import isfinite
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
 from klack.analyses.impact.contact_check import check_contact
 from klack.analyses.record import RunFields, case_fields, run_fields
 from klack.analyses.stroke.controllers import controller_notes
-from klack.analyses.stroke.missing import missing_notes
+from klack.analyses.stroke.missing import cut_records, missing_notes
 from klack.analyses.stroke.record import (
     FluidSummary,
     IncompleteStrokeError,
@@ -23,7 +25,7 @@ from klack.analyses.stroke.record import (
     StrokeVariant,
 )
 from klack.analyses.stroke.rest import rest_note
-from klack.analyses.stroke.step_check import ImpactChange, impact_changes, no_changes, told
+from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_checked
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
@@ -45,8 +47,8 @@ from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import State, simulate_network
 from klack.simulation.spatial_motion import SpatialMotion
-from klack.simulation.step_sizes import StepSizes, doubled
-from klack.stages import StageClock, collected_warnings, trial
+from klack.simulation.step_sizes import StepSizes, scaled
+from klack.stages import StageClock, collected_warnings, show, trial
 from klack.units import format_si
 
 __all__ = [
@@ -63,6 +65,9 @@ __all__ = [
     "variant_of",
 ]
 
+Warned = list[warnings.WarningMessage]
+
+_HALVINGS = 3  # of all steps: errors of first order are an eighth then, those of second a 64th
 _NEAR = 0.3  # share of what is asked that the spacing of records may be off by: 1 us is 1.28 us
 
 
@@ -100,12 +105,12 @@ def run_stroke(
     """
     begin = perf_counter()
     wanted = case.require_variants(tuple(variants) or case.run.variants)
-    states = {name: _state(case, after, name) for name in wanted}
+    begins = {name: _begin(case, after, name) for name in wanted}
     roles = find_roles(case)
     clock = StageClock(progress, result_cache())
     with collected_warnings() as notes:
         valve = build_valve(case, clock, threads=threads)
-        computed, failure = _runs(valve, roles, states, clock)
+        computed, failure = _runs(valve, roles, begins, clock)
         runs = {name: _without_path(run) for name, run in computed.items()}
         stops = stop_summaries(valve)
     results: dict[str, StrokeVariant] = {name: run.variant for name, run in runs.items()}
@@ -276,8 +281,8 @@ def run_variant(
     )
 
 
-def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State | None:
-    """State in which a variant of a former study ended; None to start from rest."""
+def _begin(case: ValveCase, after: StrokeStudy | None, name: Variant) -> NetworkResult | None:
+    """Run of a former study that a variant continues, in its steps; None to start from rest."""
     if after is None:
         return None
     if after.step != case.run.fine_step:  # the clock counts steps
@@ -294,17 +299,21 @@ def _state(case: ValveCase, after: StrokeStudy | None, name: Variant) -> State |
             expected=f"one of: {', '.join(after.variants)}",
             hint="run that variant from the start first.",
         )
-    return after.variants[name].result.state
+    return after.variants[name].result
 
 
 def _runs(
-    valve: Valve, roles: ValveRoles, states: Mapping[Variant, State | None], progress: Progress
+    valve: Valve,
+    roles: ValveRoles,
+    begins: Mapping[Variant, NetworkResult | None],
+    progress: Progress,
 ) -> tuple[dict[Variant, VariantRun], ConvergenceError | None]:
     """Variants up to the first one that fails, with what there is of it, and its error."""
     runs: dict[Variant, VariantRun] = {}
-    for name, state in states.items():
+    check = valve.case.run.check_steps is not False
+    for name, after in begins.items():
         try:
-            runs[name] = one_variant(valve, roles, name, state, progress)
+            runs[name] = one_variant(valve, roles, name, progress, after=after, check=check)
         except ConvergenceError as error:
             if not runs:
                 raise
@@ -316,9 +325,18 @@ def _runs(
 
 
 def one_variant(
-    valve: Valve, roles: ValveRoles, name: Variant, state: State | None, progress: Progress
+    valve: Valve,
+    roles: ValveRoles,
+    name: Variant,
+    progress: Progress,
+    *,
+    after: NetworkResult | None = None,
+    check: bool | None = None,
 ) -> VariantRun:
-    """Compute one variant of a valve, from rest or a state.
+    """Compute one variant of a valve, from rest or from the end of a run.
+
+    ``check`` is whether its steps are checked, and halved where impacts depend on them; by default
+    where the case asks for it.
 
     Raises
     ------
@@ -328,58 +346,100 @@ def one_variant(
         Before the first record.
     """
     begin = perf_counter()
-    stage = f"run {name}"
-    progress(stage, 0.0)
+    checked = bool(valve.case.run.check_steps) if check is None else check
+    progress(f"run {name}", 0.0)
+    kept: AbstractContextManager[Warned] = trial() if checked else nullcontext([])
+    with kept as caught:
+        run = _attempt(valve, name, progress, after=after)
+    setup_time = perf_counter() - begin - run.result.wall_time
+    steps = CheckedSteps()
+    if checked and after is not None:
+        reason = "the run continues another one, whose state belongs to its steps"
+        steps = not_checked(run.result.events, reason)
+    elif checked and run.failure is None:
+        run, caught, steps = _in_checked_steps(valve, name, progress, run, caught)
+    elif checked:
+        steps = not_checked(run.result.events, "the run ended early")
+    show(caught)
+    if steps.doubt:
+        warnings.warn(f"'{name}': {steps.doubt}", AccuracyWarning, stacklevel=2)
+    variant = variant_of(valve, roles, name, run.rows, run.result, setup_time)
+    variant = replace(variant, changes=steps.changes, halvings=steps.halvings)
+    return VariantRun(variant=variant, rows=run.rows, failure=run.failure)
+
+
+class _Attempt(NamedTuple):
+    """A run, the rows that it ran on, and why it ended early."""
+
+    rows: Rows
+    result: NetworkResult
+    failure: ConvergenceError | None
+
+
+def _attempt(
+    valve: Valve,
+    name: Variant,
+    progress: Progress,
+    *,
+    after: NetworkResult | None = None,
+    sizes: StepSizes | None = None,
+) -> _Attempt:
+    """Run a variant once."""
+    stage = f"run {name}" if sizes is None else f"check steps of {name}"
     rows = variant_network(valve, name).rows()
-    failure: ConvergenceError | None = None
+    if after is not None and after.sizes.step != valve.case.run.fine_step:
+        sizes = after.sizes  # halved by a check
     try:
         result = run_variant(
             valve.case,
             rows,
             lambda fraction: progress(stage, fraction),
-            state=state,
+            state=None if after is None else after.state,
             spatial=valve.spatial,
+            sizes=sizes,
         )
     except IncompleteRunError as error:
-        result, failure = error.result, error
-    setup_time = perf_counter() - begin - result.wall_time
-    variant = variant_of(valve, roles, name, rows, result, setup_time)
-    if valve.case.run.check_steps:
-        stage = f"check steps of {name}"
-        changes, doubt = _changes(valve, name, result, state, lambda done: progress(stage, done))
-        variant = replace(variant, changes=changes)
-        if doubt:
-            warnings.warn(f"'{name}': {doubt}", AccuracyWarning, stacklevel=2)
-    return VariantRun(variant=variant, rows=rows, failure=failure)
+        return _Attempt(rows, error.result, error)
+    return _Attempt(rows, result, None)
 
 
-def _changes(
-    valve: Valve,
-    name: Variant,
-    result: NetworkResult,
-    state: State | None,
-    progress: Callable[[float], None],
-) -> tuple[tuple[ImpactChange, ...], str]:
-    """Change of each impact when the variant is run again with all steps doubled, and doubts."""
-    longer = None
-    if state is not None:
-        reason = "the run continues another one, whose state belongs to its steps"
-    elif result.failure:
-        reason = "the run ended early"
-    else:
-        rows = variant_network(valve, name).rows()
+def _in_checked_steps(
+    valve: Valve, name: Variant, progress: Progress, run: _Attempt, caught: Warned
+) -> tuple[_Attempt, Warned, CheckedSteps]:
+    """Halve all steps until impacts do not depend on them, but as often as :data:`_HALVINGS`.
+
+    In three dimensions steps are never halved: a run takes some 10 s there, not 0.1 s.
+    """
+    most = _HALVINGS if valve.spatial is None else 0
+
+    def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
         try:
-            with trial():  # its warnings are of steps that nobody asked for
-                sizes = doubled(rows, result.sizes)
-                longer = run_variant(valve.case, rows, progress, spatial=valve.spatial, sizes=sizes)
+            sizes = scaled(run.rows, run.result.sizes, factor)
+            with trial() as kept:
+                found = _attempt(valve, name, progress, sizes=sizes)
         except (ConvergenceError, InputError) as error:
-            reason = f"no run with longer steps. {' '.join(str(error).split())}"
-    if longer is None:
-        return no_changes(result.events), f"the time steps were not checked: {reason}"
-    end = min(float(run.time[-1]) for run in (result, longer))
-    changes = impact_changes(result.events, longer.events)
-    others = [event for event in longer.events if event.time < end]
-    return changes, told(result.events, changes, valve.case.run.accuracy, others)
+            return None, [], " ".join(str(error).split())
+        reason = "" if found.failure is None else " ".join(str(found.failure).split())
+        return (None if reason else found), kept, reason
+
+    longer, _, reason = again(2.0)
+    halvings = 0
+    while True:
+        if longer is not None:
+            steps = checked_steps(run.result, longer.result, valve.case.run.accuracy, halvings)
+            if not steps.doubt or halvings == most:
+                return run, caught, steps
+        shorter, kept, failed = again(0.5) if halvings < most else (None, [], "")
+        if shorter is not None and cut_records(shorter.result) and not cut_records(run.result):
+            shorter, failed = None, "the record of the forces in fine steps is full."
+        if shorter is None:
+            if longer is None:
+                steps = not_checked(run.result.events, f"no run with longer steps. {reason}")
+            if failed:
+                steps = steps._replace(doubt=f"{steps.doubt} With shorter steps: {failed}")
+            return run, caught, steps
+        run, longer, caught = shorter, run, kept
+        halvings += 1
 
 
 def study_of_run(

@@ -11,12 +11,22 @@ from dataclasses import dataclass
 from itertools import chain
 from math import isfinite, nan
 from operator import attrgetter
+from typing import NamedTuple
 
 from klack.analyses.measures import Column, Measure, described_in
 from klack.network.accuracy import PROMISED, Accuracy
-from klack.simulation.network_result import ImpactEvent
+from klack.simulation.network_result import ImpactEvent, NetworkResult
 
-__all__ = ["CHANGE_MEASURES", "NOTICED", "ImpactChange", "impact_changes", "no_changes", "told"]
+__all__ = [
+    "CHANGE_MEASURES",
+    "NOTICED",
+    "CheckedSteps",
+    "ImpactChange",
+    "checked_steps",
+    "impact_changes",
+    "not_checked",
+    "told",
+]
 
 NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as one."""
@@ -125,10 +135,39 @@ def _by_stop(*runs: Sequence[ImpactEvent]) -> dict[str, tuple[list[ImpactEvent],
     }
 
 
-def no_changes(events: Sequence[ImpactEvent]) -> tuple[ImpactChange, ...]:
-    """None for any impact: there is no other run."""
+class CheckedSteps(NamedTuple):
+    """What a check of the steps of a run has found.
+
+    Parameters
+    ----------
+    changes : tuple of ImpactChange
+        Of each impact; empty where nothing was checked.
+    doubt : str
+        Sentence on what still depends on the steps, or on why they were not checked.
+    halvings : int
+        How often all steps were halved.
+    """
+
+    changes: tuple[ImpactChange, ...] = ()
+    doubt: str = ""
+    halvings: int = 0
+
+
+def checked_steps(
+    run: NetworkResult, longer: NetworkResult, accuracy: Accuracy, halvings: int
+) -> CheckedSteps:
+    """Compare a run with one in steps twice as long, up to where the first of them ends."""
+    end = min(float(one.time[-1]) for one in (run, longer))
+    others = [event for event in longer.events if event.time < end]
+    changes = impact_changes(run.events, longer.events)
+    return CheckedSteps(changes, told(run.events, changes, accuracy, others), halvings)
+
+
+def not_checked(events: Sequence[ImpactEvent], reason: str) -> CheckedSteps:
+    """No numbers for any impact: there is no other run."""
     numbers = [change.number for change in impact_changes(events, events)]
-    return tuple(ImpactChange(number=number, reason="no other run") for number in numbers)
+    changes = tuple(ImpactChange(number=number, reason="no other run") for number in numbers)
+    return CheckedSteps(changes, f"the time steps were not checked: {reason}")
 
 
 def _pairs(run: Sequence[ImpactEvent], other: Sequence[ImpactEvent]) -> Iterator[ImpactChange]:
@@ -211,12 +250,11 @@ def told(
         return ""
     peak, time = PROMISED[accuracy]
     more = f"; and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
-    finer = "accuracy: fine" if accuracy == "normal" else "a shorter run.step"
     return (
         f"with all time steps twice as long {'; '.join(found[:_TOLD])}{more}. The steps are short "
         f"enough for accuracy: {accuracy} where that changes less than {100 * _SHARE * peak:g} % "
-        f"and {1e6 * _SHARE * time:g} us. Try: {finer}; or run.coarse: 1, which takes many times "
-        "as long."
+        f"and {1e6 * _SHARE * time:g} us. Try: a shorter run.step; or run.coarse: 1, which takes "
+        "many times as long."
     )
 
 

@@ -262,10 +262,10 @@ def change_name(event: ImpactEvent, change: ImpactChange) -> str:
 
 
 def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
-    """What doubled steps change; nothing where that was not asked for."""
-    if variant.changes:
-        pairs = zip(variant.result.events[:_TOLD], variant.changes, strict=False)
-        named = ((change_name(event, change), change) for event, change in pairs)
+    """What doubled steps change in promised impacts; nothing where that was not asked for."""
+    pairs = zip(variant.result.events, variant.changes, strict=False)
+    named = [(change_name(event, change), change) for event, change in pairs if change.promised]
+    if named:
         title = f"{variant.name}: {CHANGES}"
         yield text_table(title, "impact", CHANGE_MEASURES, named)
 

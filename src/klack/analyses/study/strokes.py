@@ -270,7 +270,7 @@ def _stroke_of(
     """Stroke of a valve of this case, in one variant."""
     roles = find_roles(case, valve.network)
     variant = case.one_variant(wanted)
-    run = one_variant(valve, roles, variant, None, lambda stage, fraction: check())
+    run = one_variant(valve, roles, variant, lambda stage, fraction: check())
     if run.failure is not None:
         raise run.failure
 
