@@ -317,13 +317,20 @@ def test_records_that_are_further_apart_than_asked_are_told(record, told):
 
 
 @pytest.mark.slow
-def test_steps_are_checked_on_request(tmp_path, capsys):
-    words = ["--check-steps", "--variant", "dry", "--step", "100 ns", "--duration", "300 us"]
+def test_steps_are_checked_unless_they_are_to_stay(tmp_path, capsys):
+    words = ["--variant", "dry", "--step", "400 ns", "--duration", "300 us"]
 
-    assert main(["stroke", str(CASE), *words, "--out", "out"]) == 0
+    assert (
+        main(["stroke", str(CASE), *words, "--no-check-steps", "--no-report", "--out", "out"]) == 0
+    )
+    told = capsys.readouterr()
+    assert "of 400 ns" in told.out
+    assert "steps are doubled" not in told.out
+    assert main(["stroke", str(CASE), *words]) == 0
 
     text = capsys.readouterr().out
+    assert "50 ns; all of them halved 3 times, since impacts depended on them" in text
     assert "dry: what changes when all time steps are doubled" in text
-    assert re.search(r"opening 1 +[+-]0\.\d{4} +-0\.\d{4} ", text)
-    assert "impact 1 on 'opening' changes by -0." in " ".join(text.split())
+    assert re.search(r"opening 1 +[+-]0\.\d{4} +[+-]0\.\d{4} ", text)
+    assert "impact 1 on 'opening' changes by " in " ".join(text.split())
     assert "change of peak force" in (tmp_path / "out" / "report.html").read_text()

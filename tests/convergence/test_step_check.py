@@ -231,9 +231,9 @@ def test_a_stroke_tells_its_changes_after_storing(tmp_path):
 def test_an_exchange_that_would_no_longer_hold_whole_steps_is_refused():
     row = SimpleNamespace(interval=30e-6)
     rows: Any = SimpleNamespace(elements=[row], controllers=[])
-    sizes = StepSizes(step=20e-9, coarse=50, near=25, middle=1)
+    sizes = StepSizes(step=20e-9, coarse=50, near=25, middle=5)
 
-    assert scaled(rows, sizes, 2.0) == replace(sizes, step=40e-9)
+    assert scaled(rows, sizes, 2.0) == replace(sizes, step=40e-9, middle=1)
     assert scaled(rows, sizes, 0.5) == replace(sizes, step=10e-9)
     row.interval = 31e-6
     with pytest.raises(InputError, match="exchange every 31 us"):

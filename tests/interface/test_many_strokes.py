@@ -108,7 +108,8 @@ def drawn(count: int) -> list[Point]:
 def single(
     case: klack.CaseOnHand, point: Point, variant: str, measures: Sequence[str]
 ) -> list[float]:
-    """Measures of one stroke of the changed case."""
+    """Measures of one stroke of the changed case, in the steps that points of studies take."""
+    case = case.with_value("run.check_steps", False)
     for key, value in point.items():
         case = case.with_value(key, value)
     found = klack.run_stroke(case, [variant]).measures

@@ -97,6 +97,9 @@ def step_sizes(
 def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
     """Return sizes of steps that are all longer by a factor, whatever parts of the network ask for.
 
+    Longer steps have fine sub-steps throughout, so that errors of sub-steps are not those of the
+    run that they are compared with.
+
     Raises
     ------
     InputError
@@ -111,7 +114,7 @@ def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
                 expected=f"whole steps of {format_si(factor * macro, 's')} in it",
                 hint="choose run.coarse so that an even number of macro steps makes the interval.",
             )
-    return replace(sizes, step=factor * sizes.step)
+    return replace(sizes, step=factor * sizes.step, middle=1 if factor > 1.0 else sizes.middle)
 
 
 def _intervals(rows: Rows) -> list[float]:
