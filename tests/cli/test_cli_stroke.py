@@ -333,4 +333,4 @@ def test_steps_are_checked_unless_they_are_to_stay(tmp_path, capsys):
     assert "dry: what changes when all time steps are doubled" in text
     assert re.search(r"opening 1 +[+-]0\.\d{4} +[+-]0\.\d{4} ", text)
     assert "impact 1 on 'opening' changes by " in " ".join(text.split())
-    assert "change of peak force" in (tmp_path / "out" / "report.html").read_text()
+    assert "change of peak force" in (out / "report.html").read_text()
