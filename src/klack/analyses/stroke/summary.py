@@ -91,7 +91,7 @@ class EventJson(TypedDict):
         AxisJson | None, Field(description="At first touch; null for a motion along the axis.")
     ]
     doubled_steps: Annotated[
-        ChangeJson | None, Field(description="With run.check_steps; null without.")
+        ChangeJson | None, Field(description="Null where the steps were not checked.")
     ]
 
 
