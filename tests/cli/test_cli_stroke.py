@@ -318,11 +318,10 @@ def test_records_that_are_further_apart_than_asked_are_told(record, told):
 
 @pytest.mark.slow
 def test_steps_are_checked_unless_they_are_to_stay(tmp_path, capsys):
-    words = ["--variant", "dry", "--step", "400 ns", "--duration", "300 us"]
+    out = tmp_path / "out"
+    words = ["--variant", "dry", "--step", "400 ns", "--duration", "300 us", "--out", str(out)]
 
-    assert (
-        main(["stroke", str(CASE), *words, "--no-check-steps", "--no-report", "--out", "out"]) == 0
-    )
+    assert main(["stroke", str(CASE), *words, "--no-check-steps", "--no-report"]) == 0
     told = capsys.readouterr()
     assert "of 400 ns" in told.out
     assert "steps are doubled" not in told.out
