@@ -224,13 +224,13 @@ def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
     """Every variant and each of its impacts with its measures."""
     for name, variant in study.variants.items():
         yield name, variant, VARIANT_MEASURES
-        counts: Counter[str] = Counter()
-        for event, change in zip_longest(variant.result.events, variant.changes):
+        counts, called = Counter[str](), list[str]()
+        for event in variant.result.events:
             counts[event.stop] += 1
-            called = f"{name}, {event.stop} {counts[event.stop]}"
-            yield called, event, EVENT_MEASURES
-            if change is not None:
-                yield f"{called}, steps doubled", change, CHANGE_MEASURES
+            called.append(f"{name}, {event.stop} {counts[event.stop]}")
+            yield called[-1], event, EVENT_MEASURES
+        for impact, change in zip(called, variant.changes, strict=False):
+            yield f"{impact}, steps doubled", change, CHANGE_MEASURES
 
 
 def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
