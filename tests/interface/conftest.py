@@ -31,7 +31,13 @@ from klack.reduction.transfer import TransferComparison
 
 MASS, SPEED = 2.96e-3, 0.5
 
-SOFTWARE_GL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+# charts of thousands of points, drawn in two dimensions, would take that renderer 15 s
+SOFTWARE_GL = (
+    "--use-gl=angle",
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-accelerated-2d-canvas",
+)
 
 
 @pytest.fixture(scope="module")
