@@ -28,6 +28,7 @@ def test_a_mesh_shows_its_sets_and_where_they_lie(capsys):
     assert "7670 nodes, 4741 elements" in shown
     assert "extent z 0 to 24 mm" in shown  # length of the drawn needle
     assert "surface top 82 faces, z 24 mm, r" in shown
+    assert "note files of this format have no end mark: compare the counts" in shown
 
 
 CASE = """\

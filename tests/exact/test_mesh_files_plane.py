@@ -95,7 +95,7 @@ def test_coordinate_systems_of_nastran(tmp_path: Path) -> None:
         ]
         lines += [f"CORD2{kind},4,9," + ",".join(f"{v}" for v in corners[:6])]
         lines += ["," + ",".join(f"{v}" for v in corners[6:])]
-        lines += ["CORD2R,9,,1.,1.,1.,1.,1.,2.", ",2.,1.,1.", "CTETRA,1,1,1,2,3,4"]
+        lines += ["CORD2R,9,,1.,1.,1.,1.,1.,2.", ",2.,1.,1.", "CTETRA,1,1,1,2,3,4", "ENDDATA"]
         path = tmp_path / f"{kind}.bdf"
         path.write_text("\n".join(lines))
         np.testing.assert_allclose(
@@ -107,7 +107,7 @@ def test_coordinate_system_by_nodes(tmp_path: Path) -> None:
     lines = ["GRID,11,,1.,0.,0.", "GRID,12,,1.,0.,1.", "GRID,13,,1.,1.,0.", "CORD1R,4,11,12,13"]
     lines += ["GRID,1,4,0.,0.,0.", "GRID,2,4,1.,0.,0.", "GRID,3,4,0.,1.,0.", "GRID,4,4,0.,0.,1."]
     path = tmp_path / "a.bdf"
-    path.write_text("\n".join([*lines, "CTETRA,1,1,1,2,3,4"]))
+    path.write_text("\n".join([*lines, "CTETRA,1,1,1,2,3,4", "ENDDATA"]))
     truth = [[1, 0, 0], [1, 1, 0], [0, 0, 0], [1, 0, 1]]
     np.testing.assert_allclose(read_mesh_file(path, 1.0).mesh.points, truth, atol=1e-15)
 
@@ -128,7 +128,7 @@ def test_node_sets_of_nastran(card: str, tmp_path: Path) -> None:
     name, members = SETS[card]
     lines = ["GRID,1,,0.,0.,0.", "GRID,2,,1.,0.,0.", "GRID,3,,0.,1.,0.", "GRID,4,,0.,0.,1."]
     path = tmp_path / "a.bdf"
-    path.write_text("\n".join([*lines, "CTETRA,1,1,1,2,3,4", card]))
+    path.write_text("\n".join([*lines, "CTETRA,1,1,1,2,3,4", card, "ENDDATA"]))
     model = read_mesh_file(path, 1.0)
     np.testing.assert_array_equal(model.node_numbers[model.mesh.node_sets[name]], members)
     assert (name in model.mesh.surfaces) == (len(members) >= 3)
@@ -140,7 +140,7 @@ def test_includes_and_comments_of_nastran(tmp_path: Path) -> None:
         "$ nodes\nGRID,1,,0.,0.,0. $ first\nGRID,2,,1.,0.,0.\n", encoding="utf-8"
     )
     text = "INCLUDE 'nodes/kn\u00f6pfe.inc'\nGRID,3,,0.,1.,0.\n\nGRID,4,,0.,0.,1.\n"
-    text += "CTETRA,1,1,1,2,3,x\n"
+    text += "CTETRA,1,1,1,2,3,x\nENDDATA\n"
     path = tmp_path / "a.bdf"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(Exception, match=r"a.bdf:5: CTETRA: got 'x'"):
@@ -219,7 +219,7 @@ def test_names_in_comments_of_nastran(tmp_path: Path) -> None:
     lines = ["GRID,1,,0.,0.,0.", "GRID,2,,1.,0.,0.", "GRID,3,,0.,1.,0.", "GRID,4,,0.,0.,1."]
     lines += ["CTETRA,1,3,1,2,3,4", "CTRIA3,2,4,1,2,3", "PSOLID,3,6", "MAT1,6,2.1+5,,.3"]
     lines += ['$HMNAME PROP                   3"needle" 4', "$ANSA_NAME_COMMENT;4;PSHELL;seat;"]
-    lines += ["$ Femap Material 6 : steel 1.4125"]
+    lines += ["$ Femap Material 6 : steel 1.4125", "ENDDATA"]
     path = tmp_path / "a.bdf"
     path.write_text("\n".join(lines))
     model = read_mesh_file(path, 1.0)

@@ -178,6 +178,8 @@ def test_a_damaged_ansys_file_is_refused(tmp_path):
         ("1,1, 1,1, 5.0\n1,11, 1,11, 3.0\n", "direction 11"),
         ("PART-1.1,1, 1,1, 5.0\n", "PART-1.1"),
         ("1 1 5.0\n2 2\n", ":2"),
+        ("2 1 -1.0\n2 2 3.0\n3 2 -1\n3 3 2\n", "no entry on the diagonal in row 1 of 3"),
+        ("1,1, 2,1, -1.0\n2,1, 2,1, 3.0\n", "no entry on the diagonal in row 1 of 2"),
     ],
 )
 def test_what_is_no_stiffness_is_refused_with_the_reason(text, complaint, tmp_path):

@@ -79,6 +79,14 @@ FAULTS = {
         "x.inp:2: .PART: got .PART of x.inp:1 without its end",
     ),
     "open part": (PART + "*PART, NAME=b\n", "x.inp:10: .PART: got the end of the file"),
+    "open assembly": (
+        PART + "*ASSEMBLY, NAME=s\n" + INSTANCE,
+        "x.inp:10: .ASSEMBLY: got the end of the file, expected .END ASSEMBLY before",
+    ),
+    "place twice": (
+        TET + "*ELEMENT, TYPE=C3D4, ELSET=body\n7, 4, 2, 1, 3\n",
+        "x.inp: element 7: got the corners of element 1 again",
+    ),
     "end only": (TET + "*END PART\n", "x.inp:8: .END PART: got an end without a start"),
     "parts without assembly": (
         PART + PART.replace("NAME=a", "NAME=b"),

@@ -45,7 +45,7 @@ NASTRAN = {
     ),
     "mark": (
         "GRID           1\nCTETRA         1       1       1       2       3       4"
-        "                +A\n+B             5\n",
+        "                +A\n+B             5\nENDDATA\n",
         "a.bdf:3: got a continuation marked '+B      '",
     ),
     "include": (bdf("INCLUDE '../other.bdf'"), "INCLUDE: got the file '../other.bdf'"),
@@ -53,6 +53,12 @@ NASTRAN = {
     "material": (bdf(TETRA, "MAT1,1,2.1e11"), "MAT1: got less than two of E, G and nu"),
     "inverted": (bdf("CTETRA,77,1,1,3,2,4"), "element 77 (tet4, solid 'psolid_1')"),
     "no elements": (bdf(), "got no solid elements"),
+    "cut off": (bdf(TETRA).removesuffix("ENDDATA"), "got no ENDDATA behind its last line ('CTE"),
+    "element twice": (bdf(TETRA, TETRA), "got element 1 for the second time"),
+    "place twice": (
+        bdf(TETRA, "CTETRA,9,2,2,3,1,4"),
+        "element 9: got the corners of element 1 again, expected every element once",
+    ),
 }
 
 
@@ -87,7 +93,27 @@ ANSYS = {
     "no end": (cdb([TET]).partition("      -1")[0], "the end of the file, expected the end mark"),
     "format": (cdb([TET]).replace("(19i8)", "(free)"), "got '(free)', expected the format"),
     "nothing": ("/PREP7\n", "got no NBLOCK"),
+    "element twice": (
+        cdb([TET, TET]).replace("       0       2", "       0       1"),
+        "got element 1 for the second time",
+    ),
+    "parameter": (
+        cdb([TET]).replace("ET,1", "*GET,tid,ETYP,0,NUM,MAX\nET,tid"),
+        "a.cdb:3: got 'tid', a formula, or a parameter that the file does not set to a number",
+    ),
+    "damage": (cdb([TET]).replace("ET,1", "ET,1#"), "the file may be damaged"),
 }
+
+
+def test_ansys_parameters(tmp_path: Path) -> None:
+    """As *Write Input File* sets them, one after the other; truth: the same file with numbers."""
+    text = "*set,tid,4\nET,tid,170\ntid=1\n" + cdb([TET]).replace("ET,1,", "et,TID,")
+    text += "cid = 3\nMP,EX,cid,2.1e5\nMP,NUXY,cid,0.3\n*SET,cid,5\nMP,DENS,cid,7e-9\n"
+    (tmp_path / "a.cdb").write_text(text)
+    model = read_mesh_file(tmp_path / "a.cdb", MM)
+    assert model.mesh.element_count == 1
+    assert list(model.materials) == ["material_3"]
+    assert model.materials["material_3"].young == 2.1e5
 
 
 @pytest.mark.parametrize("fault", ANSYS)
@@ -129,6 +155,20 @@ GMSH = {
     ),
     "version": (HEAD.replace("2.2", "4.0"), "got version 4.0, expected 2.2 or 4.1"),
     "not gmsh": ("solid cube\n", "got no $MeshFormat at its start"),
+    "element twice": (
+        msh(["1 4 2 1 1 1 2 3 4", "1 4 2 1 1 1 2 3 4"]),
+        "got element 1 for the second time",
+    ),
+    "elements behind the count": (
+        msh(["1 4 2 1 1 1 2 3 4", "2 2 2 2 1 1 2 4", "2 2 2 2 1 1 2 4"]).replace(
+            "$Elements\n3", "$Elements\n2"
+        ),
+        "got more elements than the 2 of its count",
+    ),
+    "nodes behind the count": (
+        msh(["1 4 2 1 1 1 2 3 4"]).replace("$Nodes\n5", "$Nodes\n4"),
+        "got 4 numbers more than its counts",
+    ),
     "partitions": (HEAD.replace("2.2", "4.1") + "$PartitionedEntities\n", "without partitions"),
 }
 

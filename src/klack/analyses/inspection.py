@@ -13,7 +13,7 @@ from klack.case.surface_names import require_surface_names
 from klack.errors import InputError
 from klack.input.existing_file import refuse_lfs_pointer
 from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
-from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS
+from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS, format_of
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh
@@ -57,7 +57,7 @@ def inspect_file(
     if ending in STEP_ENDINGS:
         return tuple(_step_rows(step_content(path)))
     if ending in MESH_FORMATS:
-        return tuple(_mesh_rows(read_mesh_file(path, unit_length, solids_only=True)))
+        return tuple(_mesh_rows(path, read_mesh_file(path, unit_length, solids_only=True)))
     if ending in MATRIX_FORMATS:
         return tuple(_rows_of_matrices(path, matrix))
     if ending == ".fmu":
@@ -96,7 +96,7 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
                 mesh.file, mesh.unit, solids=solids, solids_only=mesh.solids_only
             )
             known[name] = tuple(model.mesh.surfaces)
-            yield name, tuple(_mesh_rows(model))
+            yield name, tuple(_mesh_rows(Path(mesh.file), model))
         elif body.geometry.step is not None:
             content = step_content(body.geometry.step.file)
             known[name] = tuple(face.name for face in content.faces)
@@ -147,7 +147,7 @@ def _box(part: StepPart) -> str:
     return ", ".join(f"{axis} {_range(np.array([low, high]))}" for axis, low, high in spans)
 
 
-def _mesh_rows(model: MeshModel) -> Iterator[Row]:
+def _mesh_rows(path: Path, model: MeshModel) -> Iterator[Row]:
     mesh = model.mesh
     summary = mesh_summary(mesh)
     kind = {2: "axisymmetric (r, z)", 3: "three-dimensional"}[mesh.dimension]
@@ -179,6 +179,9 @@ def _mesh_rows(model: MeshModel) -> Iterator[Row]:
         yield "material", name, f"{kind}; klack computes isotropic materials only"
     for kind, count in model.left_out.items():
         yield "left out", kind, f"{count} elements; a case needs 'elements: solids-only' for them"
+    if format_of(path).open_end:
+        words = "files of this format have no end mark: compare the counts with its program"
+        yield "note", "", words
 
 
 def _rows_of_matrices(path: Path, name: str | None) -> Iterator[Row]:

@@ -26,7 +26,8 @@ def read_abaqus_mtx(path: Path, name: str | None, role: Role | None) -> SystemMa
     Raises
     ------
     InputError
-        For internal nodes (negative numbers), for labels instead of numbers, and for damaged files.
+        For internal nodes (negative numbers), for labels instead of numbers, and for damaged files:
+        the format has neither head nor count, but each row has its entry on the diagonal.
     """
     columns = _columns(path)
     with path.open("rb") as stream:
@@ -34,6 +35,7 @@ def read_abaqus_mtx(path: Path, name: str | None, role: Role | None) -> SystemMa
     if columns == 3:
         row, column = (whole_numbers(str(path), table[:, k], "an index") - 1 for k in (0, 1))
         size = int(max(row.max(), column.max())) + 1
+        _require_diagonal(path, row, column, size)
         matrix, notes = symmetric_matrix(str(path), row, column, table[:, 2], size)
         return SystemMatrix(path=path, name="", matrix=matrix, notes=notes)
     if np.any(table[:, [0, 2]] < 0):
@@ -47,8 +49,23 @@ def read_abaqus_mtx(path: Path, name: str | None, role: Role | None) -> SystemMa
     nodes = whole_numbers(str(path), table[:, [0, 2]], "a node")
     ways = whole_numbers(str(path), table[:, [1, 3]], "a direction")
     rows, row, column = places_of_entries(str(path), nodes, ways)
+    _require_diagonal(path, row, column, len(rows.node))
     matrix, notes = symmetric_matrix(str(path), row, column, table[:, 4], len(rows.node))
     return SystemMatrix(path=path, name="", matrix=matrix, rows=rows, notes=notes)
+
+
+def _require_diagonal(
+    path: Path, row: NDArray[np.int64], column: NDArray[np.int64], size: int
+) -> None:
+    own = row[row == column]
+    if size <= len(row) and len(missing := np.setdiff1d(np.arange(size), own)):
+        raise InputError(
+            str(path),
+            got=f"no entry on the diagonal in row {missing[0] + 1} of {size}",
+            expected="an entry on the diagonal of each row, as stiffness and mass have them",
+            hint="its first or last lines may be missing: write it again. A Matrix Market file "
+            "starts with %%MatrixMarket, and states its size and count.",
+        )
 
 
 def places_of_entries(

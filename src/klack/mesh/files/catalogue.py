@@ -40,12 +40,16 @@ class MeshFormat:
         Of the names of such files.
     mark : bytes, optional
         Pattern of a line that only these files have: it decides where formats share an ending.
+    open_end : bool, optional
+        Whether the format has neither an end mark nor counts of all its content: what a file
+        loses behind a whole block is not seen.
     """
 
     path: str
     program: str
     endings: tuple[str, ...]
     mark: bytes = b""
+    open_end: bool = False
 
     @property
     def reader(self) -> MeshReader:
@@ -61,9 +65,13 @@ class MeshFormat:
 # A new format is a folder with its reader, and one line here.  Of formats with the same ending
 # those with a mark stand first.  Nothing is imported before a file is read.
 FORMATS = (
-    MeshFormat("abaqus.reader.read_abaqus", "Abaqus or CalculiX input", (".inp",)),
+    MeshFormat("abaqus.reader.read_abaqus", "Abaqus or CalculiX input", (".inp",), open_end=True),
     MeshFormat(
-        "ansys.reader.read_ansys_archive", "ANSYS archive", (".cdb", ".dat"), rb"^\s*nblock\s*,"
+        "ansys.reader.read_ansys_archive",
+        "ANSYS archive",
+        (".cdb", ".dat"),
+        rb"^\s*nblock\s*,",
+        open_end=True,
     ),
     MeshFormat("nastran.reader.read_nastran", "Nastran bulk data", (".bdf", ".nas", ".dat")),
     MeshFormat("gmsh.reader.read_gmsh", "Gmsh mesh", (".msh",)),

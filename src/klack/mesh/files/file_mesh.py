@@ -91,12 +91,13 @@ def mesh_model(
     Raises
     ------
     InputError
-        For nodes that are missing or there twice, solids that are not there, surface elements on
-        no solid, points left of the axis, and inverted elements.
+        For nodes that are missing, nodes and elements that are there twice, solids that are not
+        there, surface elements on no solid, points left of the axis, and inverted elements.
     """
     require_positive(f"{path}: unit of length", unit_length, "m")
     solids = tuple(part for part in raw.solids if len(part.numbers))
     dimension = _dimension(path, solids)
+    _require_once(path, "element", np.sort(np.concatenate([part.numbers for part in solids])))
     nodes = _NodeNumbers(path, raw.numbers)
     everything = tuple(
         ElementBlock(part.family, nodes.index(part), part.name) for part in _merged(solids)
@@ -182,6 +183,18 @@ def _merged(parts: tuple[FileElements, ...]) -> tuple[FileElements, ...]:
     )
 
 
+def _require_once(path: Path, kind: str, ascending: Ints) -> None:
+    """Raise for a number that is there twice."""
+    twice = np.flatnonzero(ascending[1:] == ascending[:-1])
+    if len(twice):
+        raise InputError(
+            str(path),
+            got=f"{kind} {ascending[twice[0]]} for the second time",
+            expected=f"every {kind} once",
+            hint="look for lines that are there twice, or write the file again.",
+        )
+
+
 class _NodeNumbers:
     """Node numbers of the file in ascending order."""
 
@@ -189,14 +202,7 @@ class _NodeNumbers:
         self._path = path
         self.order = np.argsort(numbers, kind="stable")
         self.sorted = numbers[self.order]
-        twice = np.flatnonzero(self.sorted[1:] == self.sorted[:-1])
-        if len(twice):
-            raise InputError(
-                str(path),
-                got=f"node {self.sorted[twice[0]]} for the second time",
-                expected="every node once",
-                hint="write the file again from the preprocessor.",
-            )
+        _require_once(path, "node", self.sorted)
 
     def index(self, part: FileElements) -> Ints:
         """Nodes of elements, counted from 0."""

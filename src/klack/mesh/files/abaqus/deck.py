@@ -75,6 +75,7 @@ class _Reader:
     parts: dict[str, Scope] = field(default_factory=dict)
     scope: Scope | None = None  # of the part or instance that is open
     opened: Keyword | None = None
+    assembly: Keyword | None = None  # that is open
     placement: Placement | None = None
     material: _Material | None = None
     materials: dict[str, FileMaterial] = field(default_factory=dict)
@@ -92,6 +93,7 @@ class _Reader:
                 self._close(keyword)
             case "ASSEMBLY" | "END ASSEMBLY":
                 self._require_closed(keyword)
+                self.assembly = keyword if keyword.name == "ASSEMBLY" else None
             case "MATERIAL":
                 self.material = _Material(keyword.parameter("NAME"))
             case "ELASTIC" | "DENSITY":
@@ -189,11 +191,11 @@ class _Reader:
 
     def finish(self) -> Deck:
         """Resolve what had to wait for the end of the file."""
-        if self.opened is not None:
+        if (opened := self.opened or self.assembly) is not None:
             raise InputError(
-                f"{self.opened.place}: *{self.opened.name}",
+                f"{opened.place}: *{opened.name}",
                 got="the end of the file",
-                expected=f"*END {self.opened.name} before",
+                expected=f"*END {opened.name} before",
                 hint="the file may be truncated: write it again from the preprocessor.",
             )
         if self.parts and not self.root.instances:

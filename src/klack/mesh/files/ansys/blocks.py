@@ -55,7 +55,7 @@ class Archive:
     points : array, shape (n, 3)
     elements : ElementTable
     commands : tuple of (line, fields)
-        Fields stripped, names of commands in capitals.
+        Fields stripped, names of commands in capitals, parameters replaced by their values.
     components : tuple of (name, "NODE" or "ELEM", ranges of numbers)
     """
 
@@ -90,6 +90,7 @@ def read_archive(path: Path) -> Archive:
     elements: list[ElementTable] = []
     components = []
     commands = []
+    parameters: dict[str, str] = {}
     for i, row in enumerate(rows):
         fields = _fields(lines, row)
         block = _Block(lines, row, rows[i + 1 :], fields)
@@ -107,7 +108,9 @@ def read_archive(path: Path) -> Archive:
             case "N" | "EN" if _field(fields, 3) != "-1":
                 _refuse_unblocked(lines, row)
             case _:
+                fields = (fields[0], *(parameters.get(one.upper(), one) for one in fields[1:]))
                 commands.append((row, fields))
+                parameters |= _set(fields)
     if not nodes or not elements:
         raise InputError(
             str(path),
@@ -148,6 +151,14 @@ def _fields(lines: TextLines, row: int) -> tuple[str, ...]:
     text = lines.line(row)[:640].partition("!")[0]
     name, *rest = (field.strip() for field in text.split(","))
     return (name.upper(), *rest)
+
+
+def _set(fields: tuple[str, ...]) -> dict[str, str]:
+    """Parameter that a command sets by ``*SET,name,value`` or ``name=value``, in capitals."""
+    if fields[0] == "*SET" and len(fields) > 2:
+        return {fields[1].upper(): fields[2]}
+    name, equals, value = (part.strip() for part in fields[0].partition("="))
+    return {name: value} if equals and len(fields) == 1 and name.isidentifier() else {}
 
 
 def _field(fields: tuple[str, ...], number: int) -> str:

@@ -7,6 +7,7 @@ and contact settings are ignored.
 Read by hand: mapdl-archive (0.4.2) takes 222 of 300 damaged archives, this reader 17.
 """
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -129,13 +130,24 @@ def _unit(path: Path, archive: Archive) -> float:
 
 def _whole(archive: Archive, row: int, text: str) -> int:
     if not text.lstrip("-").isdecimal() or len(text) > 18:
-        raise InputError(
-            archive.lines.place(row),
-            got=repr(text),
-            expected="a whole number",
-            hint="the file may be damaged: write it again with CDWRITE, DB.",
-        )
+        raise _no_number(archive, row, text, "a whole number")
     return int(text)
+
+
+_FORMULA = re.compile(r"[A-Za-z_][\w%()*/+-]*|\d+[*/+-][\w%()*/+-]+")
+
+
+def _no_number(archive: Archive, row: int, text: str, expected: str) -> InputError:
+    """A formula or a parameter that the file does not set is no damage."""
+    if _FORMULA.fullmatch(text):
+        return InputError(
+            archive.lines.place(row),
+            got=f"'{text}', a formula, or a parameter that the file does not set to a number",
+            expected=expected,
+            hint="*SET it to a number above, or write the mesh with CDWRITE, DB from ANSYS.",
+        )
+    hint = "the file may be damaged: write it again with CDWRITE, DB."
+    return InputError(archive.lines.place(row), got=repr(text), expected=expected, hint=hint)
 
 
 def _element_types(archive: Archive) -> tuple[dict[int, int], dict[int, int]]:
@@ -144,7 +156,7 @@ def _element_types(archive: Archive) -> tuple[dict[int, int], dict[int, int]]:
     first_option: dict[int, int] = {}
     for row, fields in archive.commands:
         if fields[0] == "ET" and len(fields) > 2:
-            name = fields[2].lstrip("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz")
+            name = re.sub(r"^[A-Za-z]+(?=\d)", "", fields[2])
             kinds[_whole(archive, row, fields[1])] = _whole(archive, row, name)
             if len(fields) > 3 and fields[3].isdecimal():
                 first_option[int(fields[1])] = int(fields[3])
@@ -334,9 +346,4 @@ def _real(archive: Archive, row: int, text: str) -> float:
     try:
         return float(text.replace("D", "E"))
     except ValueError:
-        raise InputError(
-            archive.lines.place(row),
-            got=repr(text),
-            expected="a number",
-            hint="the file may be damaged: write it again with CDWRITE, DB.",
-        ) from None
+        raise _no_number(archive, row, text, "a number") from None

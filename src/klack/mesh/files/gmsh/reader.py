@@ -21,6 +21,7 @@ from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.gmsh.sections import GmshContent, GmshElements, read_content
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.plausible import require_unit
+from klack.mesh.files.sound_mesh import same_nodes
 
 __all__ = ["read_gmsh"]
 
@@ -149,12 +150,10 @@ def _require_once(path: Path, bodies: list[GmshElements]) -> None:
         if len({part.groups for part in same}) < 2:
             continue
         corners = FAMILIES[_FAMILIES[kind][0]].corners
-        keys = np.sort(np.concatenate([part.nodes[:, :corners] for part in same]), axis=1)
-        order = np.lexsort(keys.T)
-        twice = np.flatnonzero((keys[order[1:]] == keys[order[:-1]]).all(axis=1))
-        if len(twice):
+        nodes = np.concatenate([part.nodes[:, :corners] for part in same])
+        if (twice := same_nodes(nodes)) is not None:
             numbers = np.concatenate([part.numbers for part in same])
-            _refuse_two_groups(path, int(numbers[order[twice[0]]]), "the file has it twice")
+            _refuse_two_groups(path, int(numbers[twice[0]]), "the file has it twice")
 
 
 def _solid(path: Path, content: GmshContent, part: GmshElements) -> FileElements:

@@ -181,6 +181,7 @@ class _Reader:
                     self._old_elements(place, text)
                 case _:
                     self._new(name, place, text)
+            text.require_end()
             return end
         line = self._data.find(b"\n", start) + 1 if old else start
         stream = BinaryStream(place, self._data, line, self._order, self._size)
@@ -219,7 +220,7 @@ class _Reader:
 
     def _old_elements(self, place: str, text: TextStream) -> None:
         """Rows of number, type, number of tags, tags, nodes; neighbours mostly alike."""
-        left = int(text.sizes(1)[0])
+        left = count = int(text.sizes(1)[0])
         values = text.whole(text.left)
         at = 0
         while left > 0:
@@ -231,11 +232,13 @@ class _Reader:
             most = min(left, (len(values) - at) // width) if 0 <= tags <= 10_000 else 0
             if most == 0:
                 refuse(place, f"an element with {tags} tags", "a whole element")
-            count = _alike(values[at:], width, most)
-            rows = values[at : at + count * width].reshape(count, width)
+            same = _alike(values[at:], width, most)
+            rows = values[at : at + same * width].reshape(same, width)
             self._take_tagged(place, kind, tags, rows[:, [0, *range(3, width)]])
-            at += count * width
-            left -= count
+            at += same * width
+            left -= same
+        if at < len(values):
+            refuse(place, f"more elements than the {count} of its count", "as many as it counts")
 
     def _old_binary_elements(self, place: str, stream: BinaryStream, left: int) -> None:
         while left > 0:

@@ -42,6 +42,11 @@ class TextStream:
         """Number of remaining numbers."""
         return len(self._values) - self._at
 
+    def require_end(self) -> None:
+        """Raise for numbers behind those that were counted."""
+        if self.left:
+            refuse(self._place, f"{self.left} numbers more than its counts", "as many as it counts")
+
     def real(self, count: int) -> NDArray[np.float64]:
         """Give the next finite numbers."""
         if not 0 <= count <= self.left:

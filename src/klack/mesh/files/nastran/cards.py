@@ -254,8 +254,8 @@ def read_bulk(path: Path) -> BulkData:
     Raises
     ------
     InputError
-        If it is no text, an include is missing or lies outside the folder, or a continuation does
-        not follow its card.
+        If it is no text or does not end with ENDDATA, an include is missing or lies outside the
+        folder, or a continuation does not follow its card.
     """
     data, pieces = text_with_includes(path)
     lines = TextLines.of(data, path.name)
@@ -269,7 +269,7 @@ def read_bulk(path: Path) -> BulkData:
         for row in comment_rows.tolist()
     )
     filled = _filled(lines)
-    head, body = _split(lines, filled)
+    head, body = _split(path, lines, filled)
     first_cells = lines.cells(body, 0, 8)[:, 0]
     names = _names(first_cells)
     is_card = (names != b"") & ~np.char.startswith(names, b"+") & ~np.char.startswith(names, b"*")
@@ -362,13 +362,23 @@ def _filled(lines: TextLines) -> NDArray[np.int64]:
 
 
 def _split(
-    lines: TextLines, filled: NDArray[np.int64]
+    path: Path, lines: TextLines, filled: NDArray[np.int64]
 ) -> tuple[tuple[str, ...], NDArray[np.int64]]:
     """Lines in front of BEGIN BULK as text, and the lines of the bulk data up to ENDDATA."""
     words = _names(lines.cells(filled, 0, 8)[:, 0])
     begin = np.flatnonzero(np.char.startswith(words, b"BEGIN"))
     first = int(begin[0]) + 1 if len(begin) else 0
     end = np.flatnonzero(words[first:] == b"ENDDATA")
-    last = first + int(end[0]) if len(end) else len(filled)
+    if not len(end):
+        raise InputError(
+            str(path),
+            got=f"no ENDDATA behind its last line ({lines.line(int(filled[-1]))[:40].strip()!r})"
+            if len(filled)
+            else "an empty file",
+            expected="bulk data that end with the line ENDDATA",
+            hint="the file may be truncated: write it again from the preprocessor. Where it is "
+            "whole, as one for INCLUDE, add ENDDATA as its last line.",
+        )
+    last = first + int(end[0])
     head = tuple(lines.line(row) for row in filled[: max(first - 1, 0)].tolist())
     return head, filled[first:last]
