@@ -52,7 +52,7 @@ def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> Com
     InputError
         If channels do not overlap in time, or a stored time is unusable.
     """
-    bases = {channel.name: recording.time_base(channel.name) for channel in found.values()}
+    bases = {name: base for name, (base, _) in _bases(recording, found).items()}
     fastest = min(bases.values(), key=lambda base: base.step)
     begin = max(base.start for base in bases.values())
     end = min(base.end for base in bases.values())
@@ -63,11 +63,13 @@ def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> Com
     if count < 2:
         raise InputError(
             f"{recording.path.name}: channels",
-            got=f"no common time of {', '.join(bases)}",
+            got="no common time of "
+            + ", ".join(f"{name} ({b.start:.6g} to {b.end:.6g} s)" for name, b in bases.items()),
             expected="channels that were recorded at the same time",
             hint="choose channels of one measurement in the section 'measurement' of the case.",
         )
     notes = [*recording.notes, *(channel.note for channel in found.values())]
+    notes += _started(recording, found)
     for name, base in bases.items():
         notes.append(base.note)
         if base.uniform and not _on_grid(base, start, fastest.step):
@@ -116,11 +118,15 @@ def read_channels(
             hint="check the window.",
         )
     start = clock.start + clock.step * first
+    bases = _bases(recording, found)
     return {
         role: TimeSeries(
             step=clock.step,
             values=channel.offset
-            + channel.factor * _values_at(recording, channel.name, start, clock.step, last - first),
+            + channel.factor
+            * _values_at(
+                recording, channel.name, bases[channel.name], start, clock.step, last - first
+            ),
             unit=ROLES[role].unit,
             start=start,
             name=channel.name,
@@ -171,6 +177,33 @@ def windows(
         first = last - shared
 
 
+def _bases(
+    recording: Recording, found: Mapping[Role, FoundChannel]
+) -> dict[str, tuple[TimeBase, float]]:
+    """Time of each channel from the earliest start of them, and its start after that [s]."""
+    origins = {one.name: recording.channel(one.name).origin for one in found.values()}
+    known = [origin for origin in origins.values() if origin is not None]
+    result = {}
+    for name, origin in origins.items():
+        later = 0.0 if origin is None else 1e-9 * (origin - min(known))
+        result[name] = recording.time_base(name).moved(later), later
+    return result
+
+
+def _started(recording: Recording, found: Mapping[Role, FoundChannel]) -> Iterator[str]:
+    """Which channels start later by the clock of the file, and which of them do not say."""
+    where, bases = recording.path.name, _bases(recording, found)
+    for name, (_, later) in bases.items():
+        if later > 0.0:
+            yield f"{where}: '{name}' starts {later:.9g} s later by the time stamps of the file."
+    silent = [name for name in bases if recording.channel(name).origin is None]
+    if 0 < len(silent) < len(bases):
+        yield (
+            f"{where}: {', '.join(silent)} without a start time; taken to start with the earliest "
+            "of the others."
+        )
+
+
 def _on_grid(base: TimeBase, start: float, step: float) -> bool:
     """True if samples of a uniform channel fall onto the common time."""
     if abs(base.step - step) * base.count > _SAME * step:
@@ -179,9 +212,16 @@ def _on_grid(base: TimeBase, start: float, step: float) -> bool:
     return abs(shift - round(shift)) <= _SAME
 
 
-def _values_at(recording: Recording, name: str, start: float, step: float, count: int) -> Vector:
+def _values_at(
+    recording: Recording,
+    name: str,
+    known: tuple[TimeBase, float],
+    start: float,
+    step: float,
+    count: int,
+) -> Vector:
     """Values of a channel [unit of the file] at ``start + step * k``."""
-    base = recording.time_base(name)
+    base, later = known
     if base.uniform and _on_grid(base, start, step):
         begin = round((start - base.start) / step)
         values = recording.values(name, begin, begin + count)
@@ -190,6 +230,7 @@ def _values_at(recording: Recording, name: str, start: float, step: float, count
         time = np.arange(values.size, dtype=np.float64)
         return _filled(recording, name, time, values, start + step * time)
     time, values = recording.read(name, *base.samples(start, start + step * (count - 1)))
+    time = time + later
     if base.uniform:
         time = base.start + base.step * np.round((time - base.start) / base.step)
     if not np.all(np.isfinite(values)):

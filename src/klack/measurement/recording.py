@@ -43,6 +43,8 @@ class ChannelInfo:
         Name of the stored time; empty if the file gives start and step alone.
     label : str
         Name and unit as the file writes them, ``"lift [um]"``.
+    origin : int, optional [ns]
+        When its time is zero, as the file says it by date and time of day; since 1970.
     """
 
     name: str
@@ -52,6 +54,7 @@ class ChannelInfo:
     step: float
     clock: str = ""
     label: str = ""
+    origin: int | None = None
 
 
 class Recording(Closing):

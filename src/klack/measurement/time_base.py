@@ -50,6 +50,12 @@ class TimeBase:
     note: str = ""
     marks: Vector
 
+    def moved(self, later: float) -> "TimeBase":
+        """The same samples, ``later`` [s]."""
+        return replace(
+            self, start=self.start + later, end=self.end + later, marks=self.marks + later
+        )
+
     def samples(self, begin: float, end: float) -> tuple[int, int]:
         """Range of samples that covers the times ``begin`` to ``end``, and a few more."""
         if self.uniform:

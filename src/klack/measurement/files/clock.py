@@ -1,12 +1,13 @@
-"""Which of the arrays of a file is its time, and in which unit."""
+"""Which of the arrays of a file is its time, in which unit, and when it is zero."""
 
 import re
+from calendar import timegm
 
 from klack.errors import InputError
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
 
-__all__ = ["SLOWEST", "clock_factor", "is_clock", "unique_names"]
+__all__ = ["SLOWEST", "clock_factor", "instant", "is_clock", "no_clock", "since", "unique_names"]
 
 SLOWEST = 1e-3  # [s]
 """Longest step at which a time without unit passes as seconds: lift is measured faster."""
@@ -17,7 +18,44 @@ _NAME = re.compile(
     r"([ _-]?(s|sec|ms|us|ns|abs|rel|axis|vector|\#?\d+))?",
     re.IGNORECASE,
 )
-_TIME_UNITS = {"s", "sec", "ms", "us", "ns", "msec", "usec", "seconds", "Sekunden", "second"}
+_TIME_UNITS = {
+    *("s", "sec", "second", "seconds", "Sekunden"),
+    *("ms", "msec", "millisecond", "milliseconds"),
+    *("us", "usec", "microsecond", "microseconds", "ns"),
+}
+
+
+_INSTANT = re.compile(
+    r"(\d{4})[-/.](\d\d?)[-/.](\d\d?)(?:[T\s]+(\d\d?):(\d\d)(?::(\d\d)(?:[.,](\d+))?)?)?"
+    r"\s*(?:Z|UTC|GMT|([+-]\d\d?):?(\d\d)?)?"
+)
+
+
+def instant(text: str) -> int | None:
+    """Date and time of day since 1970 [ns]; None if the text is something else.
+
+    Examples
+    --------
+    >>> instant("1970-01-01T00:00:01.5"), instant("1970/01/02"), instant("1970-01-01 1:00 +01:00")
+    (1500000000, 86400000000000, 0)
+    """
+    found = _INSTANT.fullmatch(text.strip())
+    if found is None:
+        return None
+    *numbers, part, hours, minutes = found.groups(default="")
+    year, month, day, hour, minute, second = (int(number or "0") for number in numbers)
+    if not (1 <= month <= 12 and 1 <= day <= 31):
+        return None
+    ahead = 3600 * int(hours or "0")
+    ahead += (-60 if hours.startswith("-") else 60) * int(minutes or "0")
+    whole = timegm((year, month, day, hour, minute, second)) - ahead
+    return 10**9 * whole + int(part[:9].ljust(9, "0"))
+
+
+def since(unit: str) -> tuple[str, int | None]:
+    """Unit and zero [ns] of a time in the manner of netCDF, ``seconds since 2026-03-02 08:00``."""
+    plain, _, zero = unit.partition(" since ")
+    return (plain.strip(), instant(zero)) if zero else (unit, None)
 
 
 def is_clock(name: str, unit: str) -> bool:

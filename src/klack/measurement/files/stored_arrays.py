@@ -6,18 +6,27 @@ Such files have no fixed form.  Understood are
 - a group or structure per channel: ``lift`` with ``time``, ``values``, ``unit``;
 - a sampling step or rate beside them or as attribute: ``dt``, ``fs``, ``sampling_rate``;
 - matrices with one stroke per row or column: ``lift #1``, ``lift #2``, ...;
-- units as attribute, as text beside (``unit``, ``lift_unit``) or in the name (``lift_um``).
+- units as attribute, as text beside (``unit``, ``lift_unit``) or in the name (``lift_um``);
+- starts as numbers (``t0``) or dates (``start_time``, ``seconds since 2026-03-02 08:00``);
+- ``TimeInfo`` and ``DataInfo`` beside ``Time`` and ``Data`` of a MATLAB timeseries.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.measurement.files.clock import clock_factor, is_clock, no_clock, unique_names
+from klack.measurement.files.clock import (
+    clock_factor,
+    instant,
+    is_clock,
+    no_clock,
+    since,
+    unique_names,
+)
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.recording import ChannelInfo, Recording
 from klack.measurement.unit_text import no_unit, plain_unit
@@ -41,6 +50,8 @@ _RATES = (
     "abtastrate",
 )
 _STARTS = ("t0", "start", "start_time", "wf_start_offset")
+_DATES = (*_STARTS, "wf_start_time", "startdate", "start_date", "date_time")
+_ABOUT = {"timeinfo": "time_units", "datainfo": "data_units"}
 _MOST_STROKES = 100_000
 
 
@@ -92,6 +103,8 @@ class _Line:
     clock: tuple[StoredArray, float] | None
     start: float
     step: float
+    origin: int | None
+    own_start: float | None
 
 
 class ArrayRecording(Recording):
@@ -107,6 +120,7 @@ class ArrayRecording(Recording):
     def __init__(self, path: Path, root: StoredGroup, time_step: float | None) -> None:
         notes: list[str] = []
         lines = _lines(path.name, root, None, {}, time_step, notes)
+        _require_one_start(path.name, lines)
         names = unique_names([line.name for line in lines])
         self._line = dict(zip(names, lines, strict=True))
         infos = tuple(
@@ -118,6 +132,7 @@ class ArrayRecording(Recording):
                 step=line.step,
                 clock="" if line.clock is None else f"{id(line.clock[0])}",
                 label=line.array.name,
+                origin=line.origin,
             )
             for name, line in self._line.items()
         )
@@ -169,6 +184,7 @@ def _lines(
     notes: list[str],
 ) -> list[_Line]:
     """Channels of a group and of those below it; time and step are handed down."""
+    group = _with_info(group)
     about = {**about, **group.about}
     times = [array for array in group.arrays if _is_time(array, group)]
     clock = (times[0], _unit_of(times[0], group)) if times else clock
@@ -181,12 +197,47 @@ def _lines(
     return lines
 
 
+def _with_info(group: StoredGroup) -> StoredGroup:
+    """A MATLAB timeseries with what its ``TimeInfo`` and ``DataInfo`` say as texts beside it."""
+    about, groups = dict(group.about), []
+    for below in group.groups:
+        key = _ABOUT.get(below.path.rsplit("/", 1)[-1].lower())
+        if key is None:
+            groups.append(below)
+            continue
+        about |= {key: below.about.get("units", "")}
+        about |= {name: value for name, value in below.about.items() if name == "startdate"}
+    return replace(group, about=about, groups=groups)
+
+
+def _require_one_start(file: str, lines: Sequence[_Line]) -> None:
+    """Refuse channels of one stored time that are said to start apart."""
+    first: dict[int, _Line] = {}
+    for line in lines:
+        if line.clock is None:
+            continue
+        other = first.setdefault(id(line.clock[0]), line)
+        if other.own_start != line.own_start:
+            starts = [
+                f"'{one.name}' " + ("without" if one.own_start is None else f"{one.own_start:g} s")
+                for one in (other, line)
+            ]
+            raise InputError(
+                f"{file}: start of '{line.name}'",
+                got=f"different starts beside one stored time: {', '.join(starts)}",
+                expected="a start, or a stored time",
+                hint="give each channel its own time, or a step and a start.",
+            )
+
+
 def _is_time(array: StoredArray, group: StoredGroup) -> bool:
     if not _is_vector(array.shape):
         return False
     name, unit = _split(array.name)[0], _unit_of(array, group)
     has_values = any(_split(other.name)[0].lower() in _VALUES for other in group.arrays)
-    return is_clock(name, unit) or (has_values and name.lower() in _TIMES and no_unit(unit))
+    return is_clock(name, since(unit)[0]) or (
+        has_values and name.lower() in _TIMES and no_unit(unit)
+    )
 
 
 def _lines_of(
@@ -213,7 +264,7 @@ def _lines_of(
     path = "/".join(part for part in (group.path, name) if part)
     if name.lower() in _VALUES and group.path:
         path = group.path
-    start, step, used = _time_of(file, path, array, count, clock, about, time_step, notes)
+    start, step, used, origin = _time_of(file, path, array, count, clock, about, time_step, notes)
     return [
         _Line(
             array=array,
@@ -225,6 +276,8 @@ def _lines_of(
             clock=used,
             start=start,
             step=step,
+            origin=origin,
+            own_start=_start(array.about),
         )
         for line in range(strokes)
     ]
@@ -239,24 +292,28 @@ def _time_of(
     about: Mapping[str, str | float],
     time_step: float | None,
     notes: list[str],
-) -> tuple[float, float, tuple[StoredArray, float] | None]:
-    """Start, step and stored time: own attributes first, then a time, then those of the group."""
+) -> tuple[float, float, tuple[StoredArray, float] | None, int | None]:
+    """Start, step, stored time and its zero: own attributes, then a time, then of the group."""
+    date, start = _date(array.about) or _date(about), _start(array.about)
+    start = (_start(about) or 0.0) if start is None else start
     step = _step(file, name, array.about)
     if step is not None:
-        return _start(array.about), step, None
+        return start, step, None, date
     if clock is not None and max(clock[0].shape) == count:
         stored, unit = clock
         if not no_unit(unit) or time_step is None:
             axis = _long_axis(stored.shape)
             first, last = (float(stored.read(0, axis, k, k + 1)[0]) for k in (0, count - 1))
             mean = (last - first) / (count - 1)
+            unit, zero = since(unit)
             factor, note = clock_factor(unit, mean, f"{file}: '{stored.name}'")
             notes += [note] if note else []
-            return factor * first, factor * mean, (stored, factor)
+            zero = date if zero is None else zero
+            return factor * first, factor * mean, (stored, factor), zero
     step = _step(file, name, about) if time_step is None else time_step
     if step is None:
         raise no_clock(f"{file}: '{name}'")
-    return _start(about), step, None
+    return start, step, None, date
 
 
 def _step(file: str, name: str, about: Mapping[str, str | float]) -> float | None:
@@ -277,5 +334,10 @@ def _step(file: str, name: str, about: Mapping[str, str | float]) -> float | Non
     return None
 
 
-def _start(about: Mapping[str, str | float]) -> float:
-    return next((v for key in _STARTS if isinstance(v := about.get(key), float)), 0.0)
+def _start(about: Mapping[str, str | float]) -> float | None:
+    return next((v for key in _STARTS if isinstance(v := about.get(key), float)), None)
+
+
+def _date(about: Mapping[str, str | float]) -> int | None:
+    found = (instant(v) for key in _DATES if isinstance(v := about.get(key), str))
+    return next((date for date in found if date is not None), None)

@@ -1,8 +1,8 @@
 """TDMS files of LabVIEW and DIAdem, streamed through npTDMS.
 
-Time is what the properties of each channel say (``wf_increment``, ``wf_start_offset``), or else a
-channel of its group that is a time.  Names are ``group/channel``, without the group if there is
-only one.
+Time is what the properties of each channel say (``wf_start_time``, ``wf_start_offset``,
+``wf_increment``), or else a channel of its group that is a time, by numbers or by stamps.  Names
+are ``group/channel``, without the group if there is only one.
 """
 
 from contextlib import AbstractContextManager
@@ -23,6 +23,9 @@ __all__ = ["TdmsFile"]
 
 Vector = NDArray[np.float64]
 
+_SINCE_1904 = 2_082_844_800  # [s] from the zero of LabVIEW to 1970
+_HALF = 1 << 63  # of a unit of 2^-64 of a second
+
 
 class TdmsFile(Recording):
     """Channels of numbers of a TDMS file.
@@ -39,6 +42,7 @@ class TdmsFile(Recording):
         self._tdms = _opened(path)
         self._channel: dict[str, Any] = {}
         self._clock: dict[str, tuple[Any, float]] = {}
+        self._zero: dict[str, int | None] = {}  # first stamp [ns] of a channel of time stamps
         notes: list[str] = []
         try:
             super().__init__(path, self._listed(path, time_step, notes), tuple(notes))
@@ -52,13 +56,13 @@ class TdmsFile(Recording):
         groups = [group for group in self._tdms.groups() if _numbers(group)]
         infos = []
         for group in groups:
-            clocks = [c for c in _numbers(group) if is_clock(*_name_and_unit(c))]
+            clocks = [c for c in group.channels() if _is_clock(c)]
             for channel in _numbers(group):
                 if channel in clocks:
                     continue
                 name, unit = _name_and_unit(channel)
                 full = f"{group.name}/{name}" if len(groups) > 1 else name
-                start, step, clock = self._time_of(path, channel, clocks, time_step, notes)
+                start, step, clock, origin = self._time_of(path, channel, clocks, time_step, notes)
                 count = len(channel) if not clock else min(len(channel), len(self._clock[clock][0]))
                 self._channel[full] = channel
                 infos.append(
@@ -70,6 +74,7 @@ class TdmsFile(Recording):
                         step=step,
                         clock=clock,
                         label=channel.name,
+                        origin=origin,
                     )
                 )
         return tuple(infos)
@@ -81,26 +86,26 @@ class TdmsFile(Recording):
         clocks: list[Any],
         time_step: float | None,
         notes: list[str],
-    ) -> tuple[float, float, str]:
-        """Start, step, and name of the stored time, if it is one."""
+    ) -> tuple[float, float, str, int | None]:
+        """Start, step, name of the stored time if it is one, and when it is zero."""
         increment = float(channel.properties.get("wf_increment", 0.0) or 0.0)
         if increment > 0:
-            return float(channel.properties.get("wf_start_offset", 0.0)), increment, ""
+            start = float(channel.properties.get("wf_start_offset", 0.0))
+            return start, increment, "", _nanoseconds(channel.properties.get("wf_start_time"))
         same = [c for c in clocks if len(c) == len(channel)] or clocks[:1]
-        if same and not (time_step is not None and not _name_and_unit(same[0])[1]):
+        if same and (_is_stamped(same[0]) or time_step is None or _name_and_unit(same[0])[1]):
             clock = same[0]
             ends = self._read(clock, 0, 1)[0], self._read(clock, len(clock) - 1, len(clock))[0]
             step = float(ends[1] - ends[0]) / (len(clock) - 1)
-            factor, note = clock_factor(
-                _name_and_unit(clock)[1], step, f"{path.name}: {clock.name}"
-            )
+            unit = "s" if _is_stamped(clock) else _name_and_unit(clock)[1]
+            factor, note = clock_factor(unit, step, f"{path.name}: {clock.name}")
             if note and note not in notes:
                 notes.append(note)
             self._clock[clock.path] = clock, factor
-            return factor * float(ends[0]), factor * step, clock.path
+            return factor * float(ends[0]), factor * step, clock.path, self._zero.get(clock.path)
         if time_step is None:
             raise no_clock(f"{path.name}: channel '{channel.name}'")
-        return 0.0, time_step, ""
+        return 0.0, time_step, "", None
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         return self._read(self._channel[channel.name], first, last)
@@ -114,7 +119,13 @@ class TdmsFile(Recording):
     def _read(self, channel: Any, first: int, last: int) -> Vector:
         with _damage(f"{self.path.name}: channel '{channel.name}'"):
             values = channel.read_data(offset=first, length=last - first)
-            return np.asarray(values, dtype=np.float64)
+            if not _is_stamped(channel):
+                return np.asarray(values, dtype=np.float64)
+            zero = channel.read_data(0, 1)[0]
+            self._zero[channel.path] = _nanoseconds(zero)
+            seconds = (values["seconds"] - zero.seconds).astype(np.float64)
+            parts = values["second_fractions"].astype(np.float64)
+            return np.asarray(seconds + (parts - float(zero.second_fractions)) / 2.0**64)
 
     def close(self) -> None:
         """Close the file."""
@@ -128,7 +139,7 @@ def _opened(path: Path) -> Any:
         raise MissingExtraError("npTDMS", f"reading {path.name} (TDMS)", "measurement") from error
     keep_quiet("nptdms")
     with _damage(str(path)):
-        return nptdms.TdmsFile.open(path)
+        return nptdms.TdmsFile.open(path, raw_timestamps=True)  # others are cut to 1 us
 
 
 def _damage(where: str) -> AbstractContextManager[None]:
@@ -139,6 +150,23 @@ def _damage(where: str) -> AbstractContextManager[None]:
 
 def _numbers(group: Any) -> list[Any]:
     return [c for c in group.channels() if len(c) > 1 and np.dtype(c.dtype).kind in "iuf"]
+
+
+def _is_stamped(channel: Any) -> bool:
+    return np.dtype(channel.dtype).kind == "M"
+
+
+def _is_clock(channel: Any) -> bool:
+    return len(channel) > 1 and (_is_stamped(channel) or is_clock(*_name_and_unit(channel)))
+
+
+def _nanoseconds(stamp: Any) -> int | None:
+    """Time stamp since 1970 [ns]; the zero of LabVIEW, in 1904, says nothing."""
+    if not getattr(stamp, "seconds", 0):
+        return None
+    return (int(stamp.seconds) - _SINCE_1904) * 10**9 + (
+        int(stamp.second_fractions) * 10**9 + _HALF >> 64
+    )
 
 
 def _name_and_unit(channel: Any) -> tuple[str, str]:
