@@ -187,3 +187,43 @@ def test_a_bench_that_records_less_shares_the_description_of_another(tmp_path):
     assert found.notes == ()
     with pytest.raises(InputError, match="no channel 'P_Inlet'"):
         load_stroke_set([tmp_path / "bench.csv"], rich)
+
+
+@pytest.mark.parametrize("shift", [0.1, 0.37, 0.5, 0.9])
+def test_a_step_between_samples_stays_within_its_samples(shift):
+    # a cubic spline leaves 0 to 5 by 0.54
+    t = np.arange(60.0)
+    smooth = 7.0 - (t - 30.3) ** 2
+    values = {"current": np.where(t < 30, 0.0, 5.0), "lift": smooth}
+    piece = Piece(start=-shift, step=1.0, values=values, instant=0.0)
+    found = onto_axis(piece, axis := np.arange(58.0))
+
+    assert found["current"].min() == 0.0
+    assert found["current"].max() == 5.0
+    # and a crest is what it is, not the highest sample: rounding of numbers up to 900
+    np.testing.assert_allclose(found["lift"], 7.0 - (axis + shift - 30.3) ** 2, atol=1e-12)
+
+
+def test_every_resampled_channel_is_named(tmp_path):
+    t = 10e-6 * np.arange(600)
+    slow = np.column_stack([t, 80e3 * t, 0.2e-3 + 0.7 * t, np.where(t < 1e-3, 0.0, 5.0)])
+    head = "t1 [s],lift [um],t2 [s],current [A]"
+    np.savetxt(tmp_path / "a.csv", slow, "%.9f", ",", header=head, comments="")
+    trigger = {"channel": "current", "level": "1 A", "before": "0.2 ms", "after": "3 ms"}
+    found = load_stroke_set([tmp_path / "a.csv"], section(trigger=trigger))
+
+    text = "\n".join(found.notes)
+    assert "'lift' (step 1e-05 s) resampled to steps of 7e-06 s by linear interpolation" in text
+    assert "lift, current: samples moved onto one time from the trigger" in text
+    current = found.matrix("current")
+    assert (current.min(), current.max()) == (0.0, 5.0)
+
+
+def test_channels_of_one_uneven_time_are_all_named(tmp_path):
+    t = 10e-6 * (np.arange(600) + 0.2 * np.random.default_rng(2).random(600))
+    rows = np.column_stack([t, 80e3 * t, 5e3 * t])
+    head = "t [s],lift [um],current [A]"
+    np.savetxt(tmp_path / "a.csv", rows, "%.9f", ",", header=head, comments="")
+    found = load_stroke_set([tmp_path / "a.csv"])
+
+    assert any("'lift', 'current': time jitters" in note for note in found.notes)

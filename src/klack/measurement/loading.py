@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.measurement.alignment import common_axis, covers, onto_axis
+from klack.measurement.alignment import between_samples, common_axis, covers, onto_axis
 from klack.measurement.channels import Channels
 from klack.measurement.cutting import Piece, cut_strokes, trigger_level, whole_piece
 from klack.measurement.files.opening import open_recording
@@ -146,6 +146,11 @@ def _aligned(
     axis = common_axis([cut.piece for cut in cuts], first, last)
     if trigger is not None:
         notes.extend(_shortened(axis, trigger))
+    if any(between_samples(cut.piece, axis) for cut in cuts):
+        notes.append(
+            f"{', '.join(cuts[0].piece.values)}: samples moved onto one time from the trigger, in "
+            f"steps of {axis[1] - axis[0]:.4g} s, by cubic splines held within the samples."
+        )
     rejected, strokes = [], []
     cuts.reverse()
     while cuts:  # each piece goes when its stroke has come: a long set is not held twice

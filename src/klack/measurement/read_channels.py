@@ -71,7 +71,9 @@ def common_time(recording: Recording, found: Mapping[Role, FoundChannel]) -> Com
     notes = [*recording.notes, *(channel.note for channel in found.values())]
     notes += _started(recording, found)
     for name, base in bases.items():
-        notes.append(base.note)
+        if base.note:
+            same = ", ".join(f"'{n}'" for n, other in bases.items() if other.note == base.note)
+            notes.append(f"{recording.path.name}: {same}: {base.note}")
         if base.uniform and not _on_grid(base, start, fastest.step):
             notes.append(
                 f"{recording.path.name}: '{name}' (step {base.step:.4g} s) resampled to steps of "

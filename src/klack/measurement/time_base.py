@@ -37,7 +37,7 @@ class TimeBase:
     uniform : bool
         True if the samples can be taken as they are.
     note : str
-        What was found if it is not perfect.
+        What was found if it is not perfect, to follow the names of its channels.
     marks : array, shape (m,) [s]
         Time of every 2^20th sample, by which windows of uneven times are found.
     """
@@ -120,11 +120,11 @@ def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> T
             hint="export the parts between the gaps into separate files or channels.",
         )
     if _two_lengths(sorted(lengths)) and deviation < 1.0 and longest < _GAP:
-        return replace(base, note=f"{where}: time is rounded in the file; taken as uniform.")
+        return replace(base, note="time is rounded in the file; taken as uniform.")
     what = "leaves out samples" if longest > _GAP else "jitters"
     note = (
-        f"{where}: time {what} (longest step {longest:.2f} of the usual one); resampled "
-        "by linear interpolation."
+        f"time {what} (longest step {longest:.2f} of the usual one); resampled by linear "
+        "interpolation."
     )
     return replace(base, step=usual, uniform=False, note=note)
 
