@@ -72,6 +72,50 @@ def test_mdf_numbers_are_converted_and_formulas_left_out(tmp_path):
         np.testing.assert_allclose(recording.read("lift")[1], 0.5 * counts - 3.0)
 
 
+PARTIAL = {
+    "a value": {"val_0": 65535, "text_0": b"sensor fault"},
+    "a range": {"lower_0": 65000, "upper_0": 65535, "text_0": b"sensor fault"},
+}
+
+
+@pytest.mark.parametrize("texts", PARTIAL.values(), ids=PARTIAL)
+@pytest.mark.parametrize("alone", [False, True])
+def test_mdf_samples_that_are_texts_among_numbers_are_missing(tmp_path, texts, alone):
+    counts = np.arange(100, dtype=np.uint16)
+    counts[7] = 65535
+    rules = {**texts, "default_addr": {"a": 0.5, "b": -3.0}}
+    signals = [asammdf.Signal(counts, TIME[:100], unit="um", name="lift", conversion=rules)]
+    words = {"val_0": 0, "text_0": b"off", "val_1": 1, "text_1": b"on"}
+    if not alone:
+        signals += [
+            asammdf.Signal(counts, TIME[:100], name="state", conversion=words),
+            asammdf.Signal(np.array([b"x"] * 100), TIME[:100], name="remark", encoding="utf-8"),
+        ]
+    file = asammdf.MDF(version="4.10")
+    file.append(signals)
+    file.save(tmp_path / "a.mf4")
+    file.close()
+    with open_recording(tmp_path / "a.mf4") as recording:
+        assert [channel.name for channel in recording.channels] == ["lift"]
+        expected = 0.5 * counts - 3.0
+        expected[7] = np.nan
+        np.testing.assert_array_equal(recording.values("lift"), expected)
+        notes = "\n".join(recording.notes)
+    assert "a.mf4: lift: samples that are texts are missing." in notes
+    assert alone or "'state' left out: its values stand for texts" in notes
+    assert alone or "'remark' left out: no numbers" in notes
+
+
+def test_a_file_with_nothing_but_texts_says_what_it_left_out(tmp_path):
+    words = {"val_0": 0, "text_0": b"off", "val_1": 1, "text_1": b"on"}
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(np.arange(9) % 2, TIME[:9], name="state", conversion=words)])
+    file.save(tmp_path / "a.mf4")
+    file.close()
+    with pytest.raises(InputError, match=r"no channel of numbers.*'state' left out: its values"):
+        open_recording(tmp_path / "a.mf4")
+
+
 def test_mdf_values_marked_invalid_are_missing(tmp_path):
     invalid = np.zeros(400, dtype=bool)
     invalid[[5, 77]] = True

@@ -56,7 +56,7 @@ def onto_axis(piece: Piece, axis: Vector) -> Mapping[str, Vector]:
     time = piece.start + piece.step * np.arange(count)
     inside = np.clip(axis, time[0], time[-1])
     left = np.clip(((inside - time[0]) / piece.step).astype(np.int64), 0, count - 2)
-    found = {}
+    found: dict[str, Vector] = {}
     for role, values in piece.values.items():
         low, high = _bounds(values)
         curve = scipy.interpolate.CubicSpline(time, values)(inside)

@@ -6,6 +6,7 @@ checked before memory is asked for.
 """
 
 from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from klack.closing import Closing
 from klack.errors import InputError
 from klack.measurement.time_base import TimeBase, survey_time
 
-__all__ = ["ChannelInfo", "Recording", "some_names"]
+__all__ = ["ChannelInfo", "Recording", "left_out", "some_names"]
 
 Vector = NDArray[np.float64]
 
@@ -78,7 +79,7 @@ class Recording(Closing):
         if not channels:
             raise InputError(
                 str(path),
-                got="no channel of numbers over time",
+                got="no channel of numbers over time" + "".join(f"; {note}" for note in notes),
                 expected="at least one channel",
                 hint="check that the file was exported completely.",
             )
@@ -158,8 +159,18 @@ class Recording(Closing):
         """Close the file."""
 
 
-def some_names(channels: tuple[ChannelInfo, ...], most: int = 12) -> str:
+def some_names(channels: Sequence[ChannelInfo], most: int = 12) -> str:
     """Names of channels for an error text; the first of them if there are many."""
-    names = [channel.name for channel in channels[:most]]
-    more = f", ... ({len(channels)} in all)" if len(channels) > most else ""
-    return ", ".join(names) + more
+    return _some([channel.name for channel in channels], most)
+
+
+def _some(names: Sequence[str], most: int = 12) -> str:
+    more = f", ... ({len(names)} in all)" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
+
+
+def left_out(file: str, reasons: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    """Notes of what does not become a channel: names by reason."""
+    for reason, names in reasons.items():
+        quoted = _some([f"'{name}'" for name in names])
+        yield f"{file}: {quoted} left out: {reason}."

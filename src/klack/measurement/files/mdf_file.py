@@ -1,10 +1,12 @@
 """Measurement Data Format of ASAM, versions 3 and 4, read record by record through asammdf.
 
 Values come converted to physical units.  A conversion that is a formula written in the file is not
-computed: such channels are left out, with a note.
+computed: such channels are left out, with a note.  Values that stand for a text (``sensor fault``)
+among numbers are missing.
 """
 
 from contextlib import AbstractContextManager, redirect_stdout
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 from traceback import walk_tb
@@ -16,7 +18,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError, MissingExtraError
 from klack.measurement.files.clock import no_clock, unique_names
 from klack.measurement.files.foreign import foreign_reading, keep_quiet
-from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
 
@@ -28,6 +30,8 @@ _NUMBERS_4 = range(6)  # whole and floating-point numbers in either byte order
 _NUMBERS_3 = (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, 15, 16)
 _FORMULA_4, _TEXTS_4 = 3, (7, 8, 9, 10, 11)
 _FORMULA_3, _TEXTS_3 = 10, (11, 12)
+_TEXT_OF_VALUE, _TEXT_OF_RANGE = 7, 8
+_CONVERTED = (0, 1, 2, 4, 5, 6)  # conversions from numbers to numbers
 _SYNC_TIME = 1
 _VIRTUAL = (3, 6)  # types of channels that are counted, not stored
 
@@ -49,6 +53,7 @@ class MdfFile(Recording):
             self._mdf = _opened(path, self._file)
             self._place: dict[str, tuple[int, int]] = {}
             self._second: dict[int, float] = {}
+            self._partial: dict[tuple[int, int], _Partial] = {}
             notes: list[str] = []
             super().__init__(path, self._listed(path, time_step, notes), tuple(notes))
         except BaseException:
@@ -59,29 +64,55 @@ class MdfFile(Recording):
         self, path: Path, time_step: float | None, notes: list[str]
     ) -> tuple[ChannelInfo, ...]:
         old = self._mdf.version < "4"
-        places = []
+        places: list[tuple[int, int]] = []
+        without: dict[str, list[str]] = {}
         for g, group in enumerate(self._mdf.groups):
-            if group.channel_group.cycles_nr < 2:
-                continue
             master = self._mdf.masters_db.get(g)
-            if master is not None and not _in_record(group, group.channels[master], old):
+            if (
+                group.channel_group.cycles_nr >= 2
+                and master is not None
+                and not _in_record(group, group.channels[master], old)
+            ):
                 raise _outside(path, group.channels[master])
             for c, channel in enumerate(group.channels):
-                if c == master or not _is_number(channel, old):
+                if c == master:
                     continue
-                if group.channel_dependencies[c]:
-                    continue
-                if not _in_record(group, channel, old):
-                    raise _outside(path, channel)
-                kind = getattr(channel.conversion, "conversion_type", 0)
-                if kind == (_FORMULA_3 if old else _FORMULA_4):
-                    notes.append(f"{path.name}: '{channel.name}' left out, its unit is a formula.")
-                elif kind not in (_TEXTS_3 if old else _TEXTS_4):
+                reason = self._unread(path, g, c, old)
+                if reason:
+                    without.setdefault(reason, []).append(channel.name)
+                else:
                     places.append((g, c))
+        notes += left_out(path.name, without)
+        texts = [self._mdf.groups[g].channels[c].name for g, c in self._partial]
+        if texts:
+            notes.append(f"{path.name}: {', '.join(texts)}: samples that are texts are missing.")
         names = unique_names([self._mdf.groups[g].channels[c].name for g, c in places])
         self._place = dict(zip(names, places, strict=True))
         times = {g: self._group_time(path, g, time_step, old) for g in {g for g, _ in places}}
         return tuple(self._info(name, g, c, times[g]) for name, (g, c) in self._place.items())
+
+    def _unread(self, path: Path, g: int, c: int, old: bool) -> str:
+        """Why a channel is left out; empty if it is read."""
+        group = self._mdf.groups[g]
+        channel = group.channels[c]
+        if group.channel_group.cycles_nr < 2:
+            return "fewer than two samples"
+        if not _is_number(channel, old):
+            return "no numbers"
+        if group.channel_dependencies[c]:
+            return "a structure or an array"
+        if not _in_record(group, channel, old):
+            raise _outside(path, channel)
+        kind = getattr(channel.conversion, "conversion_type", 0)
+        if kind == (_FORMULA_3 if old else _FORMULA_4):
+            return "its conversion is a formula"
+        if kind not in (_TEXTS_3 if old else _TEXTS_4):
+            return ""
+        partial = None if old else _partial(channel.conversion)
+        if partial is None:
+            return "its values stand for texts, or follow a formula"
+        self._partial[g, c] = partial
+        return ""
 
     def _group_time(
         self, path: Path, g: int, time_step: float | None, old: bool
@@ -144,8 +175,12 @@ class MdfFile(Recording):
                 record_count=last - first,
                 samples_only=True,
                 ignore_invalidation_bits=True,
+                raw=(g, c) in self._partial,
             )
-        values = np.array(samples, dtype=np.float64)
+        if (g, c) in self._partial:
+            values = self._partial[g, c](np.asarray(samples))
+        else:
+            values = np.array(samples, dtype=np.float64)
         if invalid is not None:
             values[np.asarray(invalid, dtype=bool)] = np.nan
         if values.size != last - first:
@@ -161,6 +196,46 @@ class MdfFile(Recording):
         """Close the file."""
         self._mdf.close()
         self._file.close()
+
+
+@dataclass(frozen=True)
+class _Partial:
+    """Ranges of stored values, each with its conversion or a text, and that of all others."""
+
+    ranges: tuple[tuple[float, float, Any], ...]
+    default: Any
+
+    def __call__(self, stored: NDArray[Any]) -> Vector:
+        values = _converted(self.default, stored)
+        for low, high, rule in self.ranges:
+            ends_in = stored.dtype.kind in "iu" or low == high  # of ASAM: else it ends before
+            inside = (stored >= low) & ((stored <= high) if ends_in else (stored < high))
+            values[inside] = _converted(rule, stored[inside])
+        return values
+
+
+def _converted(rule: Any, stored: NDArray[Any]) -> Vector:
+    if not hasattr(rule, "conversion_type"):
+        return np.full(stored.shape, np.nan)
+    return np.array(rule.convert(stored), dtype=np.float64)
+
+
+def _partial(conversion: Any) -> _Partial | None:
+    """Numbers for some values and texts for others; None if no value is a number."""
+    kind, refs = conversion.conversion_type, conversion.referenced_blocks
+    if kind == _TEXT_OF_VALUE:
+        ends = [(conversion[f"val_{k}"],) * 2 for k in range(conversion.val_param_nr)]
+    elif kind == _TEXT_OF_RANGE:
+        count = conversion.val_param_nr // 2
+        ends = [(conversion[f"lower_{k}"], conversion[f"upper_{k}"]) for k in range(count)]
+    else:
+        return None
+    rules = [refs.get(f"text_{k}") for k in range(len(ends))]
+    kinds = {getattr(rule, "conversion_type", None) for rule in (*rules, refs["default_addr"])}
+    if kinds == {None} or kinds - {None} - set(_CONVERTED):
+        return None
+    ranges = tuple((*end, rule) for end, rule in zip(ends, rules, strict=True))
+    return _Partial(ranges, refs["default_addr"])
 
 
 def _opened(path: Path, file: Any) -> Any:
@@ -221,6 +296,8 @@ def _outside(path: Path, channel: Any) -> InputError:
 def _unit_of(channel: Any) -> str:
     conversion = channel.conversion
     unit = getattr(channel, "unit", "") or getattr(conversion, "unit", "") or ""
+    for rule in (getattr(conversion, "referenced_blocks", None) or {}).values():
+        unit = unit or getattr(rule, "unit", "") or ""
     if isinstance(unit, bytes):
         unit = unit.decode("latin-1").rstrip(" \x00")
     return str(unit)
