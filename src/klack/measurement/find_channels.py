@@ -149,6 +149,8 @@ def _as_named(
     recording: Recording, role: Role, choice: ChannelChoice, info: ChannelInfo
 ) -> FoundChannel:
     unit = info.unit if choice.unit is None else choice.unit
+    if choice.unit is None:
+        _require_known_scale(recording, role, info)
     where = f"{recording.path.name}: channel '{info.name}' ({role})"
     si = unit_factor(unit, role, where)
     return FoundChannel(
@@ -169,9 +171,25 @@ def _guess_note(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) 
 
 def _as_guessed(recording: Recording, role: Role, info: ChannelInfo, note: str) -> FoundChannel:
     where = f"{recording.path.name}: channel '{info.name}' ({role})"
+    _require_known_scale(recording, role, info)
     si = unit_factor(info.unit, role, where)
     return FoundChannel(
         name=info.name, unit=info.unit, factor=si.factor, offset=si.offset, note=note
+    )
+
+
+def _require_known_scale(recording: Recording, role: Role, info: ChannelInfo) -> None:
+    """Refuse numbers beside which the file states a scale that is not known."""
+    if not info.unapplied:
+        return
+    unit = info.unit if role in roles_of_unit(info.unit) else ROLES[role].common[0]
+    choice = f"{{name: {info.name}, unit: {unit}, scale: 1}}"
+    raise InputError(
+        f"{recording.path.name}: channel '{info.name}' ({role})",
+        got=f"a scale that klack does not know: {info.unapplied}",
+        expected="values in the unit of the channel, or packed by scale_factor and add_offset",
+        hint=f"say in the case what the stored numbers are, with the {unit} per one of them as "
+        f"scale: measurement: {{channels: {{{role}: {choice}}}}}.",
     )
 
 

@@ -46,6 +46,8 @@ class ChannelInfo:
         Name and unit as the file writes them, ``"lift [um]"``.
     origin : int, optional [ns]
         When its time is zero, as the file says it by date and time of day; since 1970.
+    unapplied : str
+        What the file says of a scale that klack does not know, ``"gain = 0.5"``.
     """
 
     name: str
@@ -56,6 +58,7 @@ class ChannelInfo:
     clock: str = ""
     label: str = ""
     origin: int | None = None
+    unapplied: str = ""
 
 
 class Recording(Closing):

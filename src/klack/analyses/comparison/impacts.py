@@ -94,7 +94,7 @@ def compare_impact(
     computed = measure_pulse(gauge.time, shown, where)
     with collected_warnings() as notes:
         clock("read recordings", 0.0)
-        records = [_read(path, gauge.kind, channel) for path in paths]
+        records = [_read(path, gauge.kind, channel, known_speed) for path in paths]
         clock("compare pulses", 0.0)
         pulses = [_compared(record, gauge.time, shown, computed, known_speed) for record in records]
     time = _axis(computed)
@@ -187,9 +187,16 @@ def _on_axis(record: _Record, pulse: ComparedPulse, time: Floats) -> Floats:
 # ------------------------------------------------------------------------ reading
 
 
-def _read(path: Path, kind: GaugeKind, channel: str | None) -> _Record:
+def _read(path: Path, kind: GaugeKind, channel: str | None, absolute: bool) -> _Record:
     with open_recording(path) as recording:
         info = _channel(recording, channel)
+        if absolute and info.unapplied:
+            raise InputError(
+                f"{path.name}: {info.name}",
+                got=f"a scale that klack does not know: {info.unapplied}",
+                expected="values in the unit of the channel",
+                hint="without --known-speed a factor is fitted.",
+            )
         factor = _factor(path, info, kind)
         time, values = recording.read(info.name)
     known = np.isfinite(values) & np.isfinite(time)

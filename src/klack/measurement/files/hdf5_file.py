@@ -133,6 +133,10 @@ def _attributes(node: Any) -> dict[str, str | float]:
             continue
         if value is not None:
             about[key.lower()] = value
+        elif key == "valid_range" and np.shape(node.attrs[key]) == (2,):
+            about["valid_min"], about["valid_max"] = map(float, node.attrs[key])
+        elif np.asarray(node.attrs[key]).dtype.kind in "iuf":
+            about[key.lower()] = str(np.asarray(node.attrs[key]).tolist())[:_LONGEST_TEXT]
     return about
 
 

@@ -88,6 +88,8 @@ def _is_uff(head: bytes) -> bool:
 
 
 _FOREIGN = {
+    b"CDF\x01": ("a netCDF 3 file", "convert it to netCDF 4: nccopy -k nc4 old.nc new.nc."),
+    b"CDF\x02": ("a netCDF 3 file", "convert it to netCDF 4: nccopy -k nc4 old.nc new.nc."),
     b"PK\x03\x04": ("a zip archive or an Excel workbook", "export it as CSV, or unpack it."),
     b"\x1f\x8b": ("a compressed file", "unpack it first."),
     b"\xd0\xcf\x11\xe0": ("an old Office file", "export it as CSV."),

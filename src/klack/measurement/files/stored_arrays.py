@@ -28,6 +28,7 @@ from klack.measurement.files.clock import (
     unique_names,
 )
 from klack.measurement.files.csv_dialect import split_label
+from klack.measurement.files.scales import PACKED, unknown_scales, unpacked
 from klack.measurement.recording import ChannelInfo, Recording
 from klack.measurement.unit_text import no_unit, plain_unit
 
@@ -105,6 +106,7 @@ class _Line:
     step: float
     origin: int | None
     own_start: float | None
+    unapplied: str
 
 
 class ArrayRecording(Recording):
@@ -133,6 +135,7 @@ class ArrayRecording(Recording):
                 clock="" if line.clock is None else f"{id(line.clock[0])}",
                 label=line.array.name,
                 origin=line.origin,
+                unapplied=line.unapplied,
             )
             for name, line in self._line.items()
         )
@@ -185,6 +188,7 @@ def _lines(
 ) -> list[_Line]:
     """Channels of a group and of those below it; time and step are handed down."""
     group = _with_info(group)
+    group = replace(group, arrays=[_unpacked(array, group) for array in group.arrays])
     about = {**about, **group.about}
     times = [array for array in group.arrays if _is_time(array, group)]
     clock = (times[0], _unit_of(times[0], group)) if times else clock
@@ -208,6 +212,33 @@ def _with_info(group: StoredGroup) -> StoredGroup:
         about |= {key: below.about.get("units", "")}
         about |= {name: value for name, value in below.about.items() if name == "startdate"}
     return replace(group, about=about, groups=groups)
+
+
+def _own(array: StoredArray, group: StoredGroup) -> dict[str, str | float]:
+    """What is said of an array: its attributes, and values beside it that bear its name."""
+    name = _split(array.name)[0].lower()
+    if name in _VALUES:
+        beside = dict(group.about)
+    else:
+        beside = {
+            key.removeprefix(f"{name}_"): value
+            for key, value in group.about.items()
+            if key.startswith(f"{name}_")
+        }
+    return beside | dict(array.about)
+
+
+def _of_all(group: StoredGroup, about: Mapping[str, str | float]) -> dict[str, str | float]:
+    """What is said of all arrays of a group: not of one of them by its name."""
+    names = tuple(f"{_split(array.name)[0].lower()}_" for array in group.arrays)
+    return {key: value for key, value in about.items() if not key.startswith(names)}
+
+
+def _unpacked(array: StoredArray, group: StoredGroup) -> StoredArray:
+    values = unpacked(_own(array, group))
+    if values is None:
+        return array
+    return replace(array, read=lambda *where: values(array.read(*where)))
 
 
 def _require_one_start(file: str, lines: Sequence[_Line]) -> None:
@@ -264,6 +295,11 @@ def _lines_of(
     path = "/".join(part for part in (group.path, name) if part)
     if name.lower() in _VALUES and group.path:
         path = group.path
+    own = _own(array, group)
+    of_all = {key: value for key, value in _of_all(group, about).items() if key not in own}
+    unapplied = ", ".join(
+        text for text in (unknown_scales(own, PACKED), unknown_scales(of_all)) if text
+    )
     start, step, used, origin = _time_of(file, path, array, count, clock, about, time_step, notes)
     return [
         _Line(
@@ -278,6 +314,7 @@ def _lines_of(
             step=step,
             origin=origin,
             own_start=_start(array.about),
+            unapplied=unapplied,
         )
         for line in range(strokes)
     ]

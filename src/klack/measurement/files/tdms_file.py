@@ -16,6 +16,7 @@ from klack.errors import MissingExtraError
 from klack.measurement.files.clock import clock_factor, is_clock, no_clock
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.files.foreign import foreign_reading, keep_quiet
+from klack.measurement.files.scales import unknown_scales
 from klack.measurement.recording import ChannelInfo, Recording
 from klack.measurement.unit_text import no_unit, plain_unit
 
@@ -23,6 +24,11 @@ __all__ = ["TdmsFile"]
 
 Vector = NDArray[np.float64]
 
+_SCALES = {
+    *("Linear", "Polynomial", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add"),
+    *("Subtract", "AdvancedAPI"),
+}
+"""Types of scales that npTDMS applies; of others it returns the stored numbers."""
 _SINCE_1904 = 2_082_844_800  # [s] from the zero of LabVIEW to 1970
 _HALF = 1 << 63  # of a unit of 2^-64 of a second
 
@@ -75,6 +81,7 @@ class TdmsFile(Recording):
                         clock=clock,
                         label=channel.name,
                         origin=origin,
+                        unapplied=self._unapplied(group, channel),
                     )
                 )
         return tuple(infos)
@@ -106,6 +113,18 @@ class TdmsFile(Recording):
         if time_step is None:
             raise no_clock(f"{path.name}: channel '{channel.name}'")
         return 0.0, time_step, "", None
+
+    def _unapplied(self, group: Any, channel: Any) -> str:
+        """Scales of other programs, and those of National Instruments that npTDMS leaves out."""
+        about = {**self._tdms.properties, **group.properties, **channel.properties}
+        odd = {
+            key: value
+            for key, value in about.items()
+            if key.endswith("_Scale_Type") and value not in _SCALES
+        }
+        scaled = about.get("NI_Scaling_Status", "unscaled") == "scaled"
+        left = "" if scaled else ", ".join(f"{key} = {value}" for key, value in odd.items())
+        return ", ".join(text for text in (unknown_scales(about), left) if text)
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         return self._read(self._channel[channel.name], first, last)
