@@ -6,11 +6,14 @@ Truth: signals whose values are known at any time, and the words of the cases be
 import numpy as np
 import pytest
 
+from klack.case.measurement import CaseMeasurement
 from klack.errors import AccuracyWarning, InputError
 from klack.measurement.channels import ChannelChoice
 from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
+from klack.measurement.loading import load_stroke_set
 from klack.measurement.read_channels import common_time, read_channels, windows
+from klack.measurement.roles import ROLES
 from klack.measurement.unit_text import roles_of_unit, unit_factor
 from klack.units import TIME
 
@@ -173,7 +176,7 @@ def test_needed_channels_must_be_there_and_clear(tmp_path):
             find_channels(recording, needed=("pressure",))
     with (
         open_recording(some(tmp_path / "volts.csv", "out [V]")) as recording,
-        pytest.raises(InputError, match=r"scale: 1\}\}\}, with the m that one V stands for"),
+        pytest.raises(InputError, match=r"scale: 1\}\}\}, with the um that one V stands for"),
     ):
         find_channels(recording, needed=("lift",))
 
@@ -305,3 +308,33 @@ def test_windows_cover_everything_and_share_the_overlap(tmp_path):
     starts = [round(part.start / 1e-6) for part in parts]
     assert starts == [0, 200, 400, 600, 800]
     assert [part.values.size for part in parts] == [300, 300, 300, 300, 201]
+
+
+@pytest.mark.parametrize(
+    ("names", "proposed"),
+    [
+        (("current [A]",), "current"),
+        (("current [A]", "lift [mV]"), "lift"),
+        (("i_coil [A]", "CH1 [V]"), "CH1"),
+        (("current [A]", "distance [furlong]"), "distance"),
+    ],
+)
+@pytest.mark.parametrize("trigger", [{}, {"trigger": {"channel": "current", "level": "0.5 A"}}])
+def test_without_a_lift_the_key_of_the_sensor_is_proposed(tmp_path, names, proposed, trigger):
+    path = some(tmp_path / "a.csv", *names)
+    section = CaseMeasurement.model_validate(trigger)
+    for roles in (("lift",), tuple(ROLES)):
+        with pytest.raises(InputError) as caught:
+            load_stroke_set([path], section, roles=roles)
+        text = str(caught.value)
+        assert "none that could be the lift: " + ", ".join(names) in text
+        assert (
+            f"measurement: {{channels: {{lift: {{name: {proposed}, unit: um, scale: 1}}}}" in text
+        )
+    if trigger or len(names) == 1:
+        return
+    # and it works: 1 is 25 um
+    lift = ChannelChoice(name=proposed, unit="um", scale=25.0)
+    given = CaseMeasurement.model_validate({"channels": {"lift": lift}})
+    found = load_stroke_set([path], given, roles=("lift",))
+    np.testing.assert_allclose(found.matrix("lift")[0], 25e-6 * (1 + 1e-5 * np.arange(20)))

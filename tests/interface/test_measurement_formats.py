@@ -121,6 +121,14 @@ def uff_binary(path):
     uff(path, binary=1)
 
 
+def uff_uneven(path):
+    uff(path, even=0)
+
+
+def uff_uneven_binary(path):
+    uff(path, binary=1, even=0)
+
+
 def hdf5(path):
     with h5py.File(path, "w") as file:
         file["time"] = TIME
@@ -177,6 +185,8 @@ FORMATS = {
     "TDMS with a channel of time": (tdms_with_time, "a.tdms"),
     "UFF 58": (uff, "a.uff"),
     "UFF 58b": (uff_binary, "a.unv"),
+    "UFF 58 uneven": (uff_uneven, "a.uff"),
+    "UFF 58b uneven": (uff_uneven_binary, "a.unv"),
     "HDF5": (hdf5, "a.h5"),
     "HDF5 with a rate": (hdf5_with_step, "a.hdf5"),
     "MATLAB": (matlab, "a.mat"),
@@ -184,7 +194,7 @@ FORMATS = {
     "MATLAB 7.3": (matlab_73, "a.mat"),
 }
 # text of a universal file has 12 digits, counted from the largest value
-ACCURACY = {"UFF 58": 1e-11}
+ACCURACY = {"UFF 58": 1e-11, "UFF 58 uneven": 1e-11}
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -218,7 +228,7 @@ def test_a_file_that_was_cut_off_ends_in_a_clear_error(tmp_path, form):
     path = tmp_path / name
     write(path)
     path.write_bytes(path.read_bytes()[: 2 * path.stat().st_size // 3])
-    whole_until_there = form in ("csv", "UFF 58", "UFF 58b") or form.startswith("TDMS")
+    whole_until_there = form == "csv" or form.startswith(("UFF", "TDMS"))
 
     try:
         with open_recording(path) as recording:

@@ -258,11 +258,22 @@ def _ambiguous(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -
     )
 
 
+def _candidate(recording: Recording, role: Role) -> ChannelInfo:
+    """Channel that an error proposes: called so, or the volts of a sensor, or the first unknown."""
+    word = re.compile(rf"(\w*_)?({_WORDS[role]})(_?\d+)?(_\w*)?", re.IGNORECASE)
+    infos = recording.channels
+    named = [info for info in infos if word.fullmatch(_last_part(info.name))]
+    volts = [info for info in infos if roles_of_unit(info.unit) == ("voltage",)]
+    unknown = [info for info in infos if not roles_of_unit(info.unit)]
+    return (*named, *volts, *unknown, *infos)[0]
+
+
 def _not_found(recording: Recording, role: Role) -> InputError:
     listed = [
         f"{info.name} [{info.unit}]" if info.unit else info.name for info in recording.channels[:12]
     ]
-    first, unit = recording.channels[0], ROLES[role].common[0]
+    first, unit = _candidate(recording, role), ROLES[role].common[0]
+    unit = "um" if role == "lift" else unit
     choice, meaning = f"{{name: {first.name}, unit: {unit}}}", ""
     if not no_unit(first.unit):
         choice = f"{{name: {first.name}, unit: {unit}, scale: 1}}"

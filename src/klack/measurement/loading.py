@@ -17,7 +17,7 @@ from klack.measurement.find_channels import FoundChannel, find_channels
 from klack.measurement.outliers import find_outliers
 from klack.measurement.read_channels import common_time, read_channels, windows
 from klack.measurement.recording import Recording
-from klack.measurement.roles import ROLES, Role
+from klack.measurement.roles import LIFT_ALONE, ROLES, Role
 from klack.measurement.stroke_set import MeasuredStroke, Rejection, StrokeSet
 from klack.measurement.trigger import Trigger
 
@@ -74,8 +74,8 @@ def load_stroke_set(
     progress : callable
         Called with the share of the files that is done, 0 to 1.
     roles : collection of roles
-        Channels that are read beside that of the trigger.  A bench that records less than another
-        can so share its description.
+        Channels that are read beside that of the trigger; of them the recording must have the lift.
+        A bench that records less than another can so share its description.
 
     Returns
     -------
@@ -95,7 +95,8 @@ def load_stroke_set(
         progress(k / len(paths))
         step = None if measurement is None else measurement.time_step
         with open_recording(Path(path), time_step=step) as recording:
-            needed: tuple[Role, ...] = () if trigger is None else (trigger.channel,)
+            needed = {role for role in LIFT_ALONE if role in roles}
+            needed |= set() if trigger is None else {trigger.channel}
             channels = None if measurement is None else measurement.channels
             wanted = {*roles, *needed}
             found = find_channels(recording, channels, needed=needed, roles=wanted)

@@ -31,14 +31,9 @@ _OF_THE_FILE = re.compile(r"(wf_|ni_|dimension|class$|name$|_netcdf|crest)", re.
 
 def unpacked(about: About) -> Callable[[Vector], Vector] | None:
     """Function from stored numbers to values; None if they are the values."""
-    factor, offset = (
-        value if isinstance(value := about.get(key, neutral), float) else neutral
-        for key, neutral in ((_FACTOR, 1.0), (_OFFSET, 0.0))
-    )
+    factor, offset = _number(about, _FACTOR, 1.0), _number(about, _OFFSET, 0.0)
     missing = [value for key in _MISSING if isinstance(value := about.get(key), float)]
-    low, high = about.get("valid_min", -np.inf), about.get("valid_max", np.inf)
-    if not (isinstance(low, float) and isinstance(high, float)):
-        low, high = -np.inf, np.inf
+    low, high = _number(about, "valid_min", -np.inf), _number(about, "valid_max", np.inf)
     if (factor, offset, low, high) == (1.0, 0.0, -np.inf, np.inf) and not missing:
         return None
 
@@ -47,6 +42,11 @@ def unpacked(about: About) -> Callable[[Vector], Vector] | None:
         return np.where(absent, np.nan, stored * factor + offset)
 
     return values
+
+
+def _number(about: About, key: str, otherwise: float) -> float:
+    value = about.get(key)
+    return value if isinstance(value, float) else otherwise
 
 
 def unknown_scales(about: Mapping[str, object], known: Collection[str] = ()) -> str:

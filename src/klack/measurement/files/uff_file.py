@@ -39,6 +39,7 @@ class UffFile(Recording):
     """
 
     def __init__(self, path: Path) -> None:
+        self.path = path
         self._uff = _opened(path)
         self._set: dict[str, int] = {}
         self._last: tuple[int, Any] | None = None
