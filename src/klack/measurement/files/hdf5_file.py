@@ -69,23 +69,34 @@ def _group(node: Any, path: str, depth: int) -> StoredGroup:
     import h5py
 
     arrays, groups = [], []
+    unread: dict[str, list[str]] = {}
     about = _attributes(node)
     for key in node if depth < _DEEPEST else ():
-        if key.startswith("#") or isinstance(node.get(key, getlink=True), h5py.ExternalLink):
+        if key.startswith("#"):
             continue
+        below, reason = f"{path}/{key}" if path else key, ""
         try:
-            item = node[key]
+            away = isinstance(node.get(key, getlink=True), h5py.ExternalLink)
+            item = None if away else node[key]
         except KeyError:  # a link to nothing
             continue
         if isinstance(item, h5py.Group):
-            groups.append(_group(item, f"{path}/{key}" if path else key, depth + 1))
-        elif isinstance(item, h5py.Dataset) and not (item.external or item.is_virtual):
+            groups.append(_group(item, below, depth + 1))
+        elif item is None or (
+            isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
+        ):
+            reason = "its values lie in another file"
+        elif isinstance(item, h5py.Dataset):
             value = _single(item)
             if value is not None:
                 about[key.lower()] = value
             elif item.dtype.kind in "iuf" and item.ndim in (1, 2) and item.size > 1:
                 arrays.append(_array(key, item))
-    return StoredGroup(path=path, arrays=arrays, about=about, groups=groups)
+            else:
+                reason = "no vector or matrix of real numbers"
+        if reason:
+            unread.setdefault(reason, []).append(below)
+    return StoredGroup(path=path, arrays=arrays, about=about, groups=groups, unread=unread)
 
 
 def _array(name: str, item: Any) -> StoredArray:

@@ -31,7 +31,7 @@ class MatlabFile(ArrayRecording):
 
 
 def _group(fields: dict[str, MatValue], path: str, depth: int) -> StoredGroup:
-    arrays, groups = [], []
+    arrays, groups, unread = [], [], []
     about: dict[str, str | float] = {}
     for key, value in fields.items():
         if depth > _DEEPEST:
@@ -50,12 +50,15 @@ def _group(fields: dict[str, MatValue], path: str, depth: int) -> StoredGroup:
             if len(value) == 1:
                 about[key.lower()] = str(value[0])
         elif not isinstance(value, np.ndarray) or np.iscomplexobj(value):
-            continue
+            unread.append(below)
         elif value.size == 1:
             about[key.lower()] = float(value.ravel()[0])
         elif value.size and value.ndim == 2:
             arrays.append(_array(key, value))
-    return StoredGroup(path=path, arrays=arrays, about=about, groups=groups)
+        else:
+            unread.append(below)
+    reasons = {"no vector or matrix of real numbers": unread} if unread else {}
+    return StoredGroup(path=path, arrays=arrays, about=about, groups=groups, unread=reasons)
 
 
 def _array(name: str, value: Any) -> StoredArray:

@@ -29,7 +29,7 @@ from klack.measurement.files.clock import (
 )
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.files.scales import PACKED, unknown_scales, unpacked
-from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
 
 __all__ = ["ArrayRecording", "StoredArray", "StoredGroup"]
@@ -85,6 +85,8 @@ class StoredGroup:
     arrays: Sequence[StoredArray] = ()
     about: Mapping[str, str | float] = field(default_factory=dict)
     groups: Sequence["StoredGroup"] = ()
+    unread: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    """Names of what is neither, by reason."""
 
 
 _Clock = tuple[StoredArray, str]
@@ -187,6 +189,7 @@ def _lines(
     notes: list[str],
 ) -> list[_Line]:
     """Channels of a group and of those below it; time and step are handed down."""
+    notes += left_out(file, group.unread)
     group = _with_info(group)
     group = replace(group, arrays=[_unpacked(array, group) for array in group.arrays])
     about = {**about, **group.about}
@@ -281,14 +284,13 @@ def _lines_of(
     notes: list[str],
 ) -> list[_Line]:
     """One channel of a vector, several of a matrix."""
-    if len(array.shape) > 2 or max(array.shape) < 2:
-        return []
     axis = _long_axis(array.shape)
     if clock is not None and max(clock[0].shape) in array.shape:
         axis = array.shape.index(max(clock[0].shape))
     count = array.shape[axis]
     strokes = int(np.prod(array.shape)) // count
     if strokes > _MOST_STROKES or (strokes > 1 and count < 2):
+        notes += left_out(file, {f"{strokes} columns of {count} values": [array.name]})
         return []
     unit = _unit_of(array, group)
     name = _split(array.name)[0]

@@ -17,7 +17,7 @@ from klack.measurement.files.clock import clock_factor, is_clock, no_clock
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.files.foreign import foreign_reading, keep_quiet
 from klack.measurement.files.scales import unknown_scales
-from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
 
 __all__ = ["TdmsFile"]
@@ -60,6 +60,16 @@ class TdmsFile(Recording):
         self, path: Path, time_step: float | None, notes: list[str]
     ) -> tuple[ChannelInfo, ...]:
         groups = [group for group in self._tdms.groups() if _numbers(group)]
+        every = [c for group in self._tdms.groups() for c in group.channels()]
+        for reason, found in (
+            ("fewer than two samples", [c for c in every if len(c) < 2]),
+            (
+                "no numbers",
+                [c for c in every if len(c) > 1 and np.dtype(c.dtype).kind not in "iufM"],
+            ),
+        ):
+            names = [f"{c.group_name}/{c.name}" for c in found]
+            notes += left_out(path.name, {reason: names} if names else {})
         infos = []
         for group in groups:
             clocks = [c for c in group.channels() if _is_clock(c)]

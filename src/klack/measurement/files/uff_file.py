@@ -15,7 +15,7 @@ from klack.errors import InputError, MissingExtraError
 from klack.measurement.files.clock import unique_names
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.files.foreign import foreign_reading
-from klack.measurement.recording import ChannelInfo, Recording
+from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
 
@@ -43,10 +43,11 @@ class UffFile(Recording):
         self._uff = _opened(path)
         self._set: dict[str, int] = {}
         self._last: tuple[int, Any] | None = None
-        super().__init__(path, self._listed(path))
+        notes: list[str] = []
+        super().__init__(path, self._listed(path, notes), tuple(notes))
 
-    def _listed(self, path: Path) -> tuple[ChannelInfo, ...]:
-        found = []
+    def _listed(self, path: Path, notes: list[str]) -> tuple[ChannelInfo, ...]:
+        found, others = [], []
         for number, kind in enumerate(self._uff.get_set_types()):
             if int(kind) != 58:
                 continue
@@ -55,6 +56,9 @@ class UffFile(Recording):
                 head["func_type"] == 0 and head["abscissa_spec_data_type"] == _TIME_AXIS
             ):
                 found.append((number, head))
+            else:
+                others.append(f"set {number + 1} ({_name(head)})")
+        notes += left_out(path.name, {"not over time": others} if others else {})
         names = unique_names([split_label(_name(head))[0] for _, head in found])
         si = _in_si(self._uff)
         return tuple(

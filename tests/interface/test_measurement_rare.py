@@ -1,0 +1,149 @@
+"""What readers of measured files meet rarely: odd parts are left out or refused, the rest is read.
+
+Truth: the arrays that were written.
+"""
+
+import numpy as np
+import pytest
+
+from klack.errors import InputError
+from klack.measurement.files.opening import open_recording
+
+asammdf = pytest.importorskip("asammdf")
+h5py = pytest.importorskip("h5py")
+nptdms = pytest.importorskip("nptdms")
+pyuff = pytest.importorskip("pyuff")
+scipy_io = pytest.importorskip("scipy.io")
+
+TIME = 1e-5 * np.arange(50)  # [s]
+LIFT = 80.0 * np.sin(3e3 * TIME)
+
+
+def uff(path, **other):
+    about = {
+        **dict(binary=1, func_type=1, rsp_node=7, rsp_dir=3, ref_node=1, ref_dir=3),
+        **dict(data=LIFT, x=TIME, id1="lift", ord_data_type=4, abscissa_spacing=1),
+        **dict(abscissa_min=0.0, abscissa_inc=1e-5, abscissa_spec_data_type=17),
+        **dict(abscissa_axis_units_lab="s", ordinate_spec_data_type=8),
+        **dict(ordinate_axis_units_lab="NONE", orddenom_spec_data_type=0),
+        **dict(z_axis_spec_data_type=0),
+    }
+    pyuff.UFF(str(path)).write_sets(pyuff.prepare_58(**(about | other)), "add")
+    return path
+
+
+def opened(path, **options):
+    with open_recording(path, **options) as recording:
+        read = {c.name: (c.unit, *recording.read(c.name)) for c in recording.channels}
+        return read, "\n".join(recording.notes)
+
+
+def test_universal_files(tmp_path):
+    path = uff(tmp_path / "a.uff", abscissa_axis_units_lab="NONE", id1="NONE", rsp_ent_name="NONE")
+    uff(path, func_type=4, abscissa_spec_data_type=18)  # a transfer function
+    read, notes = opened(path)
+    assert list(read) == ["node 7 direction 3"]
+    assert read["node 7 direction 3"][0] == "m"
+    np.testing.assert_array_equal(read["node 7 direction 3"][2], LIFT)
+    assert "set 2 (lift)' left out: not over time" in notes
+
+    millimetres = pyuff.prepare_164(
+        units_code=5, units_description="mm", temp_mode=1, length=1e3, force=1e3, temp=1.0,
+        temp_offset=0.0,
+    )  # fmt: skip
+    path = tmp_path / "b.uff"
+    pyuff.UFF(str(path)).write_sets(millimetres, "add")
+    assert opened(uff(path))[0]["lift"][0] == ""  # 8 is a displacement, but not in SI
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        ({"x": TIME[::-1]}, "50 values with steps of -1e-05 s"),
+        ({"data": LIFT * 1j, "ord_data_type": 6}, "50 values of type complex"),
+    ],
+)
+def test_universal_sets_that_cannot_be(tmp_path, other, message):
+    with pytest.raises(InputError, match=message):
+        opened(uff(tmp_path / "a.uff", **other))
+
+
+def test_a_universal_file_that_is_too_large(tmp_path, monkeypatch):
+    monkeypatch.setattr("klack.measurement.files.uff_file._LARGEST", 100)
+    with pytest.raises(InputError, match="a universal file of"):
+        opened(uff(tmp_path / "a.uff"))
+
+
+def test_mdf_over_an_angle_needs_the_step_of_the_case(tmp_path):
+    signal = asammdf.Signal(LIFT, TIME, unit="um", name="lift", master_metadata=("angle", 2))
+    records = np.rec.fromarrays([LIFT, LIFT], names=["a", "b"])
+    file = asammdf.MDF(version="4.10")
+    file.append([signal])
+    file.append([asammdf.Signal(LIFT[:1], TIME[:1], unit="um", name="single")])
+    file.append([asammdf.Signal(records, TIME, name="pair")])
+    file.save(tmp_path / "a.mf4")
+    file.close()
+    with pytest.raises(InputError, match="group 1: got no time"):
+        opened(tmp_path / "a.mf4")
+    read, notes = opened(tmp_path / "a.mf4", time_step=1e-5)
+    np.testing.assert_allclose(read["lift"][1], TIME, rtol=1e-14)
+    assert "'single' left out: fewer than two samples" in notes
+    assert "'pair' left out: " in notes
+
+
+def test_tdms_without_a_time(tmp_path):
+    def write(*channels):
+        with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+            writer.write_segment([nptdms.ChannelObject("bench", *one) for one in channels])
+
+    lift = ("lift", LIFT, {"unit_string": "um"})
+    write(lift, ("words", ["a", "b"]))
+    with pytest.raises(InputError, match="channel 'lift': got no time"):
+        opened(tmp_path / "a.tdms")
+    read, notes = opened(tmp_path / "a.tdms", time_step=1e-5)
+    np.testing.assert_allclose(read["lift"][1], TIME, rtol=1e-14)
+    assert "'bench/words' left out: no numbers" in notes
+    write(("time", TIME), lift)
+    read, notes = opened(tmp_path / "a.tdms")
+    np.testing.assert_array_equal(read["lift"][1], TIME)
+    assert "the time has no unit; taken as seconds" in notes
+
+
+def test_hdf5_leaves_out_what_is_no_channel_and_says_so(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["lift_um"] = LIFT
+        file["cube"] = np.zeros((3, 4, 5))
+        file["complex"] = LIFT * 1j
+        file["words"] = np.array([b"a", b"b"])
+        file["note"] = "bench 3"
+        file["dt"] = 1e-5
+        file.attrs["odd"] = np.zeros((), dtype=[("a", "f8")])
+        file.attrs["none"] = h5py.Empty("f8")
+        file.create_dataset("nothing", (0,), "f8")
+    read, notes = opened(tmp_path / "a.h5")
+    assert list(read) == ["lift_um"]
+    for name in ("cube", "complex", "words"):
+        assert f"'{name}'" in notes
+
+
+def test_matlab_leaves_out_what_is_no_channel_and_says_so(tmp_path):
+    content = {"lift_um": LIFT, "fs": 1e5, "complex": LIFT * 1j, "empty": []}
+    scipy_io.savemat(tmp_path / "a.mat", content)
+    read, notes = opened(tmp_path / "a.mat")
+    assert list(read) == ["lift_um"]
+    np.testing.assert_array_equal(read["lift_um"][2], LIFT)
+    assert "'complex'" in notes
+
+
+def test_tables(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("time,lift [um]\n0,1\n1,2\n2,3\n")
+    read, notes = opened(path, time_step=1e-5)
+    np.testing.assert_allclose(read["lift"][1], 1e-5 * np.arange(3))
+    assert "time without unit replaced by time_step" in notes
+    for rows in ("1\n2\n3\n", "0,1\n5,2\n3,3\n"):  # one column, and a first one that is no time
+        path.write_text(rows)
+        with pytest.raises(InputError, match="got no time"):
+            opened(path)
+    path.write_bytes("t [s];lift [-]\n0;1\n1e-5;2\n2e-5;3\n".encode("utf-16-be"))
+    assert opened(path)[0]["lift"][0] == ""
