@@ -174,7 +174,10 @@ FAULTS = {
     ),
     "only words": ("time,lift\na,b\n", "got no line of numbers"),
     "empty": ("", "got an empty file"),
-    "no time": ("lift [um],current [A]\n1,2\n1,2\n2,3\n", "got no time, expected.*time_step"),
+    "no time": (
+        "lift [um],current [A]\n1,2\n1,2\n2,3\n",
+        "got no time among the columns 'lift .*time_step",
+    ),
     "slow time without unit": (
         "t,lift [um]\n0,1\n1,2\n2,3\n",
         "a time without unit, with steps of 1",

@@ -80,7 +80,9 @@ _TABLE: Mapping[Role, Mapping[str, float]] = {
 """Factors to SI by role; what one role reads as g (acceleration) no other role reads as a mass."""
 
 _TIMES: Mapping[str, float] = {
-    **dict.fromkeys(("s", "sec", "second", "seconds", "Sekunden", "sek"), 1.0),
+    **dict.fromkeys(
+        ("s", "sec", "Sec", "second", "Second", "seconds", "Seconds", "Sekunden", "sek"), 1.0
+    ),
     **dict.fromkeys(("ms", "msec", "millisecond", "milliseconds"), 1e-3),
     **dict.fromkeys(("us", "usec", "microsecond", "microseconds"), 1e-6),
     "ns": 1e-9,

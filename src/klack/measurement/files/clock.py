@@ -14,12 +14,12 @@ SLOWEST = 1e-3  # [s]
 
 _NAME = re.compile(
     r"(t|time|zeit|timestamps?|time[ _-]?stamp|timechannel|abtastzeit|messzeit|abszisse|abscissa|"
-    r"x_value)"
+    r"x_value|x[ -]?axis)"
     r"([ _-]?(s|sec|ms|us|ns|abs|rel|axis|vector|\#?\d+))?",
     re.IGNORECASE,
 )
 _TIME_UNITS = {
-    *("s", "sec", "second", "seconds", "Sekunden"),
+    *("s", "sec", "Sec", "second", "Second", "seconds", "Seconds", "Sekunden"),
     *("ms", "msec", "millisecond", "milliseconds"),
     *("us", "usec", "microsecond", "microseconds", "ns"),
 }
@@ -116,11 +116,11 @@ def unique_names(names: list[str]) -> list[str]:
     return result
 
 
-def no_clock(where: str) -> InputError:
-    """Error of a file without any time."""
+def no_clock(where: str, looked_at: str = "") -> InputError:
+    """Error of a file without any time; what was looked at is said."""
     return InputError(
         where,
-        got="no time",
+        got="no time" + looked_at,
         expected="a channel of time with its unit, e.g. 'time [s]'",
         hint="add it to the file, or give 'time_step: 10 us' in the section 'measurement' of the "
         "case.",

@@ -14,6 +14,7 @@ from klack.measurement.files.number_kernel import WHITESPACE
 from klack.measurement.unit_text import is_unit, no_unit, plain_unit
 
 __all__ = [
+    "SEQUENCE",
     "Column",
     "Dialect",
     "encoding_of",
@@ -25,9 +26,13 @@ __all__ = [
 
 _SEPARATORS = (";", "\t", ",", "|", "")
 _NAMES = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", "": "blanks"}
-_MISSING = {"", "nan", "na", "n/a", "null", "inf", "-inf", "-", "--", "#n/a", "-nan", "+inf"}
+_MISSING = {"", "nan", "na", "n/a", "null", "inf", "-", "#n/a", "infinity", "∞", "ol", "ovl"}
+_MISSING |= {"over", "overflow", "***"}
+SEQUENCE = "sequence"
+"""Unit of a column that counts the rows."""
 _COMMENTS = "#%!;"
 _NO_COLUMN = {"", "comment"}  # LabVIEW names a column of remarks that is not there
+_AXIS = ("x-axis", "x axis", "x", "time")
 _FOLLOWING = 3  # rows of numbers that end a header
 _NUMBERS = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
@@ -145,7 +150,7 @@ def _width(line: str, separator: str, decimal: str) -> int:
     for cell in cells:
         if pattern.fullmatch(cell):
             numbers += 1
-        elif cell.lower() not in _MISSING:
+        elif cell.lower() not in _MISSING and cell.lower().lstrip("+-") not in _MISSING:
             return 0
     return len(cells) if numbers else 0
 
@@ -182,8 +187,9 @@ def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] 
         return None
     units: list[str] = [""] * dialect.width
     names = rows.pop()
-    if rows and _is_unit_row(names):
-        units, names = [plain_unit(cell) for cell in names], rows.pop()
+    if _is_unit_row(names):
+        units = [plain_unit(cell) for cell in names]
+        names = rows.pop() if rows else [f"column {k + 1}" for k in range(dialect.width)]
     return tuple(_column(name, unit) for name, unit in zip(names, units, strict=True))
 
 
@@ -200,6 +206,8 @@ def _header_cells(line: str, dialect: Dialect) -> list[str] | None:
         if len(cells) == dialect.width - 1 and dialect.width > 2 and separator:
             cells.append("")  # the last column has no name
         numbers = any(_NUMBERS[dialect.decimal].fullmatch(cell) for cell in cells)
+        if numbers and cells[0].lower() in _AXIS and all(c.isdigit() for c in cells[1:]):
+            numbers = False  # channels are called by their numbers
         if len(cells) == dialect.width and any(cells) and not numbers:
             return cells
     return None
@@ -212,7 +220,9 @@ def _words(text: str) -> list[str]:
 
 def _is_unit_row(cells: Sequence[str]) -> bool:
     written = [cell for cell in cells if not no_unit(cell)]
-    return bool(written) and all(is_unit(cell) or _in_brackets(cell) for cell in written)
+    return bool(written) and all(
+        is_unit(cell) or _in_brackets(cell) or cell.lower() == SEQUENCE for cell in written
+    )
 
 
 def _in_brackets(cell: str) -> bool:
@@ -234,11 +244,16 @@ def split_label(label: str) -> tuple[str, str]:
         unit = match["unit"]
         if no_unit(unit):
             return match["name"], ""
+        if match["name"].lower() == "time" and is_unit(unit.lower()):
+            return match["name"], unit.lower()  # Scopy writes Time(S)
         if match["open"] == "[" or is_unit(unit):
             return match["name"], plain_unit(unit)
     match = _SLASH.fullmatch(label)
     if match and is_unit(match["unit"]):
         return match["name"], plain_unit(match["unit"])
+    match = re.fullmatch(r"in (\S+)", label)
+    if match and is_unit(match[1]):
+        return "", plain_unit(match[1])
     match = _SUFFIX.fullmatch(label)
     if match and is_unit(match["unit"]) and not _NO_SUFFIX.fullmatch(match["name"]):
         return label, plain_unit(match["unit"])

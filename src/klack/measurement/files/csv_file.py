@@ -1,6 +1,8 @@
 """Text tables: CSV and its relatives, any separator and either decimal mark."""
 
+import re
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,6 +10,7 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.measurement.files.clock import SLOWEST, clock_factor, is_clock, no_clock, unique_names
 from klack.measurement.files.csv_dialect import (
+    SEQUENCE,
     Column,
     Dialect,
     encoding_of,
@@ -15,13 +18,17 @@ from klack.measurement.files.csv_dialect import (
     first_row,
     read_columns,
 )
+from klack.measurement.files.csv_header import TableHeader, read_header
 from klack.measurement.files.number_table import NumberTable
 from klack.measurement.recording import ChannelInfo, Recording
 
 __all__ = ["CsvFile"]
 
 Vector = NDArray[np.float64]
+Value = TypeVar("Value")
 
+_LEFT_OF_ROWS = re.compile(rb"Record Length,[^,\r\n]*,[^,\r\n]*,\s*[-+.\d]+[^,\r\n]*,\s*[-+.\d]")
+_LARGEST_BESIDE = 1 << 28  # bytes
 _HEAD = 1 << 18  # bytes in which the header must end
 _SAMPLE = 1 << 14  # bytes looked at in the middle and at the end
 _TRIED = 1000  # rows by which a first column without name is recognised as time
@@ -42,24 +49,38 @@ class CsvFile(Recording):
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         data = _bytes_of(path)
-        dialect, columns, start = _survey(path, data)
+        data = _beside(data)
+        dialect, columns, header, start = _survey(path, data)
         self._table = NumberTable(path, data, start, dialect)
         self._column: dict[str, int] = {}
         self._factor: dict[str, float] = {}
         self._clock_column: dict[str, int] = {}
         notes: list[str] = []
+        if columns is None and len(header.names) == dialect.width:
+            columns = tuple(Column(name, "", name) for name in header.names)
         if columns is None:
             notes.append(f"{path.name}: no names; columns are called column 1, column 2, ...")
             columns = tuple(Column(f"column {k + 1}", "", "") for k in range(dialect.width))
             clocks = _first_as_clock(path, self._table, time_step, notes)
         else:
             clocks = _named_clocks(path, self._table, columns, time_step, notes)
-        super().__init__(path, self._channels(columns, clocks, time_step), tuple(notes))
+        channels = self._channels(columns, clocks, time_step, header, notes)
+        super().__init__(path, channels, tuple(notes))
 
     def _channels(
-        self, columns: tuple[Column, ...], clocks: dict[int, float], time_step: float | None
+        self,
+        columns: tuple[Column, ...],
+        clocks: dict[int, float],
+        time_step: float | None,
+        header: TableHeader,
+        notes: list[str],
     ) -> tuple[ChannelInfo, ...]:
         times = {k for k, c in enumerate(columns) if k in clocks or is_clock(c.name, c.unit)}
+        counts = {k for k, c in enumerate(columns) if c.unit.lower() == SEQUENCE}
+        times |= counts
+        values = [k for k in range(len(columns)) if k not in times]
+        if not clocks and time_step is None and header.steps:
+            notes.append(f"{self._table.path.name}: time made from '{header.words}' of the header.")
         names = unique_names([c.name or f"column {k + 1}" for k, c in enumerate(columns)])
         channels = []
         for k, column in enumerate(columns):
@@ -67,26 +88,50 @@ class CsvFile(Recording):
             if k in times or count == 0:
                 continue
             start, step, clock = 0.0, time_step, ""
+            place = values.index(k)
+            if not clocks and time_step is None:
+                start = _of(header.starts, place, len(values)) or 0.0
+                step = _of(header.steps, place, len(values))
+                start += self._first_count(counts) * (step or 0.0)
             if clocks:
                 of = max((c for c in clocks if c < k), default=min(clocks))
                 count, clock = min(count, int(self._table.filled[of])), names[of]
                 self._clock_column[clock], self._factor[clock] = of, clocks[of]
                 start, step = self._mean_step(of, clocks[of], count)
             if step is None:
-                raise no_clock(str(self._table.path))
+                looked = ", ".join(f"'{c.label or c.name}'" for c in columns[:12])
+                raise no_clock(str(self._table.path), f" among the columns {looked}")
             self._column[names[k]] = k
             channels.append(
                 ChannelInfo(
                     name=names[k],
-                    unit=column.unit,
+                    unit=column.unit
+                    or _of(header.units, place, len(values), all_of_one=False)
+                    or "",
                     count=count,
                     start=start,
                     step=step,
                     clock=clock,
                     label=column.label,
+                    origin=_of(header.origins, place, len(values)),
                 )
             )
         return tuple(channels)
+
+    def _first_count(self, columns: set[int]) -> float:
+        """First number of a column that counts the rows; refuse one that leaves some out."""
+        for column in columns:
+            rows = int(self._table.filled[column])
+            first, last = (self._table.column(column, k, k + 1)[0] for k in (0, rows - 1))
+            if last - first == rows - 1:
+                return float(first)
+            raise InputError(
+                f"{self._table.path.name}: column {column + 1}",
+                got=f"{rows} rows counted from {first:g} to {last:g}",
+                expected="every row of the record",
+                hint="export the record again, whole.",
+            )
+        return 0.0
 
     def _mean_step(self, clock: int, factor: float, count: int) -> tuple[float, float | None]:
         first = factor * float(self._table.column(clock, 0, 1)[0])
@@ -113,8 +158,32 @@ def _bytes_of(path: Path) -> NDArray[np.uint8]:
     return np.asarray(np.memmap(path, np.uint8, "r"))
 
 
-def _survey(path: Path, data: NDArray[np.uint8]) -> tuple[Dialect, tuple[Column, ...] | None, int]:
-    """Dialect, columns (None without header) and first byte of the rows."""
+def _of(
+    values: tuple[Value, ...], place: int, count: int, *, all_of_one: bool = True
+) -> Value | None:
+    """Value of one of ``count`` channels; a single one is for all if ``all_of_one``."""
+    if len(values) == count:
+        return values[place]
+    return values[0] if len(values) == 1 and all_of_one else None
+
+
+def _beside(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Table of an oscilloscope of Tektronix that writes its header left of its first rows."""
+    head = data[:200].tobytes()
+    if not _LEFT_OF_ROWS.match(head) or data.size > _LARGEST_BESIDE:
+        return data
+    rows = [line.split(",") for line in data.tobytes().decode("latin-1").splitlines()]
+    said = {row[0]: row[1] for row in rows if len(row) > 4 and row[0]}
+    unit, value = said.get("Horizontal Units", "s"), said.get("Vertical Units", "")
+    lines = [f"time [{unit}],{said.get('Source', 'value')} [{value}]"]
+    lines += [",".join(row[3:5]) for row in rows if len(row) > 4]
+    return np.frombuffer("\n".join(lines).encode("latin-1"), np.uint8)
+
+
+def _survey(
+    path: Path, data: NDArray[np.uint8]
+) -> tuple[Dialect, tuple[Column, ...] | None, TableHeader, int]:
+    """Dialect, columns (None without header), what stands above, first byte of the rows."""
     raw = data[:_HEAD].tobytes()
     encoding = encoding_of(raw)
     mark = 3 if raw[:3] == b"\xef\xbb\xbf" else 0
@@ -141,7 +210,8 @@ def _survey(path: Path, data: NDArray[np.uint8]) -> tuple[Dialect, tuple[Column,
         )
     row = first_row(texts, dialect)
     start = mark + sum(len(line) for line in lines[:row])
-    return dialect, read_columns(texts[:row], dialect), start
+    header, above = read_header(texts[:row], dialect.separator, dialect.decimal)
+    return dialect, read_columns(above, dialect), header, start
 
 
 def _complete_lines(raw: bytes, cut: bool) -> list[bytes]:

@@ -20,6 +20,7 @@ BAD_CELL, TOO_MANY = 1, 2
 _POWERS = np.array([float(f"1e{k}") for k in range(309)])
 _SPACE, _TAB, _LF, _CR, _QUOTE = 32, 9, 10, 13, 34
 _ZERO, _NINE, _PLUS, _MINUS = 48, 57, 43, 45
+_OVER_RANGE = 9.9e37  # IEEE 488.2: infinity 9.9e37, not a number 9.91e37; also no sum overflows
 _MOST_DIGITS = 18  # fit into 64 bits
 
 
@@ -103,7 +104,7 @@ def _number(data: NDArray[np.uint8], at: int, end: int, decimal: int) -> tuple[f
 
 @inner
 def _missing(data: NDArray[np.uint8], at: int, stop: int) -> bool:
-    """True for nan, na, n/a, null, inf, - and the like, in any case."""
+    """True for nan, na, n/a, null, inf, - and signs for "over range", in any case."""
     if at < stop and (data[at] == _PLUS or data[at] == _MINUS):
         at += 1
     key = np.int64(0)
@@ -112,7 +113,8 @@ def _missing(data: NDArray[np.uint8], at: int, stop: int) -> bool:
         if 65 <= c <= 90:
             c += 32
         key = key * 256 + c
-    # as numbers of base 256: nothing or another -, na, nan, inf, n/a, null, #n/a
+    # as numbers of base 256: nothing or another -, na, nan, inf, n/a, null, #n/a,
+    # infinit(y), the sign of infinity in UTF-8, ol, ovl, over, overflo(w), ***
     return (
         key == 0
         or key == 0x2D
@@ -122,6 +124,13 @@ def _missing(data: NDArray[np.uint8], at: int, stop: int) -> bool:
         or key == 0x6E2F61
         or key == 0x6E756C6C
         or key == 0x236E2F61
+        or key == 0x696E66696E6974
+        or key == 0xE2889E
+        or key == 0x6F6C
+        or key == 0x6F766C
+        or key == 0x6F766572
+        or key == 0x6F766572666C6F
+        or key == 0x2A2A2A
     )
 
 
@@ -196,6 +205,8 @@ def parse_rows(
                     if stop > behind or behind == at:
                         if not _missing(data, at, stop):
                             return row, at, BAD_CELL, column
+                        value = np.nan
+                    elif abs(value) >= _OVER_RANGE:
                         value = np.nan
                     if place[column] >= 0:
                         out[place[column], row] = value
