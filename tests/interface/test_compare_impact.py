@@ -122,3 +122,51 @@ def test_a_record_without_a_plateau_or_with_volts_is_an_error(result, tmp_path, 
     for file, text in ((bell, "no plateau"), (volts, "the unit 'V'"), (tmp_path / "x", "no such")):
         assert main(["compare", str(result), "--measurement", str(file), "--output", "front"]) == 2
         assert text in " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor", "said", "not_said"),
+    [
+        ("um/m", -1.5, "If the recordings are absolute, the speeds were", "without a unit"),
+        ("", -1.5, "A recording without a unit, or with a scale that is not known", "absolute"),
+        ("um/m", -4000.0, "The recordings are not absolute", "If the recordings"),
+    ],
+)
+def test_a_speed_is_said_only_where_it_can_be_true(
+    result, tmp_path, capsys, unit, factor, said, not_said
+):
+    file = recording(tmp_path / "shot.csv", result, factor, unit)
+    assert main(["compare", str(result), "--measurement", str(file), "--output", "front",
+                 "--no-report", "--out", str(tmp_path / "out")]) == 0  # fmt: skip
+    text = " ".join(capsys.readouterr().out.split())
+    assert said in text
+    assert not_said not in text
+
+
+@pytest.mark.parametrize(
+    ("row", "text", "said"),
+    [
+        (51, None, "a time that does not rise: .* at row 51 of its numbers"),
+        (51, "2e6,1", "a time that does not rise: .* at row 52 of its numbers"),
+        (51, "nan,1", "a time that does not rise: no value at row 51 of its numbers"),
+    ],
+)
+def test_a_time_that_cannot_be_is_told_with_its_row(result, tmp_path, capsys, row, text, said):
+    file = recording(tmp_path / "shot.csv", result)
+    lines = file.read_text().splitlines()  # the names are line 0
+    lines[row] = lines[row - 1] if text is None else text
+    file.write_text("\n".join(lines))
+    assert main(["compare", str(result), "--measurement", str(file), "--output", "front"]) == 2
+    assert re.search(said, " ".join(capsys.readouterr().err.split()))
+
+
+def test_missing_values_of_a_pulse_are_told_with_the_first(result, tmp_path):
+    file = recording(tmp_path / "shot.csv", result)
+    lines = file.read_text().splitlines()
+    for row, value in ((21, "inf"), (40, "nan")):
+        lines[row] = lines[row].split(",")[0] + "," + value
+    file.write_text("\n".join(lines))
+    record = klack.compare(klack.load_result(result), file, output="front").record
+    assert any(
+        "2 missing values of 'strain' left out, the first at row 21" in n for n in record.notes
+    )

@@ -253,7 +253,7 @@ def test_a_few_lost_samples_are_bridged_and_many_refused(tmp_path):
     time = np.delete(1e-6 * np.arange(3000), np.arange(700, 720))
     table(path, ["t [s]", "lift [um]"], [time, lift_of(time)])
     with pytest.raises(
-        InputError, match=r"got a gap of 2\.1e-05 s in its time, with steps of 1e-06"
+        InputError, match=r"got a gap of 2\.1e-05 s in its time before row 701 of its numbers"
     ):
         read(path)
 
@@ -272,11 +272,42 @@ def test_a_few_missing_values_are_bridged_and_many_refused(tmp_path):
         read(path)
 
 
-def test_a_time_that_starts_again_is_refused(tmp_path):
-    time = np.tile(1e-6 * np.arange(50), 3)[:-1]
-    path = table(tmp_path / "a.csv", ["t [s]", "lift [um]"], [time, lift_of(time)])
-    with pytest.raises(InputError, match=r"does not rise: 0 s at sample 51"):
-        read(path)
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda t: t.__setitem__(30, t[28]), r"does not rise: 2.8e-05 s at row 31 of its numbers"),
+        (lambda t: t.__setitem__(30, t[29]), r"does not rise: 2.9e-05 s at row 31 of its numbers"),
+        (lambda t: t.__setitem__(30, 2e6), r"does not rise: 3.1e-05 s at row 32 of its numbers"),
+        (lambda t: t.__setitem__(slice(30, 50), t[30:50] + 2.0), "a gap of 2 s .* before row 31"),
+        (lambda t: t.__setitem__(49, 2e6), "a gap of 2e.06 s .* before row 50 of its numbers"),
+        (lambda t: t.__setitem__(30, np.nan), "does not rise: no value at row 31 of its numbers"),
+    ],
+)
+def test_times_that_cannot_be_are_refused_with_their_row(tmp_path, spoil, message):
+    time = 1e-6 * np.arange(50)
+    lift = lift_of(time)
+    spoil(time)
+    path = table(tmp_path / "a.csv", ["t [s]", "lift [um]"], [time, lift])
+    with pytest.raises(InputError, match=message):
+        load_stroke_set([path])
+
+
+@pytest.mark.parametrize("name", [None, "lift"])
+def test_a_time_that_starts_again_is_cut_into_segments(tmp_path, name):
+    one = 1e-6 * np.arange(-10, 490)
+    time = np.concatenate([one, one + 2e-7, one[:-1]])  # of an oscilloscope: by parts of a step
+    number = np.repeat([1.0, 2.0, 3.0], [500, 500, 499])
+    path = table(tmp_path / "a.csv", ["t [s]", "lift [um]", "i [A]"], [time, number, -number])
+    channels = {} if name is None else {"lift": name, "current": "i"}
+    section = CaseMeasurement.model_validate({"channels": channels})
+    found = load_stroke_set([path], section)
+
+    assert len(found.strokes) == 3
+    assert any("time starts again; cut into 3 parts" in note for note in found.notes)
+    np.testing.assert_array_equal(found.matrix("current").mean(axis=1), [-1.0, -2.0, -3.0])
+    with open_recording(path) as recording:
+        assert [c.name for c in recording.channels][:3] == ["lift #1", "lift #2", "lift #3"]
+        np.testing.assert_allclose(recording.time("lift #2"), one + 2e-7, rtol=0, atol=1e-17)
 
 
 def test_channels_that_never_overlap_are_refused(tmp_path):

@@ -121,7 +121,7 @@ def matches(pattern: str, text: str) -> bool:
 
 
 def _matching(recording: Recording, role: Role, choice: ChannelChoice) -> list[ChannelInfo]:
-    """Channels of a name or pattern; the part behind the last ``/`` is enough."""
+    """Channels of a name or pattern, numbered ones too; what stands behind a ``/`` is enough."""
     found = [info for info in recording.channels if matches(choice.name, info.name)]
     found = found or [
         info
@@ -135,7 +135,8 @@ def _matching(recording: Recording, role: Role, choice: ChannelChoice) -> list[C
             expected=f"one of: {some_names(recording.channels)}",
             hint="correct the name; * and ? stand for anything.",
         )
-    if len(found) > 1 and not re.search(r"[*?]", choice.name):
+    numbered = {re.sub(r" #\d+$", "", info.name) for info in found} == {choice.name}
+    if len(found) > 1 and not (numbered or re.search(r"[*?]", choice.name)):
         raise _ambiguous(recording, role, found)
     return found
 

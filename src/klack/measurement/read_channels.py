@@ -256,7 +256,7 @@ def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: V
         )
     warnings.warn(
         f"{recording.path.name}: {np.count_nonzero(missing)} missing values of '{name}' filled "
-        "by linear interpolation.",
+        f"by linear interpolation, the first at {time[begins[0]]:.6g} s.",
         AccuracyWarning,
         stacklevel=4,
     )

@@ -135,8 +135,13 @@ class Recording(Closing):
                 lambda first, last: self._time(channel, first, last),
                 channel.count,
                 f"{self.path.name}: time of '{name}'",
+                lambda sample: self.place(name, sample),
             )
         return self._time_bases[key]
+
+    def place(self, name: str, sample: int) -> str:
+        """What users know a sample by, for messages; formats of text override this."""
+        return f"sample {sample + 1}"
 
     def _window(self, channel: ChannelInfo, first: int, last: int | None) -> tuple[int, int]:
         end = channel.count if last is None else min(last, channel.count)

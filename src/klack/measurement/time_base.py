@@ -67,7 +67,9 @@ class TimeBase:
         return max(first, 0), min(max(last, 0), self.count)
 
 
-def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> TimeBase:
+def survey_time(
+    read: Callable[[int, int], Vector], count: int, where: str, place: Callable[[int], str]
+) -> TimeBase:
     """Go through a stored time once, in blocks.
 
     Parameters
@@ -77,6 +79,8 @@ def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> T
     count : int
     where : str
         File and channel, for errors.
+    place : callable
+        What a sample is called there, counted from 0.
 
     Raises
     ------
@@ -93,18 +97,20 @@ def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> T
     start, end = float(read(0, 1)[0]), float(read(count - 1, count)[0])
     step = (end - start) / (count - 1)
     marks, lengths = [], set[float]()
-    deviation, longest, usual, previous = 0.0, 0.0, step, np.empty(0)
+    deviation, longest, usual, previous, widest = 0.0, 0.0, step, np.empty(0), 0
     for first in range(0, count, _BLOCK):
         time = read(first, min(first + _BLOCK, count))
         steps = np.diff(np.concatenate((previous, time)))
-        _check_order(steps, time, first, where)
+        _check_order(steps, time, first, where, place)
         if first == 0:
             usual = float(np.median(steps))
         marks.append(float(time[0]))
         previous = time[-1:]
         uniform = start + step * np.arange(first, first + time.size)
         deviation = max(deviation, float(np.max(np.abs(time - uniform))) / step)
-        longest = max(longest, float(np.max(steps, initial=0.0)) / usual)
+        if float(np.max(steps, initial=0.0)) / usual > longest:
+            longest = float(np.max(steps)) / usual
+            widest = first + int(np.argmax(steps)) + time.size - steps.size
         if len(lengths) <= _LENGTHS:
             lengths.update(np.unique(np.round(steps / usual, 4)).tolist()[: _LENGTHS + 1])
     base = TimeBase(
@@ -115,7 +121,8 @@ def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> T
     if longest > _LARGE_GAP:
         raise InputError(
             where,
-            got=f"a gap of {longest * usual:.3g} s in its time, with steps of {usual:.3g} s",
+            got=f"a gap of {longest * usual:.3g} s in its time before {place(widest)}, with steps "
+            f"of {usual:.3g} s",
             expected="gaps of at most five samples",
             hint="export the parts between the gaps into separate files or channels.",
         )
@@ -129,18 +136,21 @@ def survey_time(read: Callable[[int, int], Vector], count: int, where: str) -> T
     return replace(base, step=usual, uniform=False, note=note)
 
 
-def _check_order(steps: Vector, time: Vector, first: int, where: str) -> None:
-    """Raise where the time is constant, decreasing or missing."""
-    wrong = np.flatnonzero(~(steps > 0))
+def _check_order(
+    steps: Vector, time: Vector, first: int, where: str, place: Callable[[int], str]
+) -> None:
+    """Raise where the time is constant, decreasing, missing or without end."""
+    wrong = np.flatnonzero(~((steps > 0) & (steps < np.inf)))
     if wrong.size == 0:
         return
     k = int(wrong[0]) + time.size - steps.size
-    came = "no value" if np.isnan(time[k]) else f"{time[k]:.9g} s"
+    came = f"{time[k]:.9g} s" if np.isfinite(time[k]) else "no value"
     raise InputError(
         where,
-        got=f"a time that does not rise: {came} at sample {first + k + 1}",
+        got=f"a time that does not rise: {came} at {place(first + k)}",
         expected="times that rise from sample to sample",
-        hint="write each stroke into its own file or channel; a restarting time is not cut.",
+        hint="correct it, or write each stroke into its own file or channel; of tables, a time "
+        "that starts again is cut where all parts are alike.",
     )
 
 

@@ -1,5 +1,6 @@
 """A computed output of an impact beside recordings of the same sensor."""
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ from klack.analyses.comparison.calculix import level_of
 from klack.analyses.comparison.impacts_record import ComparedPulse, MeasuredImpactStudy
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.record import case_fields, run_fields
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.gauges.gauge import GaugeKind, GaugeRecord
 from klack.low_pass import LowPass
 from klack.measurement.files.opening import open_recording
@@ -48,6 +49,7 @@ class _Record:
     time: Floats
     values: Floats
     pulse: Pulse
+    absolute: bool
 
 
 def compare_impact(
@@ -170,6 +172,7 @@ def _compared(
         fitted=not known_speed,
         shift=fit.shift,
         rms=fit.rms,
+        absolute=record.absolute,
     )
 
 
@@ -198,20 +201,29 @@ def _read(path: Path, kind: GaugeKind, channel: str | None, absolute: bool) -> _
                 hint="without --known-speed a factor is fitted.",
             )
         factor = _factor(path, info, kind)
+        recording.time_base(info.name)  # refuses times that do not rise, with their row
         time, values = recording.read(info.name)
-    known = np.isfinite(values) & np.isfinite(time)
+        known = np.isfinite(values)
+        if not np.all(known):
+            first = recording.place(info.name, int(np.argmin(known)))
+            warnings.warn(
+                f"{path.name}: {np.count_nonzero(~known)} missing values of '{info.name}' left "
+                f"out, the first at {first}.",
+                AccuracyWarning,
+                stacklevel=2,
+            )
     time, values = time[known], factor * values[known]
     where = f"{path.name}: {info.name}"
-    if len(time) > 1 and not np.all(np.diff(time) > 0.0):
-        raise InputError(
-            where,
-            got="times that do not rise",
-            expected="one record with rising times",
-            hint="give every shot a file of its own.",
-        )
     pulse = measure_pulse(time, values, where)
     label = info.label or info.name
-    return _Record(name=path.name, channel=label, time=time, values=values, pulse=pulse)
+    return _Record(
+        name=path.name,
+        channel=label,
+        time=time,
+        values=values,
+        pulse=pulse,
+        absolute=not (no_unit(info.unit) or info.unapplied),
+    )
 
 
 def _channel(recording: Recording, name: str | None) -> ChannelInfo:

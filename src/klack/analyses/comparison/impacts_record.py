@@ -33,6 +33,9 @@ class ComparedPulse:
         Computed time minus measured time.
     rms : float [-]
         Of the difference, over the measured plateau.
+    absolute : bool
+        False if the recording cannot be in the unit of the output: it names none, or a scale that
+        klack does not know.
     """
 
     name: str
@@ -43,6 +46,7 @@ class ComparedPulse:
     fitted: bool
     shift: float
     rms: float
+    absolute: bool = True
 
     @property
     def length_difference(self) -> float:

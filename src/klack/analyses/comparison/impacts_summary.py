@@ -76,6 +76,10 @@ def pulse_verdict(study: MeasuredImpactStudy) -> str:
     )
 
 
+_LIKELY = 10.0
+"""Factor of a speed beside the computed one above which a recording is taken for scaled."""
+
+
 def _side(difference: float) -> str:
     return "short" if difference < 0.0 else "long"
 
@@ -86,9 +90,18 @@ def factor_sentence(study: MeasuredImpactStudy) -> str:
     if not pulses[0].fitted:
         return "No factor was fitted: the speed is taken as known and the recordings as absolute."
     speeds = ", ".join(f"{pulse.factor * study.speed:.4g}" for pulse in pulses)
+    said = (
+        "One factor and one shift in time were fitted to each recording: the height of a pulse is "
+        "no prediction."
+    )
+    if not all(pulse.absolute for pulse in pulses):
+        return (
+            f"{said} A recording without a unit, or with a scale that is not known, has no speed."
+        )
+    if any(not 1.0 / _LIKELY < pulse.factor < _LIKELY for pulse in pulses):
+        return f"{said} The recordings are not absolute: they would be those of {speeds} m/s."
     return (
-        f"One factor and one shift in time were fitted to each recording: the height of a pulse is "
-        f"no prediction. If the recordings are absolute, the speeds were {speeds} m/s "
+        f"{said} If the recordings are absolute, the speeds were {speeds} m/s "
         f"({study.speed:g} m/s computed)."
     )
 

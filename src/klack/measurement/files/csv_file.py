@@ -31,6 +31,8 @@ _LEFT_OF_ROWS = re.compile(rb"Record Length,[^,\r\n]*,[^,\r\n]*,\s*[-+.\d]+[^,\r
 _LARGEST_BESIDE = 1 << 28  # bytes
 _HEAD = 1 << 18  # bytes in which the header must end
 _SAMPLE = 1 << 14  # bytes looked at in the middle and at the end
+_BLOCK = 1 << 20  # rows looked at together
+_SHORTEST_SEGMENT, _MOST_SEGMENTS = 20, 10_000  # rows, segments
 _TRIED = 1000  # rows by which a first column without name is recognised as time
 
 
@@ -38,7 +40,8 @@ class CsvFile(Recording):
     """Table of a text file.
 
     A column is a time by its name or unit and holds for the columns right of it, up to the next
-    one.  Missing values at the end of a column end the channel; others are nan.
+    one.  Missing values at the end of a column end the channel; others are nan.  Where a time
+    starts again and again, as segments of an oscilloscope do, each part is a channel of its own.
 
     Parameters
     ----------
@@ -52,9 +55,10 @@ class CsvFile(Recording):
         data = _beside(data)
         dialect, columns, header, start = _survey(path, data)
         self._table = NumberTable(path, data, start, dialect)
-        self._column: dict[str, int] = {}
+        self._column: dict[str, tuple[int, int]] = {}  # and first row
         self._factor: dict[str, float] = {}
-        self._clock_column: dict[str, int] = {}
+        self._segments: dict[int, list[tuple[int, int]]] = {}
+        self._clock_column: dict[str, tuple[int, int]] = {}
         notes: list[str] = []
         if columns is None and len(header.names) == dialect.width:
             columns = tuple(Column(name, "", name) for name in header.names)
@@ -84,39 +88,76 @@ class CsvFile(Recording):
         names = unique_names([c.name or f"column {k + 1}" for k, c in enumerate(columns)])
         channels = []
         for k, column in enumerate(columns):
-            count = int(self._table.filled[k])
-            if k in times or count == 0:
+            filled = int(self._table.filled[k])
+            if k in times or filled == 0:
                 continue
-            start, step, clock = 0.0, time_step, ""
             place = values.index(k)
-            if not clocks and time_step is None:
+            unit = column.unit or _of(header.units, place, len(values), all_of_one=False) or ""
+            start, step, parts = 0.0, time_step, [(0, filled)]
+            of = max((c for c in clocks if c < k), default=min(clocks, default=0))
+            if clocks:
+                parts = self._parts(of, notes)
+            elif time_step is None:
                 start = _of(header.starts, place, len(values)) or 0.0
                 step = _of(header.steps, place, len(values))
                 start += self._first_count(counts) * (step or 0.0)
-            if clocks:
-                of = max((c for c in clocks if c < k), default=min(clocks))
-                count, clock = min(count, int(self._table.filled[of])), names[of]
-                self._clock_column[clock], self._factor[clock] = of, clocks[of]
-                start, step = self._mean_step(of, clocks[of], count)
-            if step is None:
-                looked = ", ".join(f"'{c.label or c.name}'" for c in columns[:12])
-                raise no_clock(str(self._table.path), f" among the columns {looked}")
-            self._column[names[k]] = k
-            channels.append(
-                ChannelInfo(
-                    name=names[k],
-                    unit=column.unit
-                    or _of(header.units, place, len(values), all_of_one=False)
-                    or "",
-                    count=count,
-                    start=start,
-                    step=step,
-                    clock=clock,
-                    label=column.label,
-                    origin=_of(header.origins, place, len(values)),
+            for number, (begin, end) in enumerate(parts, start=1):
+                count, clock = min(filled, end) - begin, ""
+                behind = f" #{number}" if len(parts) > 1 else ""
+                if count < 1:
+                    continue
+                if clocks:
+                    clock = names[of] + behind
+                    self._clock_column[clock], self._factor[clock] = (of, begin), clocks[of]
+                    start, step = self._mean_step(of, clocks[of], begin, begin + count)
+                if step is None:
+                    looked = ", ".join(f"'{c.label or c.name}'" for c in columns[:12])
+                    raise no_clock(str(self._table.path), f" among the columns {looked}")
+                self._column[names[k] + behind] = k, begin
+                channels.append(
+                    ChannelInfo(
+                        name=names[k] + behind,
+                        unit=unit,
+                        count=count,
+                        start=start,
+                        step=step,
+                        clock=clock,
+                        label=column.label,
+                        origin=_of(header.origins, place, len(values)),
+                    )
                 )
-            )
         return tuple(channels)
+
+    def _parts(self, clock: int, notes: list[str]) -> list[tuple[int, int]]:
+        """Rows of each segment, where a time starts again and again from the same value."""
+        if clock in self._segments:
+            return self._segments[clock]
+        count, begins, last = int(self._table.filled[clock]), [0], np.inf
+        for first in range(0, count, _BLOCK):
+            time = self._table.column(clock, first, min(first + _BLOCK, count))
+            back = np.flatnonzero(np.diff(time, prepend=last) < 0.0)
+            begins += (first + back[back + first > 0]).tolist()
+            last = float(time[-1])
+            if len(begins) > _MOST_SEGMENTS:
+                break
+        parts = list(zip(begins, [*begins[1:], count], strict=True))
+        if not self._alike(clock, parts):
+            parts = [(0, count)]
+        if len(parts) > 1:
+            notes.append(
+                f"{self._table.path.name}: time starts again; cut into {len(parts)} parts."
+            )
+        self._segments[clock] = parts
+        return parts
+
+    def _alike(self, clock: int, parts: list[tuple[int, int]]) -> bool:
+        """True for parts of the same length that start within a step of each other."""
+        lengths = [end - begin for begin, end in parts]
+        if min(lengths) < _SHORTEST_SEGMENT or max(lengths) - min(lengths) > 2:
+            return False
+        two = self._table.column(clock, 0, 2)
+        starts = [float(self._table.column(clock, begin, begin + 1)[0]) for begin, _ in parts]
+        return max(starts) - min(starts) <= two[1] - two[0]
 
     def _first_count(self, columns: set[int]) -> float:
         """First number of a column that counts the rows; refuse one that leaves some out."""
@@ -133,19 +174,26 @@ class CsvFile(Recording):
             )
         return 0.0
 
-    def _mean_step(self, clock: int, factor: float, count: int) -> tuple[float, float | None]:
-        first = factor * float(self._table.column(clock, 0, 1)[0])
-        last = factor * float(self._table.column(clock, count - 1, count)[0])
-        return first, (last - first) / max(count - 1, 1)
+    def _mean_step(
+        self, clock: int, factor: float, begin: int, end: int
+    ) -> tuple[float, float | None]:
+        first, last = (float(self._table.column(clock, k, k + 1)[0]) for k in (begin, end - 1))
+        return factor * first, factor * (last - first) / max(end - begin - 1, 1)
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        return self._table.column(self._column[channel.name], first, last)
+        column, begin = self._column[channel.name]
+        return self._table.column(column, begin + first, begin + last)
+
+    def place(self, name: str, sample: int) -> str:
+        """Row of a sample among the rows of numbers."""
+        return f"row {self._column[name][1] + sample + 1} of its numbers"
 
     def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         if not channel.clock:
             return super()._time(channel, first, last)
-        clock = channel.clock
-        return self._factor[clock] * self._table.column(self._clock_column[clock], first, last)
+        column, begin = self._clock_column[channel.clock]
+        time = self._table.column(column, begin + first, begin + last)
+        return self._factor[channel.clock] * time
 
 
 def _bytes_of(path: Path) -> NDArray[np.uint8]:
