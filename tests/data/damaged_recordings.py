@@ -12,10 +12,16 @@ import time
 import warnings
 from pathlib import Path
 
+from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
 from klack.measurement.files.opening import open_recording
+from klack.measurement.loading import load_stroke_set
 
 warnings.simplefilter("ignore")
+
+TRIGGERED = CaseMeasurement.model_validate(
+    {"trigger": {"channel": "current", "level": "-2.87 A", "before": "20 us", "after": "50 us"}}
+)
 
 
 def damaged(raw: bytes, draw: random.Random) -> bytes:
@@ -42,10 +48,11 @@ def damaged(raw: bytes, draw: random.Random) -> bytes:
 
 
 def read(path: Path) -> None:
-    """Everything that is in a recording."""
+    """Everything that is in a recording, and what a comparison reads of it."""
     with open_recording(path) as recording:
         for channel in recording.channels:
             recording.read(channel.name)
+    load_stroke_set([path], TRIGGERED, roles=("lift",))
 
 
 def main() -> None:

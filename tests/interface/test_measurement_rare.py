@@ -3,11 +3,14 @@
 Truth: the arrays that were written.
 """
 
+import warnings
+
 import numpy as np
 import pytest
 
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 from klack.measurement.files.opening import open_recording
+from klack.measurement.loading import load_stroke_set
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")
@@ -147,3 +150,54 @@ def test_tables(tmp_path):
             opened(path)
     path.write_bytes("t [s];lift [-]\n0;1\n1e-5;2\n2e-5;3\n".encode("utf-16-be"))
     assert opened(path)[0]["lift"][0] == ""
+
+
+def test_one_sample_far_outside_all_others_is_told(tmp_path):
+    lift = LIFT.copy()
+    lift[20] = 4e6
+    path = hdf5_of(tmp_path / "a.h5", lift)
+    with pytest.warns(
+        AccuracyWarning, match="1 of the values of 'lift_um' far outside.* at 0.0002 s"
+    ):
+        load_stroke_set([path])
+    # a pulse of several samples and the last digit of a converter are signals
+    pulse = np.where(np.arange(50) // 3 == 7, 4e6, LIFT)
+    digit = np.where(np.arange(50) % 9 == 7, 1.0, 0.0)
+    for values in (pulse, digit):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            load_stroke_set([hdf5_of(path, values)])
+
+
+def test_values_beyond_any_instrument_are_missing(tmp_path):
+    lift = LIFT.copy()
+    lift[[20, 21]] = 1e308, np.inf
+    with pytest.warns(AccuracyWarning, match=r"2 missing values of 'lift_um' filled.* at 0.0002 s"):
+        found = load_stroke_set([hdf5_of(tmp_path / "a.h5", lift)])
+    assert np.isfinite(found.matrix("lift")).all()
+
+
+def hdf5_of(path, lift):
+    with h5py.File(path, "w") as file:
+        file["lift_um"], file["dt"] = lift, 1e-5
+    return path
+
+
+def test_a_tdms_file_that_ends_early_is_told(tmp_path, capfd):
+    about = {"unit_string": "um", "wf_increment": 1e-5}
+    with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
+        writer.write_segment([nptdms.ChannelObject("bench", "lift", LIFT, about)])
+    content = (tmp_path / "a.tdms").read_bytes()
+    (tmp_path / "a.tdms").write_bytes(content[:-80])
+    read, notes = opened(tmp_path / "a.tdms")
+    np.testing.assert_array_equal(read["lift"][2], LIFT[:40])
+    assert "less data than expected" in notes
+    assert capfd.readouterr().err == ""
+
+
+def test_an_uneven_universal_set_without_its_end_is_refused(tmp_path):
+    path = uff(tmp_path / "a.uff", abscissa_spacing=0)
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) - 60] + content[-7:])
+    with pytest.raises(InputError, match=r"a\.uff: .*(times|values|cannot be read)"):
+        opened(path)

@@ -24,6 +24,8 @@ Vector = NDArray[np.float64]
 
 _SAME = 0.01  # of a step
 _MOST_MISSING = 5  # samples in a row
+_SPIKE = 2.0  # ranges of all other samples
+_FEWEST, _MOST_SPIKES = 20, 10  # samples; more spikes are a signal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -227,17 +229,40 @@ def _values_at(
     if base.uniform and _on_grid(base, start, step):
         begin = round((start - base.start) / step)
         values = recording.values(name, begin, begin + count)
+        _tell_spikes(recording, name, start, step, values)
         if np.all(np.isfinite(values)):
             return values
         time = np.arange(values.size, dtype=np.float64)
         return _filled(recording, name, time, values, start + step * time)
     time, values = recording.read(name, *base.samples(start, start + step * (count - 1)))
     time = time + later
+    _tell_spikes(recording, name, float(time[0]), base.step, values)
     if base.uniform:
         time = base.start + base.step * np.round((time - base.start) / base.step)
     if not np.all(np.isfinite(values)):
         values = _filled(recording, name, time, values, time)
     return np.interp(start + step * np.arange(count), time, values)
+
+
+def _tell_spikes(
+    recording: Recording, name: str, start: float, step: float, values: Vector
+) -> None:
+    """Warn of single samples that leave their neighbours by more than all others ever move."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < _FEWEST:
+        return
+    x = values[known]
+    middle = np.median([x[:-2], x[1:-1], x[2:]], axis=0)
+    moved = float(np.max(middle) - np.min(middle))
+    spikes = known[1 + np.flatnonzero(np.abs(x[1:-1] - middle) > _SPIKE * moved)]
+    if moved > 0.0 and 0 < spikes.size <= _MOST_SPIKES:
+        at = start + step * spikes[0]
+        warnings.warn(
+            f"{recording.path.name}: {spikes.size} of the values of '{name}' far outside all "
+            f"others, the first at {at:.6g} s: {values[spikes[0]]:.3g}.",
+            AccuracyWarning,
+            stacklevel=4,
+        )
 
 
 def _filled(recording: Recording, name: str, at: Vector, values: Vector, time: Vector) -> Vector:

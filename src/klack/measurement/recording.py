@@ -21,6 +21,8 @@ __all__ = ["ChannelInfo", "Recording", "left_out", "some_names"]
 
 Vector = NDArray[np.float64]
 
+OVER_RANGE = 9.9e37
+"""IEEE 488.2 writes 9.9e37 for infinity and 9.91e37 for what is no number."""
 _LARGEST_WINDOW = 200_000_000  # samples, 1.6 GB
 
 
@@ -105,12 +107,12 @@ class Recording(Closing):
         """
         channel = self.channel(name)
         begin, end = self._window(channel, first, last)
-        return self._time(channel, begin, end), self._values(channel, begin, end)
+        return self._time(channel, begin, end), self._known(channel, begin, end)
 
     def values(self, name: str, first: int = 0, last: int | None = None) -> Vector:
         """Values [unit of the file] alone of the same samples."""
         channel = self.channel(name)
-        return self._values(channel, *self._window(channel, first, last))
+        return self._known(channel, *self._window(channel, first, last))
 
     def time(self, name: str, first: int = 0, last: int | None = None) -> Vector:
         """Time [s] alone of the same samples."""
@@ -154,6 +156,12 @@ class Recording(Closing):
                 hint="read it piecewise: give a trigger in the section 'measurement'.",
             )
         return begin, end
+
+    def _known(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        """Values, those out of range of any instrument as missing."""
+        values = self._values(channel, first, last)
+        over = ~(np.abs(values) < OVER_RANGE)
+        return np.where(over, np.nan, values) if np.any(over) else values
 
     @abstractmethod
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
+from klack.measurement.recording import OVER_RANGE
 
 __all__ = ["BAD_CELL", "TOO_MANY", "WHITESPACE", "parse_rows"]
 
@@ -20,7 +21,6 @@ BAD_CELL, TOO_MANY = 1, 2
 _POWERS = np.array([float(f"1e{k}") for k in range(309)])
 _SPACE, _TAB, _LF, _CR, _QUOTE = 32, 9, 10, 13, 34
 _ZERO, _NINE, _PLUS, _MINUS = 48, 57, 43, 45
-_OVER_RANGE = 9.9e37  # IEEE 488.2: infinity 9.9e37, not a number 9.91e37; also no sum overflows
 _MOST_DIGITS = 18  # fit into 64 bits
 
 
@@ -206,7 +206,7 @@ def parse_rows(
                         if not _missing(data, at, stop):
                             return row, at, BAD_CELL, column
                         value = np.nan
-                    elif abs(value) >= _OVER_RANGE:
+                    elif abs(value) >= OVER_RANGE:
                         value = np.nan
                     if place[column] >= 0:
                         out[place[column], row] = value

@@ -5,6 +5,7 @@ Time is what the properties of each channel say (``wf_start_time``, ``wf_start_o
 are ``group/channel``, without the group if there is only one.
 """
 
+import logging
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from klack.errors import MissingExtraError
 from klack.measurement.files.clock import clock_factor, is_clock, no_clock
 from klack.measurement.files.csv_dialect import split_label
-from klack.measurement.files.foreign import foreign_reading, keep_quiet
+from klack.measurement.files.foreign import foreign_reading, heard
 from klack.measurement.files.scales import unknown_scales
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
@@ -30,6 +31,7 @@ _SCALES = {
 }
 """Types of scales that npTDMS applies; of others it returns the stored numbers."""
 _SINCE_1904 = 2_082_844_800  # [s] from the zero of LabVIEW to 1970
+_LONGEST = 200  # signs of what npTDMS says
 _HALF = 1 << 63  # of a unit of 2^-64 of a second
 
 
@@ -45,11 +47,11 @@ class TdmsFile(Recording):
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         self.path = path
-        self._tdms = _opened(path)
+        notes: list[str] = []
+        self._tdms = _opened(path, notes)
         self._channel: dict[str, Any] = {}
         self._clock: dict[str, tuple[Any, float]] = {}
         self._zero: dict[str, int | None] = {}  # first stamp [ns] of a channel of time stamps
-        notes: list[str] = []
         try:
             super().__init__(path, self._listed(path, time_step, notes), tuple(notes))
         except BaseException:
@@ -147,7 +149,8 @@ class TdmsFile(Recording):
 
     def _read(self, channel: Any, first: int, last: int) -> Vector:
         with _damage(f"{self.path.name}: channel '{channel.name}'"):
-            values = channel.read_data(offset=first, length=last - first)
+            with heard([logger for name, logger in _loggers() if name.startswith("nptdms")]):
+                values = channel.read_data(offset=first, length=last - first)
             if not _is_stamped(channel):
                 return np.asarray(values, dtype=np.float64)
             zero = channel.read_data(0, 1)[0]
@@ -161,14 +164,21 @@ class TdmsFile(Recording):
         self._tdms.close()
 
 
-def _opened(path: Path) -> Any:
+def _opened(path: Path, notes: list[str]) -> Any:
     try:
         import nptdms
     except ImportError as error:
         raise MissingExtraError("npTDMS", f"reading {path.name} (TDMS)", "measurement") from error
-    keep_quiet("nptdms")
-    with _damage(str(path)):
-        return nptdms.TdmsFile.open(path, raw_timestamps=True)  # others are cut to 1 us
+    loggers = [logger for name, logger in _loggers() if name.startswith("nptdms")]
+    with _damage(str(path)), heard(loggers) as said:
+        tdms = nptdms.TdmsFile.open(path, raw_timestamps=True)  # others are cut to 1 us
+    notes += [f"{path.name}: {' '.join(text.split())[:_LONGEST]}." for text in dict.fromkeys(said)]
+    return tdms
+
+
+def _loggers() -> list[tuple[str, logging.Logger]]:
+    known = logging.Logger.manager.loggerDict.items()
+    return [(name, logger) for name, logger in known if isinstance(logger, logging.Logger)]
 
 
 def _damage(where: str) -> AbstractContextManager[None]:

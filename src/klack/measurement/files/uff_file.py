@@ -119,6 +119,13 @@ class UffFile(Recording):
         if not channel.clock:
             return super()._time(channel, first, last)
         data = self._data(self._set[channel.name])
+        if len(data["x"]) < channel.count:
+            raise InputError(
+                f"{self.path.name}: channel '{channel.name}'",
+                got=f"{len(data['x'])} times",
+                expected=f"{channel.count}",
+                hint="the file was truncated; export it again.",
+            )
         return _second(self.path, data) * np.asarray(data["x"][first:last], dtype=np.float64)
 
 
