@@ -3,6 +3,7 @@
 Truth: errors against fine steps alone, extrapolated from three lengths; definition for the pairs.
 """
 
+import runpy
 from dataclasses import fields, replace
 from math import isnan, nan
 from pathlib import Path
@@ -23,7 +24,9 @@ from klack.network.accuracy import PROMISED
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.step_sizes import StepSizes, scaled
 
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+ROOT = Path(__file__).parents[2]
+HOW_TO = ROOT / "docs" / "how-to"
+DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_valves.py"))
 
 
 def impact(time: float, speed: float = 1.0, lasts: float = 5e-6, **more: float) -> ImpactEvent:
@@ -174,6 +177,29 @@ def test_steps_that_are_too_long_are_halved_until_impacts_are_right(truth):
 
 
 @pytest.mark.slow
+def test_steps_are_halved_on_while_changes_fall(tmp_path):
+    """A damped wet stop: 1 % after one halving, 0.2 % after three, promised 0.05 %, no less.
+
+    Truth: fine steps alone, extrapolated over two lengths, which differ by 0.015 % from those of
+    twice these lengths.
+    """
+    case = read_valve_case(DRAWS["draw"](38), tmp_path / "valve.yaml")
+
+    def wet(**changes: Any) -> StrokeVariant:
+        run = case.run.model_copy(update={"duration": 1.1e-4, **changes})
+        return run_stroke(case.model_copy(update={"run": run}), variants=("wet",)).reference
+
+    one, half = (wet(step=h, coarse=1, check_steps=False).result.events for h in (5e-9, 2.5e-9))
+    checked = wet()
+
+    assert checked.halvings > 3
+    assert len(checked.result.events) == len(half) == 3
+    for event, long, short in zip(checked.result.events, one, half, strict=True):
+        assert event.peak_force == pytest.approx(2.0 * short.peak_force - long.peak_force, rel=5e-4)
+        assert event.time == pytest.approx(2.0 * short.time - long.time, abs=5e-8, rel=0.0)
+
+
+@pytest.mark.slow
 def test_steps_that_are_short_enough_stay_as_they_are():
     """The run is that without a check, to the last bit."""
     plain, checked = dry(step=1e-8, check_steps=False), dry(step=1e-8, check_steps=None)
@@ -210,15 +236,15 @@ def test_changes_vanish_with_the_square_of_the_step():
 @pytest.mark.slow
 def test_a_stroke_tells_its_changes_after_storing(tmp_path):
     text = (HOW_TO / "small_valve.yaml").read_text().replace("duration: 2 ms", "duration: 300 us")
-    text = text.replace("step: 20 ns", "step: 400 ns, check_steps: true")
+    text = text.replace("step: 20 ns", "step: 3.2 us, check_steps: true")
     made = run_stroke(read_valve_case(text, tmp_path / "valve.yaml"), variants=("dry",))
     STROKE.save(made, tmp_path)
     loaded = STROKE.load(tmp_path)
 
     (change,) = made.reference.changes
     assert loaded.reference.changes == made.reference.changes
-    assert loaded.reference.halvings == made.reference.halvings == 3
-    assert "50 ns; all of them halved 3 times" in steps_told(loaded.reference)
+    assert loaded.reference.halvings == made.reference.halvings == 5
+    assert "100 ns; all of them halved 5 times" in steps_told(loaded.reference)
     (event,) = stroke_to_json(loaded)["events"]
     assert event["doubled_steps"]["peak_force_change"] == change.peak_force
     assert event["doubled_steps"]["promised"]

@@ -243,6 +243,11 @@ class StepCounts:
     sub_fine: int = 0
     repeats: int = 0
 
+    @property
+    def taken(self) -> int:
+        """Steps of the bodies."""
+        return self.fine + self.flight + self.sub
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NetworkResult:

@@ -5,7 +5,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from math import isfinite
+from math import inf, isfinite
 from time import perf_counter
 from typing import NamedTuple
 
@@ -68,6 +68,8 @@ __all__ = [
 Warned = list[warnings.WarningMessage]
 
 _HALVINGS = 3  # of all steps: errors of first order are an eighth then, those of second a 64th
+_FALLING = 6  # of them at most, where changes still fall from one to the next
+_LONG_RUN = 400_000  # steps of a run that is not halved more than three times: the next takes 1 s
 _NEAR = 0.3  # share of what is asked that the spacing of records may be off by: 1 us is 1.28 us
 
 
@@ -406,11 +408,13 @@ def _attempt(
 def _in_checked_steps(
     valve: Valve, name: Variant, progress: Progress, run: _Attempt, caught: Warned
 ) -> tuple[_Attempt, Warned, CheckedSteps]:
-    """Halve all steps until impacts do not depend on them, but as often as :data:`_HALVINGS`.
+    """Halve all steps until impacts do not depend on them.
 
-    In three dimensions steps are never halved: a run takes some 10 s there, not 0.1 s.
+    As often as :data:`_HALVINGS`, and on to :data:`_FALLING` while the largest change falls: an
+    error that depends on where a step happens to lie need not fall with shorter ones.  In three
+    dimensions steps are never halved: a run takes some 10 s there, not 0.1 s.
     """
-    most = _HALVINGS if valve.spatial is None else 0
+    most = _FALLING if valve.spatial is None else 0
 
     def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
         try:
@@ -423,12 +427,15 @@ def _in_checked_steps(
         return (None if reason else found), kept, reason
 
     longer, _, reason = again(2.0)
-    halvings = 0
+    halvings, before = 0, inf
     while True:
         if longer is not None:
             steps = checked_steps(run.result, longer.result, valve.case.run.accuracy, halvings)
-            if not steps.doubt or halvings == most:
+            largest = steps.largest(valve.case.run.accuracy)
+            falls = largest < before and run.result.steps.taken < _LONG_RUN
+            if not steps.doubt or halvings >= (most if falls else min(most, _HALVINGS)):
                 return run, caught, steps
+            before = largest
         shorter, kept, failed = again(0.5) if halvings < most else (None, [], "")
         if shorter is not None and cut_records(shorter.result) and not cut_records(run.result):
             shorter, failed = None, "the record of the forces in fine steps is full."

@@ -9,7 +9,7 @@ may differ less, and what both runs share, the model and what counts as an impac
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import isfinite, nan
+from math import inf, isfinite, isnan, nan
 from operator import attrgetter
 from typing import NamedTuple
 
@@ -68,11 +68,20 @@ class ImpactChange:
         """Whether klack promises the accuracy of this impact: the first three on each stop."""
         return 1 <= self.number <= _PROMISED
 
+    def over_promise(self, accuracy: Accuracy) -> float:
+        """Change of the peak or the time over what the accuracy promises; inf without a pair."""
+        if not self.promised:
+            return 0.0
+        if self.reason not in ("", _OPEN):
+            return inf
+        peak, time = PROMISED[accuracy]
+        return max(
+            0.0 if isnan(self.peak_force) else abs(self.peak_force) / peak, abs(self.time) / time
+        )
+
     def doubtful(self, accuracy: Accuracy) -> bool:
         """Whether it changes by more than half of what the accuracy promises, or has no pair."""
-        peak, time = PROMISED[accuracy]
-        large = abs(self.peak_force) > _SHARE * peak or abs(self.time) > _SHARE * time
-        return self.promised and (large or self.reason not in ("", _OPEN))
+        return self.over_promise(accuracy) > _SHARE
 
 
 CHANGE_MEASURES: tuple[Measure[ImpactChange], ...] = described_in(
@@ -151,6 +160,10 @@ class CheckedSteps(NamedTuple):
     changes: tuple[ImpactChange, ...] = ()
     doubt: str = ""
     halvings: int = 0
+
+    def largest(self, accuracy: Accuracy) -> float:
+        """Largest change over what is promised."""
+        return max((change.over_promise(accuracy) for change in self.changes), default=0.0)
 
 
 def checked_steps(
