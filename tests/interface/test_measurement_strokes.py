@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from klack.analyses.comparison.strokes import require_same_way
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
 from klack.measurement.alignment import common_axis, onto_axis
@@ -227,3 +228,29 @@ def test_channels_of_one_uneven_time_are_all_named(tmp_path):
     found = load_stroke_set([tmp_path / "a.csv"])
 
     assert any("'lift', 'current': time jitters" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("offset", [0.0, 200e-6])
+def test_a_lift_that_counts_backwards_is_refused_with_the_key(offset):
+    time = np.linspace(0.0, 4e-3, 500)
+    lift = 80e-6 * np.clip((time - 0.4e-3) / 0.1e-3, 0.0, 1.0) * (time < 2.6e-3)
+    noise = 1e-6 * np.random.default_rng(1).normal(size=time.size)
+    require_same_way("bench.csv", lift, lift + noise + offset)
+    require_same_way("bench.csv", lift, 0.0 * lift)
+    with pytest.raises(InputError, match=r"(?s)lift: got a lift that moves against .*scale: -1"):
+        require_same_way("bench.csv", lift, offset - lift + noise)
+
+
+def test_recordings_whose_trigger_jitters_are_aligned(tmp_path):
+    paths = []
+    for k in range(5):
+        paths.append(tmp_path / f"shot{k}.csv")
+        write(paths[k], [1e-3 + 37.3e-6 * k], 6e-3)
+    found = load_stroke_set(paths, section(zero="none"))
+
+    assert len(found.strokes) == 5
+    lift = found.matrix("lift")[:, found.time < 2.4e-3]  # later it falls between two samples
+    # the noise of 0.1 um, and 2 us of a rise of 80 um in 300 us where a sample is held
+    assert np.abs(lift - np.median(lift, axis=0)).max() < 0.6e-6 + 2e-6 * 80e-6 / 300e-6
+    starts = np.array([stroke.start for stroke in found.strokes])
+    np.testing.assert_allclose(np.diff(starts), 37.3e-6, rtol=0, atol=1e-8)

@@ -110,7 +110,8 @@ def load_stroke_set(
             source or "measurement",
             got="no stroke",
             expected="a channel that crosses the trigger level",
-            hint="check measurement.trigger: channel, level or share, and slope.",
+            hint="check measurement.trigger: channel, level or share, and slope; scale: -1 turns a "
+            "channel round.",
         )
     zero = measurement is not None and measurement.zero == "start"
     return _aligned(source, cuts, trigger, zero=zero or measurement is None, notes=notes)

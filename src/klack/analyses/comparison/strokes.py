@@ -58,6 +58,7 @@ _REPLICAS, _SEED = 5, 1
 """Readings of the computed lift, each with noise of its own."""
 _FEWEST_SHOTS = 3
 _STOPS: tuple[Stop, ...] = ("opening", "seat")
+_AGAINST = -0.5  # correlation
 
 
 def compare_strokes(
@@ -134,6 +135,7 @@ def _compare(
     estimate = velocity_of(time, lift, bandwidth=section.velocity_bandwidth)
     speed = velocity_of(time, computed, bandwidth=estimate.bandwidth)
     low, median, high = _band(lift)
+    require_same_way(strokes.source, computed, median)
     slow, middle, fast = _band(estimate.velocity)
     sensor = section.sensor
     if section.zero == "start":
@@ -178,6 +180,27 @@ def _compare(
         impacts=_impacts(model, readings, strokes.step),
         highest=_highest([stroke.name for stroke in strokes.strokes], readings),
     )
+
+
+def require_same_way(source: str, computed: Floats, measured: Floats) -> None:
+    """Refuse a lift that goes down where the computed one goes up.
+
+    Raises
+    ------
+    InputError
+        If they are correlated by less than -0.5 over the record.
+    """
+    if float(np.ptp(computed)) == 0.0 or float(np.ptp(measured)) == 0.0:
+        return
+    together = float(np.corrcoef(computed, measured)[0, 1])
+    if together < _AGAINST:
+        raise InputError(
+            f"{source}: lift",
+            got=f"a lift that moves against the computed one (correlation {together:.2f})",
+            expected="lift that grows as the valve opens",
+            hint="if the sensor counts backwards, say so in the case: measurement: {channels: "
+            "{lift: {name: NAME, scale: -1}}}.",
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
