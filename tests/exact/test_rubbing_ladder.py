@@ -33,6 +33,7 @@ pytestmark = [
 CASE = """
 klack: 1
 title: A ball on a cone of 45 degrees
+unusual: true  # a soft solid as dense as steel
 materials:
   hard: {{young: {young} GPa, poisson: 0.3, density: 7850 kg/m^3}}
   soft: {{young: 1 GPa, poisson: 0.45, density: 7850 kg/m^3}}

@@ -47,13 +47,21 @@ def test_slips_of_units_are(slip: str):
 
 
 @pytest.mark.slow
-def test_the_note_is_shown_once_and_stands_in_the_numbers(tmp_path, monkeypatch, capsys):
+def test_such_a_material_is_refused_until_it_is_confirmed_and_then_noted_once(
+    tmp_path, monkeypatch, capsys
+):
     monkeypatch.chdir(tmp_path)
     text = (DATA / "tiny_rods.yaml").read_text()
     assert "young: 210 GPa" in text
     case = tmp_path / "soft.yaml"
-    case.write_text(text.replace("young: 210 GPa", "young: 210 MPa"))
+    soft = text.replace("young: 210 GPa", "young: 210 MPa")
+    case.write_text(soft)
+    assert main(["impact", str(case)]) == 2
+    refused = "".join(capsys.readouterr())
+    assert "soft.yaml:4: materials.steel: got a Young's modulus of 0.21 GPa at 7850" in refused
+    assert "'unusual: true' at the head of the case" in refused
 
+    case.write_text(f"unusual: true\n{soft}")
     assert main(["impact", str(case), "--no-report", "--no-certify"]) == 0
 
     said = " ".join("".join(capsys.readouterr()).split())

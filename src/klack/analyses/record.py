@@ -144,7 +144,7 @@ class _Case(Protocol):
     @property
     def own_components(self) -> Mapping[str, str]: ...
     @property
-    def parameter_notes(self) -> tuple[str, ...]: ...
+    def input_notes(self) -> tuple[str, ...]: ...
 
 
 _version = cache(version)
@@ -168,7 +168,7 @@ def case_fields(case: _Case | CaseRecord, case_text: str | None = None) -> CaseF
     if isinstance(case, CaseRecord):
         name, text, notes = case.case, case.case_text, ()
     else:
-        name, text, notes = case.name, case.source, case.parameter_notes
+        name, text, notes = case.name, case.source, case.input_notes
     return {
         "case": name,
         "title": case.title,

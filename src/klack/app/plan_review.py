@@ -18,13 +18,14 @@ from klack.app.parts import Part
 from klack.app.plan_case import BodySizes, case_text
 from klack.app.valve_plan import BODIES, ValvePlan
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
+from klack.case import plausible
 from klack.case.case_tree import tree_of
 from klack.contact.hertz import line_half_width, point_radius
 from klack.errors import KlackError
 from klack.material_library import library_material
 from klack.materials import Material
 from klack.mesh.curve import Curve
-from klack.mesh.element_estimate import element_count
+from klack.mesh.element_estimate import mesh_nodes, run_time
 from klack.mesh.occ import MM
 from klack.mesh.profile import Profile
 from klack.mesh.sizing import MeshSizing, Refinement
@@ -34,17 +35,10 @@ __all__ = ["review"]
 
 _PARTS, _FACES, _MATERIALS, _MOTION = range(4)  # steps of the guide
 
-_USUAL_SIZE = (1e-3, 0.2)  # [m] of the longest side
-_USUAL_MASS = (1e-5, 0.5)  # [kg] of a needle
-_USUAL_SPEED = (0.02, 5.0)  # [m/s]
 _CLEAR = 1e-6  # [m] above first touch, where two bodies must not overlap
 _LEAST_OVERLAP = 1e-6  # [mm^2] or [mm^3]: below is round-off of OpenCASCADE
 _SHARP = np.radians(2.0)
-_NODES = {2: 2.1, 3: 1.5}  # of six-node triangles and ten-node tetrahedra, per element
-_GROWN = {2: 2.0, 3: 2.5}  # elements in all over those of the wanted sizes: the growth between
-_SECONDS = {2: (8.0, 1.0e-3), 3: (20.0, 1.4e-3)}
-"""Of a first run on two cores: at least, and for each node."""
-_LONG = 300.0  # [s]
+_LONG = 300.0  # [s] of a first run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,12 +120,11 @@ def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
 def _sizes_of_parts(parts: Mapping[str, Part]) -> Iterator[Finding]:
     longest = {body: part.longest for body, part in parts.items()}
     words = ", ".join(f"{body} {format_si(x, 'm', 3)}" for body, x in longest.items())
-    low, high = _USUAL_SIZE
     worst = max(longest.values()) / min(longest.values())
-    if min(longest.values()) < 0.1 * low or max(longest.values()) > 5 * high or worst > 100:
+    if not all(plausible.SIZE.is_possible(side) for side in longest.values()) or worst > 100:
         advice = "export with the right unit: STEP files state it; tables are in mm."
         yield _error("units", f"longest sides: {words}", advice, _PARTS)
-    elif min(longest.values()) < low or max(longest.values()) > high or worst > 20:
+    elif not all(plausible.SIZE.is_usual(side) for side in longest.values()) or worst > 20:
         advice = "compare with the drawing: a wrong unit looks like this."
         yield _doubt("units", f"longest sides: {words}", advice, _PARTS)
     else:
@@ -175,8 +168,7 @@ def _masses(parts: Mapping[str, Part], materials: Mapping[str, Material]) -> Ite
     mass = parts["needle"].volume * materials["needle"].density
     words = f"needle {1e3 * mass:.4g} g"
     words += f", housing {1e3 * parts['housing'].volume * materials['housing'].density:.4g} g"
-    low, high = _USUAL_MASS
-    if low <= mass <= high:
+    if plausible.MOVING_MASS.is_usual(mass):
         yield _good("mass", words)
     else:
         advice = "compare with a scale or the CAD program; check the unit of the file."
@@ -384,9 +376,8 @@ def _effort(
                 for at in ring
             ),
         )
-        nodes += _NODES[own] * _GROWN[own] * sum(element_count(sizing, own, measure, {}).values())
-    least, each = _SECONDS[dimension]
-    seconds = least + each * nodes
+        nodes += mesh_nodes(sizing, own, measure)
+    seconds = run_time(nodes, dimension)
     time = f"{seconds:.0f} s" if seconds < 120 else f"{seconds / 60:.0f} min"
     finest = format_si(sizes["needle"].contact, "m", 2)
     words = f"about {_two_digits(nodes):.0f} nodes, elements of {finest} at the contact; a first "
@@ -412,12 +403,11 @@ def _hold(
     else:
         words = f"{plan.force} closes ({numbers['force'] / weight:.0f} times the weight of the "
         yield _good("static hold", f"{words}needle, which is left out); housing held at {held}")
-    low, high = _USUAL_SPEED
-    if low <= numbers["speed"] <= high:
+    if plausible.SPEED.is_usual(numbers["speed"]):
         yield _good("speed", plan.speed)
     else:
-        advice = f"needles of solenoid valves hit with {low:g} to {high:g} m/s."
-        yield _doubt("speed", plan.speed, advice, _MOTION)
+        grade = _doubt if plausible.SPEED.is_possible(numbers["speed"]) else _error
+        yield grade("speed", plan.speed, f"{plausible.SPEED.reason}.", _MOTION)
 
 
 def _of_grade(grade: str) -> Callable[..., Finding]:

@@ -13,7 +13,7 @@ from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
 from klack.assembling.face_form import form_of_faces, layer_of_faces
 from klack.assembling.gauges import place_gauges
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
-from klack.assembling.given_shapes import require_given_shapes
+from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.held_nodes import held_nodes
 from klack.assembling.mesh_messages import meshed_for_case
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
@@ -43,6 +43,7 @@ __all__ = [
     "find_touch",
     "mesh_body",
     "place_meshes",
+    "wanted_sizes",
     "warn_far_touch",
 ]
 
@@ -159,11 +160,18 @@ def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
     """
     _require_surfaces(case)
     progress("mesh", 0.0)
-    require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
+    shapes = require_given_shapes(
+        case, lambda name: mesh_body(case.bodies[name], name, ()), progress
+    )
     moving, stop = case.contact.moving, case.contact.stop
     touch = find_touch(case.bodies, moving, stop)
-    upper = mesh_body(case.moving_body, moving.body, _places_of_moving_body(case, touch))
-    lower = mesh_body(case.stop_body, stop.body, touch.lower if touch else ())
+    places = {
+        moving.body: _places_of_moving_body(case, touch),
+        stop.body: touch.lower if touch else (),
+    }
+    tell_effort(case, shapes, wanted_sizes(case.bodies, places), progress)
+    upper = mesh_body(case.moving_body, moving.body, places[moving.body])
+    lower = mesh_body(case.stop_body, stop.body, places[stop.body])
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
     progress("mesh", 0.6)
     pose, form = _pose(case, upper, upper_surface, lower, lower_surface, touch)
@@ -300,6 +308,17 @@ def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) 
     profiles = geometry.profile.profiles()
     model, layers = geometry.model or "axisymmetric", geometry.layers
     return meshed_for_case(name, sizing, lambda s: meshed_profiles(profiles, s, model, layers))
+
+
+def wanted_sizes(
+    bodies: Mapping[str, CaseBody], places: Mapping[str, tuple[tuple[float, ...], ...]]
+) -> dict[str, MeshSizing]:
+    """Element sizes of the bodies that klack meshes, refined at places (r, z) or (x, y, z)."""
+    return {
+        name: _sizing(settings, own)
+        for name, own in places.items()
+        if (settings := bodies[name].mesh) is not None
+    }
 
 
 def _ring(place: tuple[float, ...]) -> tuple[float, ...]:

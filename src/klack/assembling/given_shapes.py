@@ -1,4 +1,4 @@
-"""Shapes that a case names, looked into before anything is meshed: their surfaces and their size.
+"""Shapes that a case names, looked into before anything is meshed: surfaces, size, mass, effort.
 
 What a STEP file or a mesh does not have is told at once, and a length in the wrong unit is asked
 about here: a STEP file in metres is a needle of 19 m, which only the memory of the machine would
@@ -6,7 +6,8 @@ notice.  The numerics themselves know no scale.
 """
 
 import json
-from collections.abc import Callable, Mapping
+import warnings
+from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
@@ -17,51 +18,163 @@ from klack.cache.entry import Entry
 from klack.cache.remember import remembered
 from klack.cache.setting import result_cache
 from klack.case.bodies import CaseBody, CaseFile
+from klack.case.plausible import MOVING_MASS, SIZE
+from klack.case.schema import Case
 from klack.case.surface_names import place_of, require_surface_names
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
+from klack.memory import in_words
+from klack.mesh.element_estimate import element_memory, mesh_nodes, run_time
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Profile
+from klack.mesh.quality import corner_volume
+from klack.mesh.sizing import MeshSizing
 from klack.mesh.step_content import step_content
+from klack.progress import Progress, remark, silent
 from klack.units import format_si
 
-__all__ = ["require_given_shapes", "require_usual_sizes"]
+__all__ = ["GivenShape", "require_given_shapes", "require_usual_sizes", "tell_effort"]
 
-_LARGEST, _SMALLEST = 1.0, 1e-4  # [m]; of the largest body of a valve
+_LONG = 900.0  # [s] of a run that is worth a word before it begins; the estimate is a rough one
 _MOST_APART = 100.0
 _ALIKE = 0.1  # relative; how exactly a size is confirmed
 
 
-class _Shape(NamedTuple):
-    """Names of the surfaces, and the longest side of the box around the shape [m]."""
+class GivenShape(NamedTuple):
+    """Names of the surfaces, longest side of the box around the shape [m], and volume [m^3]."""
 
     surfaces: tuple[str, ...]
     extent: float
+    volume: float
 
 
-def require_given_shapes(case: CaseFile, read: Callable[[str], Mesh]) -> None:
-    """Check the surfaces that a case names in files, and the sizes of all its bodies.
+def require_given_shapes(
+    case: CaseFile, read: Callable[[str], Mesh], progress: Progress = silent
+) -> dict[str, GivenShape]:
+    """Check the surfaces that a case names in files, and the sizes and masses of its bodies.
 
     Parameters
     ----------
     case : CaseFile
     read : callable
         Reads the finished mesh, or the nodes, of a body by its name.
+    progress : callable
+        Told what is in doubt, at once.
+
+    Returns
+    -------
+    dict of str to GivenShape
+        Of the bodies that have one.
 
     Raises
     ------
     InputError
         For a surface that a file does not have, with its key in the case; for a size that asks
         for a confirmation, see :func:`require_usual_sizes`.
+
+    Warns
+    -----
+    AccuracyWarning
+        About unusual sizes and masses.
     """
-    known, extents = {}, {}
+    shapes: dict[str, GivenShape] = {}
     for name, body in case.bodies.items():
         shape = _shape(body, partial(read, name))
         if shape is not None:
-            extents[name] = shape.extent
-            if body.geometry.profile is None:
-                known[name] = shape.surfaces
-    require_surface_names(case, known)
-    require_usual_sizes(case, extents)
+            shapes[name] = shape
+    files = {n: s.surfaces for n, s in shapes.items() if case.bodies[n].geometry.profile is None}
+    require_surface_names(case, files)
+    require_usual_sizes(case, {name: shape.extent for name, shape in shapes.items()})
+    for doubt in case.doubts:
+        remark(progress, f"note: {doubt}")
+    for doubt in (*_size_doubts(case, shapes), *_mass_doubts(case, shapes)):
+        _tell(doubt, progress)
+    return shapes
+
+
+def _tell(doubt: str, progress: Progress) -> None:
+    """Say it now, before long work, and with the result."""
+    remark(progress, f"note: {doubt}")
+    warnings.warn(doubt, AccuracyWarning, stacklevel=3)
+
+
+def _size_doubts(case: CaseFile, shapes: Mapping[str, GivenShape]) -> Iterator[str]:
+    if not shapes:
+        return
+    name = max(shapes, key=lambda name: shapes[name].extent)
+    extent = shapes[name].extent
+    if not SIZE.is_usual(extent) and not _is_confirmed(case, name):
+        size = format_si(extent, "m")
+        yield (
+            f"bodies.{name}: {size} is an unusual size (longest side; {SIZE.reason}). Try: check "
+            f"the unit of its shape, or confirm it: geometry: {{extent: {size}}}."
+        )
+
+
+def _mass_doubts(case: CaseFile, shapes: Mapping[str, GivenShape]) -> Iterator[str]:
+    """Of the body that moves, with the mean density of its solids."""
+    name = case.contact.moving.body if isinstance(case, Case) else ""
+    given = case.bodies[name].material if name in shapes else None
+    if given is None:
+        return
+    names = {given} if isinstance(given, str) else set(given.values())
+    mass = shapes[name].volume * float(np.mean([case.materials[one].density for one in names]))
+    if not MOVING_MASS.is_usual(mass):
+        yield (
+            f"bodies.{name}: a mass of {MOVING_MASS.shown(mass)} is unusual (usual: "
+            f"{MOVING_MASS.in_words}; "
+            f"{MOVING_MASS.reason}). Try: check the unit of its shape and its density."
+        )
+
+
+def tell_effort(
+    case: CaseFile,
+    shapes: Mapping[str, GivenShape],
+    sizings: Mapping[str, MeshSizing],
+    progress: Progress,
+) -> None:
+    """Say before the meshing what a large mesh takes.
+
+    Parameters
+    ----------
+    case : CaseFile
+    shapes : mapping of body to GivenShape
+    sizings : mapping of body to MeshSizing
+        Of the bodies that klack meshes.
+    progress : callable
+        Told at once.
+
+    Warns
+    -----
+    AccuracyWarning
+        With nodes, time and memory, where a run takes more than a quarter of an hour.
+    """
+    nodes = {
+        name: _nodes(case.bodies[name], shapes[name], sizing) for name, sizing in sizings.items()
+    }
+    if not nodes:
+        return
+    dimension = max(case.bodies[name].geometry.dimension for name in nodes)
+    total = sum(nodes.values())
+    seconds = run_time(total, dimension)
+    if seconds > _LONG:
+        worst = max(nodes, key=lambda name: nodes[name])
+        size = format_si(sizings[worst].smallest, "m", 2)
+        _tell(
+            f"bodies.{worst}.mesh: elements of {size} to {format_si(sizings[worst].size, 'm', 2)} "
+            f"make a mesh of about {total:.1g} nodes in all; a first run takes some "
+            f"{seconds / 60:.0f} min on two cores and at least "
+            f"{in_words(element_memory(dimension, total / 2))} of memory. Try: larger sizes, or a "
+            "smaller extent of the refinement.",
+            progress,
+        )
+
+
+def _nodes(body: CaseBody, shape: GivenShape, sizing: MeshSizing) -> float:
+    geometry = body.geometry
+    if geometry.profile is None or geometry.model == "solid":
+        return mesh_nodes(sizing, 3, shape.volume)
+    area = sum(profile.area for profile in geometry.profile.profiles().values())
+    return mesh_nodes(sizing, 2, area) * (geometry.layers or 1)
 
 
 def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
@@ -93,7 +206,7 @@ def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
         return
     name, largest = max(extents.items(), key=lambda item: item[1])
     other, smallest = min(extents.items(), key=lambda item: item[1])
-    if name in asked and not _SMALLEST <= largest <= _LARGEST:
+    if name in asked and not SIZE.is_possible(largest):
         raise _question(case, name, largest, "a largest body of 0.1 mm to 1 m")
     if largest > _MOST_APART * smallest:
         far = other if other in asked else name
@@ -117,17 +230,20 @@ def _question(case: CaseFile, name: str, extent: float, expected: str) -> InputE
     )
 
 
-def _shape(body: CaseBody, read: Callable[[], Mesh]) -> _Shape | None:
+def _shape(body: CaseBody, read: Callable[[], Mesh]) -> GivenShape | None:
     geometry = body.geometry
     if geometry.profile is not None:
-        return _Shape(geometry.profile.surfaces, _extent_of(geometry.profile.profiles()))
+        profiles = geometry.profile.profiles()
+        volume = sum(profile.volume for profile in profiles.values())
+        return GivenShape(geometry.profile.surfaces, _extent_of(profiles), volume)
     if geometry.step is not None:
         return _step_shape(geometry.step.file)
     if geometry.mesh is None:
         return None  # a reduced model has no shape; a table of nodes says its unit
     mesh = read()
     names = (*mesh.surfaces, *mesh.node_sets)
-    return _Shape(names, _longest(mesh.points, mesh.dimension))
+    volume = corner_volume(mesh) if mesh.blocks else 0.0
+    return GivenShape(names, _longest(mesh.points, mesh.dimension), volume)
 
 
 def _extent_of(profiles: Mapping[str, Profile]) -> float:
@@ -143,21 +259,22 @@ def _longest(points: np.ndarray, dimension: int) -> float:
     return float(np.max(np.ptp(points, axis=0)))
 
 
-def _step_shape(path: Path) -> _Shape:
+def _step_shape(path: Path) -> GivenShape:
     """Faces and size of a STEP file; what is in it counts, not its name or its date."""
     return remembered(
         result_cache() if path.is_file() else None,
         "shape",
-        ("STEP", path.read_bytes() if path.is_file() else b""),
+        ("STEP with volume", path.read_bytes() if path.is_file() else b""),
         lambda: _read_step_shape(path),
         pack=lambda shape: Entry(arrays={}, text=json.dumps(shape)),
-        unpack=lambda entry: _Shape(tuple(json.loads(entry.text)[0]), json.loads(entry.text)[1]),
+        unpack=lambda entry: GivenShape(*json.loads(entry.text)),
     )
 
 
-def _read_step_shape(path: Path) -> _Shape:
+def _read_step_shape(path: Path) -> GivenShape:
     content = step_content(path)
     sides = np.max([solid.high for solid in content.solids], axis=0) - np.min(
         [solid.low for solid in content.solids], axis=0
     )
-    return _Shape(tuple(face.name for face in content.faces), float(np.max(sides)))
+    volume = sum(solid.size for solid in content.solids)
+    return GivenShape(tuple(face.name for face in content.faces), float(np.max(sides)), volume)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from klack.assembling.bodies import assemble_body, find_touch, mesh_body
+from klack.assembling.bodies import assemble_body, find_touch, mesh_body, wanted_sizes
 from klack.assembling.damping_choice import damping_of
-from klack.assembling.given_shapes import require_given_shapes
+from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.modes import mode_pool, selection_of
 from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
@@ -218,13 +218,17 @@ def build_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Elastic
 def mesh_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Mesh]:
     """Mesh every body as drawn, fine at the first touch of each of its stops."""
     progress("mesh", 0.0)
-    require_given_shapes(case, lambda name: mesh_body(case.bodies[name], name, ()))
+    shapes = require_given_shapes(
+        case, lambda name: mesh_body(case.bodies[name], name, ()), progress
+    )
     places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
     for stop in case.stops.values():
         touch = find_touch(case.bodies, stop.upper, stop.lower)
         if touch is not None:
             places[stop.upper.body] += touch.upper
             places[stop.lower.body] += touch.lower
+    wanted = {name: tuple(own) for name, own in places.items()}
+    tell_effort(case, shapes, wanted_sizes(case.bodies, wanted), progress)
     result = {}
     for i, (name, given) in enumerate(case.bodies.items()):
         progress("mesh", i / len(case.bodies))

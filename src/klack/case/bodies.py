@@ -1,6 +1,6 @@
 """Materials, bodies and their reduction: the parts that every kind of case shares."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from math import isclose
 from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, Self
@@ -18,6 +18,7 @@ from klack.case.foreign import Matrices, ReducedModel
 from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import PARAMETERS, Written
+from klack.case.plausible import GO_ON, Number
 from klack.errors import InputError
 from klack.hardening import (
     HARDNESS_SPREAD,
@@ -26,7 +27,7 @@ from klack.hardening import (
     vickers_of_rockwell,
     yield_of_hardness,
 )
-from klack.input.problem import CaseProblem, Key, nearest, one_of
+from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of
 from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
 from klack.material_library import MATERIALS, find_material
 from klack.materials import Material
@@ -447,6 +448,12 @@ class CaseFile(Section):
         default_factory=dict, description="name: properties."
     )
     bodies: Mapping[Name, CaseBody] = Field(description="name: body.")
+    unusual: bool = Field(
+        default=False,
+        strict=True,
+        description="true: numbers that no valve has, such as 300 m/s, are computed with a note; "
+        "else they are an error.",
+    )
 
     _path: Path | None = PrivateAttr(None)
     _source: str = PrivateAttr("")
@@ -494,11 +501,42 @@ class CaseFile(Section):
         """Keys whose values follow from a parameter or an argument; of any other key, itself."""
         return self._expanded.behind(key) if self._expanded is not None else (key,)
 
+    def plausible_numbers(self) -> Iterator[Number]:
+        """Numbers of this kind of case whose size tells of a wrong unit."""
+        return iter(())
+
+    def require_possible(self) -> None:
+        """Raise :class:`InputError` for numbers that cannot be, unless the case confirms them."""
+        if self.unusual:
+            return
+        for number in self.plausible_numbers():
+            number.require_possible(self._where(number.key))
+        for name, given in self.materials.items():
+            if (question := given.named(name).question) is not None:
+                got, _, reason = question.partition(": ")[2].partition(" would ")
+                raise InputError(
+                    self._where(("materials", name)),
+                    got=got,
+                    expected=f"a solid: this one would {reason.partition('. Try')[0]}",
+                    hint=f"steel has 210 GPa and 7850 kg/m^3; {GO_ON}",
+                )
+
+    def _where(self, key: Key) -> str:
+        if self._expanded is None:
+            return f"{self._path or 'case'}: {key_text(key)}"
+        return self._expanded.origin(key).where()
+
     @property
-    def parameter_notes(self) -> tuple[str, ...]:
-        """What tells that parameters of the case have no effect."""
+    def doubts(self) -> tuple[str, ...]:
+        """What is doubtful about its numbers."""
+        found = (number.doubt for number in self.plausible_numbers())
+        return tuple(doubt for doubt in found if doubt is not None)
+
+    @property
+    def input_notes(self) -> tuple[str, ...]:
+        """What is doubtful about its numbers, and which of its parameters have no effect."""
         unused = self._expanded.unused_parameters() if self._expanded is not None else ()
-        return tuple(
+        return self.doubts + tuple(
             f"parameters.{name}: nothing in this case follows from it. "
             f"Try: an expression where its value belongs, such as '= {name}'."
             for name in unused

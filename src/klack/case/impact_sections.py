@@ -4,7 +4,7 @@ Each checks itself.  :class:`ImpactSections` holds them all; what contradicts ea
 :mod:`klack.case.consistency`, and :class:`klack.case.schema.Case` is what passed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from math import radians
 from typing import Annotated, Literal, Self
 
@@ -20,6 +20,7 @@ from klack.case.noise import CaseNoise
 from klack.case.opposite import CaseOpposite
 from klack.case.outputs import CaseOutput
 from klack.case.placement import Placement
+from klack.case.plausible import SPEED, Number
 from klack.case.shots import Shots
 from klack.case.study import CaseStudy
 from klack.contact.friction import MOST_FRICTION, Friction
@@ -398,6 +399,10 @@ class ImpactSections(CaseFile):
     study: CaseStudy | None = Field(
         default=None, description="What klack study varies, and what it computes."
     )
+
+    def plausible_numbers(self) -> Iterator[Number]:
+        """The speed of the impact."""
+        yield Number(("motion", "speed"), self.motion.speed, SPEED)
 
     @property
     def moving_body(self) -> CaseBody:

@@ -90,9 +90,12 @@ def validated(
         "expanded": found,
     }
     try:
-        return kind.model_validate(found.data, context=context)
+        checked = kind.model_validate(found.data, context=context)
     except ValidationError as error:
         raise first_error(kind, error, found) from None
+    if isinstance(checked, CaseFile):
+        checked.require_possible()
+    return checked
 
 
 def case_schema() -> dict[str, Any]:

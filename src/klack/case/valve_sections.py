@@ -4,7 +4,7 @@
 :mod:`klack.case.valve_consistency`, and :class:`klack.case.valve.ValveCase` is what passed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -16,6 +16,7 @@ from klack.case.measurement import CaseMeasurement
 from klack.case.motion_of_valve import ValveGuide, ValveMotion, ValvePlacement
 from klack.case.noise import CaseNoise
 from klack.case.part_sections import INCLUDE, PARTS, CaseInclude
+from klack.case.plausible import PART_MASS, SPEED, Number
 from klack.case.shots import StrokeShots
 from klack.case.study import CaseStudy
 from klack.case.thermal import CaseThermal
@@ -213,3 +214,12 @@ class ValveSections(CaseFile):
     study: CaseStudy | None = Field(
         default=None, description="What klack study varies, and what it computes."
     )
+
+    def plausible_numbers(self) -> Iterator[Number]:
+        """Masses of rigid parts, and the speeds that they begin with."""
+        for name, part in self.network.components.items():
+            if part.type == "rigid-mass":
+                key = ("network", "components", name)
+                yield Number((*key, "mass"), getattr(part, "mass", 1.0), PART_MASS)
+                if speed := abs(getattr(part, "speed", 0.0)):
+                    yield Number((*key, "speed"), speed, SPEED)

@@ -232,7 +232,7 @@ def export(
         from klack.cli.export_results import run_and_export
 
         made, incomplete = run_and_export(case, to, folder, threads=threads, quiet=quiet)
-    wanted.warn(case.parameter_notes)
+    wanted.warn(case.input_notes)
     _tell(case.name, to, made, wanted)
     if incomplete:
         raise incomplete

@@ -12,7 +12,7 @@ from klack.memory import available_memory, require_memory
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.units import format_si
 
-__all__ = ["element_count", "element_memory", "require_meshable"]
+__all__ = ["element_count", "element_memory", "mesh_nodes", "require_meshable", "run_time"]
 
 # netgen: elements per h^3 (3.7 in a slim rod, 5 to 7 in bulky bodies) or h^2
 _DENSITY = {3: 3.5, 2: 2.2}
@@ -20,6 +20,12 @@ _DENSITY = {3: 3.5, 2: 2.2}
 _BYTES = {3: 6000.0, 2: 1200.0}
 # share of a refined ball or ring that lies inside of the body; its middle lies on a surface
 _INSIDE = 0.4
+# six-node triangles and ten-node tetrahedra: nodes per element, and elements in all over those of
+# the wanted sizes: the growth between
+_NODES = {2: 2.1, 3: 1.5}
+_GROWN = {2: 2.0, 3: 2.5}
+# [s] of a first run on two cores: at least, and for each node
+_SECONDS = {2: (8.0, 1.0e-3), 3: (20.0, 1.4e-3)}
 
 
 def element_count(
@@ -59,6 +65,18 @@ def element_count(
             density * volume / refinement.size**dimension
         )
     return counts
+
+
+def mesh_nodes(sizing: MeshSizing, dimension: int, measure: float) -> float:
+    """Nodes of a mesh, roughly; see :func:`element_count` for the parameters."""
+    count = sum(element_count(sizing, dimension, measure, {}).values())
+    return _NODES[dimension] * _GROWN[dimension] * count
+
+
+def run_time(nodes: float, dimension: int) -> float:
+    """Time [s] of a first run of an impact on two cores, roughly, from the nodes of all bodies."""
+    least, each = _SECONDS[dimension]
+    return least + each * nodes
 
 
 def element_memory(dimension: int, count: float) -> float:

@@ -47,7 +47,7 @@ def advise_case(
         advice = advise_stroke(
             case, error=error, confirm=confirm, progress=progress, threads=threads
         )
-    return replace(advice, notes=(*advice.notes, *case.parameter_notes))
+    return replace(advice, notes=(*advice.notes, *case.input_notes))
 
 
 def _refuse_options(*given: tuple[str, object]) -> None:

@@ -183,9 +183,7 @@ def run_sources(
 
 
 def _with_notes(sources: Sequence[NoiseSource], case: Case | ValveCase) -> tuple[NoiseSource, ...]:
-    return tuple(
-        replace(source, notes=(*source.notes, *case.parameter_notes)) for source in sources
-    )
+    return tuple(replace(source, notes=(*source.notes, *case.input_notes)) for source in sources)
 
 
 # --------------------------------------------------------------------------- impacts

@@ -34,7 +34,7 @@ def reduce(
         study.save(stage)
         made = ", ".join(sorted(path.name for path in stage.iterdir()))
     wanted.show(REDUCTION.told(study))
-    wanted.note(checked.parameter_notes)
+    wanted.note(checked.input_notes)
     wanted.say(f"Results in {folder}: {made}")
     wanted.write(lambda: REDUCTION.to_json(study))
     return 0

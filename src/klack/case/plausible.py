@@ -1,0 +1,126 @@
+"""Numbers that a valve can have: doubts beside unusual ones, errors at those that cannot be.
+
+The usual sign of a wrong unit is a number a thousand times off.  Sizes and masses of bodies are
+judged where their shapes are known, before they are meshed (:mod:`klack.assembling.given_shapes`),
+materials by :attr:`klack.materials.Material.question`.
+"""
+
+from dataclasses import dataclass
+from math import inf
+from typing import NamedTuple
+
+from klack.errors import InputError
+from klack.input.problem import Key, key_text
+from klack.units import format_si
+
+__all__ = ["GO_ON", "MOVING_MASS", "PART_MASS", "SIZE", "SPEED", "Number", "Range"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Range:
+    """Range of one kind of number.
+
+    Parameters
+    ----------
+    unit : str
+        SI, without prefix.
+    usual : pair of float
+        Outside: in doubt.
+    possible : pair of float
+        Outside: an error.
+    reason : str
+        Why, as one clause.
+    """
+
+    unit: str
+    usual: tuple[float, float]
+    possible: tuple[float, float]
+    reason: str
+
+    def is_usual(self, value: float) -> bool:
+        """Whether nothing has to be said."""
+        return self.usual[0] <= value <= self.usual[1]
+
+    def is_possible(self, value: float) -> bool:
+        """Whether it can be at all."""
+        return self.possible[0] <= value <= self.possible[1]
+
+    @property
+    def in_words(self) -> str:
+        """The usual range."""
+        return " to ".join(self.shown(value) for value in self.usual)
+
+    def shown(self, value: float) -> str:
+        """A number with its unit, masses below 1 kg in grams."""
+        if self.unit == "kg" and value < 1.0:
+            return f"{1e3 * value:.3g} g"
+        return format_si(value, self.unit)
+
+
+SPEED = Range(
+    unit="m/s",
+    usual=(2e-3, 20.0),
+    possible=(0.0, 100.0),
+    reason="flat faces of steel that meet are loaded with 20 MPa for each m/s, and at 100 m/s "
+    "hardened steel yields throughout; needles hit with 0.02 to 5 m/s",
+)
+"""Of an impact [m/s].  Below 2 mm/s a stroke of 0.1 mm takes 50 ms: no valve switches so slowly."""
+
+MOVING_MASS = Range(
+    unit="kg",
+    usual=(1e-5, 0.5),
+    possible=(0.0, inf),
+    reason="needles of injectors weigh 10 mg and more, armatures of large solenoid valves up to "
+    "0.5 kg",
+)
+"""Of the body that moves [kg]; what cannot be is told by its size and its material."""
+
+PART_MASS = Range(
+    unit="kg",
+    usual=(1e-6, 10.0),
+    possible=(1e-9, 1000.0),
+    reason="a rigid part of a valve weighs 1 mg to 10 kg, with its housing",
+)
+"""Of a rigid part of a network [kg]."""
+
+SIZE = Range(
+    unit="m",
+    usual=(1e-3, 0.2),
+    possible=(1e-4, 1.0),
+    reason="needles and housings are 1 to 200 mm long",
+)
+"""Longest side [m] of the largest body."""
+
+GO_ON = "check its unit; 'unusual: true' at the head of the case computes it all the same."
+"""Advice at what cannot be."""
+
+
+class Number(NamedTuple):
+    """A number of a case, its key, and what it may be."""
+
+    key: Key
+    value: float
+    range: Range
+
+    @property
+    def doubt(self) -> str | None:
+        """What makes it doubtful, in words; None for a usual number."""
+        if self.range.is_usual(self.value):
+            return None
+        return (
+            f"{key_text(self.key)}: {self.range.shown(self.value)} is unusual (usual: "
+            f"{self.range.in_words}; {self.range.reason}). Try: check its unit."
+        )
+
+    def require_possible(self, where: str) -> None:
+        """Raise :class:`InputError` for a number that cannot be; ``where`` is its place."""
+        if self.range.is_possible(self.value):
+            return
+        least, most = (self.range.shown(limit) for limit in self.range.possible)
+        expected = f"{most} or less" if self.value > self.range.possible[1] else f"{least} or more"
+        raise InputError(
+            where,
+            got=self.range.shown(self.value),
+            expected=f"{expected}: {self.range.reason}",
+            hint=GO_ON,
+        )
