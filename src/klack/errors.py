@@ -13,7 +13,7 @@ __all__ = [
 ]
 
 
-_LONGEST = 1200  # characters
+_LONGEST = 600  # characters of each part
 
 
 class KlackError(Exception):
@@ -41,7 +41,7 @@ class InputError(KlackError, ValueError):
 
 def _shortened(text: str) -> str:
     """Leave out the middle of what is longer than a message should be: a line of a megabyte."""
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 300]} ... {text[-250:]}"
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 200]} ... {text[-150:]}"
 
 
 class ConvergenceError(KlackError, RuntimeError):

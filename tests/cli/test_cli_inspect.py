@@ -305,6 +305,17 @@ def test_a_support_on_a_node_set_is_refused_as_by_a_run(tmp_path: Path, capsys):
     assert "'FEET'" in capsys.readouterr().err
 
 
+def test_a_drawn_body_shows_its_edges_volume_and_mass(capsys):
+    """Truth: cylinders of radius 2 mm, 20 and 40 mm long: pi r^2 h, times 7850 kg/m^3."""
+    assert main(["inspect", str(Path(__file__).parents[1] / "data" / "tiny_rods.yaml")]) == 0
+
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "solid short 251.327 mm^3, 1.9729 g of steel" in shown
+    assert "solid long 502.655 mm^3, 3.9458 g of steel" in shown
+    assert "surface far z -40 mm, r 0 to 2 mm" in shown
+    assert "surface side z 0 to 20 mm, r 2 mm" in shown
+
+
 def test_parameters_and_parts_of_a_case_are_shown(capsys, tmp_path):
     """Truth: the files of the page on parameters and parts."""
     case = Path(__file__).parents[2] / "docs" / "how-to" / "four_injectors.yaml"

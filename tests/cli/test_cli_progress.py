@@ -100,6 +100,24 @@ def test_lines_tell_compiling_and_waiting_once_each(capsys):
     assert told == ["waiting for another process that compiles", "compiling (once)"]
 
 
+def test_a_stage_that_lasts_is_told_at_its_beginning_and_again(monkeypatch, capsys):
+    """Nothing is called meanwhile: a factorisation reports nothing for minutes."""
+    for name, short in (("_LASTS", 0.05), ("_AGAIN", 0.1), ("_OFTEN", 0.01)):
+        monkeypatch.setattr(f"klack.terminal.progress.{name}", short)
+    told = ""
+    with show_progress() as progress:
+        progress("static contact", 0.25)
+        end = time.monotonic() + 20.0
+        while told.count("so far") < 2 and time.monotonic() < end:
+            time.sleep(0.02)
+            told += capsys.readouterr().err
+
+    first, again, *_ = told.splitlines()
+    assert first == "static contact ..."
+    assert again.startswith("static contact: ")
+    assert again.endswith("s so far, 25 %")
+
+
 def test_a_short_command_leaves_the_screen_alone(screen, monkeypatch):
     with shown_on(screen, monkeypatch) as progress:
         progress("mesh", 1.0)

@@ -345,10 +345,10 @@ def test_a_study_builds_bodies_again_where_they_follow_from_a_parameter(old, new
 
 
 def test_parameters_without_effect_are_named():
-    told = read_valve_case(SPARE, SMALL).parameter_notes
+    told = read_valve_case(SPARE, SMALL).input_notes
 
     assert [note.partition(":")[0] for note in told] == ["parameters.spare", "parameters.other"]
-    assert read_valve_case(PARAMETRIC, SMALL).parameter_notes == ()
+    assert read_valve_case(PARAMETRIC, SMALL).input_notes == ()
 
 
 @pytest.mark.slow
@@ -384,6 +384,6 @@ def test_every_record_of_a_case_takes_its_notes():
         **case_fields(case), **run_fields(0.0, StageClock(silent)), warnings=("other",)
     )
 
-    assert made.warnings == ("other", *case.parameter_notes)
+    assert made.warnings == ("other", *case.input_notes)
     assert len(of_cases) > 10
     assert all(kind.__post_init__ is CaseRecord.__post_init__ for kind in of_cases)

@@ -219,8 +219,33 @@ MISTAKES = {
         "valve.yaml:3: title",
         ["a second time", "once"],
     ),
+    "duplicate key in a section": (
+        ("  gap: 0", "  gap: 0\n  gap: 1 um"),
+        "valve.yaml:44: gap",
+        ["'gap' a second time"],
+    ),
+    "misplaced key": (("motion: {", "gap: 1 um\nmotion: {"), "gap", ["its place is contact.gap"]),
+    "model of another program": (
+        ("model: swept", "model: 3d"),
+        "geometry.model",
+        ["write solid or swept"],
+    ),
+    "coordinates with a unit": (
+        ("start: [0, ", "start: [0 mm, "),
+        "start[0]",
+        ["got '0 mm'", "write the number alone"],
+    ),
+    "deeper line": (("  gap: 0", "     gap: 0"), "valve.yaml", ["same indentation"]),
+    "no blank behind a colon": (("  gap: 0", "  gap:0"), "valve.yaml", ["a line without 'key: v"]),
+    "open quote": (("title: ", "title: '"), "valve.yaml:2", ["a quote that is not closed"]),
+    "comma in a number": (
+        ("poisson: 0.3", "poisson: 0,3"),
+        "materials",
+        ["a point as decimal sign"],
+    ),
+    "word as a count": (("count: 20", "count: twenty"), "count", ["write digits"]),
     "hole": (("motion: {", "motion: "), "valve.yaml:44", ["not YAML"]),
-    "tabulator": (("title:", "\ttitle:"), "valve.yaml:2", ["not YAML"]),
+    "tabulator": (("title:", "\ttitle:"), "valve.yaml:2", ["indent with spaces, not tabs"]),
     "colon in a title": (("Two turned", "Two: turned"), "valve.yaml:2", ["not YAML", "quotes"]),
     "unknown alias": (("steel:", "steel: *x"), "valve.yaml:6", ["not YAML"]),
     "python object": (("title: ", "title: !!python/name:os.system "), "title", ["python"]),
@@ -242,6 +267,14 @@ def test_mistake_is_named_with_line_and_key(name):
     assert "\nTry: " in text
     assert "pydantic" not in text
     assert len(text.splitlines()) <= 3
+
+
+def test_the_first_of_two_equal_keys_is_named_by_its_line():
+    """Not the line where their section begins."""
+    text = changed("contact:\n", "contact:\n  angles: 48\n  gap: 0 um\n")
+    line = text[: text.index("  gap: 0 um")].count("\n") + 1
+
+    assert f"first in line {line})" in str(complaint(text))
 
 
 def test_further_mistakes_are_counted():

@@ -4,6 +4,7 @@ Truth: the mesher itself, asked with the size of the hint.
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -11,18 +12,21 @@ import psutil
 import pytest
 
 from klack import memory
-from klack.assembling.bodies import mesh_body
-from klack.assembling.mesh_messages import meshed_for_case
+from klack.assembling.bodies import mesh_body, place_meshes
+from klack.assembling.mesh_messages import coarsest_sound, meshed_for_case
 from klack.case import find_case, load_case
+from klack.case.reader import read_case
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Line, Profile
 from klack.mesh.quality import PoorElementError
-from klack.mesh.sizing import MeshSizing
+from klack.mesh.sizing import MeshSizing, Refinement
 from klack.mesh.solid import mesh_step, write_step_revolved
+from klack.progress import silent
 from klack.units import LENGTH, parse_quantity
 
+RODS = (Path(__file__).parents[1] / "data" / "tiny_rods.yaml").read_text(encoding="utf-8")
 PIN = Profile((0, 0), (Line((1e-3, 0)), Line((1e-3, 4e-3)), Line((0, 4e-3)), Line((0, 0))))
 
 
@@ -74,6 +78,56 @@ def test_a_thin_walled_tube_of_a_step_file(tmp_path: Path):
     found = re.search(r"bodies\.tube\.mesh\.size: (\S+ \S+) \(tried", caught.value.hint)
     assert found is not None, caught.value.hint
     assert parse_quantity(found[1], LENGTH, "size") < 1.5e-3
+
+
+def test_what_is_called_tried_had_the_refinements_of_the_run():
+    """A size that changes where the bodies touch: the refinement there needs still smaller ones.
+
+    Without its refinement the first finer size, 1.4 mm, does.
+    """
+    tried: list[MeshSizing] = []
+
+    def at_size(size: float) -> MeshSizing:
+        return MeshSizing(size=size, refinements=(Refinement(position=(1e-3, size), size=1e-4),))
+
+    def mesher(sizing: MeshSizing) -> Mesh:
+        tried.append(sizing)
+        return needs(0.8e-3 if sizing.refinements else 1.5e-3)(replace(sizing, refinements=()))
+
+    with pytest.raises(InputError) as caught:
+        meshed_for_case("pin", at_size(2e-3), mesher, at_size)
+
+    assert "bodies.pin.mesh.size: 700 um (tried, it does)" in caught.value.hint
+    assert tried[-1] == at_size(0.7e-3)
+
+
+def test_a_first_mesh_is_as_coarse_as_its_elements_allow():
+    """Of 2 mm the shares 0.7 and 0.5 are tried; 1.2 mm is the limit."""
+    mesh = coarsest_sound(MeshSizing(size=2e-3), needs(1.2e-3))
+    same = mesh_meridian({"pin": PIN}, MeshSizing(size=1e-3))
+    assert (mesh.points == same.points).all()
+    with pytest.raises(PoorElementError):
+        coarsest_sound(MeshSizing(size=2e-3), needs(0.01e-3))
+
+
+def test_faces_that_do_not_meet_are_told_with_place_and_bodies():
+    """A face of radius 0 to 2 mm, and one that begins at 3 mm."""
+    text = RODS.replace(
+        "mesh: {size: 1 mm}", "mesh: {size: 1 mm, contact: {size: 50 um, extent: 50 um}}"
+    )
+    text = text.replace("start: [0, -40]", "start: [3, -40]")
+    text = text.replace("line: [2, -40]", "line: [5, -40]").replace(
+        "line: [2, 0], name: side", "line: [5, 0], name: side"
+    )
+    text = text.replace("line: [0, 0], name: end", "line: [3, 0], name: end").replace(
+        "name: axis", "name: bore"
+    )
+    with pytest.raises(InputError) as caught:
+        place_meshes(read_case(text, Path("rods.yaml")), silent)
+
+    assert str(caught.value).startswith(
+        "rods.yaml:37: contact.between: short.end on long.end: got radii 0 to 2 mm over 3 to 5 mm"
+    )
 
 
 def test_without_a_size_that_does_the_hint_says_what_to_look_at():

@@ -18,11 +18,15 @@ import pytest
 import klack
 from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.parameters import short_names
+from klack.analyses.study.parameters import parameters_of, short_names
 from klack.case.reader import parse
+from klack.case.study import CaseStudy
+from klack.case.study_source import StudySource
+from klack.case.valve_reader import load_any_case
 from klack.cli.main import main
 from klack.errors import InputError
 from klack.report.html import write_report
+from klack.studies.spread import Normal
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 PRELOAD = "network.components.spring.preload"
@@ -265,6 +269,24 @@ def test_what_cannot_be_is_one_error_with_its_line(tmp_path, capsys, old, new, w
     assert "Traceback" not in said
     assert str(file) in said
     assert not (out / "result.zarr").exists()
+
+
+@pytest.mark.parametrize("sd", ["5 K", "5 degC"])
+def test_the_spread_of_a_temperature_is_a_difference(sd):
+    """5 degC of scatter are 5 K; a mean of 20 degC is 293.15 K."""
+    given = {"normal": {"mean": "20 degC", "sd": sd}}
+    source = StudySource(
+        study=CaseStudy.model_validate(
+            {"parameters": {"network.ambient.temperature": given}, "measures": ["opening_time"]}
+        ),
+        path=SMALL,
+        lines=parse("study: {}", SMALL)[1],
+        text="",
+    )
+
+    (found,) = parameters_of(load_any_case(SMALL), source)
+
+    assert found.spread == Normal(293.15, 5.0)
 
 
 def test_expressions_in_a_circle(tmp_path):

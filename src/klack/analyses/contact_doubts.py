@@ -10,6 +10,9 @@ from klack.units import format_si
 __all__ = ["MeshedContact", "contact_doubt", "contact_to_json", "elastic_above"]
 
 
+_HARDEST = 2.5e9  # [Pa]; bearing and high-speed steel of 64 HRC has 2.0 to 2.4 GPa
+
+
 class MeshedContact(Protocol):
     """Mesh of a contact."""
 
@@ -57,9 +60,15 @@ def contact_doubt(contact: MeshedContact) -> str:
 
 
 def elastic_above(contact: MeshedContact) -> str:
-    """Yield stress that elastic faces need; empty if it is not known."""
+    """Yield stress that elastic faces need, and whether any has it; empty if it is not known."""
     if not isfinite(contact.needed_yield):
         return ""
+    if contact.needed_yield > _HARDEST:
+        return (
+            f"The faces {contact.surfaces} would yield: elastic ones need a yield stress of "
+            f"{format_si(contact.needed_yield, 'Pa', 2)}, and hardened steel has about 2 GPa. "
+            "Try: 'yield' or 'hardness' of the material, with which klack computes it."
+        )
     return (
         f"The faces {contact.surfaces} stay elastic from a yield stress of about "
         f"{format_si(contact.needed_yield, 'Pa', 2)} on."

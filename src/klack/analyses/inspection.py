@@ -9,6 +9,7 @@ from klack.analyses.expanded_rows import Row, expanded_rows
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.given_bodies import reduced_from_file
 from klack.case.bodies import CaseFile
+from klack.case.geometry import ProfileGeometry
 from klack.case.surface_names import require_surface_names
 from klack.errors import InputError
 from klack.input.existing_file import refuse_lfs_pointer
@@ -101,9 +102,24 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
             content = step_content(body.geometry.step.file)
             known[name] = tuple(face.name for face in content.faces)
             yield name, tuple(_step_rows(content))
-        else:
-            yield name, (("geometry", "", "meshed by klack when the case runs"),)
+        elif body.geometry.profile is not None:
+            yield name, tuple(_drawn_rows(case, name, body.geometry.profile))
     require_surface_names(case, known)
+
+
+def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[Row]:
+    """Solids and edges of a drawing; volume and mass are those of the body of revolution."""
+    profiles = drawn.profiles()
+    materials = case.materials_of(name, profiles)
+    yield "geometry", "", "drawn; meshed by klack when the case runs"
+    for solid, profile in profiles.items():
+        mass = f"{profile.volume * materials[solid].density * 1e3:.5g} g"
+        kind = f"{mass} of {materials[solid].name}"
+        yield "solid", solid, f"{profile.volume * 1e9:.6g} mm^3, {kind}"
+    for edge in drawn.surfaces:
+        curves = [c for p in profiles.values() for c in p.curves if c.name == edge]
+        points = np.concatenate([c.at(np.linspace(0.0, 1.0, 65)) for c in curves])
+        yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
 
 
 def _reduced_rows(body: ReducedBody) -> Iterator[Row]:

@@ -1,9 +1,10 @@
 """From a case to meshed, placed and supported elastic bodies."""
 
 import warnings
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,12 @@ from klack.assembling.gauges import place_gauges
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.held_nodes import held_nodes
-from klack.assembling.mesh_messages import meshed_for_case
+from klack.assembling.mesh_messages import coarsest_sound, meshed_for_case
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings
 from klack.case.schema import Case
+from klack.case.surface_names import place_of
 from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import contact_space, touching_shift
@@ -28,8 +30,10 @@ from klack.contact.surface_edges import SurfaceEdges, surface_edges, turned_away
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
 from klack.gauges.gauge import Gauge
+from klack.input.problem import Key
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh, Surface, solid_at
+from klack.mesh.quality import PoorElementError
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.progress import Progress
@@ -42,10 +46,14 @@ __all__ = [
     "build_bodies",
     "find_touch",
     "mesh_body",
+    "named_contact",
     "place_meshes",
     "wanted_sizes",
     "warn_far_touch",
 ]
+
+Places = tuple[tuple[float, ...], ...]
+"""Where meshes are refined: (r, z) or (x, y, z) [m]."""
 
 _SAME_HEIGHT = 5e-4  # of the narrower surface; clearances that differ by less belong to one touch
 _SAFE_SHARE = 0.5  # of the extent of a refinement; the rest is for the width of the contact
@@ -164,17 +172,29 @@ def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
         case, lambda name: mesh_body(case.bodies[name], name, ()), progress
     )
     moving, stop = case.contact.moving, case.contact.stop
-    touch = find_touch(case.bodies, moving, stop)
+    with named_contact(case, ("contact", "between"), moving, stop):
+        touch = find_touch(case.bodies, moving, stop)
     places = {
         moving.body: _places_of_moving_body(case, touch),
         stop.body: touch.lower if touch else (),
     }
     tell_effort(case, shapes, wanted_sizes(case.bodies, places), progress)
-    upper = mesh_body(case.moving_body, moving.body, places[moving.body])
-    lower = mesh_body(case.stop_body, stop.body, places[stop.body])
+
+    def places_at(name: str, size: float) -> Places:
+        other = _with_size(case, name, size)
+        found = find_touch(other.bodies, moving, stop)
+        if name == moving.body:
+            return _places_of_moving_body(other, found)
+        return found.lower if found else ()
+
+    upper, lower = (
+        mesh_body(case.bodies[name], name, places[name], partial(places_at, name))
+        for name in (moving.body, stop.body)
+    )
     upper_surface, lower_surface = upper.surface(moving.surface), lower.surface(stop.surface)
     progress("mesh", 0.6)
-    pose, form = _pose(case, upper, upper_surface, lower, lower_surface, touch)
+    with named_contact(case, ("contact", "between"), moving, stop):
+        pose, form = _pose(case, upper, upper_surface, lower, lower_surface, touch)
     upper = upper.moved(pose.shift[2:] * [0.0, 1.0]) if upper.dimension == 2 else upper.placed(pose)
     _check_refinement(case, upper, upper_surface, lower, lower_surface, touch, pose, form)
     progress("mesh", 1.0)
@@ -229,13 +249,31 @@ def _require_surfaces(case: Case) -> None:
             )
 
 
-def _places_of_moving_body(case: Case, touch: Touch | None) -> tuple[tuple[float, ...], ...]:
+def _places_of_moving_body(case: Case, touch: Touch | None) -> Places:
     """Where the moving body first touches either stop, as drawn."""
     places = touch.upper if touch else ()
     if case.opposite is not None:
         above = find_touch(case.bodies, case.opposite.stop, case.opposite.moving)
         places += above.lower if above else ()
     return places
+
+
+@contextmanager
+def named_contact(
+    case: CaseFile, key: Key, upper: SurfaceName, lower: SurfaceName
+) -> Iterator[None]:
+    """Tell errors of two surfaces that do not meet with their place in the case, and bodies."""
+    try:
+        yield
+    except InputError as error:
+        if not error.where.startswith("contact of"):
+            raise
+        raise InputError(
+            f"{place_of(case, key, on_key=False)}: {upper} on {lower}",
+            got=error.got,
+            expected=error.expected,
+            hint=error.hint,
+        ) from error
 
 
 def find_touch(
@@ -252,7 +290,7 @@ def find_touch(
             above.profiles().values(), upper.surface, below.profiles().values(), lower.surface
         )
     # a first mesh without refinement tells where to refine
-    meshes = [mesh_body(bodies[name], name, ()) for name in (upper.body, lower.body)]
+    meshes = [mesh_body(bodies[name], name) for name in (upper.body, lower.body)]
     return first_touch_of_meshes(
         meshes[0],
         meshes[0].surface(upper.surface),
@@ -280,8 +318,33 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
 
 
-def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) -> Mesh:
-    """Mesh one body, refined at the given places ((r, z) or (x, y, z))."""
+def _with_size(case: Case, name: str, size: float) -> Case:
+    """The same case with another general element size [m] of a body."""
+    body = case.bodies[name]
+    if body.mesh is None:
+        return case
+    changed = body.model_copy(update={"mesh": body.mesh.model_copy(update={"size": size})})
+    return case.model_copy(update={"bodies": {**case.bodies, name: changed}})
+
+
+def mesh_body(
+    body: CaseBody,
+    name: str,
+    places: Places | None = None,
+    places_at: Callable[[float], Places] | None = None,
+) -> Mesh:
+    """Mesh one body.
+
+    Parameters
+    ----------
+    body : CaseBody
+    name : str
+    places : tuple of (r, z) or (x, y, z) [m], optional
+        Where it is refined.  Without, a first mesh to look at: finer than asked for where its
+        elements would be poor.
+    places_at : callable, optional
+        The places that a case with another general size [m] would have.
+    """
     geometry = body.geometry
     if geometry.nodes is not None:
         return node_mesh(geometry.nodes, geometry.dimension, f"bodies.{name}.geometry.nodes")[0]
@@ -299,19 +362,48 @@ def mesh_body(body: CaseBody, name: str, places: tuple[tuple[float, ...], ...]) 
         )
     if geometry.step is not None:
         step = geometry.step
-        return meshed_for_case(name, _sizing(body.mesh, places), lambda s: meshed_step(step, s))
+
+        def mesher(sizing: MeshSizing) -> Mesh:
+            return meshed_step(step, sizing)
+
+        return _meshed(name, body.mesh, mesher, places, places_at)
     if geometry.profile is None:
         raise InputError(
             f"bodies.{name}.geometry", got="no shape", expected="a profile", hint="draw one."
         )
-    sizing = _sizing(body.mesh, tuple(_ring(at) for at in places))
     profiles = geometry.profile.profiles()
     model, layers = geometry.model or "axisymmetric", geometry.layers
-    return meshed_for_case(name, sizing, lambda s: meshed_profiles(profiles, s, model, layers))
+
+    def of_profiles(sizing: MeshSizing) -> Mesh:
+        return meshed_profiles(profiles, sizing, model, layers)
+
+    rings = None if places is None else tuple(_ring(at) for at in places)
+    return _meshed(name, body.mesh, of_profiles, rings, None)
+
+
+def _meshed(
+    name: str,
+    settings: MeshSettings,
+    mesher: Callable[[MeshSizing], Mesh],
+    places: Places | None,
+    places_at: Callable[[float], Places] | None,
+) -> Mesh:
+    """Mesh a body in the sizes of its case; without places, a first mesh."""
+    if places is None:
+        with suppress(PoorElementError):  # the message comes from below
+            return coarsest_sound(_sizing(settings, ()), mesher)
+    sizing = _sizing(settings, places or ())
+    if places_at is None:
+        return meshed_for_case(name, sizing, mesher)
+
+    def at_size(size: float) -> MeshSizing:
+        return replace(_sizing(settings, places_at(size)), size=size)
+
+    return meshed_for_case(name, sizing, mesher, at_size)
 
 
 def wanted_sizes(
-    bodies: Mapping[str, CaseBody], places: Mapping[str, tuple[tuple[float, ...], ...]]
+    bodies: Mapping[str, CaseBody], places: Mapping[str, Places]
 ) -> dict[str, MeshSizing]:
     """Element sizes of the bodies that klack meshes, refined at places (r, z) or (x, y, z)."""
     return {
@@ -337,7 +429,7 @@ def _require_dimension(file: Path, mesh: Mesh, dimension: int) -> None:
         )
 
 
-def _sizing(settings: MeshSettings, places: tuple[tuple[float, ...], ...]) -> MeshSizing:
+def _sizing(settings: MeshSettings, places: Places) -> MeshSizing:
     refinements: tuple[Refinement, ...] = ()
     if settings.contact is not None:
         refinements = tuple(

@@ -9,7 +9,7 @@ from klack.mesh.quality import PoorElementError
 from klack.mesh.sizing import MeshSizing
 from klack.units import format_si
 
-__all__ = ["meshed_for_case"]
+__all__ = ["coarsest_sound", "meshed_for_case"]
 
 _FINER = (0.7, 0.5, 0.35, 0.25, 0.12, 0.06)
 """Shares of a size that are tried when it gives poor elements."""
@@ -17,7 +17,29 @@ _MOST_TRIED = 50_000
 """Elements after which no finer size is tried."""
 
 
-def meshed_for_case(body: str, sizing: MeshSizing, mesher: Callable[[MeshSizing], Mesh]) -> Mesh:
+def coarsest_sound(sizing: MeshSizing, mesher: Callable[[MeshSizing], Mesh]) -> Mesh:
+    """Mesh of a sizing, or with a finer size where its elements are poor: a mesh to look at.
+
+    Raises
+    ------
+    PoorElementError
+        If no size does.
+    """
+    for share in (1.0, *_FINER):
+        try:
+            return mesher(replace(sizing, size=share * sizing.size))
+        except PoorElementError as error:
+            if share == _FINER[-1] or error.elements > _MOST_TRIED:
+                raise
+    raise AssertionError  # the last share returns or raises
+
+
+def meshed_for_case(
+    body: str,
+    sizing: MeshSizing,
+    mesher: Callable[[MeshSizing], Mesh],
+    at_size: Callable[[float], MeshSizing] | None = None,
+) -> Mesh:
     """Mesh a body of a case; an error names the key of the case.
 
     Parameters
@@ -26,6 +48,9 @@ def meshed_for_case(body: str, sizing: MeshSizing, mesher: Callable[[MeshSizing]
     sizing : MeshSizing
     mesher : callable
         Makes the mesh of a sizing.
+    at_size : callable, optional
+        All that the case would ask for with another general size [m], its refinements where the
+        bodies would be found to touch then; without, only that size changes.
 
     Raises
     ------
@@ -40,7 +65,7 @@ def meshed_for_case(body: str, sizing: MeshSizing, mesher: Callable[[MeshSizing]
             f"{key}.size: {error.where}",
             got=f"{format_si(sizing.size, 'm')}, which gives {error.got}",
             expected=error.expected,
-            hint=_finer(key, sizing, mesher, error),
+            hint=_finer(key, sizing, mesher, at_size, error),
         ) from error
     except InputError as error:
         setting = error.where.rsplit(": ", 1)[-1]
@@ -53,7 +78,11 @@ def meshed_for_case(body: str, sizing: MeshSizing, mesher: Callable[[MeshSizing]
 
 
 def _finer(
-    key: str, sizing: MeshSizing, mesher: Callable[[MeshSizing], Mesh], error: PoorElementError
+    key: str,
+    sizing: MeshSizing,
+    mesher: Callable[[MeshSizing], Mesh],
+    at_size: Callable[[float], MeshSizing] | None,
+    error: PoorElementError,
 ) -> str:
     elements = error.elements
     for share in _FINER:
@@ -61,7 +90,7 @@ def _finer(
             break
         size = float(f"{share * sizing.size:.2g}")
         try:
-            mesher(replace(sizing, size=size))
+            mesher(replace(sizing, size=size) if at_size is None else at_size(size))
         except PoorElementError as still:
             elements = still.elements
             continue

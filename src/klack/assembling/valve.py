@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from klack.assembling.bodies import assemble_body, find_touch, mesh_body, wanted_sizes
+from klack.assembling.bodies import (
+    assemble_body,
+    find_touch,
+    mesh_body,
+    named_contact,
+    wanted_sizes,
+)
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.modes import mode_pool, selection_of
@@ -222,8 +228,9 @@ def mesh_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Mesh]:
         case, lambda name: mesh_body(case.bodies[name], name, ()), progress
     )
     places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
-    for stop in case.stops.values():
-        touch = find_touch(case.bodies, stop.upper, stop.lower)
+    for name, stop in case.stops.items():
+        with named_contact(case, ("stops", name, "between"), stop.upper, stop.lower):
+            touch = find_touch(case.bodies, stop.upper, stop.lower)
         if touch is not None:
             places[stop.upper.body] += touch.upper
             places[stop.lower.body] += touch.lower

@@ -12,6 +12,7 @@ from typing import Any
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from klack.case.yaml_limits import UnboundedTree, bounded_yaml
 from klack.errors import InputError
@@ -89,7 +90,7 @@ def _parsed(text: str, path: Path) -> tuple[Any, Lines]:
     try:
         data = bounded_yaml().load(StringIO(text))
     except DuplicateKeyError as error:
-        raise _duplicate(error, path) from None
+        raise _duplicate(error, text, path) from None
     except UnboundedTree as error:
         raise InputError(
             f"{path}:{error.problem_mark.line + 1}",
@@ -167,7 +168,8 @@ class _Plain:
             self.lines.keys[path] = where[0] + 1
             self.lines.values[path] = where[2] + 1
         if not isinstance(name, str):
-            self._refuse(path, f"the key {name}", "text as a key")
+            hint = 'put it into quotes; a number has a point as decimal sign: 0.3, not "0,3".'
+            self._refuse(path, f"the key {name}", "text as a key", hint)
         return self._text(str(name), path)
 
     def _text(self, text: str, key: Key) -> str:
@@ -183,10 +185,11 @@ class _Plain:
         raise InputError(where, got=got, expected=expected, hint=hint)
 
 
-def _duplicate(error: DuplicateKeyError, path: Path) -> InputError:
+def _duplicate(error: DuplicateKeyError, text: str, path: Path) -> InputError:
     line = error.problem_mark.line + 1 if error.problem_mark else 1
     name = str(error.problem).split('"')[1] if '"' in str(error.problem) else "?"
-    first = f" (first in line {error.context_mark.line + 1})" if error.context_mark else ""
+    found = _first_line(bounded_yaml().compose(StringIO(text)), name, error.context_mark)
+    first = "" if found is None else f" (first in line {found})"
     return InputError(
         f"{path}:{line}: {name}",
         got=f"the key '{name}' a second time in one mapping{first}",
@@ -195,17 +198,59 @@ def _duplicate(error: DuplicateKeyError, path: Path) -> InputError:
     )
 
 
+def _first_line(node: Any, name: str, mapping: Any) -> int | None:
+    """Line of the first key of this name in the mapping that begins at a mark."""
+    if isinstance(node, ScalarNode) or mapping is None:
+        return None
+    if node.start_mark.index == mapping.index and isinstance(node, MappingNode):
+        return next((k.start_mark.line + 1 for k, _ in node.value if k.value == name), None)
+    parts = node.value if isinstance(node, SequenceNode) else [v for _, v in node.value]
+    return next((line for part in parts if (line := _first_line(part, name, mapping))), None)
+
+
+_YAML_WORDS = {
+    "mapping values are not allowed": (
+        "a second ': ' in one line, or a line that is indented further than its section",
+        "put text with a colon into quotes; give keys of one section the same indentation.",
+    ),
+    "cannot start any token": (
+        "a tab or a sign that begins no value",
+        "indent with spaces, not tabs; put text that starts with @, ` or % into quotes.",
+    ),
+    "expected <block end>": (
+        "a line that is indented differently from its section, or a bracket or quote too many",
+        "give all keys of one section the same indentation, in spaces.",
+    ),
+    "could not find expected ':'": (
+        "a line without 'key: value'",
+        "write 'key: value' with a blank behind the colon; close the quote opened before.",
+    ),
+    "expected ',' or": (
+        "brackets that are not closed, or values without a comma between them",
+        "close the bracket { or [ that was opened here or before; separate values by commas.",
+    ),
+    "found unexpected end of stream": ("a quote that is not closed", "close it."),
+}
+"""Begin of a problem of the parser; what it means, and what to do."""
+
+_SEEN_LATE = ("could not find expected ':'", "expected ',' or", "found unexpected end of stream")
+"""Problems that lie where the text begins that the parser was reading."""
+
+
 def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     mark = error.problem_mark or error.context_mark
+    if any(words in str(error.problem) for words in _SEEN_LATE):
+        mark = error.context_mark or mark
     where = f"{path}:{mark.line + 1}" if mark else str(path)
     column = f" at column {mark.column + 1}" if mark else ""
-    context = f" {error.context}" if error.context else ""
+    said = f"{error.problem or 'unreadable'}{f' {error.context}' if error.context else ''}"
     hint = "check this line and the one before: indentation by spaces, 'key: value', brackets."
-    if "mapping values are not allowed" in str(error.problem):
-        hint = "put text with a colon into quotes; close the bracket or quote opened before."
+    for problem, (meaning, advice) in _YAML_WORDS.items():
+        if problem in str(error.problem):
+            said, hint = meaning, advice
     return InputError(
         where,
-        got=f"text that is not YAML{column}: {error.problem or 'unreadable'}{context}",
+        got=f"text that is not YAML{column}: {said}",
         expected="a case file (YAML 1.2)",
         hint=hint,
     )

@@ -1,9 +1,9 @@
 """The first mistake in a case, in words: where, what came, what was expected, what to try."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_args, get_origin
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
 from klack.case.origin import ExpandedCase
@@ -23,6 +23,10 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
     problem = _problem(first, found.data, case)
     key = _existing(found.data, first["loc"]) + problem.key
     hint = problem.hint
+    if problem.on_key and problem.got.startswith("the unknown key") and problem.key:
+        homes = _homes(case, str(problem.key[-1]))
+        if homes and "did you mean" not in hint:
+            hint = f"its place is {' or '.join(homes[:3])}; check its indentation."
     if more:
         hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
     got, written = problem.got, found.expressions.get(key)
@@ -30,6 +34,31 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
         got += f", from '{written.text}'"
     where = found.origin(key).where(on_key=problem.on_key)
     return InputError(where, got=got, expected=problem.expected, hint=hint)
+
+
+def _homes(section: type[BaseModel], name: str, path: str = "") -> list[str]:
+    """Places of a key in all sections of a case, ``bodies.NAME.mesh.size``; shortest first."""
+    found, below = [], []
+    for field, info in section.model_fields.items():
+        key = f"{path}{info.alias or field}"
+        if path and (info.alias or field) == name:
+            found.append(key)
+        for kind, many in _sections(info.annotation):
+            if path.count(".") < _DEEPEST:
+                below += _homes(kind, name, f"{key}.NAME." if many else f"{key}.")
+    return sorted(dict.fromkeys(found + below), key=lambda place: place.count("."))
+
+
+_DEEPEST = 5  # levels in which a misplaced key is looked for
+
+
+def _sections(kind: Any, many: bool = False) -> Iterator[tuple[type[BaseModel], bool]]:
+    """Sections in a type, and whether they stand under names of the user's own."""
+    if isinstance(kind, type) and issubclass(kind, BaseModel):
+        yield kind, many
+    mapping = isinstance(get_origin(kind), type) and issubclass(get_origin(kind), Mapping)
+    for part in get_args(kind):
+        yield from _sections(part, many or mapping)
 
 
 def _existing(data: Any, location: Sequence[str | int]) -> Key:
@@ -106,10 +135,30 @@ _PLAIN_NAME = (
 )
 
 
+_MEANT = {
+    **dict.fromkeys(("3d", "3-d", "three-dimensional", "volume"), ("solid", "swept")),
+    **dict.fromkeys(("2d", "2-d", "plane", "rotational"), ("axisymmetric",)),
+}
+"""Words of other programs, and those of klack."""
+_WITHOUT_UNIT = "write the number alone; coordinates have the 'unit' that stands beside them."
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
 def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     """Expected value and advice for the built-in errors of pydantic."""
     if kind == "string_pattern_mismatch" and "_-]" not in context["pattern"]:
         return _PLAIN_NAME
+    if kind == "float_type" and isinstance(value, str) and not _is_number(value):
+        return "a number without unit", _WITHOUT_UNIT
+    if kind == "int_type" and isinstance(value, str) and not _is_number(value):
+        return "a whole number", "write digits, such as 5."
     if kind in _TYPES:
         return _TYPES[kind]
     if kind in _BOUNDS:
@@ -121,9 +170,13 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     if kind in ("literal_error", "union_tag_invalid"):
         allowed = str(context.get("expected") or context.get("expected_tags"))
         names = [
-            part for part in allowed.replace(" or ", ", ").replace("'", "").split(", ") if part
+            {"True": "true", "False": "false"}.get(part, part)
+            for part in allowed.replace(" or ", ", ").replace("'", "").split(", ")
+            if part
         ]
-        return f"one of: {', '.join(names)}", nearest(str(value), names, f"write {names[0]}.")
+        meant = [name for name in _MEANT.get(str(value).lower(), ()) if name in names]
+        hint = f"write {' or '.join(meant)}." if meant else "write one of these words."
+        return f"one of: {', '.join(names)}", nearest(str(value), names, hint)
     if kind == "union_tag_not_found":
         name = _discriminator(context)
         example = "consistent" if name == "kind" else "..."

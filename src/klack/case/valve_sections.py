@@ -216,10 +216,12 @@ class ValveSections(CaseFile):
     )
 
     def plausible_numbers(self) -> Iterator[Number]:
-        """Masses of rigid parts, and the speeds that they begin with."""
+        """Masses of rigid parts, the speeds that they begin with, and those at stops."""
         for name, part in self.network.components.items():
             if part.type == "rigid-mass":
                 key = ("network", "components", name)
                 yield Number((*key, "mass"), getattr(part, "mass", 1.0), PART_MASS)
                 if speed := abs(getattr(part, "speed", 0.0)):
                     yield Number((*key, "speed"), speed, SPEED)
+        for name, stop in self.stops.items():
+            yield Number(("stops", name, "speed"), stop.speed, SPEED)

@@ -20,6 +20,8 @@ PROGRESS_FILE = "KLACK_PROGRESS_FILE"
 """Environment variable with the file that gets the progress instead of the terminal."""
 
 _PATIENCE = 2.0  # s that a stage may take without a line
+_LASTS = 5.0  # s after which a stage that has not ended is named
+_AGAIN = 30.0  # s between two lines of a stage that lasts
 _OFTEN = 0.2  # s between two lines of one stage in a file
 _SOON = 0.5  # s until the bar is there
 _KINDS = {
@@ -53,6 +55,7 @@ def show_progress(quiet: bool = False) -> Iterator[Progress]:
             yield lines
         finally:
             lines.compiling.forget()
+            lines.stop()
         lines.finish()
 
 
@@ -80,12 +83,39 @@ class _ToFile:
 
 
 class _Lines:
-    """One line on stderr for each stage that took its time, and one if something is compiled."""
+    """Lines on stderr for each stage that takes its time, and one if something is compiled.
+
+    A stage is named when it has begun to last, again every 30 s with how far it is, and at its end.
+    """
 
     def __init__(self) -> None:
-        self.stage, self.start = "", time.perf_counter()
+        self.stage, self.start, self.fraction = "", time.perf_counter(), 0.0
         self.compiling = _Compiling(self._tell)
         self._told = {""}
+        self._ended = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        """Say what lasts, from a thread of its own: long steps report nothing for minutes."""
+        said, due = ("", 0.0), 0.0
+        while not self._ended.wait(_OFTEN):
+            now = time.perf_counter()
+            stage, start = self.stage, self.start
+            if stage and (stage, start) != said and now - start > _LASTS:
+                said, due = (stage, start), start + _AGAIN
+                self._print(f"{stage} ...")
+            elif (stage, start) == said and now > due:
+                due += _AGAIN
+                far = f", {100 * self.fraction:.0f} %" if self.fraction else ""
+                self._print(f"{stage}: {now - start:.0f} s so far{far}")
+
+    def _print(self, line: str) -> None:
+        with suppress(OSError, ValueError):  # nobody listens any more
+            print(line, file=sys.stderr, flush=True)
+
+    def stop(self) -> None:
+        """Say nothing more."""
+        self._ended.set()
 
     def _tell(self, words: str) -> None:
         if words not in self._told:
@@ -97,6 +127,7 @@ class _Lines:
         if stage != self.stage:
             self.finish()
             self.stage, self.start = stage, time.perf_counter()
+        self.fraction = fraction
 
     def remark(self, line: str) -> None:
         """Print a line of text."""

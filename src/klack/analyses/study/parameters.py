@@ -14,7 +14,7 @@ from klack.errors import InputError
 from klack.expressions.expression import RESERVED
 from klack.input.problem import CaseProblem, Key
 from klack.studies.spread import Listed, Normal, Range, Spread
-from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
+from klack.units import KINDS, RATIO, TEMPERATURE, TEMPERATURE_RISE, Kind, format_si, parse_quantity
 
 __all__ = ["Parameter", "parameters_of", "short_names", "unit_of", "written"]
 
@@ -200,6 +200,14 @@ def _kind_of(item: StudyParameter) -> Kind:
     )
 
 
+def _deviation(value: Written, kind: Kind) -> float:
+    """Standard deviation; one of 5 degC is a difference of temperatures, 5 K."""
+    if kind != TEMPERATURE:
+        return parse_quantity(value, kind)
+    text = re.sub(r"(degC|°C)$", "K", value.strip()) if isinstance(value, str) else value
+    return parse_quantity(text, TEMPERATURE_RISE)
+
+
 def _spread(source: StudySource, name: str, item: StudyParameter, of: Quantity | Kind) -> Spread:
     at: Key = ("parameters", name)
 
@@ -214,7 +222,7 @@ def _spread(source: StudySource, name: str, item: StudyParameter, of: Quantity |
         mean = read(item.normal.mean, "normal", "mean")
         deviation = source.read(
             (*at, "normal", "sd"),
-            lambda: parse_quantity(item.normal.sd, kind),  # type: ignore[union-attr]
+            lambda: _deviation(item.normal.sd, kind),  # type: ignore[union-attr]
         )
         if deviation <= 0.0:
             raise InputError(
