@@ -370,8 +370,9 @@ def _split(text: str, kind: Kind, where: str) -> tuple[float, str]:
         hint = f'write one number and one unit, e.g. "{kind.example}".'
         if re.match(r"[+-]?\d+,\d", squeezed):
             hint = f'use a point as decimal sign: "{squeezed.replace(",", ".", 1)}".'
-        elif re.search(r"[A-Za-z][23]$", squeezed):
-            hint = f"write a power with ^: {squeezed[:-1]}^{squeezed[-1]}."
+        elif re.search(r"[A-Za-z][23²³]$", squeezed):
+            power = {"²": "2", "³": "3"}.get(squeezed[-1], squeezed[-1])
+            hint = f"write a power with ^: {squeezed[:-1]}^{power}."
         raise QuantityError(where, text, kind, hint)
     return float(match["number"]), match["unit"] or ""
 

@@ -287,6 +287,7 @@ def test_a_case_shows_of_a_file_only_the_solids_that_a_body_takes(tmp_path: Path
     assert main(["inspect", str(bricks_case(tmp_path))]) == 0
     pin, block = " ".join(capsys.readouterr().out.split()).split("block what")
     assert "volume 1 mm^3" in pin
+    assert "mass 0.00785 g of steel" in pin
     assert "UPPER" in pin
     assert "LOWER" not in pin
     assert "UPPER" not in block
@@ -310,8 +311,10 @@ def test_a_drawn_body_shows_its_edges_volume_and_mass(capsys):
     assert main(["inspect", str(Path(__file__).parents[1] / "data" / "tiny_rods.yaml")]) == 0
 
     shown = " ".join(capsys.readouterr().out.split())
-    assert "solid short 251.327 mm^3, 1.9729 g of steel" in shown
-    assert "solid long 502.655 mm^3, 3.9458 g of steel" in shown
+    assert "solid short 251.327 mm^3" in shown
+    assert "mass 1.97292 g of steel" in shown
+    assert "solid long 502.655 mm^3" in shown
+    assert "mass 3.94584 g of steel" in shown
     assert "surface far z -40 mm, r 0 to 2 mm" in shown
     assert "surface side z 0 to 20 mm, r 2 mm" in shown
 

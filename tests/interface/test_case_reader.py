@@ -225,6 +225,13 @@ MISTAKES = {
         ["'gap' a second time"],
     ),
     "misplaced key": (("motion: {", "gap: 1 um\nmotion: {"), "gap", ["its place is contact.gap"]),
+    "name instead of a mapping": (
+        ("fixed: [{surface: rim, sectors: {count: 3, width: 40 deg}}]", "fixed: [rim]"),
+        "fixed[0]",
+        ["write {surface: rim}"],
+    ),
+    "typographic minus": (("start: [0, 2]", "start: [0, \N{MINUS SIGN}2]"), "start[1]", ["as '-'"]),
+    "section of a valve": (("motion: {", "netwrk: {}\nmotion: {"), "netwrk", ["'network'"]),
     "model of another program": (
         ("model: swept", "model: 3d"),
         "geometry.model",

@@ -105,7 +105,7 @@ def test_a_large_mesh_is_told_before_it_is_made(size, told, recwarn):
         assert (
             "bodies.long.mesh: elements of 5 um to 5 um make a mesh of about 4e+07 nodes" in said[0]
         )
-        assert "min on two cores and at least" in said[0]
+        assert "h on two cores and at least" in said[0]
 
 
 def test_no_case_of_klack_is_doubted():

@@ -1,6 +1,7 @@
 """Content of a file of another program, before a case is written for it."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -97,11 +98,12 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
                 mesh.file, mesh.unit, solids=solids, solids_only=mesh.solids_only
             )
             known[name] = tuple(model.mesh.surfaces)
-            yield name, tuple(_mesh_rows(Path(mesh.file), model))
+            yield name, (*_mesh_rows(Path(mesh.file), model), _mass(case, name, _volumes(model)))
         elif body.geometry.step is not None:
             content = step_content(body.geometry.step.file)
             known[name] = tuple(face.name for face in content.faces)
-            yield name, tuple(_step_rows(content))
+            volumes = {solid.name: solid.size for solid in content.solids}
+            yield name, (*_step_rows(content), _mass(case, name, volumes))
         elif body.geometry.profile is not None:
             yield name, tuple(_drawn_rows(case, name, body.geometry.profile))
     require_surface_names(case, known)
@@ -110,16 +112,37 @@ def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
 def _drawn_rows(case: CaseFile, name: str, drawn: ProfileGeometry) -> Iterator[Row]:
     """Solids and edges of a drawing; volume and mass are those of the body of revolution."""
     profiles = drawn.profiles()
-    materials = case.materials_of(name, profiles)
     yield "geometry", "", "drawn; meshed by klack when the case runs"
     for solid, profile in profiles.items():
-        mass = f"{profile.volume * materials[solid].density * 1e3:.5g} g"
-        kind = f"{mass} of {materials[solid].name}"
-        yield "solid", solid, f"{profile.volume * 1e9:.6g} mm^3, {kind}"
+        yield "solid", solid, f"{profile.volume * 1e9:.6g} mm^3"
     for edge in drawn.surfaces:
         curves = [c for p in profiles.values() for c in p.curves if c.name == edge]
         points = np.concatenate([c.at(np.linspace(0.0, 1.0, 65)) for c in curves])
         yield "surface", edge, f"z {_range(points[:, 1])}, r {_range(points[:, 0])}"
+    yield _mass(case, name, {solid: profile.volume for solid, profile in profiles.items()})
+
+
+def _mass(case: CaseFile, name: str, volumes: Mapping[str, float]) -> Row:
+    """Mass of a body from the volume [m^3] of each solid and the materials of the case."""
+    try:
+        materials = case.materials_of(name, volumes)
+    except InputError as error:  # what there is shall be shown all the same
+        return "mass", "", error.got
+    mass = sum(volume * materials[solid].density for solid, volume in volumes.items())
+    kinds = ", ".join(dict.fromkeys(material.name for material in materials.values()))
+    return "mass", "", f"{1e3 * mass:.6g} g of {kinds}"
+
+
+def _volumes(model: MeshModel) -> dict[str, float]:
+    return {
+        solid: corner_volume(
+            replace(
+                model.mesh,
+                blocks=tuple(block for block in model.mesh.blocks if block.solid == solid),
+            )
+        )
+        for solid in model.mesh.solids
+    }
 
 
 def _reduced_rows(body: ReducedBody) -> Iterator[Row]:

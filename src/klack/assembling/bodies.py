@@ -253,7 +253,9 @@ def _places_of_moving_body(case: Case, touch: Touch | None) -> Places:
     """Where the moving body first touches either stop, as drawn."""
     places = touch.upper if touch else ()
     if case.opposite is not None:
-        above = find_touch(case.bodies, case.opposite.stop, case.opposite.moving)
+        stop, moving = case.opposite.stop, case.opposite.moving
+        with named_contact(case, ("opposite", "between"), stop, moving):
+            above = find_touch(case.bodies, stop, moving)
         places += above.lower if above else ()
     return places
 

@@ -159,10 +159,11 @@ def tell_effort(
     if seconds > _LONG:
         worst = max(nodes, key=lambda name: nodes[name])
         size = format_si(sizings[worst].smallest, "m", 2)
+        time = f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.2g} h"
         _tell(
             f"bodies.{worst}.mesh: elements of {size} to {format_si(sizings[worst].size, 'm', 2)} "
             f"make a mesh of about {total:.1g} nodes in all; a first run takes some "
-            f"{seconds / 60:.0f} min on two cores and at least "
+            f"{time} on two cores and at least "
             f"{in_words(element_memory(dimension, total / 2))} of memory. Try: larger sizes, or a "
             "smaller extent of the refinement.",
             progress,

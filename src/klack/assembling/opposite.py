@@ -4,7 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from klack.assembling.bodies import BodyPair, assemble_body, find_touch, mesh_body
+from klack.assembling.bodies import (
+    BodyPair,
+    assemble_body,
+    find_touch,
+    mesh_body,
+    named_contact,
+)
 from klack.assembling.candidates import Candidates
 from klack.assembling.ladder import impact_energy, static_ladder
 from klack.case.schema import Case
@@ -77,11 +83,13 @@ def build_opposite(
         return None
     progress("upper stop", 0.0)
     name = asked.stop.body
-    touch = find_touch(case.bodies, asked.stop, asked.moving)
+    with named_contact(case, ("opposite", "between"), asked.stop, asked.moving):
+        touch = find_touch(case.bodies, asked.stop, asked.moving)
     mesh = mesh_body(case.bodies[name], name, touch.upper if touch else ())
     surface = mesh.surface(asked.stop.surface)
     moving_surface = pair.upper.mesh.surface(asked.moving.surface)
-    shift = touching_shift(mesh, surface, pair.upper.mesh, moving_surface)
+    with named_contact(case, ("opposite", "between"), asked.stop, asked.moving):
+        shift = touching_shift(mesh, surface, pair.upper.mesh, moving_surface)
     body = assemble_body(case, name, mesh.moved(np.array([0.0] * (mesh.dimension - 1) + [shift])))
     flexibility = Flexibility(body, threads=threads, cache=moving.cache)
     contact = BodyPair(

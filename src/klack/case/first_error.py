@@ -24,9 +24,7 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
     key = _existing(found.data, first["loc"]) + problem.key
     hint = problem.hint
     if problem.on_key and problem.got.startswith("the unknown key") and problem.key:
-        homes = _homes(case, str(problem.key[-1]))
-        if homes and "did you mean" not in hint:
-            hint = f"its place is {' or '.join(homes[:3])}; check its indentation."
+        hint = _with_its_place(case, key, hint)
     if more:
         hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
     got, written = problem.got, found.expressions.get(key)
@@ -34,6 +32,19 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
         got += f", from '{written.text}'"
     where = found.origin(key).where(on_key=problem.on_key)
     return InputError(where, got=got, expected=problem.expected, hint=hint)
+
+
+def _with_its_place(case: type[BaseModel], key: Key, hint: str) -> str:
+    """Advice for an unknown key that is known elsewhere; components have keys of their own."""
+    if "did you mean" in hint or key[:2] == ("network", "components"):
+        return hint
+    homes = _homes(case, str(key[-1]))
+    if 0 < len(homes) <= _MOST_PLACES:
+        return f"its place is {' or '.join(homes)}; check its indentation."
+    return hint if len(key) > 1 else nearest(str(key[-1]), ("network",), hint)
+
+
+_MOST_PLACES = 3  # that a message names
 
 
 def _homes(section: type[BaseModel], name: str, path: str = "") -> list[str]:
@@ -156,7 +167,8 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     if kind == "string_pattern_mismatch" and "_-]" not in context["pattern"]:
         return _PLAIN_NAME
     if kind == "float_type" and isinstance(value, str) and not _is_number(value):
-        return "a number without unit", _WITHOUT_UNIT
+        minus = value.startswith("\N{MINUS SIGN}")
+        return "a number without unit", "write the minus as '-'." if minus else _WITHOUT_UNIT
     if kind == "int_type" and isinstance(value, str) and not _is_number(value):
         return "a whole number", "write digits, such as 5."
     if kind in _TYPES:

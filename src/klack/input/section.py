@@ -41,11 +41,15 @@ class Section(BaseModel):
             return value
         known = {info.alias or name: info for name, info in cls.model_fields.items()}
         if not isinstance(value, Mapping):
+            hint = "indent the keys below this one, or write {key: value, ...}."
+            required = [key for key, info in known.items() if info.is_required()]
+            if isinstance(value, str) and len(required) == 1:
+                hint = f"write {{{required[0]}: {value[:80]}}}."
             raise CaseProblem(
                 (),
                 got="nothing" if value is None else f"'{value}'"[:80],
                 expected=f"a mapping with the keys: {one_of(known)}",
-                hint="indent the keys below this one, or write {key: value, ...}.",
+                hint=hint,
             )
         for key in value:
             if key not in known:

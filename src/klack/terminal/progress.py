@@ -9,7 +9,9 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from functools import partial
+from math import inf
 from pathlib import Path
+from time import monotonic
 from typing import Any, Protocol
 
 from klack.progress import PointCount
@@ -97,17 +99,17 @@ class _Lines:
 
     def _watch(self) -> None:
         """Say what lasts, from a thread of its own: long steps report nothing for minutes."""
-        said, due = ("", 0.0), 0.0
+        stage, since, due = "", monotonic(), inf
         while not self._ended.wait(_OFTEN):
-            now = time.perf_counter()
-            stage, start = self.stage, self.start
-            if stage and (stage, start) != said and now - start > _LASTS:
-                said, due = (stage, start), start + _AGAIN
-                self._print(f"{stage} ...")
-            elif (stage, start) == said and now > due:
-                due += _AGAIN
+            now = monotonic()
+            if self.stage != stage:
+                stage, since, due = self.stage, now, now + _LASTS
+            elif now > due:
+                begins, due = due == since + _LASTS, now + _AGAIN
                 far = f", {100 * self.fraction:.0f} %" if self.fraction else ""
-                self._print(f"{stage}: {now - start:.0f} s so far{far}")
+                self._print(
+                    f"{stage} ..." if begins else f"{stage}: {now - since:.0f} s so far{far}"
+                )
 
     def _print(self, line: str) -> None:
         with suppress(OSError, ValueError):  # nobody listens any more
