@@ -197,3 +197,39 @@ def test_different_starts_beside_one_stored_time_are_refused(tmp_path):
             file[name].attrs.update({"unit": unit, "t0": later})
     with pytest.raises(InputError, match=r"beside one stored time: '\w+' 0.*'\w+' 0"):
         open_recording(tmp_path / "a.h5")
+
+
+STAMPS = {
+    "dates": ("2026-03-02 08:00:{:09.6f}", ",", "."),
+    "dates of ISO 8601": ("2026-03-02T08:00:{:09.6f}Z", ";", ","),
+    "times of day": ("08:00:{:09.6f}", "\t", "."),
+    "decimal comma": ("08:00:{:09.6f}", ";", ","),
+}
+
+
+@pytest.mark.parametrize(("form", "separator", "decimal"), STAMPS.values(), ids=STAMPS)
+def test_time_stamps_as_a_column(tmp_path, form, separator, decimal):
+    rows = []
+    for time, lift, current in zip(TIME, LIFT, current_at(TIME), strict=True):
+        cells = [form.format(59.99 + time), f"{lift:.9f}"]
+        rows.append(separator.join([*cells, f"{current:.9f}"]).replace(".", decimal))
+    text = f"Logger 3 of 08:00:00.5\n\nTimestamp{separator}lift [um]{separator}current [A]\n"
+    path = tmp_path / "a.csv"
+    path.write_text(text + "\n".join(rows))
+    series, notes = read(path)
+    assert any("taken as seconds" in note for note in notes)
+    assert series["lift"].step == pytest.approx(STEP, rel=1e-9)  # stamps have 1 us, steps 10
+    np.testing.assert_allclose(series["lift"].values, 1e-6 * LIFT, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(series["current"].values, current_at(TIME), rtol=0, atol=1e-9)
+
+
+def test_time_stamps_of_19_digits_are_not_cut(tmp_path):
+    path = tmp_path / "a.h5"
+    zero = START.astype(np.int64)  # [ns], of which a real number keeps 256
+    with h5py.File(path, "w") as file:
+        for name, unit, values, later in CHANNELS:
+            file[f"{name}/time"] = zero + np.round(1e9 * (TIME + later)).astype(np.int64)
+            file[f"{name}/time"].attrs["unit"] = "ns"
+            file[f"{name}/values"] = values
+            file[f"{name}/values"].attrs["unit"] = unit
+    check(path)

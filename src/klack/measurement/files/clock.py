@@ -13,8 +13,8 @@ SLOWEST = 1e-3  # [s]
 """Longest step at which a time without unit passes as seconds: lift is measured faster."""
 
 _NAME = re.compile(
-    r"(t|time|zeit|timestamps?|time[ _-]?stamp|timechannel|abtastzeit|messzeit|abszisse|abscissa|"
-    r"x_value|x[ -]?axis)"
+    r"(t|time|date[ /_-]?time|zeit|timestamps?|time[ _-]?stamp|timechannel|abtastzeit|messzeit|"
+    r"abszisse|abscissa|x_value|x[ -]?axis)"
     r"([ _-]?(s|sec|ms|us|ns|abs|rel|axis|vector|\#?\d+))?",
     re.IGNORECASE,
 )

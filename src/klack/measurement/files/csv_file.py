@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.measurement.files.clock import SLOWEST, clock_factor, is_clock, no_clock, unique_names
+from klack.measurement.files.clock import (
+    SLOWEST,
+    clock_factor,
+    instant,
+    is_clock,
+    no_clock,
+    unique_names,
+)
 from klack.measurement.files.csv_dialect import (
     SEQUENCE,
     Column,
@@ -28,7 +35,11 @@ Vector = NDArray[np.float64]
 Value = TypeVar("Value")
 
 _LEFT_OF_ROWS = re.compile(rb"Record Length,[^,\r\n]*,[^,\r\n]*,\s*[-+.\d]+[^,\r\n]*,\s*[-+.\d]")
-_LARGEST_BESIDE = 1 << 28  # bytes
+_STAMP = re.compile(
+    rb"(?<![\d:.])(?P<day>\d{4}[-/.]\d\d?[-/.]\d\d?[T ]+)?"
+    rb"\d\d?:\d\d:\d\d[.,]\d+(Z|[+-]\d\d:\d\d)?(?![\d:])"
+)
+_LARGEST_REWRITTEN = 1 << 28  # bytes
 _HEAD = 1 << 18  # bytes in which the header must end
 _SAMPLE = 1 << 14  # bytes looked at in the middle and at the end
 _BLOCK = 1 << 20  # rows looked at together
@@ -52,7 +63,7 @@ class CsvFile(Recording):
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         data = _bytes_of(path)
-        data = _beside(data)
+        data = _stamps_as_numbers(_beside(data))
         dialect, columns, header, start = _survey(path, data)
         self._table = NumberTable(path, data, start, dialect)
         self._column: dict[str, tuple[int, int]] = {}  # and first row
@@ -218,7 +229,7 @@ def _of(
 def _beside(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Table of an oscilloscope of Tektronix that writes its header left of its first rows."""
     head = data[:200].tobytes()
-    if not _LEFT_OF_ROWS.match(head) or data.size > _LARGEST_BESIDE:
+    if not _LEFT_OF_ROWS.match(head) or data.size > _LARGEST_REWRITTEN:
         return data
     rows = [line.split(",") for line in data.tobytes().decode("latin-1").splitlines()]
     said = {row[0]: row[1] for row in rows if len(row) > 4 and row[0]}
@@ -226,6 +237,31 @@ def _beside(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
     lines = [f"time [{unit}],{said.get('Source', 'value')} [{value}]"]
     lines += [",".join(row[3:5]) for row in rows if len(row) > 4]
     return np.frombuffer("\n".join(lines).encode("latin-1"), np.uint8)
+
+
+def _stamps_as_numbers(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Table with its time stamps as seconds since the first of them."""
+    if data.size > _LARGEST_REWRITTEN:
+        return data
+    lines = data[:_HEAD].tobytes().splitlines(keepends=True)[:_TRIED]
+    stamped = [bool(_STAMP.search(line)) for line in lines]
+    begin = next((k for k in range(len(lines) - 2) if all(stamped[k : k + 3])), None)
+    if begin is None:
+        return data
+    at = sum(len(line) for line in lines[:begin])
+    zero: int | None = None
+
+    def seconds(found: "re.Match[bytes]") -> bytes:
+        nonlocal zero
+        text = found[0].decode("ascii")
+        stamp = instant(text if found["day"] else f"1970-01-01 {text}")
+        if stamp is None:
+            return found[0]
+        zero = stamp if zero is None else zero
+        return b"%de-9" % (stamp - zero)  # without a decimal mark
+
+    text = data.tobytes()
+    return np.frombuffer(text[:at] + _STAMP.sub(seconds, text[at:]), np.uint8)
 
 
 def _survey(

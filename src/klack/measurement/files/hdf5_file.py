@@ -110,7 +110,17 @@ def _array(name: str, item: Any) -> StoredArray:
                 values = item[first:last, line] if axis == 0 else item[line, first:last]
         return np.asarray(values, dtype=np.float64)
 
-    return StoredArray(name=name, shape=item.shape, read=read, about=_attributes(item))
+    def whole(first: int, last: int) -> NDArray[np.int64]:
+        with _damage(f"{Path(item.file.filename).name}: '{name}'"):
+            return np.asarray(item[first:last], dtype=np.int64)
+
+    return StoredArray(
+        name=name,
+        shape=item.shape,
+        read=read,
+        whole=whole if item.ndim == 1 and item.dtype.kind in "iu" else None,
+        about=_attributes(item),
+    )
 
 
 def _check_size(name: str, item: Any) -> None:

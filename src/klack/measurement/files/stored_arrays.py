@@ -74,6 +74,10 @@ class StoredArray:
     name: str
     shape: tuple[int, ...]
     read: Callable[[int, int, int, int], Vector]
+    whole: Callable[[int, int], NDArray[np.int64]] | None = None
+    """Samples of a vector of whole numbers."""
+    zero: int = 0
+    """Number that was taken off all, as the first time stamp."""
     about: Mapping[str, str | float] = field(default_factory=dict)
 
 
@@ -194,7 +198,7 @@ def _lines(
     group = replace(group, arrays=[_unpacked(array, group) for array in group.arrays])
     about = {**about, **group.about}
     times = [array for array in group.arrays if _is_time(array, group)]
-    clock = (times[0], _unit_of(times[0], group)) if times else clock
+    clock = (_from_first(times[0]), _unit_of(times[0], group)) if times else clock
     lines = []
     for array in group.arrays:
         if array not in times:
@@ -262,6 +266,20 @@ def _require_one_start(file: str, lines: Sequence[_Line]) -> None:
                 expected="a start, or a stored time",
                 hint="give each channel its own time, or a step and a start.",
             )
+
+
+def _from_first(array: StoredArray) -> StoredArray:
+    """Time stamps since the first one: whole numbers of 19 digits are cut as real ones."""
+    whole = array.whole
+    zero = 0 if whole is None else int(whole(0, 1)[0])
+    if whole is None or abs(zero) < 2**53:
+        return array
+    stamps = whole
+    return replace(
+        array,
+        zero=zero,
+        read=lambda line, axis, first, last: (stamps(first, last) - zero).astype(np.float64),
+    )
 
 
 def _is_time(array: StoredArray, group: StoredGroup) -> bool:
@@ -348,6 +366,8 @@ def _time_of(
             factor, note = clock_factor(unit, mean, f"{file}: '{stored.name}'")
             notes += [note] if note else []
             zero = date if zero is None else zero
+            if stored.zero:
+                zero = (zero or 0) + stored.zero * round(1e9 * factor)
             return factor * first, factor * mean, (stored, factor), zero
     step = _step(file, name, about) if time_step is None else time_step
     if step is None:
