@@ -165,6 +165,12 @@ GMSH = {
         ),
         "got more elements than the 2 of its count",
     ),
+    "lost name": (
+        HEAD
+        + '$PhysicalNames\n2\n3 1 "body"\n$EndPhysicalNames\n'
+        + msh(["1 4 2 1 1 1 2 3 4"]).removeprefix(HEAD),
+        "PhysicalNames: got 1 names, expected 2, according to its count",
+    ),
     "nodes behind the count": (
         msh(["1 4 2 1 1 1 2 3 4"]).replace("$Nodes\n5", "$Nodes\n4"),
         "got 4 numbers more than its counts",

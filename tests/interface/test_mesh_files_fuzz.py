@@ -314,6 +314,15 @@ def test_noise(ending: str, tmp_path: Path) -> None:
         assert volume(path, text) is None
 
 
+@pytest.mark.parametrize(
+    ("whole", "other"),
+    [("$Nodes\n1 8 1 8", "$Nodes\n1 9 1 9"), ("$Elements\n2 2", "$Elements\n2 3")],
+)
+def test_blocks_of_less_than_their_section_counts(whole: str, other: str, tmp_path: Path) -> None:
+    assert whole in MSH4
+    assert volume(tmp_path / "a.msh", MSH4.replace(whole, other).encode()) is None
+
+
 def test_packed_data_that_would_be_huge(tmp_path: Path) -> None:
     """A small file that says it holds 2 GB is refused before they are unpacked."""
     path, data = content("vtu zlib", tmp_path)

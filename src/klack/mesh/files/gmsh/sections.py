@@ -156,12 +156,17 @@ class _Reader:
 
     def _physical_names(self, place: str, start: int) -> None:
         end = self._data.find(b"$EndPhysicalNames", start)
-        text = self._data[start : max(end, start)].decode("utf-8", "replace")
-        for line in text.splitlines()[1:]:
+        if end < 0:
+            refuse(place, "the end of the file", "$EndPhysicalNames")
+        text = self._data[start:end].decode("utf-8", "replace")
+        count, *lines = [line.strip() for line in text.splitlines() if line.strip()] or [""]
+        if count != str(len(lines)):
+            refuse(place, f"{len(lines)} names", f"{count or 'a count'}, according to its count")
+        for line in lines:
             match = _PHYSICAL.match(line)
             if match:
                 self._content.names[int(match[1]), int(match[2])] = match[3]
-            elif line.strip():
+            else:
                 refuse(place, repr(line[:40]), 'dimension, number and "name"')
 
     def _numbers(self, name: str, place: str, start: int) -> int:
@@ -264,10 +269,12 @@ class _Reader:
                 for _ in range(count):
                     self._entity(dimension, stream)
             return
-        blocks = int(stream.sizes(4)[0])
+        blocks, total = (int(number) for number in stream.sizes(4)[:2])
+        left = total
         for _ in range(blocks):
             first, second, third = stream.whole(3).tolist()
             count = int(stream.sizes(1)[0])
+            left -= count
             if not 0 <= (first if name == "Nodes" else 0) <= 3:
                 refuse(place, f"an entity of dimension {first}", "dimension 0 to 3")
             if name == "Nodes":
@@ -280,6 +287,8 @@ class _Reader:
                 rows = stream.sizes(count * width).reshape(count, width)
                 groups = self._content.groups.get((first, second), ())
                 self._take(third, groups, rows)
+        if left:
+            refuse(place, f"{total - left} in all", f"{total}, according to its count")
 
     def _entity(self, dimension: int, stream: Stream) -> None:
         tag = int(stream.whole(1)[0])
