@@ -10,7 +10,7 @@ import pytest
 from klack.assembling.given_shapes import require_given_shapes, require_usual_sizes
 from klack.case.reader import read_case
 from klack.cli.main import main
-from klack.errors import InputError
+from klack.errors import AccuracyWarning, InputError
 
 RODS = (Path(__file__).parents[1] / "data" / "tiny_rods.yaml").read_text(encoding="utf-8")
 MODEL = "      model: axisymmetric\n"
@@ -47,6 +47,12 @@ def test_a_drawing_in_the_wrong_unit_is_asked_about(unit, size):
 @pytest.mark.parametrize("unit", ["m", "um"])
 def test_what_the_question_proposes_is_taken(unit):
     require_given_shapes(rods(unit, f"40 {unit}"), no_mesh)
+
+
+def test_a_case_that_is_unusual_as_a_whole_is_noted():
+    text = RODS.replace("unit: mm", "unit: m").replace("klack: 1", "klack: 1\nunusual: true")
+    with pytest.warns(AccuracyWarning, match="bodies.long: 40 m is an unusual size"):
+        require_given_shapes(read_case(text, Path("rods.yaml")), no_mesh)
 
 
 def test_a_confirmation_of_another_size_is_refused():

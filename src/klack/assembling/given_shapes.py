@@ -191,7 +191,8 @@ def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
     ------
     InputError
         If the largest body is above 1 m or below 0.1 mm, or two of them differ 100-fold, and the
-        case does not confirm it by ``geometry.extent``; or if that is not what the shape has.
+        case does not confirm it, by ``geometry.extent`` or as a whole by ``unusual``; or if the
+        extent is not what the shape has.
     """
     for name, extent in extents.items():
         said = case.bodies[name].geometry.extent
@@ -203,7 +204,7 @@ def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
                 hint="check the unit of the shape, or correct the extent.",
             )
     asked = {name: size for name, size in extents.items() if not _is_confirmed(case, name)}
-    if not asked:
+    if not asked or case.unusual:
         return
     name, largest = max(extents.items(), key=lambda item: item[1])
     other, smallest = min(extents.items(), key=lambda item: item[1])
