@@ -41,7 +41,10 @@ class InputError(KlackError, ValueError):
 
 def _shortened(text: str) -> str:
     """Leave out the middle of what is longer than a message should be: a line of a megabyte."""
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 200]} ... {text[-150:]}"
+    if len(text) <= _LONGEST:
+        return text
+    head, tail = text[: _LONGEST - 200].rsplit(" ", 1)[0], text[-150:].split(" ", 1)[-1]
+    return f"{head} ... {tail}"
 
 
 class ConvergenceError(KlackError, RuntimeError):

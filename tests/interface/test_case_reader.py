@@ -284,6 +284,16 @@ def test_the_first_of_two_equal_keys_is_named_by_its_line():
     assert f"first in line {line})" in str(complaint(text))
 
 
+def test_long_lists_lose_their_middle_and_no_half_words():
+    names = [f"component-{i}" for i in range(200)]
+    error = InputError("case", got="x", expected=", ".join(names), hint="a" * 5000)
+
+    kept = error.expected.replace(" ... ", " ").split(", ")
+    assert set(kept[:20] + kept[-5:]) <= set(names)
+    assert len(error.expected) < 620
+    assert len(error.hint) < 620
+
+
 def test_further_mistakes_are_counted():
     text = changed("0.5 m/s", "0.5").replace("1.2 mm", "1.2 bar").replace("210 GPa", "210")
 
