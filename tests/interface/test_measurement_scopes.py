@@ -156,3 +156,29 @@ def test_labview_channels_that_start_apart_keep_it(tmp_path):
     assert series["current"].start == pytest.approx(START + 3e-4, rel=1e-9)
     np.testing.assert_allclose(series["lift"].values, 1e-6 * FIRST[30:], atol=1e-18)
     np.testing.assert_allclose(series["current"].values, SECOND[:-30], atol=1e-12)
+
+
+def notes_of(path, text):
+    path.write_text(text)
+    with open_recording(path) as recording:
+        return "\n".join(recording.notes)
+
+
+def test_rows_above_a_faulty_one_are_told(tmp_path):
+    lines = YOKOGAWA.splitlines(keepends=True)
+    lines[13] = "1.0,2..0\n"  # of the made time, two rows would be missing without a word
+    assert "2 lines of numbers, the first of them line 12, stand above" in notes_of(
+        tmp_path / "a.csv", "".join(lines)
+    )
+
+
+@pytest.mark.parametrize(
+    "text",
+    [SIGLENT, TEKTRONIX_MSO, YOKOGAWA, KEYSIGHT_INFINIIUM, SCOPY, LABVIEW_NONE, LABVIEW_ONE],
+)
+def test_a_table_shorter_than_its_header_says_is_told(tmp_path, text):
+    assert "the header speaks of" not in notes_of(tmp_path / "a.csv", text)
+    lines = text.splitlines(keepends=True)
+    del lines[-7:]
+    said = notes_of(tmp_path / "a.csv", "".join(lines))
+    assert "the header speaks of 300 rows, the table has 293" in said

@@ -21,6 +21,7 @@ __all__ = [
     "find_dialect",
     "first_row",
     "read_columns",
+    "rows_above",
     "split_label",
 ]
 
@@ -167,6 +168,17 @@ def first_row(lines: Sequence[str], dialect: Dialect) -> int:
         if all(good[n : n + _FOLLOWING]):
             return k
     return len(lines)
+
+
+def rows_above(header: Sequence[str], dialect: Dialect) -> list[int]:
+    """Lines of a header that are rows of numbers of a table of several columns."""
+    if dialect.width < 2:
+        return []
+    return [
+        k
+        for k, line in enumerate(header)
+        if _width(line, dialect.separator, dialect.decimal) == dialect.width
+    ]
 
 
 def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] | None:

@@ -24,6 +24,7 @@ from klack.measurement.files.csv_dialect import (
     find_dialect,
     first_row,
     read_columns,
+    rows_above,
 )
 from klack.measurement.files.csv_header import TableHeader, read_header
 from klack.measurement.files.number_table import NumberTable
@@ -64,13 +65,18 @@ class CsvFile(Recording):
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         data = _bytes_of(path)
         data = _stamps_as_numbers(_beside(data))
-        dialect, columns, header, start = _survey(path, data)
+        dialect, columns, header, texts, start = _survey(path, data)
         self._table = NumberTable(path, data, start, dialect)
         self._column: dict[str, tuple[int, int]] = {}  # and first row
         self._factor: dict[str, float] = {}
         self._segments: dict[int, list[tuple[int, int]]] = {}
         self._clock_column: dict[str, tuple[int, int]] = {}
         notes: list[str] = []
+        if above := rows_above(texts, dialect):
+            notes.append(
+                f"{path.name}: {len(above)} lines of numbers, the first of them line "
+                f"{above[0] + 1}, stand above others and are left out."
+            )
         if columns is None and len(header.names) == dialect.width:
             columns = tuple(Column(name, "", name) for name in header.names)
         if columns is None:
@@ -80,6 +86,11 @@ class CsvFile(Recording):
         else:
             clocks = _named_clocks(path, self._table, columns, time_step, notes)
         channels = self._channels(columns, clocks, time_step, header, notes)
+        longest = max((channel.count for channel in channels), default=0)
+        if header.count and longest != header.count:
+            notes.append(
+                f"{path.name}: the header speaks of {header.count} rows, the table has {longest}."
+            )
         super().__init__(path, channels, tuple(notes))
 
     def _channels(
@@ -266,8 +277,8 @@ def _stamps_as_numbers(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 def _survey(
     path: Path, data: NDArray[np.uint8]
-) -> tuple[Dialect, tuple[Column, ...] | None, TableHeader, int]:
-    """Dialect, columns (None without header), what stands above, first byte of the rows."""
+) -> tuple[Dialect, tuple[Column, ...] | None, TableHeader, list[str], int]:
+    """Dialect, columns (None without header), what stands above, its lines, and first byte."""
     raw = data[:_HEAD].tobytes()
     encoding = encoding_of(raw)
     mark = 3 if raw[:3] == b"\xef\xbb\xbf" else 0
@@ -295,7 +306,7 @@ def _survey(
     row = first_row(texts, dialect)
     start = mark + sum(len(line) for line in lines[:row])
     header, above = read_header(texts[:row], dialect.separator, dialect.decimal)
-    return dialect, read_columns(above, dialect), header, start
+    return dialect, read_columns(above, dialect), header, texts[:row], start
 
 
 def _complete_lines(raw: bytes, cut: bool) -> list[bytes]:

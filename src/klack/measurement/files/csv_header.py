@@ -23,6 +23,10 @@ _STEPS = (
 _RATES = ("sample rate", "samplerate", "sampling rate", "sampling frequency", "sample frequency")
 _STARTS = ("xorg", "xorigin", "x origin", "x0", "t0", "hoffset", "xstart", "xzero", "start")
 _INDICES = ("zero index", "trigger point")  # samples before the zero of time
+_COUNTS = (
+    *("record length", "points", "samples", "blocksize", "nr of samples", "memory length"),
+    "segmentsize",
+)
 _TIME_UNITS = ("horizontal units", "hunit", "xunits", "x units", "x unit")
 _UNITS = ("vertical units", "vunit", "y unit label", "yunits", "y units", "y unit")
 _NAMES = ("source", "tracename", "trace name")
@@ -46,6 +50,8 @@ class TableHeader:
     units, names : tuple of str
     origins : tuple of int [ns]
         Dates of the zero of time since 1970.
+    count : int
+        Rows of the table, of each segment; 0 if it is not said.
     words : str
         Where the step comes from, ``"Sample Interval"``.
     """
@@ -55,6 +61,7 @@ class TableHeader:
     units: tuple[str, ...] = ()
     names: tuple[str, ...] = ()
     origins: tuple[int | None, ...] = ()
+    count: int = 0
     words: str = ""
 
 
@@ -91,7 +98,10 @@ def read_header(
 
 def _header(said: _Said, decimal: str) -> TableHeader:
     about = TableHeader(
-        units=_texts(said, _UNITS), names=_texts(said, _NAMES), origins=_dates(said)
+        units=_texts(said, _UNITS),
+        names=_texts(said, _NAMES),
+        origins=_dates(said),
+        count=next((int(n) for n in _first(said, _COUNTS, decimal, 1.0)[1] if n >= 1.0), 0),
     )
     unit = next((said[key][1][0] for key in _TIME_UNITS if key in said), "s")
     try:
@@ -161,7 +171,7 @@ def _is_number(cells: Sequence[str], place: int, decimal: str) -> bool:
 
 
 def _cells(line: str, separator: str) -> list[str]:
-    text = line.strip(" \r\n").lstrip("#%!").strip(" ")
+    text = line.strip(" \r\n").lstrip("#%!" if separator == ";" else "#%!;").strip(" ")
     cells = text.split(separator) if separator else re.split(r"\t|\s{2,}", text)
     return [cell.strip().strip('"').strip() for cell in cells]
 
