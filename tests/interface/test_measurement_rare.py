@@ -201,3 +201,66 @@ def test_an_uneven_universal_set_without_its_end_is_refused(tmp_path):
     path.write_bytes(content[: len(content) - 60] + content[-7:])
     with pytest.raises(InputError, match=r"a\.uff: .*(times|values|cannot be read)"):
         opened(path)
+
+
+def test_hdf5_attributes_of_odd_types_are_passed_over(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["lift"], file["dt"] = LIFT, 1e-5
+        file["#refs#/a"] = LIFT
+        attrs = file["lift"].attrs
+        attrs["unit"] = np.array(["um"], dtype=object)
+        attrs["vector"] = np.arange(3.0)
+        attrs["empty"] = h5py.Empty("f8")
+        attrs["pair"] = np.zeros(2, dtype=[("a", "f8")])
+        attrs["reference"] = file["lift"].ref
+    read, _ = opened(tmp_path / "a.h5")
+    assert list(read) == ["lift"]
+    assert read["lift"][0] == "um"
+
+
+def test_a_matrix_of_too_many_columns_is_left_out(tmp_path):
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file["time_s"], file["lift_um"] = TIME, LIFT
+        file["map"] = np.zeros((50, 100_001), dtype=np.int8)
+    read, notes = opened(tmp_path / "a.h5")
+    assert list(read) == ["lift_um"]
+    assert "'map' left out: 100001 columns of 50 values" in notes
+
+
+def test_mdf_files_that_are_cut_within_their_records(tmp_path):
+    file = asammdf.MDF(version="4.10")
+    file.append([asammdf.Signal(LIFT, TIME, unit="um", name="lift")])
+    file.save(tmp_path / "a.mf4")
+    file.close()
+    with open_recording(tmp_path / "a.mf4") as recording:
+        group = recording._mdf.groups[0]
+        group.channel_group.cycles_nr += 20  # as if the header said more than there is
+        with pytest.raises(InputError, match="got 50 values from sample 1 on, expected 70"):
+            recording._values(recording.channel("lift"), 0, 70)
+        with pytest.raises(InputError, match="less than the 70 records declared"):
+            recording._group_time(tmp_path / "a.mf4", 0, None, False)
+
+
+def test_mdf_3_has_its_units_as_bytes_of_the_conversion(tmp_path):
+    file = asammdf.MDF(version="3.30")
+    file.append([asammdf.Signal(LIFT, TIME, unit="µm", name="lift", conversion={"a": 2, "b": 0})])
+    file.save(tmp_path / "a.mdf")
+    file.close()
+    read, _ = opened(tmp_path / "a.mdf")
+    assert read["lift"][0] == "um"
+    np.testing.assert_array_equal(read["lift"][2], 2.0 * LIFT)
+
+
+def test_columns_that_end_before_a_segment_have_no_part_in_it(tmp_path):
+    one = 1e-5 * np.arange(30)
+    lines = [f"{t:.6f},{k},{k if k < 30 else ''}" for k, t in enumerate(np.tile(one, 2))]
+    (tmp_path / "a.csv").write_text("\n".join(["t [s],lift [um],i [A]", *lines]))
+    read, _ = opened(tmp_path / "a.csv")
+    assert list(read) == ["lift #1", "lift #2", "i #1"]
+
+
+def test_times_that_look_like_stamps_but_are_none_stay_text(tmp_path):
+    lines = [f"2026-13-02 08:00:{k:02d}.5,{k}" for k in range(9)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,lift [um]", *lines]))
+    with pytest.raises(InputError, match="no line of numbers"):
+        opened(tmp_path / "a.csv")

@@ -182,3 +182,36 @@ def test_a_table_shorter_than_its_header_says_is_told(tmp_path, text):
     del lines[-7:]
     said = notes_of(tmp_path / "a.csv", "".join(lines))
     assert "the header speaks of 300 rows, the table has 293" in said
+
+
+def test_names_of_traces_are_those_of_the_header(tmp_path):
+    path = tmp_path / "a.csv"
+    for text in (YOKOGAWA, YOKOGAWA.replace('"Model","DL850"\n', "")):
+        path.write_text(text)
+        with open_recording(path) as recording:
+            assert [c.name for c in recording.channels] == ["CH1", "CH2"]
+
+
+@pytest.mark.parametrize(
+    ("header", "step"),
+    [
+        ("Sample Interval,10 us", 1e-5),
+        ("Sample Interval: 1e-5", 1e-5),
+        ("Sample Rate,100 kHz", 1e-5),
+        ("Sample Rate,1e5 S/s", 1e-5),
+        ("Horizontal Units,ms\nSample Interval,0.01", 1e-5),
+        ("Horizontal Units,Hz\nSample Interval,0.01", None),  # a spectrum
+        ("Sample Interval,10 furlong", None),
+        ("Sample Rate,100 rpm", None),
+        ("Sample Interval,short", None),
+    ],
+)
+def test_steps_of_headers(tmp_path, header, step):
+    path = tmp_path / "a.csv"
+    path.write_text(f"{header}\nlift [um],i [A]\n" + rows(FIRST, SECOND))
+    if step is None:
+        with pytest.raises(InputError, match="no time among the columns 'lift"):
+            open_recording(path)
+        return
+    with open_recording(path) as recording:
+        assert recording.channels[0].step == pytest.approx(step, rel=1e-12)

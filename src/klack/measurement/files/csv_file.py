@@ -77,7 +77,7 @@ class CsvFile(Recording):
                 f"{path.name}: {len(above)} lines of numbers, the first of them line "
                 f"{above[0] + 1}, stand above others and are left out."
             )
-        if columns is None and len(header.names) == dialect.width:
+        if len(header.names) == dialect.width:
             columns = tuple(Column(name, "", name) for name in header.names)
         if columns is None:
             notes.append(f"{path.name}: no names; columns are called column 1, column 2, ...")
