@@ -3,8 +3,11 @@
 Truth: signals whose values are known at any time, and the words of the cases below.
 """
 
+import re
+
 import numpy as np
 import pytest
+from ruamel.yaml import YAML
 
 from klack.case.measurement import CaseMeasurement
 from klack.errors import AccuracyWarning, InputError
@@ -369,3 +372,13 @@ def test_without_a_lift_the_key_of_the_sensor_is_proposed(tmp_path, names, propo
     given = CaseMeasurement.model_validate({"channels": {"lift": lift}})
     found = load_stroke_set([path], given, roles=("lift",))
     np.testing.assert_allclose(found.matrix("lift")[0], 25e-6 * (1 + 1e-5 * np.arange(20)))
+
+
+@pytest.mark.parametrize("name", ["1", "a: b", "it's", "# 3", "[x]"])
+def test_the_proposed_key_can_be_pasted_into_a_case(tmp_path, name):
+    path = some(tmp_path / "a.csv", f"{name} [V]")
+    with pytest.raises(InputError) as caught:
+        load_stroke_set([path])
+    (text,) = re.findall(r"measurement: (\{.*\}\})", str(caught.value))
+    given = CaseMeasurement.model_validate(YAML(typ="safe").load(text))
+    assert load_stroke_set([path], given).count == 1

@@ -184,7 +184,7 @@ def _require_known_scale(recording: Recording, role: Role, info: ChannelInfo) ->
     if not info.unapplied:
         return
     unit = info.unit if role in roles_of_unit(info.unit) else ROLES[role].common[0]
-    choice = f"{{name: {info.name}, unit: {unit}, scale: 1}}"
+    choice = f"{{name: {_as_yaml(info.name)}, unit: {unit}, scale: 1}}"
     raise InputError(
         f"{recording.path.name}: channel '{info.name}' ({role})",
         got=f"a scale that klack does not know: {info.unapplied}",
@@ -249,13 +249,21 @@ def _pair(
     ]
 
 
+def _as_yaml(name: str) -> str:
+    """Name of a channel as a case file takes it: numbers and odd signs in quotes."""
+    if re.fullmatch(r"[^\W\d][\w ./-]*", name):
+        return name
+    quoted = name.replace("'", "''")
+    return f"'{quoted}'"
+
+
 def _ambiguous(recording: Recording, role: Role, infos: Sequence[ChannelInfo]) -> InputError:
-    candidates = some_names(tuple(infos))
+    candidates, choice = some_names(tuple(infos)), _as_yaml(infos[0].name)
     return InputError(
         f"{recording.path.name}: channels",
         got=f"several that could be the {role}: {candidates}",
         expected=f"one channel of {role}, or a series with names that differ only in their number",
-        hint=f"name it in the case: measurement: {{channels: {{{role}: {infos[0].name}}}}}.",
+        hint=f"name it in the case: measurement: {{channels: {{{role}: {choice}}}}}.",
     )
 
 
@@ -275,9 +283,10 @@ def _not_found(recording: Recording, role: Role) -> InputError:
     ]
     first, unit = _candidate(recording, role), ROLES[role].common[0]
     unit = "um" if role == "lift" else unit
-    choice, meaning = f"{{name: {first.name}, unit: {unit}}}", ""
+    name = _as_yaml(first.name)
+    choice, meaning = f"{{name: {name}, unit: {unit}}}", ""
     if not no_unit(first.unit):
-        choice = f"{{name: {first.name}, unit: {unit}, scale: 1}}"
+        choice = f"{{name: {name}, unit: {unit}, scale: 1}}"
         meaning = f", with the {unit} that one {first.unit} stands for as scale"
     return InputError(
         f"{recording.path.name}: channels",
