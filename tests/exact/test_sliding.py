@@ -169,6 +169,29 @@ def test_a_needle_breaks_away_from_a_stiff_seat():
     assert result.books.relative_residual < BALANCE
 
 
+@pytest.mark.parametrize("step", [10e-9, 5e-9, 2.5e-9])
+def test_friction_holds_a_needle_on_a_seat_without_preload(step):
+    """Truth, exact: it stays; only round-off of the friction moves it, 1e-16 of 0.1 um in a step.
+
+    Near the place where it started displacements have no round-off of their own.
+    """
+    parts = {
+        "needle": RigidMass(mass=15e-3),
+        "pull": ForceOverTime(time=(0.0, 1e-4, 1.2e-4), force=(0.0, 15e-3, 1.0)),
+        "guide": GuideFriction(coulomb=20e-3),
+        "seat": EndStop(gap=0.0, law={"kind": "hertz", "radius": 20e-3, "modulus": 115e9}),
+    }
+    joined = ["needle.body", "pull.end", "guide.body", "seat.upper"]
+    network = Network(parts, [joined, ["seat.lower", "ground"]])
+
+    result = simulate_network(network.rows(), duration=1.2e-4, step=step, coarse=1, record=1e-6)
+
+    rising = slice(1, int(np.searchsorted(result.time, 1e-4)))
+    assert np.abs(result.channels["needle.body displacement"].values[rising]).max() < 1e-24
+    force = result.channels["guide.body force"].values[rising]
+    np.testing.assert_allclose(force, -150.0 * (result.time[rising] - 0.5e-6), atol=1e-9)
+
+
 def test_viscous_friction_alone_is_a_dashpot():
     """Truth, exact: v = v0 exp(-b t / m)."""
     result = run({"guide": GuideFriction(coulomb=0.0, viscous=0.5)}, speed=0.5, duration=6e-3)

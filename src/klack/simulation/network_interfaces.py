@@ -56,6 +56,8 @@ __all__ = [
 _ENERGY_LEFT = 1e-12  # energy that what is left of the last change costs, over the work of the step
 _LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay the same in this one
 _ROUND_OFF = 4e-16  # of a displacement
+_FORCE_ROUND_OFF = 1e-15  # of the displacement by friction, which holds a body where it started
+_FEW_SWEEPS = 8  # are enough, unless what still changes is that
 _MOST_SWEEPS = 200
 _FALLS = 1.5  # times the force now: a contact that had so much a macro step ago releases soon
 HELD = 0.5  # of the suction: a film that pulls more may begin to cavitate
@@ -164,10 +166,12 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
                 moved = move_body(bodies, G, low, -change, moved)
         moved = slip(sliding, bodies, G, step, sweep == 0, moved)
         left, work = slip_seen_late(sliding, S)
-        distance = 0.0
+        distance, held = 0.0, 0.0
         for s in range(sliding.rows.sliders):
             upper, lower = sliding.rows.upper[s], sliding.rows.lower[s]
             distance = max(distance, abs(S[Y1 + upper]), abs(S[Y1 + lower]))
+            own = sliding.rows.G[step.level * sliding.rows.sliders + s]
+            held = max(held, own * abs(sliding.trial.force[s]))
         for c in range(rows.interfaces):
             if trial.force[c] != 0.0:
                 gap = gap_between(rows, S, c)
@@ -176,6 +180,8 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
                 work += abs(trial.force[c] * (gap - state.gap[c]))
                 distance = max(distance, abs(S[Y1 + rows.upper[c]]), abs(S[Y1 + rows.lower[c]]))
         if left <= _ENERGY_LEFT * work or moved <= _ROUND_OFF * distance:
+            return True
+        if sweep >= _FEW_SWEEPS and moved <= _FORCE_ROUND_OFF * held:
             return True
     return False
 
