@@ -14,8 +14,10 @@ import pytest
 from klack import memory
 from klack.assembling.bodies import mesh_body, place_meshes
 from klack.assembling.mesh_messages import coarsest_sound, meshed_for_case
+from klack.assembling.valve import mesh_valve_bodies
 from klack.case import find_case, load_case
 from klack.case.reader import read_case
+from klack.case.valve_reader import load_any_case
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh
@@ -99,6 +101,22 @@ def test_what_is_called_tried_had_the_refinements_of_the_run():
 
     assert "bodies.pin.mesh.size: 700 um (tried, it does)" in caught.value.hint
     assert tried[-1] == at_size(0.7e-3)
+
+
+def test_a_valve_has_the_places_of_its_stops_at_every_size(monkeypatch):
+    """Drawn bodies touch where their drawing says, whatever the size of their elements."""
+    seen = {}
+
+    def no_mesh(body, name, places=None, places_at=None):
+        seen[name] = places, places_at(2.0 * body.mesh.size)
+
+    monkeypatch.setattr("klack.assembling.valve.mesh_body", no_mesh)
+    mesh_valve_bodies(load_any_case(find_case("demo-stroke")), silent)
+
+    assert seen
+    for places, again in seen.values():
+        assert len(places) > 0
+        assert again == places
 
 
 def test_a_first_mesh_is_as_coarse_as_its_elements_allow():

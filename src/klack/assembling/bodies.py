@@ -6,6 +6,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +43,7 @@ from klack.units import format_si
 __all__ = [
     "BodyPair",
     "PlacedMeshes",
+    "Places",
     "assemble_body",
     "build_bodies",
     "find_touch",
@@ -50,7 +52,10 @@ __all__ = [
     "place_meshes",
     "wanted_sizes",
     "warn_far_touch",
+    "with_size",
 ]
+
+C = TypeVar("C", bound=CaseFile)
 
 Places = tuple[tuple[float, ...], ...]
 """Where meshes are refined: (r, z) or (x, y, z) [m]."""
@@ -181,7 +186,7 @@ def place_meshes(case: Case, progress: Progress) -> PlacedMeshes:
     tell_effort(case, shapes, wanted_sizes(case.bodies, places), progress)
 
     def places_at(name: str, size: float) -> Places:
-        other = _with_size(case, name, size)
+        other = with_size(case, name, size)
         found = find_touch(other.bodies, moving, stop)
         if name == moving.body:
             return _places_of_moving_body(other, found)
@@ -320,7 +325,7 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     return elastic_body(name, mesh, materials, fixed_nodes=held_nodes(body, mesh))
 
 
-def _with_size(case: Case, name: str, size: float) -> Case:
+def with_size(case: C, name: str, size: float) -> C:
     """The same case with another general element size [m] of a body."""
     body = case.bodies[name]
     if body.mesh is None:

@@ -3,16 +3,19 @@
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from klack.assembling.bodies import (
+    Places,
     assemble_body,
     find_touch,
     mesh_body,
     named_contact,
     wanted_sizes,
+    with_size,
 )
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
@@ -227,20 +230,29 @@ def mesh_valve_bodies(case: ValveCase, progress: Progress) -> dict[str, Mesh]:
     shapes = require_given_shapes(
         case, lambda name: mesh_body(case.bodies[name], name, ()), progress
     )
-    places: dict[str, list[tuple[float, ...]]] = {name: [] for name in case.bodies}
+    places = _touched_places(case)
+    tell_effort(case, shapes, wanted_sizes(case.bodies, places), progress)
+
+    def places_at(name: str, size: float) -> Places:
+        return _touched_places(with_size(case, name, size))[name]
+
+    result = {}
+    for i, (name, given) in enumerate(case.bodies.items()):
+        progress("mesh", i / len(case.bodies))
+        result[name] = mesh_body(given, name, places[name], partial(places_at, name))
+    return result
+
+
+def _touched_places(case: ValveCase) -> dict[str, Places]:
+    """Where each body first touches another one at a stop, as drawn."""
+    places: dict[str, Places] = dict.fromkeys(case.bodies, ())
     for name, stop in case.stops.items():
         with named_contact(case, ("stops", name, "between"), stop.upper, stop.lower):
             touch = find_touch(case.bodies, stop.upper, stop.lower)
         if touch is not None:
             places[stop.upper.body] += touch.upper
             places[stop.lower.body] += touch.lower
-    wanted = {name: tuple(own) for name, own in places.items()}
-    tell_effort(case, shapes, wanted_sizes(case.bodies, wanted), progress)
-    result = {}
-    for i, (name, given) in enumerate(case.bodies.items()):
-        progress("mesh", i / len(case.bodies))
-        result[name] = mesh_body(given, name, tuple(places[name]))
-    return result
+    return places
 
 
 def _mode_pools(
