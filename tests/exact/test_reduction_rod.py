@@ -125,11 +125,11 @@ def test_two_shifted_attachment_modes_are_exact_at_both_shifts(free, shifts, end
 @pytest.mark.parametrize(("count", "shifts"), [(1, (20e3, 190e3)), (3, (-50e3, 30e3, -200e3))])
 def test_every_shift_adds_one_orthonormal_mode_per_port(free, count, shifts):
     """M-orthonormal and K-diagonal to round-off: the recovered shapes of all nodes tell."""
-    body, ports, pool, _ = free
+    body, ports, pool, flexibility = free
     kept = Modes(omega=pool.omega[:count], shapes=pool.shapes[:, :count])
     patterns = np.column_stack([port.pattern for port in ports])
 
-    extra = shifted_attachment(body, kept, patterns, [shift_at(f) for f in shifts])
+    extra = shifted_attachment(body, kept, patterns, [shift_at(f) for f in shifts], flexibility)
 
     assert len(extra.omega) == 2 * len(shifts)  # two ports
     V = np.hstack([body.rigid_modes, kept.shapes, extra.shapes])

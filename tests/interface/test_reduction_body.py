@@ -5,9 +5,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_array
 
+from klack.cache.result_cache import ResultCache
 from klack.elasticity.eigen import eigenmodes
+from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError
-from klack.reduction import dynamic_stiffness
+from klack.reduction import attachment, dynamic_stiffness
 from klack.reduction.attachment import shift_at
 from klack.reduction.damping import LossFactor, ModalDamping, RayleighDamping
 from klack.reduction.full_order import full_order_receptance
@@ -248,6 +250,23 @@ def test_without_pardiso_shifted_modes_are_the_same(parts, monkeypatch):
 
     assert_allclose(without.omega, with_it.omega, rtol=1e-9)
     assert_allclose(abs(without.port_shapes), abs(with_it.port_shapes), rtol=1e-6)
+
+
+def test_shifted_modes_of_a_kept_body_are_solved_for_once(parts, tmp_path, monkeypatch):
+    """Exact: without a factor, the same bits for the same shifts, and nothing for another one."""
+    flexibility = Flexibility(parts[0], cache=ResultCache(tmp_path, 10**9))
+    given = {"flexibility": flexibility, "correction": "attachment"}
+    shifts = [shift_at(130e3), shift_at(-20e3)]
+    once = reduce_with(parts, shifts=shifts, **given)
+    monkeypatch.setattr(Flexibility, "factorised", None)
+    monkeypatch.setattr(attachment, "factorized_symmetric", None)
+    again = reduce_with(parts, shifts=shifts, **given)
+
+    assert_array_equal(again.omega, once.omega)
+    assert_array_equal(again.port_shapes, once.port_shapes)
+    for other in (-21e3, 131e3):
+        with pytest.raises(TypeError, match="not callable"):
+            reduce_with(parts, shifts=[shift_at(other)], **given)
 
 
 def test_ports_refuse_what_they_cannot_use():

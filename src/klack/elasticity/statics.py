@@ -103,11 +103,11 @@ class Flexibility(Closing):
                 hint="larger elements away from the contact, or a machine with more memory.",
             )
             K = self.body.K[self._kept][:, self._kept]
-            self._factor = self._factorised(K)
+            self._factor = self.factorised(K)
         return self._factor
 
-    def _factorised(self, K: csr_array) -> Factorization:
-        """Factor in the precision that fits."""
+    def factorised(self, K: csr_array) -> Factorization:
+        """Factor of a positive definite matrix by the solver of this body, as precise as fits."""
         backend, threads, budget = self._backend, self._threads, self._budget
         try:
             return factorize(K, backend=backend, threads=threads, budget=budget)

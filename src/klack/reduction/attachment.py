@@ -30,15 +30,17 @@ error of the order ``(omega_1 / omega_{m+1})^4``; with two shifts far below, of 
 """
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.cache.entry import Entry
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
-from klack.elasticity.factorization import Backend, factorize
+from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.reduction.dynamic_stiffness import Solver, factorized_symmetric
 from klack.units import format_si
@@ -106,11 +108,9 @@ def shifted_attachment(
     kept: Modes,
     patterns: Floats,
     shifts: Sequence[float],
-    *,
-    backend: Backend = "auto",
-    threads: int | None = None,
+    flexibility: Flexibility,
 ) -> Modes:
-    """Shifted attachment modes in modal form; one factorisation for each shift.
+    """Shifted attachment modes in modal form; one factorisation for each shift, kept in the cache.
 
     Parameters
     ----------
@@ -120,8 +120,8 @@ def shifted_attachment(
     patterns : array, shape (n_dof, n_ports) [-]
     shifts : sequence of float [(rad/s)^2]
         Of both signs, see the module text; a positive one is at a frequency (:func:`shift_at`).
-    backend, threads
-        Of :func:`klack.elasticity.factorization.factorize`, for negative shifts.
+    flexibility : Flexibility
+        Of the same body.
 
     Raises
     ------
@@ -131,7 +131,13 @@ def shifted_attachment(
     """
     found = np.empty((body.dof_count, 0))
     for i, shift in enumerate(shifts):
-        deflections = _shifted_solve(body, patterns, float(shift), backend, threads)
+        deflections = flexibility.remembered(
+            "shifted deflections",
+            (patterns, float(shift)),
+            partial(_shifted_solve, body, patterns, float(shift), flexibility),
+            lambda U: Entry(arrays={"U": U}),
+            lambda entry: entry.arrays["U"],
+        )
         own = _new_directions(body, kept, deflections)
         if not own.shape[1]:
             continue  # the kept modes have it all
@@ -146,7 +152,7 @@ def shifted_attachment(
 
 
 def _shifted_solve(
-    body: ElasticBody, patterns: Floats, shift: float, backend: Backend, threads: int | None
+    body: ElasticBody, patterns: Floats, shift: float, flexibility: Flexibility
 ) -> Floats:
     """Response at a shift; refused where it is nothing but one mode of the body."""
     free = body.free
@@ -157,7 +163,7 @@ def _shifted_solve(
         raise _at_eigenfrequency(body, shift, 0.0)
     matrix, result = (K - shift * M).tocsr(), np.zeros_like(patterns)
     if shift < 0:
-        with factorize(matrix, backend=backend, threads=threads) as factors:
+        with flexibility.factorised(matrix) as factors:
             response = factors.solve(load)
     else:
         with factorized_symmetric(matrix) as solve:

@@ -96,7 +96,7 @@ def reduce_body(
     if correction == "attachment" and shifts is None:
         extra = residual_attachment(body, kept, flexibility.deflections(patterns))
     elif correction == "attachment" and shifts is not None:
-        extra = shifted_attachment(body, kept, patterns, shifts, backend=backend, threads=threads)
+        extra = shifted_attachment(body, kept, patterns, shifts, flexibility)
     elif shifts is not None:
         raise InputError(
             f"reduction of body '{body.name}': shifts",
