@@ -4,15 +4,11 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-__all__ = ["FEW_UNKNOWNS", "available_cores", "share_of", "side_by_side"]
+__all__ = ["available_cores", "share_of", "side_by_side", "threads_for"]
 
 _T = TypeVar("_T")
 
-FEW_UNKNOWNS = 100_000
-"""Of all bodies, up to which several threads for each cost more than they save.
-
-They take one: their bits are then the same on any number of threads.
-"""
+_FEW_UNKNOWNS = 100_000  # up to which several threads cost more than they save
 
 
 def available_cores() -> int:
@@ -23,6 +19,14 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):  # not on macOS and Windows
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def threads_for(unknowns: int, threads: int | None = None) -> int | None:
+    """Threads of BLAS for all bodies together; as given, or None (all), for many unknowns.
+
+    Few take one: their bits are then the same on any number of threads.
+    """
+    return 1 if unknowns <= _FEW_UNKNOWNS else threads
 
 
 def share_of(threads: int | None, parts: int) -> int:

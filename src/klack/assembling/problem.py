@@ -23,7 +23,7 @@ from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.pairing import axial_distance
 from klack.contact.statics import ReachError, StaticContact
 from klack.contact.worn_faces import opened_by
-from klack.cores import FEW_UNKNOWNS, side_by_side
+from klack.cores import side_by_side, threads_for
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.budget import Budget
 from klack.elasticity.eigen import mode_memory
@@ -74,7 +74,7 @@ class PlacedBodies(Closing):
     @property
     def threads(self) -> int | None:
         """Threads of BLAS: one, or all that there are."""
-        return 1 if self.pair.unknowns <= FEW_UNKNOWNS else None
+        return threads_for(self.pair.unknowns)
 
     def close(self) -> None:
         """Free the factorisations."""
@@ -193,15 +193,15 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
     progress("factorise", 0.0)
     bodies = (pair.upper, pair.lower)
     # large ones take the memory that is left one after the other, as its plan says
-    few = pair.unknowns <= FEW_UNKNOWNS
-    at_once = threads != 1 and few
-    with threadpool_limits(1 if few else None, user_api="blas"):
+    blas, of_solver = threads_for(pair.unknowns), threads_for(pair.unknowns, threads)
+    at_once = threads != 1 and blas == 1
+    with threadpool_limits(blas, user_api="blas"):
         upper, lower = side_by_side(
             [
                 partial(
                     Flexibility,
                     body,
-                    threads=1 if few else threads,
+                    threads=of_solver,
                     cache=result_cache(),
                     budget=_budget(case, body, progress),
                     at_once=at_once,
@@ -217,7 +217,7 @@ def place_bodies(case: Case, progress: Progress, *, threads: int | None = None) 
         flexibility_upper=upper,
         flexibility_lower=lower,
         candidates=Candidates(pair, upper, lower),
-        opposite=build_opposite(case, pair, upper, progress, threads=1 if few else threads),
+        opposite=build_opposite(case, pair, upper, progress, threads=of_solver),
     )
 
 

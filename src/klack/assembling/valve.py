@@ -29,7 +29,7 @@ from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_roles import FLEXIBLE_BODY, find_roles
-from klack.cores import FEW_UNKNOWNS
+from klack.cores import threads_for
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
@@ -112,8 +112,7 @@ def build_valve(
     bodies = build_valve_bodies(case, progress)
     if case.motion == "three-dimensional":
         check_heights(case, find_roles(case), bodies)
-    if sum(body.dof_count for body in bodies.values()) <= FEW_UNKNOWNS:
-        threads = 1
+    threads = threads_for(sum(body.dof_count for body in bodies.values()), threads)
     with threadpool_limits(limits=threads, user_api="blas"):
         return _built(case, bodies, progress, threads)
 
