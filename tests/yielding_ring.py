@@ -38,7 +38,7 @@ __all__ = [
 BALL = 1.25e-3  # [m]
 RING = BALL / sqrt(2.0)
 DEEP = 0.8e-3
-GROWTH = 2.0  # of the elements outside of the finest ones
+GROWTH = 3.0  # of the elements outside of the finest ones
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

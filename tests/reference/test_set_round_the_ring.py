@@ -61,8 +61,9 @@ def _deck(body, material, loads, printed):
     lines += ["*SOLID SECTION, ELSET=BODY, MATERIAL=SOFT", "*BOUNDARY"]
     lines += [f"{k // d + 1}, {k % d + 1}, {k % d + 1}" for k in body.fixed]
     for load in loads:
-        lines += ["*STEP, INC=100", "*STATIC, SOLVER=SPOOLES", "1., 1.", "*CLOAD, OP=NEW"]
         force = load.reshape(-1, d)
+        first = 1.0 if np.any(force) else 0.25  # to let go at once diverges, and is cut to this
+        lines += ["*STEP, INC=100", "*STATIC, SOLVER=SPOOLES", f"{first}, 1.", "*CLOAD, OP=NEW"]
         lines += [f"{i + 1}, {k + 1}, {force[i, k]:.12e}" for i, k in np.argwhere(force != 0.0)]
         if not np.any(force):
             lines.append(f"{printed[0] + 1}, {d}, 0.")
