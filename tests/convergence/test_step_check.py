@@ -177,7 +177,7 @@ def test_steps_that_are_too_long_are_halved_until_impacts_are_right(truth):
 
 
 @pytest.mark.slow
-def test_steps_are_halved_on_while_changes_fall(tmp_path):
+def test_short_runs_are_halved_on(tmp_path):
     """A damped wet stop: 1 % after one halving, 0.2 % after three, promised 0.05 %, no less.
 
     Truth: fine steps alone, extrapolated over two lengths, which differ by 0.015 % from those of
@@ -243,8 +243,8 @@ def test_a_stroke_tells_its_changes_after_storing(tmp_path):
 
     (change,) = made.reference.changes
     assert loaded.reference.changes == made.reference.changes
-    assert loaded.reference.halvings == made.reference.halvings == 5
-    assert "100 ns; all of them halved 5 times" in steps_told(loaded.reference)
+    assert loaded.reference.halvings == made.reference.halvings == 6
+    assert "50 ns; all of them halved 6 times" in steps_told(loaded.reference)
     (event,) = stroke_to_json(loaded)["events"]
     assert event["doubled_steps"]["peak_force_change"] == change.peak_force
     assert event["doubled_steps"]["promised"]

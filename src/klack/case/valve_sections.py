@@ -118,8 +118,8 @@ class StrokeRun(Section):
     check_steps: bool | None = Field(
         default=None,
         description="Whether to run each variant again with all steps twice as long, tell what "
-        "that changes in each impact, and halve all steps, three times or on to six while that "
-        "falls, until the first three impacts on each stop change by less than half of what the "
+        "that changes in each impact, and halve all steps, three times or in short runs six, "
+        "until the first three impacts on each stop change by less than half of what the "
         "accuracy promises; by default in single strokes, not in points of studies and shots.",
     )
     record: Time = Field(

@@ -68,8 +68,8 @@ __all__ = [
 Warned = list[warnings.WarningMessage]
 
 _HALVINGS = 3  # of all steps: errors of first order are an eighth then, those of second a 64th
-_FALLING = 6  # of them at most, where changes still fall from one to the next
-_LONG_RUN = 400_000  # steps of a run that is not halved more than three times: the next takes 1 s
+_MOST_HALVINGS = 6  # of short runs
+_SHORT = 100_000, 400_000  # steps of such a run, and of one whose changes fall: the next takes 1 s
 _NEAR = 0.3  # share of what is asked that the spacing of records may be off by: 1 us is 1.28 us
 
 
@@ -410,11 +410,11 @@ def _in_checked_steps(
 ) -> tuple[_Attempt, Warned, CheckedSteps]:
     """Halve all steps until impacts do not depend on them.
 
-    As often as :data:`_HALVINGS`, and on to :data:`_FALLING` while the largest change falls: an
-    error that depends on where a step happens to lie need not fall with shorter ones.  In three
-    dimensions steps are never halved: a run takes some 10 s there, not 0.1 s.
+    As often as :data:`_HALVINGS`, and on to :data:`_MOST_HALVINGS` where that is short, longer if
+    the largest change falls: an error that depends on where a step happens to lie need not fall.
+    In three dimensions steps are never halved: a run takes some 10 s there, not 0.1 s.
     """
-    most = _FALLING if valve.spatial is None else 0
+    most = _MOST_HALVINGS if valve.spatial is None else 0
 
     def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
         try:
@@ -432,8 +432,8 @@ def _in_checked_steps(
         if longer is not None:
             steps = checked_steps(run.result, longer.result, valve.case.run.accuracy, halvings)
             largest = steps.largest(valve.case.run.accuracy)
-            falls = largest < before and run.result.steps.taken < _LONG_RUN
-            if not steps.doubt or halvings >= (most if falls else min(most, _HALVINGS)):
+            is_short = run.result.steps.taken < _SHORT[largest < before]
+            if not steps.doubt or halvings >= (most if is_short else min(most, _HALVINGS)):
                 return run, caught, steps
             before = largest
         shorter, kept, failed = again(0.5) if halvings < most else (None, [], "")
