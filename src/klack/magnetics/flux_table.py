@@ -58,7 +58,7 @@ STOPS = 8
 """Number of the header that counts the stops."""
 
 SETTLES = 9
-"""Number of the header that says where the directions without eddy currents stand; 0: none."""
+"""Number of the header that says where the directions without eddy currents stand, or 0."""
 
 CLOSE = 1e-8
 """Newton step, over the flux at which the iron's curve ends, that leaves round-off: its square."""
