@@ -13,7 +13,7 @@ __all__ = [
 ]
 
 
-_LONGEST = 600  # characters of each part
+_LONGEST = 1200  # characters of each part; the names that a study may measure are a thousand
 
 
 class KlackError(Exception):

@@ -30,6 +30,7 @@ from klack.simulation.yielding_step import (
 )
 
 __all__ = [
+    "FORCE_ROUND_OFF",
     "HELD",
     "begin_cut_contacts",
     "begin_interfaces",
@@ -56,8 +57,8 @@ __all__ = [
 _ENERGY_LEFT = 1e-12  # energy that what is left of the last change costs, over the work of the step
 _LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay the same in this one
 _ROUND_OFF = 4e-16  # of a displacement
-_FORCE_ROUND_OFF = 1e-15  # of the displacement by friction, which holds a body where it started
-_FEW_SWEEPS = 8  # are enough, unless what still changes is that
+FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
+_FEW_SWEEPS = 8  # are enough, unless what still changes is that of friction that holds a body
 _MOST_SWEEPS = 200
 _FALLS = 1.5  # times the force now: a contact that had so much a macro step ago releases soon
 HELD = 0.5  # of the suction: a film that pulls more may begin to cavitate
@@ -181,7 +182,7 @@ def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Ste
                 distance = max(distance, abs(S[Y1 + rows.upper[c]]), abs(S[Y1 + rows.lower[c]]))
         if left <= _ENERGY_LEFT * work or moved <= _ROUND_OFF * distance:
             return True
-        if sweep >= _FEW_SWEEPS and moved <= _FORCE_ROUND_OFF * held:
+        if sweep >= _FEW_SWEEPS and moved <= FORCE_ROUND_OFF * held:
             return True
     return False
 

@@ -59,6 +59,7 @@ from klack.simulation.network_far_films import (
     push_by_far_films,
 )
 from klack.simulation.network_interfaces import (
+    FORCE_ROUND_OFF,
     begin_cut_contacts,
     begin_interfaces,
     begin_macro_interfaces,
@@ -153,7 +154,6 @@ SETTLED = (2e-4, 1e-6), (5e-5, 1e-12)
 """Of a macro step, then of a fine one: displacement by the missed force, over the longest
 displacement of a port, and energy that catching up costs over the work of the step."""
 
-_FORCE_ROUND_OFF = 2e-15  # of each force that acts, whatever the others leave of their sum
 FEW_REPEATS = 8  # are enough, unless what still changes is round-off
 MOST_REPEATS = 200
 MACRO_REPEATS = 6  # without success: fine steps
@@ -585,7 +585,7 @@ def moved_by_round_off(G: Any, ports: int, elements: Any, fluid: Any, contacts: 
             way = row[contacts.rows.upper[c]] - row[contacts.rows.lower[c]]
             total += abs(way * contacts.trial.force[c])
         largest = max(largest, total)
-    return _FORCE_ROUND_OFF * largest
+    return FORCE_ROUND_OFF * largest
 
 
 @phase
