@@ -56,7 +56,7 @@ class AccuracyWarning(UserWarning):
 
 
 class CacheWarning(UserWarning):
-    """Results are not kept for later runs; those of this run are not affected."""
+    """Results are not kept for later runs, or not found again; numbers are not affected."""
 
 
 class LeftAloneWarning(UserWarning):

@@ -20,7 +20,7 @@ from klack.analyses.calibration.log import TRIAL_LOG, TrialKey, trial_log
 from klack.analyses.calibration.motion import Motion
 from klack.analyses.catalogue import load_result
 from klack.analyses.result_folder import is_result
-from klack.errors import InputError
+from klack.errors import CacheWarning, InputError
 from klack.folder_lock import locked
 from klack.held_folder import HeldFolder
 from klack.stage import Stage
@@ -319,6 +319,26 @@ def test_a_log_cut_at_any_byte_gives_back_whole_strokes(tmp_path: Path):
                 assert found.channels["lift"].tobytes() == motion.channels["lift"].tobytes()
                 assert (found.step, found.impacts) == (motion.step, motion.impacts)
         assert path.read_bytes() == (whole[: whole.rfind(b"\n", 0, end) + 1] or header)
+
+
+@pytest.mark.parametrize("bad", [b"", b"{", b"\0" * 40, b"[" * 100_000, b"7", b'{"values": {}}'])
+def test_a_damaged_line_of_a_log_costs_that_line_alone_and_is_told(bad: bytes, tmp_path: Path):
+    motion = Motion(step=2e-6, channels={}, impacts={})
+    keys: list[TrialKey] = [(1.5e-3, float(value)) for value in range(5)]
+    with trial_log(tmp_path, "mark") as log:
+        for key in keys:
+            log.add(key, motion)
+    path = tmp_path / TRIAL_LOG.file
+    lines = path.read_bytes().split(b"\n")
+    path.write_bytes(b"\n".join([*lines[:2], bad, *lines[3:]]))
+
+    with pytest.warns(CacheWarning, match=r"1 of 5 lines are damaged, the first is line 3\."):
+        log = trial_log(tmp_path, "mark")
+    with log:
+        assert list(log.done) == [keys[0], *keys[2:]]
+        log.add(keys[1], motion)
+    with pytest.warns(CacheWarning, match="1 of 6"), trial_log(tmp_path, "mark") as log:
+        assert sorted(log.done) == keys
 
 
 # --------------------------------------------------------------------------- stages and locks

@@ -1,12 +1,13 @@
 """Finished parts of long work on disk, so that interrupted work can be resumed.
 
 A text file: the first line says what is computed, each further one holds one part as JSON.  It is
-only read by the same klack for the same work; otherwise it starts anew.  A line that was cut off by
-a crash, and all behind it, is cut off and computed again.
+only read by the same klack for the same work; otherwise it starts anew.  A last line that a crash
+has left without its end is cut off; a damaged one between others is told.  Both are computed again.
 """
 
 import json
 import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -20,7 +21,7 @@ import numpy as np
 import klack
 from klack.case.bodies import CaseBody
 from klack.closing import Closing
-from klack.errors import InputError
+from klack.errors import CacheWarning, InputError
 from klack.folder_lock import try_lock
 from klack.own_file import open_own_file
 
@@ -168,16 +169,25 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
             os.close(handle)
 
     def _take_over(self, file: FileIO) -> None:
-        """Read what an earlier run left, up to the first damaged line, and cut off the rest."""
-        whole = file.tell()
-        for line in file.read().split(b"\n")[:-1]:  # what follows the last end of line was cut off
+        """Read what an earlier run left; a damaged line costs no other one."""
+        start, damaged = file.tell(), list[int]()
+        *lines, rest = file.read().split(b"\n")
+        for number, line in enumerate(lines, 2):  # after the header
             try:
                 key, part = self.form.read(json.loads(line))
-            except (ValueError, KeyError, TypeError, AttributeError):  # it is damaged
-                break
-            self.done[key] = part
-            whole += len(line) + 1
-        file.truncate(whole)
+            except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+                damaged.append(number)
+            else:
+                self.done[key] = part
+        if rest:  # cut off by a crash
+            file.truncate(start + sum(len(line) + 1 for line in lines))
+        if damaged:
+            warnings.warn(
+                f"{self.path}: {len(damaged)} of {len(lines)} lines are damaged, the first is line "
+                f"{damaged[0]}. What they held of {self.form.parts} is computed again.",
+                CacheWarning,
+                stacklevel=2,
+            )
 
     def _refuse(self, path: Path, error: OSError) -> InputError:
         return InputError(
