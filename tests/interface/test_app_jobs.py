@@ -134,8 +134,8 @@ def test_damaged_files_of_a_run_are_no_run(folder):
 
 
 def test_a_run_that_cannot_be_written_down_is_not_left_running(folder, sleeping, monkeypatch):
-    def write(path, values):
-        if path.name == "process.json":
+    def write(held, name, values):
+        if name == "process.json":
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(jobs_module, "_write", write)

@@ -5,20 +5,25 @@ a link, so that neither ``..`` nor a link leads out.
 """
 
 import errno
+import json
 import os
 import secrets
 import stat
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from klack.errors import InputError
 from klack.held_folder import HeldFolder, synchronise
 
-__all__ = ["RESULT_NAME", "Found", "OpenFolder", "result_names"]
+__all__ = ["OWN", "RESULT_NAME", "Found", "OpenFolder", "replace_file", "result_names"]
+
+OWN = ".klack-app"
+"""Folder of the application itself, in the opened one."""
 
 RESULT_NAME = "result.zarr"
 """Of :mod:`klack.analyses.store`, whose import takes seconds."""
@@ -30,6 +35,7 @@ _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
 _CHOOSE = "choose one in the list of cases and results; what was there may be moved or removed."
 _RENAME = "take another name."
+_NOT_OURS = "remove or rename it: klack app makes a folder of this name of its own."
 _NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 _STEP_ENDINGS = (".step", ".stp")
 
@@ -145,7 +151,7 @@ class OpenFolder:
             state = held.state(name)
             if state is not None and not stat.S_ISREG(state.st_mode):
                 raise _refused(relative, "a link or a folder")
-            _replace(held, name, data)
+            replace_file(held, name, data)
 
     def make_file(self, relative: str, text: str) -> None:
         """Make a new text file, and the folder for it; what is there stays.
@@ -179,12 +185,59 @@ class OpenFolder:
             try:
                 with held.inner(new) as inner:
                     for file, data in files.items():
-                        _replace(inner, file, data)
+                        replace_file(inner, file, data)
                 held.rename(new, last)
             except BaseException:
                 held.remove(new)
                 raise
             held.synchronise()
+
+    @contextmanager
+    def own(self, *names: str) -> Iterator[HeldFolder]:
+        """The application's own folder, or one in it, made where it is not there, held.
+
+        Raises
+        ------
+        InputError
+            Where a link or a file has taken its name: what is behind it is not ours.
+        """
+        with self._parent(OWN) as (held, _), ExitStack() as stack:
+            for name in (OWN, *names):
+                with suppress(FileExistsError):
+                    held.make(name, 0o700)
+                if not held.has_folder(name):
+                    raise _refused("/".join((OWN, *names)), "a link or a file", _NOT_OURS)
+                held = stack.enter_context(held.inner(name))
+            yield held
+
+    def require_own(self, relative: str) -> None:
+        """Refuse to have a result written where a link leads out of the folder.
+
+        Raises
+        ------
+        InputError
+            If the entry, or a folder above it, is a link.
+        """
+        path = PurePosixPath(relative)
+        for place in (path, *path.parents[:-1]):
+            if (self.path / place).is_symlink():
+                raise _refused(str(place), "a link", "remove it, or move what it names here.")
+
+    def keep(self, name: str, data: bytes | None) -> None:
+        """Replace a file of the application's own; None removes it."""
+        with self.own() as held:
+            if data is None:
+                held.remove(name)
+            else:
+                replace_file(held, name, data)
+
+    def own_json(self, *names: str) -> dict[str, Any]:
+        """What a file of the application's own holds; nothing if there is none, or a bad one."""
+        try:
+            found = json.loads(self.read("/".join((OWN, *names))))
+        except (InputError, ValueError, RecursionError):
+            return {}
+        return found if isinstance(found, dict) else {}
 
     def absolute(self, relative: str) -> Path:
         """Path of an entry below the folder that is there and no link.
@@ -265,7 +318,7 @@ def result_names(cases: Iterable[str]) -> dict[str, str]:
     }
 
 
-def _replace(held: HeldFolder, name: str, data: bytes) -> None:
+def replace_file(held: HeldFolder, name: str, data: bytes) -> None:
     """Replace a file of a held folder by one rename, once it is on the disk."""
     new = f".klack-{secrets.token_hex(8)}"
     try:

@@ -25,17 +25,16 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
-from shutil import rmtree
 from threading import Lock
 from typing import Any, Literal
 
 import psutil
 
-from klack.app.folder import OpenFolder, result_names
+from klack.app.folder import OWN, OpenFolder, replace_file, result_names
 from klack.errors import InputError
+from klack.held_folder import HeldFolder
 from klack.progress import PointCount
 from klack.terminal.progress import PROGRESS_FILE
-from klack.whole_file import whole_file
 
 __all__ = ["COMMANDS", "LIVE", "OF_STUDIES", "Job", "Jobs", "State"]
 
@@ -48,7 +47,7 @@ OF_STUDIES = ("study", "optimise")
 LIVE = "live"
 """Of :mod:`klack.analyses.study.live_record`, whose import takes seconds."""
 
-_HOME = ".klack-app"
+_RUNS = "jobs"
 _NAME = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{8}")
 _MOST_RUNNING = 4
 _AGAIN = 10.0  # [s] after which a run that was cancelled is asked again
@@ -108,7 +107,7 @@ class Jobs:
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder
-        self._place = folder.path / _HOME / "jobs"
+        self._place = folder.path / OWN / _RUNS
         self._children: dict[str, subprocess.Popen[bytes]] = {}
         self._starting = Lock()  # pages start runs in threads: a double click is two of them
 
@@ -154,30 +153,40 @@ class Jobs:
         if any(job.out == out for job in running):
             raise _refused(f"a run that writes to {out}, beside another", "one at a time")
         name = time.strftime("%Y%m%d-%H%M%S-") + secrets.token_hex(4)
-        place = self._place / name
         job = Job(name=name, command=command, case=case, out=out, started=time.time(), study=study)
         arguments = [command, str(path), "--out", str(self._folder.path / out), *options]
         try:
-            place.mkdir(parents=True, mode=0o700)
-            _write(place / "job.json", asdict(job))
-            self._launch(name, place, arguments)
+            self._folder.require_own(out)
+            with self._folder.own(_RUNS, name) as held:
+                _write(held, "job.json", asdict(job))
+                self._launch(name, held, arguments)
         except (OSError, InputError) as error:
             child = self._children.pop(name, None)
             if child is not None:  # nobody could tell it from another process
                 child.kill()
                 child.wait()
-            rmtree(place, ignore_errors=True)
+            self._remove(name)
+            if isinstance(error, InputError):
+                raise
             raise InputError(
                 f"run of {case}",
-                got=error.got if isinstance(error, InputError) else error.strerror or str(error),
+                got=error.strerror or str(error),
                 expected="room on the disk, and the right to write there",
                 hint="make room, or change the rights of the folder, then run it again.",
             ) from None
         return job
 
-    def _launch(self, name: str, place: Path, arguments: list[str]) -> None:
+    def _remove(self, name: str) -> None:
+        with suppress(OSError, InputError), self._folder.own(_RUNS) as held:
+            held.remove(name)
+
+    def _launch(self, name: str, held: HeldFolder, arguments: list[str]) -> None:
         """Start the process of a run, and write down which one it is."""
-        with (place / "stdout").open("wb") as output, (place / "stderr").open("wb") as errors:
+        place, new = self._place / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL
+        with (
+            os.fdopen(held.open("stdout", new), "wb") as output,
+            os.fdopen(held.open("stderr", new), "wb") as errors,
+        ):
             child = subprocess.Popen(
                 # -P: not from the opened folder, where a stranger's numpy.py may lie
                 [sys.executable, "-P", "-m", "klack.cli.job_process", str(place), *arguments],
@@ -190,7 +199,7 @@ class Jobs:
             )
         self._children[name] = child
         begun = psutil.Process(child.pid).create_time()
-        _write(place / "process.json", {"pid": child.pid, "begun": begun})
+        _write(held, "process.json", {"pid": child.pid, "begun": begun})
 
     def all(self) -> list[Job]:
         """Every run, the latest first."""
@@ -215,30 +224,29 @@ class Jobs:
         """Ask a run to stop; it leaves nothing half written."""
         process = self._process(_require_name(name))
         if process is not None:
-            _ask_to_stop(self._place / name / _CANCELLED, process)
+            self._ask_to_stop(name, process)
 
     def forget(self, name: str) -> None:
         """Remove what is known of a run that has ended; its result stays."""
         job = self._job(_require_name(name))
         if job is not None and job.state != "running":
-            rmtree(self._place / name, ignore_errors=True)
+            self._remove(name)
 
     def _job(self, name: str) -> Job | None:
-        place = self._place / name
-        asked = _read(place / "job.json")
-        if asked is None:
+        asked = self._read(name, "job.json")
+        if not asked:
             return None
         if name in self._children and self._children[name].poll() is not None:
             del self._children[name]
-        process, cancelled = self._process(name), place / _CANCELLED
+        process, cancelled = self._process(name), self._place / name / _CANCELLED
         is_running, is_cancelled = process is not None, cancelled.exists()
         if process is not None and is_cancelled and _seconds_since(cancelled) > _AGAIN:
-            _ask_to_stop(cancelled, process)  # a library may have dropped the first request
-        ending = _read(place / "ending.json")  # after the look at the process
-        progress = _read(place / "progress.json") or {}
+            self._ask_to_stop(name, process)  # a library may have dropped the first request
+        ending = self._read(name, "ending.json")  # after the look at the process
+        progress = self._read(name, "progress.json")
         try:
             known = {key: asked[key] for key in ("command", "case", "out", "started")}
-            code = None if ending is None else int(ending["code"])
+            code = int(ending["code"]) if ending else None
             return Job(
                 name=name,
                 **known,
@@ -246,7 +254,7 @@ class Jobs:
                 stage="stopping" if is_cancelled else str(progress.get("stage", "starting")),
                 fraction=float(progress.get("fraction", 0.0)),
                 code=code,
-                told=_tail(place / "stderr") if code else "",
+                told=self._tail(name) if code else "",
                 study=str(asked.get("study", "")),
                 points=_points(progress.get("points")),
             )
@@ -255,9 +263,7 @@ class Jobs:
 
     def _process(self, name: str) -> psutil.Process | None:
         """Its process, if that runs: the same number may be another one's by now."""
-        told = _read(self._place / name / "process.json")
-        if told is None:
-            return None
+        told = self._read(name, "process.json")
         try:
             process = psutil.Process(int(told["pid"]))
             same = abs(process.create_time() - float(told["begun"])) < 0.01
@@ -266,11 +272,21 @@ class Jobs:
         except (psutil.Error, KeyError, TypeError, ValueError):
             return None
 
+    def _ask_to_stop(self, name: str, process: psutil.Process) -> None:
+        with self._folder.own(_RUNS, name) as held:
+            replace_file(held, _CANCELLED, b"")
+        with suppress(psutil.Error):
+            process.send_signal(signal.SIGTERM)
 
-def _ask_to_stop(cancelled: Path, process: psutil.Process) -> None:
-    cancelled.touch()
-    with suppress(psutil.Error):
-        process.send_signal(signal.SIGTERM)
+    def _read(self, name: str, file: str) -> dict[str, Any]:
+        return self._folder.own_json(_RUNS, name, file)
+
+    def _tail(self, name: str) -> str:
+        try:
+            told = self._folder.read(f"{OWN}/{_RUNS}/{name}/stderr")
+        except InputError:
+            return ""
+        return told.decode("utf-8", errors="replace")[-_TOLD:].strip()
 
 
 def _seconds_since(file: Path) -> float:
@@ -310,21 +326,5 @@ def _refused(got: str, expected: str) -> InputError:
     return InputError("run", got=got, expected=expected, hint="wait for a run, or cancel it.")
 
 
-def _write(path: Path, values: dict[str, Any]) -> None:
-    with whole_file(path) as new:
-        new.write_text(json.dumps(values), encoding="utf-8")
-
-
-def _read(path: Path) -> dict[str, Any] | None:
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return None
-    return found if isinstance(found, dict) else None
-
-
-def _tail(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8", errors="replace")[-_TOLD:].strip()
-    except OSError:
-        return ""
+def _write(held: HeldFolder, name: str, values: dict[str, Any]) -> None:
+    replace_file(held, name, json.dumps(values).encode())

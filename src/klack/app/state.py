@@ -3,10 +3,8 @@
 import json
 import secrets
 from collections import OrderedDict
-from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
-from typing import Any
 
 from klack.app.answers import ResultCard
 from klack.app.folder import OpenFolder
@@ -15,7 +13,6 @@ from klack.app.uploads import Uploads
 from klack.app.valve_plan import Plans
 from klack.app.worker import Worker
 from klack.errors import InputError
-from klack.whole_file import whole_file
 
 __all__ = ["LONGEST_NOTE", "Notes", "Sounds", "State"]
 
@@ -66,11 +63,11 @@ class Notes:
     """
 
     def __init__(self, folder: OpenFolder) -> None:
-        self._folder, self._home = folder, folder.path / ".klack-app"
+        self._folder = folder
 
     def note(self, of: str) -> str:
         """Note on a case or result."""
-        return str(self._read("notes.json").get(of, ""))
+        return str(self._folder.own_json("notes.json").get(of, ""))
 
     def set_note(self, of: str, text: str) -> None:
         """Keep a note; an empty one is removed."""
@@ -85,7 +82,7 @@ class Notes:
 
     def draft(self, of: str) -> str | None:
         """Text of a case that was not saved."""
-        found = self._read(self._draft_name(of)).get(of)
+        found = self._folder.own_json(self._draft_name(of)).get(of)
         return found if isinstance(found, str) else None
 
     def set_draft(self, of: str, text: str | None) -> None:
@@ -118,24 +115,12 @@ class Notes:
         return f"draft-{sha256(of.encode()).hexdigest()[:16]}.json"
 
     def _change(self, name: str, of: str, text: str) -> None:
-        kept = self._read(name)
-        kept.pop(of, None)
+        kept = self._folder.own_json(name)
+        before = kept.pop(of, None)
         if text:
             kept[of] = text
-        file = self._home / name
-        if not kept:
-            file.unlink(missing_ok=True)
-            return
-        self._folder.require_here()  # else a folder of its former name would be made
-        with whole_file(file) as new:
-            new.write_text(json.dumps(kept), encoding="utf-8")
-
-    def _read(self, name: str) -> dict[str, Any]:
-        with suppress(OSError, ValueError):
-            found = json.loads((self._home / name).read_text(encoding="utf-8"))
-            if isinstance(found, dict):
-                return found
-        return {}
+        if text or before is not None:
+            self._folder.keep(name, json.dumps(kept).encode() if kept else None)
 
 
 class State:

@@ -3,14 +3,11 @@
 import json
 import re
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import asdict, dataclass, fields, replace
-from pathlib import Path
 from typing import Any
 
 from klack.app.folder import OpenFolder
 from klack.errors import InputError
-from klack.whole_file import whole_file
 
 __all__ = ["BODIES", "STEPS", "Plans", "ValvePlan"]
 
@@ -159,15 +156,11 @@ class Plans:
     """
 
     def __init__(self, folder: OpenFolder) -> None:
-        self._file: Path = folder.path / ".klack-app" / _FILE
+        self._folder = folder
 
     def load(self) -> ValvePlan:
         """The plan as it was left; a new one where there is none, or one that is damaged."""
-        with suppress(OSError, ValueError):
-            found = json.loads(self._file.read_text(encoding="utf-8"))
-            if isinstance(found, dict):
-                return _plan_of(found)
-        return ValvePlan()
+        return _plan_of(self._folder.own_json(_FILE))
 
     def keep(self, plan: ValvePlan) -> None:
         """Keep a plan.
@@ -185,13 +178,11 @@ class Plans:
                     expected=f"at most {_LONGEST}",
                     hint="bring such a body as STEP file or as mesh.",
                 )
-        self._file.parent.mkdir(mode=0o700, exist_ok=True)
-        with whole_file(self._file) as new:
-            new.write_text(json.dumps(asdict(plan)), encoding="utf-8")
+        self._folder.keep(_FILE, json.dumps(asdict(plan)).encode())
 
     def forget(self) -> None:
         """Begin anew."""
-        self._file.unlink(missing_ok=True)
+        self._folder.keep(_FILE, None)
 
 
 def _plan_of(found: Mapping[str, Any]) -> ValvePlan:

@@ -1,0 +1,108 @@
+"""The application writes and deletes only what it made itself, in folders that are no links."""
+
+import asyncio
+import os
+from pathlib import Path
+
+import pytest
+
+from klack.app.folder import OpenFolder
+from klack.app.jobs import Jobs
+from klack.app.state import Notes
+from klack.app.uploads import Uploads
+from klack.app.valve_plan import Plans, ValvePlan
+from klack.errors import InputError
+
+NAME = "20260101-000000-01234567"
+
+
+@pytest.fixture
+def outside(tmp_path: Path) -> Path:
+    """A folder of the user's beside the opened one, with more STEP files than are kept."""
+    place = tmp_path / "outside"
+    for inner in ("uploads", f"jobs/{NAME}", "run"):
+        (place / inner).mkdir(parents=True)
+    for number in range(20):
+        for folder in (place, place / "uploads"):
+            (folder / f"{number:024x}.step").write_text("ISO-10303-21;")
+    for name in ("notes.json", "new-valve.json"):
+        (place / name).write_text('{"case.yaml": "of another"}')
+    (place / "jobs" / NAME / "job.json").write_text(
+        '{"command": "impact", "case": "case.yaml", "out": "x", "started": 1.0}'
+    )
+    return place
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> OpenFolder:
+    """An opened folder with a case."""
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "case.yaml").write_text("klack: 1\n")
+    return OpenFolder(tmp_path / "cases")
+
+
+def _content(place: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(place).as_posix(): path.read_bytes() if path.is_file() else b""
+        for path in place.rglob("*")
+    }
+
+
+def _upload(folder: OpenFolder) -> str:
+    async def parts():
+        yield b"ISO-10303-21;"
+
+    return asyncio.run(Uploads(folder).take(parts()))
+
+
+def _start(folder: OpenFolder) -> object:
+    return Jobs(folder).start("impact", "case.yaml", "klack-results/case")
+
+
+@pytest.mark.parametrize(
+    ("planted", "act"),
+    [
+        (".klack-app", _upload),
+        (".klack-app/uploads", _upload),
+        (".klack-app", lambda folder: Notes(folder).set_note("case.yaml", "mine")),
+        (".klack-app", lambda folder: Notes(folder).set_draft("case.yaml", "mine")),
+        (".klack-app", lambda folder: Plans(folder).keep(ValvePlan())),
+        (".klack-app", lambda folder: Plans(folder).forget()),
+        (".klack-app", _start),
+        (".klack-app/jobs", _start),
+        ("klack-results", _start),
+        ("klack-results/case", _start),
+    ],
+)
+def test_what_is_behind_a_planted_link_stays_as_it_was(planted, act, folder, outside):
+    before = _content(outside)
+    link = folder.path / planted
+    link.parent.mkdir(exist_ok=True)
+    link.symlink_to(outside, target_is_directory=True)
+
+    with pytest.raises(InputError, match="a link"):
+        act(folder)
+    assert _content(outside) == before
+
+
+def test_runs_and_notes_behind_a_link_are_not_there(folder, outside):
+    (folder.path / ".klack-app").symlink_to(outside, target_is_directory=True)
+    jobs, before = Jobs(folder), _content(outside)
+
+    assert Notes(folder).note("case.yaml") == ""
+    assert jobs.all() == []
+    jobs.forget(NAME)
+    jobs.cancel(NAME)
+    assert _content(outside) == before
+
+
+def test_uploads_beyond_the_most_go_and_files_of_other_names_stay(folder):
+    place = folder.path / ".klack-app" / "uploads"
+    place.mkdir(parents=True)
+    strange = [f"part {number}.step" for number in range(20)]
+    for name in strange:
+        (place / name).write_text("ISO-10303-21;")
+        os.utime(place / name, (1.0, 1.0))
+    own = [_upload(folder).rpartition("/")[2] for _ in range(14)]
+
+    assert {path.name for path in place.iterdir()} == {*strange, *own[2:]}
