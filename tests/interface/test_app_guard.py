@@ -27,9 +27,9 @@ async def echo(scope: Any, receive: Any, send: Any) -> None:
     await send({"type": "http.response.body", "body": f"inside {size}".encode()})
 
 
-def ask(access: Access, method: str, path: str, **more: Any) -> Any:
+def ask(access: Access, method: str, path: str, app: Any = echo, **more: Any) -> Any:
     async def run() -> Any:
-        transport = httpx.ASGITransport(app=Guard(echo, access, largest=1000))
+        transport = httpx.ASGITransport(app=Guard(app, access, largest=1000))
         cookies = more.pop("cookies", None)
         async with httpx.AsyncClient(transport=transport, base_url=OWN, cookies=cookies) as client:
             return await client.request(method, path, **more)
@@ -127,6 +127,25 @@ def test_bodies_are_bounded_whether_their_length_is_told_or_not(access, inside):
 
     assert [told.status_code, untold.status_code, wrong.status_code] == [413, 413, 413]
     assert just.text == "inside 1000"
+
+
+def test_a_framework_that_answers_500_for_a_body_above_the_limit_is_not_heard(access, inside):
+    async def framework(scope: Any, receive: Any, send: Any) -> None:
+        try:
+            await echo(scope, receive, send)
+        except Exception:
+            await send({"type": "http.response.start", "status": 500, "headers": []})
+            await send({"type": "http.response.body", "body": b"internal error"})
+            raise
+
+    async def pieces():
+        for _ in range(11):
+            yield b"x" * 100
+
+    own = {"headers": {"origin": OWN}, "cookies": inside, "content": pieces()}
+    answer = ask(access, "POST", "/", app=framework, **own)
+
+    assert (answer.status_code, answer.text) == (413, "More than 1000 bytes.\n")
 
 
 @pytest.mark.parametrize(
