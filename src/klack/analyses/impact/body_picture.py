@@ -34,7 +34,7 @@ __all__ = ["body_pictures", "section_lines", "with_peak_stress"]
 Floats = NDArray[np.float64]
 
 _FRAMES = 121
-_LONGEST = 2.0  # [s] for all frames: each takes a run of its own
+_WORK = 3e8  # steps of a mode in all frames, 2 s: each takes a run of its own
 _FULL = 32767
 
 
@@ -180,7 +180,7 @@ def _frames(
     """Instants, contact force at each, and modal coordinates of both bodies, (frames, m) each."""
     step = case.run.reduced_step
     last = max(1, round(case.run.duration / step))
-    most = int(_LONGEST / max(0.5 * ran.wall_time, 1e-4))
+    most = int(_WORK / (0.5 * last * (pair.upper.mode_count + pair.lower.mode_count)))
     count = min(max(min(_FRAMES, most), 2), last + 1)
     steps = np.unique(np.round(np.linspace(0, last, count)).astype(int))
     # the instant of the highest force is one of them
