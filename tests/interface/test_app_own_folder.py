@@ -1,11 +1,15 @@
-"""The application writes and deletes only what it made itself, in folders that are no links."""
+"""The application writes and deletes only its own files, and waits for no odd one of others."""
 
 import asyncio
 import os
+import socket
+import sys
+from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
+from klack.app import folder as app_folder
 from klack.app.folder import OpenFolder
 from klack.app.jobs import Jobs
 from klack.app.state import Notes
@@ -106,3 +110,71 @@ def test_uploads_beyond_the_most_go_and_files_of_other_names_stay(folder):
     own = [_upload(folder).rpartition("/")[2] for _ in range(14)]
 
     assert {path.name for path in place.iterdir()} == {*strange, *own[2:]}
+
+
+# --------------------------------------------------------------------------- odd entries
+
+
+@pytest.fixture
+def odd(folder: OpenFolder) -> OpenFolder:
+    """The opened folder, with entries of all kinds that are no plain files."""
+    os.mkfifo(folder.path / "pipe.yaml")
+    (folder.path / "endless.yaml").symlink_to("/dev/zero")
+    with socket.socket(socket.AF_UNIX) as own, chdir(folder.path):
+        own.bind("socket.step")
+    for name in (b"caf\xe9.yaml", b"caf\xe9.step"):
+        Path(os.fsdecode(os.fsencode(folder.path) + b"/" + name)).write_text("klack: 1\n")
+    return folder
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names that are no text are of Linux")
+def test_the_list_names_odd_entries_and_waits_for_none(odd):
+    found = odd.look()
+
+    assert (found.cases, found.steps, found.is_whole) == (("case.yaml",), (), True)
+    assert found.odd == (
+        "caf\\xe9.step (a name that is not UTF-8)",
+        "caf\\xe9.yaml (a name that is not UTF-8)",
+        "endless.yaml (a symbolic link)",
+        "pipe.yaml (a named pipe)",
+        "socket.step (a socket)",
+    )
+    for text in found.odd:
+        text.encode()  # else no page of it reaches the browser
+
+
+def test_a_file_that_becomes_a_pipe_while_it_is_listed_does_not_block(odd):
+    assert not app_folder._is_case(odd.path / "pipe.yaml")
+    assert not app_folder._is_case(odd.path / "endless.yaml")
+    assert app_folder._is_case(odd.path / "case.yaml")
+
+
+def test_a_result_with_a_pipe_in_it_is_refused_before_it_is_read(folder):
+    result = folder.path / "run" / "result.zarr" / "inner"
+    result.mkdir(parents=True)
+    (result / "plain").write_text("")
+    folder.require_plain("run/result.zarr")
+    os.mkfifo(result / "zarr.json")
+
+    with pytest.raises(InputError, match=r"run/result\.zarr/inner/zarr\.json.*\n?.*a named pipe"):
+        folder.require_plain("run/result.zarr")
+
+
+def test_names_that_are_no_text_are_refused_in_words(folder, tmp_path):
+    with pytest.raises(InputError, match="not below the folder"):
+        folder.read("\udce9.yaml")
+    strange = tmp_path / os.fsdecode(b"\xe9")
+    strange.mkdir()
+    with pytest.raises(InputError, match="not UTF-8"):
+        OpenFolder(strange)
+
+
+def test_ten_thousand_entries_hide_no_case(folder):
+    for number in range(10_000):
+        (folder.path / f"{number}.yaml").symlink_to("case.yaml")
+    (folder.path / "z").mkdir()
+    (folder.path / "z" / "case.yaml").write_text("klack: 1\n")
+    found = folder.look()
+
+    assert (found.cases, found.is_whole) == (("case.yaml", "z/case.yaml"), True)
+    assert len(found.odd) == 10_000

@@ -19,6 +19,8 @@ from typing import Any
 
 from klack.errors import InputError
 from klack.held_folder import HeldFolder, synchronise
+from klack.own_file import SAFELY, kind_of
+from klack.terminal.printable import printable
 
 __all__ = ["OWN", "RESULT_NAME", "Found", "OpenFolder", "replace_file", "result_names"]
 
@@ -30,7 +32,7 @@ RESULT_NAME = "result.zarr"
 
 LARGEST_CASE = 1_000_000  # [byte] of a case file; of klack.case.case_text, which takes its time
 LARGEST_FILE = 256 * 2**20  # [byte] of a report or a sound
-_DEEPEST, _MOST = 5, 2000  # levels, and entries that are looked at
+_DEEPEST, _MOST = 5, 20_000  # levels, and entries that are looked at
 _LEFT_OUT = ("node_modules", "__pycache__", "site-packages")
 _CASE_ENDINGS = (".yaml", ".yml")
 _CHOOSE = "choose one in the list of cases and results; what was there may be moved or removed."
@@ -38,6 +40,7 @@ _RENAME = "take another name."
 _NOT_OURS = "remove or rename it: klack app makes a folder of this name of its own."
 _NO_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EPERM, errno.EIO)
 _STEP_ENDINGS = (".step", ".stp")
+_ENDINGS = (*_CASE_ENDINGS, *_STEP_ENDINGS)
 
 
 @dataclass(frozen=True)
@@ -54,12 +57,16 @@ class Found:
         False where there is more than was looked at.
     steps : tuple of str
         STEP files.
+    odd : tuple of str
+        What has the name of a case, a STEP file or a folder and is not looked into, with the
+        reason.
     """
 
     cases: tuple[str, ...]
     results: tuple[str, ...]
     is_whole: bool
     steps: tuple[str, ...] = ()
+    odd: tuple[str, ...] = ()
 
 
 class OpenFolder:
@@ -80,12 +87,20 @@ class OpenFolder:
                 hint="klack app, in the folder of your cases.",
             )
         self.path = path.resolve()
+        if not _is_text(str(self.path)):
+            raise InputError(
+                f"FOLDER {_shown(str(self.path))}",
+                got="a name that is not UTF-8, which no browser can show",
+                expected="a folder whose path is text in UTF-8",
+                hint="rename it.",
+            )
 
     def look(self) -> Found:
         """Find cases and results; links are not followed."""
         cases: list[str] = []
         results: list[str] = []
         steps: list[str] = []
+        odd: list[str] = []
         seen = 0
         waiting = [(self.path, 0)]
         while waiting and seen < _MOST:
@@ -96,10 +111,15 @@ class OpenFolder:
                 continue
             for entry in entries:
                 seen += 1
-                if entry.name.startswith(".") or entry.name in _LEFT_OUT or entry.is_symlink():
+                if entry.name.startswith(".") or entry.name in _LEFT_OUT:
+                    continue
+                is_folder = entry.is_dir(follow_symlinks=False)
+                if not is_folder and not entry.name.lower().endswith(_ENDINGS):
                     continue
                 here = Path(entry.path).relative_to(self.path).as_posix()
-                if entry.is_dir(follow_symlinks=False):
+                if reason := _oddness(entry, is_folder):
+                    odd.append(f"{_shown(here)} ({reason})")
+                elif is_folder:
                     if entry.name == RESULT_NAME:
                         results.append(str(PurePosixPath(here).parent))
                     elif depth < _DEEPEST:
@@ -113,7 +133,26 @@ class OpenFolder:
             results=tuple(sorted(results)),
             is_whole=seen < _MOST,
             steps=tuple(sorted(steps)),
+            odd=tuple(sorted(odd)),
         )
+
+    def require_plain(self, relative: str) -> None:
+        """Refuse a folder with an entry that reading may wait for without end.
+
+        Raises
+        ------
+        InputError
+            For a pipe, a socket or a device anywhere in it.
+        """
+        for place, _, names in os.walk(self.absolute(relative)):
+            for path in (Path(place, name) for name in names):
+                try:
+                    state = path.stat()
+                except OSError:  # gone at this moment, or a link to nothing
+                    continue
+                if not stat.S_ISREG(state.st_mode):
+                    inner = _shown(path.relative_to(self.path).as_posix())
+                    raise _refused(inner, kind_of(state), "remove it: no result has such a file.")
 
     def read(self, relative: str, *, largest: int = LARGEST_FILE) -> bytes:
         """Content of a file below the folder.
@@ -265,7 +304,8 @@ class OpenFolder:
     def _parent(self, relative: str) -> Iterator[tuple[HeldFolder, str]]:
         """Folder of an entry, held from the top without a link, and the name of the entry."""
         parts = relative.split("/")
-        if not relative or "\0" in relative or "\\" in relative or {"", ".", ".."} & set(parts):
+        is_odd = "\0" in relative or "\\" in relative or not _is_text(relative)
+        if not relative or is_odd or {"", ".", ".."} & set(parts):
             raise _refused(relative, "a path that is not below the folder")
         with ExitStack() as stack:
             try:
@@ -336,11 +376,38 @@ def replace_file(held: HeldFolder, name: str, data: bytes) -> None:
     held.synchronise()
 
 
+def _is_text(name: str) -> bool:
+    """Whether a name of the system is text: other bytes stand in it as lone surrogates."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def _shown(name: str) -> str:
+    """A name in signs that can be shown, whatever bytes it has."""
+    return printable(os.fsencode(name).decode("utf-8", "backslashreplace"))
+
+
+def _oddness(entry: "os.DirEntry[str]", is_folder: bool) -> str:
+    """Why an entry is not looked into; empty if it is."""
+    if not _is_text(entry.name):
+        return "a name that is not UTF-8"
+    if is_folder or entry.is_file(follow_symlinks=False):
+        return ""
+    try:
+        return kind_of(entry.stat(follow_symlinks=False))
+    except OSError:
+        return "gone at this moment"
+
+
 def _is_case(path: Path) -> bool:
     """Whether a file begins like a case: with its version, in the first lines."""
     try:
-        with path.open("rb") as file:
-            head = file.read(4096)
+        with os.fdopen(os.open(path, os.O_RDONLY | SAFELY), "rb") as file:
+            is_file = stat.S_ISREG(os.fstat(file.fileno()).st_mode)  # it was one, as it was listed
+            head = file.read(4096) if is_file else b""
     except OSError:
         return False
     return any(line.startswith(b"klack:") for line in head.splitlines())

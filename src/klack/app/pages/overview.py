@@ -11,7 +11,7 @@ from urllib.parse import urlencode
 from nicegui import ui
 
 from klack.app.answers import Checked, ResultCard
-from klack.app.folder import RESULT_NAME
+from klack.app.folder import RESULT_NAME, Found
 from klack.app.jobs import OF_STUDIES, Job
 from klack.app.pages.frame import (
     START_VALUE,
@@ -33,6 +33,8 @@ __all__ = ["overview_page"]
 
 _EVERY = 1.0  # [s] that runs are looked at
 _SHORT, _LINES = 400, 8  # characters and lines of a note that is shown whole
+_AT_ONCE = 100  # rows of a list
+_NAMED = 5  # files that are left out
 _HEAD = 120  # characters of one that is folded
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
 _WORDS = {
@@ -60,6 +62,7 @@ class _Overview:
         self._seen: tuple[tuple[str, str], ...] = ()
         self._ended: set[str] | None = None
         self._progress: dict[str, Callable[[Job], None]] = {}
+        self._most = _AT_ONCE
 
     async def build(self) -> None:
         """Make the page, then fill it while it is shown already."""
@@ -77,7 +80,7 @@ class _Overview:
         found = await asyncio.to_thread(self._state.folder.look)
         with self._cases:
             self._cases.clear()
-            await self._show_cases(found.cases, found.is_whole)
+            await self._show_cases(found)
         if self._results.is_deleted:
             return
         with self._results:
@@ -143,14 +146,31 @@ class _Overview:
         await _telling(lambda: self._state.jobs.forget(name))
         self._show_jobs()
 
+    def _offer_more(self, count: int) -> None:
+        """At the end of a list that is not shown whole: thousands of rows take minutes."""
+        if count <= self._most:
+            return
+
+        async def more() -> None:
+            self._most += _AT_ONCE
+            await self._fill()
+
+        with ui.element("div").classes("k-row"):
+            plain(f"The first {self._most} of {count}").classes("k-soft")
+            button(f"Show {min(_AT_ONCE, count - self._most)} more", more)
+
     # ----------------------------------------------------------------------- cases
 
-    async def _show_cases(self, cases: tuple[str, ...], is_whole: bool) -> None:
+    async def _show_cases(self, found: Found) -> None:
+        cases = found.cases
         with ui.element("div").classes("k-head"):
             heading("Cases")
             link("New valve", "/new").classes("k-main-btn" if not cases else "")
             button("New case", self._ask_new)
-        if not is_whole:
+        if found.odd:
+            more = f" and {len(found.odd) - _NAMED} more" if len(found.odd) > _NAMED else ""
+            plain(f"Left out: {', '.join(found.odd[:_NAMED])}{more}.", "p").classes("k-error")
+        if not found.is_whole:
             plain("There is more below this folder than is looked at.", "p").classes("k-error")
         if not self._state.folder.path.is_dir():
             plain(
@@ -167,7 +187,8 @@ class _Overview:
             ).classes("k-soft")
             return
         with ui.element("div").classes("k-sheet"):
-            rows = [(case, _reading(case)) for case in cases]
+            rows = [(case, _reading(case)) for case in cases[: self._most]]
+            self._offer_more(len(cases))
         for case, row in rows:
             checked = await self._checked(case)
             if row.is_deleted:  # the list is made anew meanwhile, or the page is left
@@ -303,7 +324,8 @@ class _Overview:
         self._chosen = [name for name in self._chosen if name in results]
         self._commands = {}
         with ui.element("div").classes("k-sheet"):
-            rows = [(name, _reading(name)) for name in results]
+            rows = [(name, _reading(name)) for name in results[: self._most]]
+            self._offer_more(len(results))
 
         def chosen() -> None:
             kinds = {self._commands.get(name) for name in self._chosen}
@@ -336,6 +358,8 @@ class _Overview:
             known = self._state.cards.get(name)
             if known is not None and known[0] == mark:
                 return known[1]
+            inner = f"{name}/{RESULT_NAME}" if name != "." else RESULT_NAME
+            await asyncio.to_thread(self._state.folder.require_plain, inner)
             card: ResultCard = await self._state.reader.call("card", str(place))
             self._state.cards[name] = (mark, card)
             return card
