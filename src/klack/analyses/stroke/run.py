@@ -69,7 +69,8 @@ Warned = list[warnings.WarningMessage]
 
 _HALVINGS = 3  # of all steps: errors of first order are an eighth then, those of second a 64th
 _MOST_HALVINGS = 6  # of short runs
-_SHORT = 100_000, 400_000  # steps of such a run, and of one whose changes fall: the next takes 1 s
+_SHORT_RUN = 100_000  # steps
+_FALLING_RUN = 400_000  # where changes fall: the next takes 1 s
 _NEAR = 0.3  # share of what is asked that the spacing of records may be off by: 1 us is 1.28 us
 
 
@@ -432,7 +433,7 @@ def _in_checked_steps(
         if longer is not None:
             steps = checked_steps(run.result, longer.result, valve.case.run.accuracy, halvings)
             largest = steps.largest(valve.case.run.accuracy)
-            is_short = run.result.steps.taken < _SHORT[largest < before]
+            is_short = run.result.steps.taken < (_FALLING_RUN if largest < before else _SHORT_RUN)
             if not steps.doubt or halvings >= (most if is_short else min(most, _HALVINGS)):
                 return run, caught, steps
             before = largest

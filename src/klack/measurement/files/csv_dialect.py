@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from klack.measurement.files.number_kernel import WHITESPACE
+from klack.measurement.files.number_kernel import MISSING, WHITESPACE
 from klack.measurement.unit_text import is_unit, no_unit, plain_unit
 
 __all__ = [
@@ -27,8 +27,6 @@ __all__ = [
 
 _SEPARATORS = (";", "\t", ",", "|", "")
 _NAMES = {";": "semicolons", "\t": "tabs", ",": "commas", "|": "bars", "": "blanks"}
-_MISSING = {"", "nan", "na", "n/a", "null", "inf", "-", "#n/a", "infinity", "∞", "ol", "ovl"}
-_MISSING |= {"over", "overflow", "***"}
 SEQUENCE = "sequence"
 """Unit of a column that counts the rows."""
 _COMMENTS = "#%!;"
@@ -151,7 +149,7 @@ def _width(line: str, separator: str, decimal: str) -> int:
     for cell in cells:
         if pattern.fullmatch(cell):
             numbers += 1
-        elif cell.lower() not in _MISSING and cell.lower().lstrip("+-") not in _MISSING:
+        elif cell.lower() not in MISSING and cell.lower().lstrip("+-") not in MISSING:
             return 0
     return len(cells) if numbers else 0
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from klack.compiling.jit import inner, njit
 from klack.measurement.recording import OVER_RANGE
 
-__all__ = ["BAD_CELL", "TOO_MANY", "WHITESPACE", "parse_rows"]
+__all__ = ["BAD_CELL", "MISSING", "TOO_MANY", "WHITESPACE", "parse_rows"]
 
 WHITESPACE = 0
 """Separator: any run of blanks and tabs."""
@@ -22,6 +22,15 @@ _POWERS = np.array([float(f"1e{k}") for k in range(309)])
 _SPACE, _TAB, _LF, _CR, _QUOTE = 32, 9, 10, 13, 34
 _ZERO, _NINE, _PLUS, _MINUS = 48, 57, 43, 45
 _MOST_DIGITS = 18  # fit into 64 bits
+
+MISSING = (
+    *("", "-", "na", "nan", "n/a", "#n/a", "null", "inf", "infinity", "∞"),
+    *("ol", "ovl", "over", "overflow", "***"),
+)
+"""Words for a missing value and signs for "over range", in small letters and without a sign."""
+
+_KEY_BYTES = 7  # of a word, as a number of base 256
+_MISSING_KEYS = tuple(int.from_bytes(word.encode()[:_KEY_BYTES], "big") for word in MISSING)
 
 
 @inner
@@ -104,34 +113,16 @@ def _number(data: NDArray[np.uint8], at: int, end: int, decimal: int) -> tuple[f
 
 @inner
 def _missing(data: NDArray[np.uint8], at: int, stop: int) -> bool:
-    """True for nan, na, n/a, null, inf, - and signs for "over range", in any case."""
+    """True for a word of :data:`MISSING`, in any case and behind a sign."""
     if at < stop and (data[at] == _PLUS or data[at] == _MINUS):
         at += 1
     key = np.int64(0)
-    for k in range(at, min(stop, at + 7)):
+    for k in range(at, min(stop, at + _KEY_BYTES)):
         c = np.int64(data[k])
         if 65 <= c <= 90:
             c += 32
         key = key * 256 + c
-    # as numbers of base 256: nothing or another -, na, nan, inf, n/a, null, #n/a,
-    # infinit(y), the sign of infinity in UTF-8, ol, ovl, over, overflo(w), ***
-    return (
-        key == 0
-        or key == 0x2D
-        or key == 0x6E61
-        or key == 0x6E616E
-        or key == 0x696E66
-        or key == 0x6E2F61
-        or key == 0x6E756C6C
-        or key == 0x236E2F61
-        or key == 0x696E66696E6974
-        or key == 0xE2889E
-        or key == 0x6F6C
-        or key == 0x6F766C
-        or key == 0x6F766572
-        or key == 0x6F766572666C6F
-        or key == 0x2A2A2A
-    )
+    return key in _MISSING_KEYS
 
 
 @njit
