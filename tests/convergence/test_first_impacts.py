@@ -4,17 +4,16 @@ What the steps miss of a peak is estimated by ``klack.simulation.impact_doubts``
 the same stroke in much shorter steps.
 """
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from doubts import doubts
 from numpy.typing import NDArray
 
 from klack.case.valve_reader import load_valve_case
-from klack.errors import AccuracyWarning
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.friction import GuideFriction
@@ -51,10 +50,9 @@ def rows(restitution: float | None = None, film: FilmRow | None = None) -> Rows:
 
 def impact(of: Rows, step: float | None = None) -> tuple[NetworkResult, list[str]]:
     """One stroke and its doubts."""
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always", AccuracyWarning)
+    with doubts() as said:
         result = simulate_network(of, duration=60e-6, step=step, start="free")
-    return result, [str(item.message) for item in said]
+    return result, said
 
 
 @pytest.mark.parametrize("restitution", [0.05, 0.2, 0.5, 1.0])
@@ -167,10 +165,9 @@ def loaded(restitution: float | None) -> Rows:
 
 
 def stroke(of: Rows, **steps: float) -> tuple[NetworkResult, list[str]]:
-    with warnings.catch_warnings(record=True) as said:
-        warnings.simplefilter("always", AccuracyWarning)
+    with doubts() as said:
         result = simulate_network(of, duration=7e-4, **steps)
-    return result, [str(item.message) for item in said]
+    return result, said
 
 
 def test_a_stop_that_was_swung_on_is_told_with_the_shift_of_its_first_impact():

@@ -4,13 +4,13 @@ Truth: Hertz's laws (Johnson 1985, 4.22 and 4.45) and the contact of a mesh that
 and names of the drawing.
 """
 
-import warnings
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 import pytest
+from doubts import doubts
 
 from klack.analyses.impact.contact_check import (
     FEWEST_POINTS,
@@ -93,11 +93,10 @@ def checked(asked: Case, force: float = 5.0) -> tuple[ContactCheck, list[str]]:
     """Check the static contact at a force, and return what was said."""
     problem = build_problem(asked, silent)
     force = min(force, problem.static.max_force)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with doubts() as said:
         found = check_contact(asked, problem.pair, problem.static, force, "tip on seat")
     problem.close()
-    return found, [str(w.message) for w in caught if issubclass(w.category, AccuracyWarning)]
+    return found, said
 
 
 @pytest.mark.slow

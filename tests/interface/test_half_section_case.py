@@ -1,15 +1,15 @@
 """Cases of half sections with motion: three-dimensional: what is refused, and with which words."""
 
-import warnings
 from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from doubts import doubts
 
 from klack.analyses.stroke.axis_place import guide_of
 from klack.assembling.valve import build_valve
 from klack.case.valve_reader import read_valve_case
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import InputError
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "half_section_stroke.yaml"
 HALF = CASE.read_text(encoding="utf-8")
@@ -71,10 +71,8 @@ def test_a_wide_guide_names_the_stop_that_it_brings_to_the_axis():
 @pytest.mark.slow
 def test_bodies_without_a_mode_of_order_1_are_named():
     few = COARSE.replace("needle: {count: 12}", "needle: {count: 1}")
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
+    with doubts() as told:
         valve = build_valve(read(few))
-    told = [str(w.message) for w in caught if w.category is AccuracyWarning]
     assert [text for text in told if "keeps no elastic mode of order 1" in text] == [
         "'needle' keeps no elastic mode of order 1: across its axis it moves as a rigid body, and "
         "yields statically. Try: more modes in reduction.modes.needle."

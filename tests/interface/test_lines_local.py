@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from doubts import doubts
 
 from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.chamber import Chamber
@@ -54,10 +55,9 @@ def run(rows, duration=200e-6, **more):
 
 def told(rows, **more):
     """Warnings of a run that speak of the line."""
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always")
+    with doubts() as texts:
         run(rows, **more)
-    return [str(x.message) for x in found if "'pipe'" in str(x.message)]
+    return [text for text in texts if "'pipe'" in text]
 
 
 @pytest.mark.parametrize(

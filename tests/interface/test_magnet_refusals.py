@@ -1,10 +1,9 @@
 """What magnets and boost capacitors refuse or doubt: truth = where, what, expected, what to try."""
 
-import warnings
-
 import pytest
+from doubts import doubts
 
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import InputError
 from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.magnetics.magnetic_network import MagneticNetwork
@@ -131,11 +130,9 @@ def test_a_remanent_start_that_another_circuit_would_turn_round_is_doubted(turns
         ],
     )
 
-    with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always")
+    with doubts() as texts:
         network.rows()
 
-    texts = [str(w.message) for w in found if w.category is AccuracyWarning]
     assert len(texts) == len(parts)
     for text in texts:
         assert "components.magnet.start" in text

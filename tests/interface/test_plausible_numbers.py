@@ -6,6 +6,7 @@ The other half of it: no case that klack ships, shows or tests is doubted.
 from pathlib import Path
 
 import pytest
+from doubts import doubts
 
 from klack.assembling.bodies import wanted_sizes
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
@@ -13,7 +14,7 @@ from klack.case import shipped_cases
 from klack.case.reader import read_case
 from klack.case.valve_reader import read_any_case
 from klack.cli.main import main
-from klack.errors import AccuracyWarning, InputError
+from klack.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 RODS = (ROOT / "tests" / "data" / "tiny_rods.yaml").read_text(encoding="utf-8")
@@ -86,21 +87,22 @@ def test_masses_of_rigid_parts(mass, words):
 def test_sizes_and_masses_are_told_before_the_mesh():
     """Rods of 20 and 40 cm with a radius of 2 cm; the short one, of steel, weighs 1.97 kg."""
     said = Said()
-    with pytest.warns(AccuracyWarning) as caught:
+    with doubts() as told:
         require_given_shapes(rods("unit: mm", "unit: cm"), no_mesh, said)
 
-    assert [f"note: {item.message}" for item in caught] == said
+    assert [f"note: {text}" for text in told] == said
     assert "bodies.long: 400 mm is an unusual size (longest side; needles and" in said[0]
     assert "bodies.short: a mass of 1.973 kg is unusual (usual: 0.01 g to 500 g" in said[1]
 
 
 @pytest.mark.parametrize(("size", "told"), [("0.2 mm", False), ("5 um", True)])
-def test_a_large_mesh_is_told_before_it_is_made(size, told, recwarn):
+def test_a_large_mesh_is_told_before_it_is_made(size, told):
     case, said = rods("mesh: {size: 1 mm}", f"mesh: {{size: {size}}}"), Said()
     shapes = require_given_shapes(case, no_mesh)
-    tell_effort(case, shapes, wanted_sizes(case.bodies, {"short": (), "long": ()}), said)
+    with doubts() as texts:
+        tell_effort(case, shapes, wanted_sizes(case.bodies, {"short": (), "long": ()}), said)
 
-    assert len(said) == len(recwarn) == told
+    assert len(said) == len(texts) == told
     if told:
         assert (
             "bodies.long.mesh: elements of 5 um to 5 um make a mesh of about 4e+07 nodes" in said[0]
