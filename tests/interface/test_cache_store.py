@@ -206,6 +206,21 @@ def test_deleting_while_another_process_reads(tmp_path):
     assert cleared > 0
 
 
+def test_what_others_delete_again_and_again_is_not_kept_and_costs_no_note(tmp_path, monkeypatch):
+    cache = ResultCache(tmp_path / "c", LARGE)
+    with monkeypatch.context() as patch:
+
+        def delete_before(part: Path, place: Path) -> None:
+            cache.clear()
+            os.rename(part, place)
+
+        patch.setattr(os, "replace", delete_before)
+        assert notes_of(cache) == []
+        assert cache.content().count == 0
+    assert notes_of(cache) == []
+    assert cache.content().count == 2
+
+
 KILLED = SQUARES.replace(
     'print("ready", flush=True)',
     """

@@ -22,6 +22,7 @@ _UNFINISHED = re.compile(r"new-[^.]*\.entry\.part")
 _FORGOTTEN = 3600.0  # s after which an unfinished file is deleted
 _SPARE = 1.0 / 32.0  # of the limit: left free by who deletes, so that not every entry makes it look
 _WRITERS = 8.0  # processes that may write at once without a look, and stay below the limit
+_TRIES = 3  # to write while others delete
 _TAG = "Signature: 8a477f597d28d172789f06886806bc55\n# Results of klack; safe to delete.\n"
 
 
@@ -81,10 +82,12 @@ class ResultCache:
         if not self._writable:
             return
         try:
-            try:
-                size = self._write(key, entry)
-            except FileNotFoundError:  # the folder was deleted just now
-                size = self._write(key, entry)
+            for _ in range(_TRIES):
+                with suppress(FileNotFoundError):  # another process deletes what is there
+                    size = self._write(key, entry)
+                    break
+            else:
+                return
             self._own.add(key)
             self._room -= size
             if self._room <= 0.0:
