@@ -3,6 +3,7 @@
 import ctypes
 import signal
 import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -15,6 +16,15 @@ def _stopped_in_a_callback(number: int) -> None:
     callback()
 
 
+@pytest.fixture
+def heard() -> Iterator[None]:
+    """Ctrl-C is heard also where the tests were started in the background, which ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=("Ctrl-C", "SIGTERM")
 )
