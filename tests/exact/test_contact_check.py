@@ -141,6 +141,54 @@ def test_a_sharp_edge_is_told_whatever_the_mesh(size):
     assert "give the edge its real radius" in said[0]
 
 
+def edged(angle: float) -> str:
+    """Needle of two cones that meet at an edge [deg], half of it to either side of the seat."""
+    half = np.radians(angle / 2.0)
+    low = 0.7 * np.tan(np.pi / 4.0 - half)
+    high = low + 0.3 * np.tan(np.pi / 4.0 + half)
+    return f"{{line: [0.7, {low:.12f}], name: tip}}, {{line: [1, {high:.12f}], name: tip}}"
+
+
+EDGE = "contact: an edge of 'needle' lies in it (needle.tip, at (0.7, "
+
+
+@pytest.mark.parametrize(("angle", "size"), [(1.0, 0.005), (5.0, 0.001), (15.0, 0.0002)])
+def test_an_edge_within_the_contact_costs_pressure_and_yield_not_the_force(angle, size):
+    found, said = checked(case(edged(angle), CONE, size, extent=10.0 * size, speed=1.0), 60.0)
+
+    assert len(said) == 1
+    assert said[0].startswith(EDGE)
+    assert f", {180.0 - angle:g} deg)" in said[0]
+    assert found.doubts == ()
+    assert np.isnan(found.needed_yield)
+
+
+@pytest.mark.parametrize("needle", [edged(0.5), BALL], ids=["half a degree", "arc"])
+def test_a_face_without_edges_keeps_its_yield(needle):
+    found, said = checked(case(needle, CONE, 0.01, extent=0.1, speed=1.0), 60.0)
+
+    assert said == []
+    assert found.needed_yield > 0.0
+
+
+@pytest.mark.slow
+def test_the_force_on_an_edge_converges_and_its_pressure_does_not():
+    """A wedge in contact with a half-plane has a pressure like log 1/r (Johnson 1985, 5.2)."""
+    forces, pressures = [], []
+    for size in (0.001, 0.0005, 0.00025):
+        problem = build_problem(case(edged(10.0), CONE, size, extent=0.01, speed=1.0), silent)
+        static = problem.static
+        forces.append(float(np.interp(1e-6, static.approach, static.force)))
+        lam = static.pattern_at(60.0) * 60.0
+        pressures.append(float(np.max(lam / static.space.area)))
+        problem.close()
+
+    assert forces[1] == pytest.approx(forces[2], rel=5e-3)
+    assert abs(forces[1] - forces[2]) < abs(forces[0] - forces[2])
+    assert pressures[1] > 1.05 * pressures[0]
+    assert pressures[2] > 1.05 * pressures[1]
+
+
 def test_a_flat_face_with_edges_is_no_sharp_edge():
     flat = "{line: [1, 0], name: tip}"
 
@@ -219,6 +267,7 @@ def test_edges_of_a_drawing_come_back_from_its_mesh(mesher):
 
     assert tip.ends.any()
     assert not tip.corners.any()
+    assert None not in tip.neighbour  # facets of an arc are no edges
     assert set(tip.neighbour) <= {"", "face1", "face2", "face3"}
     radius = np.linalg.norm(tip.line[tip.ends, 0, :-1], axis=1)
     np.testing.assert_allclose(radius, 0.5e-3, rtol=1e-6)

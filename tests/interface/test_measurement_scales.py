@@ -44,6 +44,20 @@ def hdf5(path, about, values=COUNTS, **root):
     return path
 
 
+def netcdf3(path, about, values=COUNTS):
+    with scipy_io.netcdf_file(path, "w") as file:
+        file.createDimension("sample", len(values))
+        time, lift = (file.createVariable(n, t, ("sample",)) for n, t in NETCDF)
+        time[:], lift[:] = TIME, values
+        time.units, lift.units = "s", "um"
+        for key, value in about.items():
+            setattr(lift, key, value)
+    return path
+
+
+NETCDF = (("time", "d"), ("lift", "h"))
+
+
 def matlab(path, about):
     lift = {"values": COUNTS[:, None], "unit": "um", "time": TIME[:, None], **about}
     scipy_io.savemat(path, {"lift": lift})
@@ -82,18 +96,28 @@ def uff(path, unit, values, kind=0):
 PACKED = {"scale_factor": FACTOR, "add_offset": OFFSET}
 
 
-def test_netcdf_is_unpacked_and_its_fill_values_are_missing(tmp_path):
-    check(hdf5(tmp_path / "a.nc", PACKED))
+@pytest.mark.parametrize("write", [hdf5, netcdf3])
+def test_netcdf_is_unpacked_and_its_fill_values_are_missing(tmp_path, write):
+    check(write(tmp_path / "a.nc", PACKED))
     check(matlab(tmp_path / "a.mat", PACKED))
     stored = COUNTS.copy()
     stored[[5, 7, 9]] = -999, -998, 2000
     about = {**PACKED, "_FillValue": np.int16(-999), "missing_value": np.int16(-998)}
     about["valid_range"] = np.array([0, 1000], np.int16)
-    with open_recording(hdf5(tmp_path / "a.nc", about, stored)) as recording:
+    with open_recording(write(tmp_path / "a.nc", about, stored)) as recording:
         values = recording.values("lift")
     assert np.flatnonzero(np.isnan(values)).tolist() == [5, 7, 9]
     with pytest.warns(UserWarning, match="3 missing values of 'lift' filled"):
         check(tmp_path / "a.nc")
+
+
+def test_a_netcdf_3_file_that_ends_early_is_one_error(tmp_path):
+    path = netcdf3(tmp_path / "a.nc", PACKED)
+    data = path.read_bytes()
+    for end in (len(data) - 1, len(data) // 2, 100, 10, 4):
+        path.write_bytes(data[:end])
+        with pytest.raises(InputError, match=r"a netCDF 3 file that cannot be read"):
+            read(path)
 
 
 def test_netcdf_times_are_unpacked(tmp_path):

@@ -1,7 +1,8 @@
 r"""Edges of a contact surface: where the named surface ends, and where the skin has a corner.
 
 A contact that reaches the end of the *named* surface may continue beyond it; one on a sharp
-corner has no width of its own.  Both are told by the angle between the outward normals of the two
+corner has no width of its own; at a blunt edge within a contact the pressure has no limit.  All
+are told by the angle between the outward normals of the two
 faces that meet: :math:`\cos\vartheta = n_1 \cdot n_2`, counted positive where the body is convex.
 In the half section of a body of revolution an edge is a point.
 """
@@ -20,9 +21,13 @@ from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = ["SHARP", "SurfaceEdges", "surface_edges", "turned_away"]
 
-SHARP = np.radians(10.0)
-"""Angle between two normals [rad] above which an edge is a corner; a smooth surface on coarse
+SHARP = np.radians(10.0 - 1e-6)
+"""Angle between two normals [rad] from which on an edge is a corner; a smooth surface on coarse
 quadratic faces has less."""
+
+_BLUNT = np.radians(1.0 - 1e-6)
+"""Angle [rad] from which on an edge is kept that turns twice as much as all beside it: those of the
+facets of a round face are alike."""
 
 _SHALLOW = np.sin(np.radians(0.5))
 """Slope on both sides of a corner above which it is the corner that touches, not a face."""
@@ -79,8 +84,8 @@ class SurfaceEdges:
 def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
     """Find the edges of a surface at which it ends or has a corner.
 
-    Smooth edges between two of its own faces are left out, and so are places on the axis of a body
-    of revolution.
+    Smooth edges between two of its own faces are left out, those of facets up to 10 degrees, and
+    places on the axis of a body of revolution.
 
     Parameters
     ----------
@@ -104,10 +109,22 @@ def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
             rows.append((first[key], skin, j, True))
     angle = np.array([_angle(own, i, other, j) for i, other, j, _ in rows])
     names = _names(mesh, [other.faces[j] if out else None for _, other, j, out in rows])
+    sides: dict[tuple[int, ...], list[int]] = {}
+    for k, (i, other, j, _) in enumerate(rows):
+        for face in (own.faces[i], other.faces[j]):
+            sides.setdefault(face, []).append(k)
+
+    def beside(k: int) -> float:
+        """Twice the turn at the other sides of both faces, and within them."""
+        i, other, j, _ = rows[k]
+        near = {*sides[own.faces[i]], *sides[other.faces[j]]} - {k}
+        return 2.0 * max(own.turn[i], other.turn[j], *(abs(angle[n]) for n in near), 0.0)
+
     kept = [
         k
         for k, (i, *_, outside) in enumerate(rows)
-        if (outside or angle[k] > SHARP) and not (d == 2 and own.line[i, 0, 0] == 0.0)
+        if not (d == 2 and own.line[i, 0, 0] == 0.0)
+        and (outside or angle[k] > SHARP or (angle[k] > _BLUNT and angle[k] > beside(k)))
     ]
     chosen = [rows[k] for k in kept]
     return SurfaceEdges(
@@ -120,23 +137,25 @@ def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
 
 @dataclass(frozen=True, slots=True)
 class _Rims:
-    """Sides of faces: corner nodes, normal of the face there, tangent into the face."""
+    """Sides of faces: corner nodes, normal there, tangent into the face, its turn to the middle."""
 
     keys: list[tuple[int, ...]]
     faces: list[tuple[int, ...]]
     line: NDArray[np.float64]
     normal: NDArray[np.float64]
     along: NDArray[np.float64]
+    turn: NDArray[np.float64]
 
 
 def _rims(mesh: Mesh, blocks: Sequence[FaceBlock]) -> _Rims:
     keys: list[tuple[int, ...]] = []
     faces: list[tuple[int, ...]] = []
-    lines, normals, tangents = [], [], []
+    lines, normals, tangents, turns = [], [], [], []
     for block in blocks:
         family, corner = FAMILIES[block.family], reference_nodes(block.family)
         sides = [(k,) for k in range(2)] if family.dimension == 1 else list(family.edges)
         nodes = block.connectivity
+        centre = face_geometry(mesh.points, block, corner[: family.corners].mean(axis=0)[None])
         for side in sides:
             at = face_geometry(mesh.points, block, corner[list(side)].mean(axis=0, keepdims=True))
             begin, end = mesh.points[nodes[:, side[0]]], mesh.points[nodes[:, side[-1]]]
@@ -148,6 +167,8 @@ def _rims(mesh: Mesh, blocks: Sequence[FaceBlock]) -> _Rims:
             lines.append(np.stack([begin, middle, end], axis=1))
             normals.append(normal)
             tangents.append(_unit(inward))
+            cosine = np.sum(normal * centre.normal[:, 0], axis=1)
+            turns.append(np.arccos(np.clip(cosine, -1.0, 1.0)))
     d = mesh.dimension
     return _Rims(
         keys,
@@ -155,6 +176,7 @@ def _rims(mesh: Mesh, blocks: Sequence[FaceBlock]) -> _Rims:
         np.concatenate([np.zeros((0, 3, d)), *lines]),
         np.concatenate([np.zeros((0, d)), *normals]),
         np.concatenate([np.zeros((0, d)), *tangents]),
+        np.concatenate([np.zeros(0), *turns]),
     )
 
 
@@ -205,8 +227,8 @@ def _names(mesh: Mesh, faces: list[tuple[int, ...] | None]) -> list[str | None]:
 
 def turned_away(edges: SurfaceEdges, mesh: Mesh, surface: Surface) -> NDArray[np.bool_]:
     """Edges whose both faces lead away from the other surface, shape (m,)."""
-    if not len(edges.line):
-        return np.zeros(0, dtype=bool)
+    if not edges.corners.any():
+        return np.zeros(len(edges.line), dtype=bool)
     outward = -edges.along.sum(axis=1)
     length = np.linalg.norm(outward, axis=1, keepdims=True)
     outward = outward / np.where(length > 0.0, length, 1.0)

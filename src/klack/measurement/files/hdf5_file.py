@@ -1,9 +1,10 @@
-"""HDF5 files, among them those of MATLAB 7.3, read in parts through h5py.
+"""HDF5 files, among them those of MATLAB 7.3, read in parts through h5py; netCDF 3 through SciPy.
 
 Links to other files and data that lie in other files are not followed: a measurement holds its
 own data.
 """
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,14 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError, MissingExtraError
 from klack.measurement.files.foreign import foreign_reading
-from klack.measurement.files.stored_arrays import ArrayRecording, StoredArray, StoredGroup
+from klack.measurement.files.stored_arrays import (
+    ArrayRecording,
+    StoredArray,
+    StoredGroup,
+    held_array,
+)
 
-__all__ = ["Hdf5File"]
+__all__ = ["Hdf5File", "NetCdf3File"]
 
 Vector = NDArray[np.float64]
 
@@ -49,6 +55,41 @@ class Hdf5File(ArrayRecording):
         self._file.close()
 
 
+class NetCdf3File(ArrayRecording):
+    """Variables of numbers of a netCDF file of version 3 or earlier, read as a whole.
+
+    Parameters
+    ----------
+    path : Path
+    time_step : float, optional [s]
+        Of variables without time.
+    """
+
+    def __init__(self, path: Path, time_step: float | None = None) -> None:
+        from scipy.io import netcdf_file
+
+        hint = "it may be truncated: copy or export it again."
+        arrays, unread = [], []
+        with (
+            foreign_reading(str(path), "a netCDF 3 file", hint),
+            netcdf_file(path, mmap=False) as opened,
+        ):
+            file: Any = opened
+            about = _attributes(file._attributes)
+            for name, variable in file.variables.items():
+                values = np.asarray(variable.data)
+                if values.dtype.kind == "S":
+                    about[name.lower()] = _plain(values.tobytes().rstrip(b"\0 ")) or ""
+                elif values.size == 1:
+                    about[name.lower()] = float(values.ravel()[0])
+                elif values.ndim in (1, 2) and values.size:
+                    arrays.append(held_array(name, values, _attributes(variable._attributes)))
+                else:
+                    unread.append(name)
+        reasons = {"no vector or matrix of real numbers": unread} if unread else {}
+        super().__init__(path, StoredGroup(arrays=arrays, about=about, unread=reasons), time_step)
+
+
 def _opened(path: Path) -> Any:
     try:
         import h5py
@@ -70,7 +111,7 @@ def _group(node: Any, path: str, depth: int) -> StoredGroup:
 
     arrays, groups = [], []
     unread: dict[str, list[str]] = {}
-    about = _attributes(node)
+    about = _attributes(node.attrs)
     for key in node if depth < _DEEPEST else ():
         if key.startswith("#"):
             continue
@@ -119,7 +160,7 @@ def _array(name: str, item: Any) -> StoredArray:
         shape=item.shape,
         read=read,
         whole=whole if item.ndim == 1 and item.dtype.kind in "iu" else None,
-        about=_attributes(item),
+        about=_attributes(item.attrs),
     )
 
 
@@ -145,19 +186,19 @@ def _single(item: Any) -> str | float | None:
     return _plain(item[()])
 
 
-def _attributes(node: Any) -> dict[str, str | float]:
+def _attributes(stored: Mapping[str, Any]) -> dict[str, str | float]:
     about = {}
-    for key in node.attrs:
+    for key in stored:
         try:
-            value = _plain(node.attrs[key])
+            value = _plain(stored[key])
         except (OSError, TypeError, ValueError):  # of a type that h5py does not know
             continue
         if value is not None:
             about[key.lower()] = value
-        elif key == "valid_range" and np.shape(node.attrs[key]) == (2,):
-            about["valid_min"], about["valid_max"] = map(float, node.attrs[key])
-        elif np.asarray(node.attrs[key]).dtype.kind in "iuf":
-            about[key.lower()] = str(np.asarray(node.attrs[key]).tolist())[:_LONGEST_TEXT]
+        elif key == "valid_range" and np.shape(stored[key]) == (2,):
+            about["valid_min"], about["valid_max"] = map(float, stored[key])
+        elif np.asarray(stored[key]).dtype.kind in "iuf":
+            about[key.lower()] = str(np.asarray(stored[key]).tolist())[:_LONGEST_TEXT]
     return about
 
 

@@ -1,17 +1,13 @@
 """MATLAB files of version 5 to 7.2, read as a whole; later ones are HDF5."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from klack.measurement.files.stored_arrays import ArrayRecording, StoredArray, StoredGroup
+from klack.measurement.files.stored_arrays import ArrayRecording, StoredGroup, held_array
 from klack.model_files.mat5 import MatValue, read_mat5
 
 __all__ = ["MatlabFile"]
-
-Vector = NDArray[np.float64]
 
 _DEEPEST = 8
 
@@ -54,16 +50,8 @@ def _group(fields: dict[str, MatValue], path: str, depth: int) -> StoredGroup:
         elif value.size == 1:
             about[key.lower()] = float(value.ravel()[0])
         elif value.size and value.ndim == 2:
-            arrays.append(_array(key, value))
+            arrays.append(held_array(key, value))
         else:
             unread.append(below)
     reasons = {"no vector or matrix of real numbers": unread} if unread else {}
     return StoredGroup(path=path, arrays=arrays, about=about, groups=groups, unread=reasons)
-
-
-def _array(name: str, value: Any) -> StoredArray:
-    def read(line: int, axis: int, first: int, last: int) -> Vector:
-        part = value[first:last, line] if axis == 0 else value[line, first:last]
-        return np.asarray(part, dtype=np.float64)
-
-    return StoredArray(name=name, shape=value.shape, read=read)

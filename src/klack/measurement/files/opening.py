@@ -21,7 +21,7 @@ def open_recording(path: str | Path, *, time_step: float | None = None) -> Recor
     Parameters
     ----------
     path : str or Path
-        CSV and other text tables, MDF 3 and 4, TDMS, UFF (sets 58 and 58b), HDF5, MATLAB.
+        CSV and other text tables, MDF 3 and 4, TDMS, UFF (sets 58 and 58b), HDF5, netCDF, MATLAB.
     time_step : float, optional [s]
         Sampling step, used where the file has no time of its own.
 
@@ -68,6 +68,10 @@ def _open(path: Path, head: bytes, time_step: float | None) -> Recording:
         from klack.measurement.files.hdf5_file import Hdf5File
 
         return Hdf5File(path, time_step)
+    if head[:4] in (b"CDF\x01", b"CDF\x02"):
+        from klack.measurement.files.hdf5_file import NetCdf3File
+
+        return NetCdf3File(path, time_step)
     if head[:6] == b"MATLAB" or path.suffix.lower() == ".mat":
         from klack.measurement.files.matlab_file import MatlabFile
 
@@ -88,8 +92,7 @@ def _is_uff(head: bytes) -> bool:
 
 
 _FOREIGN = {
-    b"CDF\x01": ("a netCDF 3 file", "convert it to netCDF 4: nccopy -k nc4 old.nc new.nc."),
-    b"CDF\x02": ("a netCDF 3 file", "convert it to netCDF 4: nccopy -k nc4 old.nc new.nc."),
+    b"CDF\x05": ("a netCDF file of 64 bits", "convert it: nccopy -k nc4 old.nc new.nc."),
     b"PK\x03\x04": ("a zip archive or an Excel workbook", "export it as CSV, or unpack it."),
     b"\x1f\x8b": ("a compressed file", "unpack it first."),
     b"\xd0\xcf\x11\xe0": ("an old Office file", "export it as CSV."),

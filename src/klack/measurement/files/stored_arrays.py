@@ -14,6 +14,7 @@ Such files have no fixed form.  Understood are
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +33,7 @@ from klack.measurement.files.scales import PACKED, unknown_scales, unpacked
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
 
-__all__ = ["ArrayRecording", "StoredArray", "StoredGroup"]
+__all__ = ["ArrayRecording", "StoredArray", "StoredGroup", "held_array"]
 
 Vector = NDArray[np.float64]
 
@@ -79,6 +80,27 @@ class StoredArray:
     zero: int = 0
     """Number that was taken off all, as the first time stamp."""
     about: Mapping[str, str | float] = field(default_factory=dict)
+
+
+def held_array(
+    name: str, values: NDArray[Any], about: Mapping[str, str | float] | None = None
+) -> StoredArray:
+    """Array of a file that is read as a whole."""
+
+    def read(line: int, axis: int, first: int, last: int) -> Vector:
+        part = values if values.ndim == 1 else values[:, line] if axis == 0 else values[line]
+        return np.asarray(part[first:last], dtype=np.float64)
+
+    def whole(first: int, last: int) -> NDArray[np.int64]:
+        return np.asarray(values[first:last], dtype=np.int64)
+
+    return StoredArray(
+        name=name,
+        shape=values.shape,
+        read=read,
+        whole=whole if values.ndim == 1 and values.dtype.kind in "iu" else None,
+        about=about or {},
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
