@@ -140,6 +140,17 @@ def test_mistakes_are_one_message(bench, tmp_path, capsys, old, new, words):
     assert "Try:" in error
 
 
+def test_a_lift_that_counts_backwards_is_refused(bench, tmp_path, capsys):
+    table = np.loadtxt(bench / "strokes.csv", delimiter=",", skiprows=1)
+    head = (bench / "strokes.csv").read_text().splitlines()[0]
+    table[:, 1:] *= -1.0
+    np.savetxt(tmp_path / "strokes.csv", table, "%.9e", ",", header=head, comments="")
+    (tmp_path / "valve.yaml").write_text((bench / "valve.yaml").read_text())
+
+    assert main(command(tmp_path, tmp_path / "out", "--quiet")) == 2
+    assert "a lift that moves against the computed one" in capsys.readouterr().err
+
+
 def test_a_missing_file_is_named(bench, tmp_path, capsys, monkeypatch):
     args = command(bench, tmp_path / "out", "--quiet")
     args[3] = str(tmp_path / "nothing.csv")

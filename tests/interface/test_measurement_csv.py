@@ -216,3 +216,17 @@ def test_large_tables_are_parsed_again_in_blocks(tmp_path, monkeypatch):
             np.testing.assert_array_equal(
                 recording.read("lift", first, last)[1], rows[first:last, 1]
             )
+
+
+@pytest.mark.parametrize("first", ["0.0,0.#0,0", "xx,0.0,0", "0.0x,0.0x,0x", "0,0,0,5,6"])
+def test_a_damaged_first_row_is_told_and_names_nothing(tmp_path, first):
+    rows = [f"{1e-5 * k:.5f},{0.5 * k:.2f},{k % 7}" for k in range(1, 50)]
+    path = tmp_path / "a.csv"
+    path.write_text("\n".join(["time [s],lift [um],current [A]", first, *rows]))
+
+    with open_recording(path) as recording:
+        assert [(c.name, c.unit, c.count) for c in recording.channels] == [
+            ("lift", "um", 49),
+            ("current", "A", 49),
+        ]
+        assert "1 row above the first whole ones, from line 2 on, left out" in recording.notes[0]

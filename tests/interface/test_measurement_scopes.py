@@ -167,7 +167,7 @@ def notes_of(path, text):
 def test_rows_above_a_faulty_one_are_told(tmp_path):
     lines = YOKOGAWA.splitlines(keepends=True)
     lines[13] = "1.0,2..0\n"  # of the made time, two rows would be missing without a word
-    assert "2 lines of numbers, the first of them line 12, stand above" in notes_of(
+    assert "3 rows above the first whole ones, from line 12 on, left out" in notes_of(
         tmp_path / "a.csv", "".join(lines)
     )
 
@@ -215,3 +215,31 @@ def test_steps_of_headers(tmp_path, header, step):
         return
     with open_recording(path) as recording:
         assert recording.channels[0].step == pytest.approx(step, rel=1e-12)
+
+
+def test_a_header_in_a_file_of_its_own(tmp_path):
+    """R&S RTO: ``a.csv`` has the words, ``a.Wfm.csv`` the values."""
+    head = "Resolution:1e-05:\nRecordLength:298:\nXStart:-0.00098:\nHardwareXStart:-0.001:\n"
+    head += "SignalHardwareRecordLength:300:\nSignalResolution:1e-05:\nSource:Ch1:\n"
+    table, words = tmp_path / "a.Wfm.csv", tmp_path / "a.csv"
+    words.write_text(head)
+    table.write_text(rows(FIRST))
+    with open_recording(table) as recording:
+        (channel,) = recording.channels
+        assert (channel.name, channel.start, channel.step) == ("Ch1", -1e-3, 1e-5)
+        np.testing.assert_allclose(recording.values("Ch1"), FIRST, atol=1e-15)
+    table.write_text(rows(FIRST[2:]))
+    with open_recording(table) as recording:
+        assert recording.channels[0].start == -0.98e-3
+    with pytest.raises(InputError, match=r"give a\.Wfm\.csv, whose header this is"):
+        open_recording(words)
+    table.write_text(2 * rows(FIRST))
+    with pytest.raises(InputError, match=r"got 600 rows, where the header says 300"):
+        open_recording(table)
+
+
+@pytest.mark.parametrize("sign", ["inf", "OL", "OVR", "9.9E+37", "nan"])
+def test_a_recording_of_over_range_alone_says_so(tmp_path, sign):
+    (tmp_path / "a.csv").write_text("time [s],lift [um]\n" + "".join(f"{t},{sign}\n" for t in TIME))
+    with pytest.raises(InputError, match="missing or signs of over range"):
+        open_recording(tmp_path / "a.csv")

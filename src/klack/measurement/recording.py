@@ -86,7 +86,7 @@ class Recording(Closing):
                 str(path),
                 got="no channel of numbers over time" + "".join(f"; {note}" for note in notes),
                 expected="at least one channel",
-                hint="check that the file was exported completely.",
+                hint="check that it was exported completely, and the range of the instrument.",
             )
 
     def channel(self, name: str) -> ChannelInfo:

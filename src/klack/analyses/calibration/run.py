@@ -19,6 +19,7 @@ from klack.analyses.calibration.record import (
     FittedImpact,
     ProfileCurve,
 )
+from klack.analyses.comparison.strokes import require_same_way
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.valve import build_valve
 from klack.case.calibration import CaseCalibration
@@ -120,8 +121,8 @@ def run_calibration(
     Raises
     ------
     InputError
-        For a case without what is needed, a motion in three dimensions, or strokes without the
-        fitted channels.
+        For a case without what is needed, a motion in three dimensions, strokes without the
+        fitted channels, or a lift that goes down where the computed one goes up.
     ConvergenceError
         A trial that cannot be computed.
     """
@@ -275,6 +276,7 @@ def _calibrate(
     at_start = whole.motion(start, whole.duration)
     before = whole.recorded(at_start, start)
     mean = strokes.matrix("lift").mean(axis=0)
+    require_same_way(strokes.source, before["lift"], mean)
     measured = _impacts_of(strokes.time, mean, whole.sensor)
     if not any(measured.values()):  # nothing to be seen: take the model's
         measured = _computed_impacts(whole, at_start, start)

@@ -177,7 +177,14 @@ LIFT_CURVE = _curve("lift", "y", "m", _LIFT, "lift_rms", "lift_scatter")
 VELOCITY_CURVE = _curve(
     "velocity", "v", "m/s", Column("m/s", 1.0, ".4f"), "velocity_rms", "velocity_scatter"
 )
-LIFT = _compared("lift", "s", "m", _LIFT, "Lift between both stops.", attrgetter("way"))
+LIFT = _compared(
+    "lift",
+    "s",
+    "m",
+    _LIFT,
+    "Rest on the opening stop less rest on the seat: the gap, and how far forces press stops in.",
+    attrgetter("way"),
+)
 
 VARIANT_MEASURES: tuple[Measure[ComparedVariant], ...] = described_in(
     _THEORY,

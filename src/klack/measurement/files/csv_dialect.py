@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from klack.measurement.files.clock import is_clock
 from klack.measurement.files.number_kernel import MISSING, WHITESPACE
 from klack.measurement.unit_text import is_unit, no_unit, plain_unit
 
@@ -37,6 +38,7 @@ _NUMBERS = {
     ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?"),
     ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eEdD][+-]?\d+)?"),
 }
+_LIKE_NUMBER = re.compile(r"[^A-Za-z\[(]*\d[^A-DF-Za-df-z]*|[-+]?[\d.]+\w*")
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?P<open>[\[({])(?P<unit>[^\[\]{}]*)[\])}]")
 _SLASH = re.compile(r"(?P<name>.*?\S)(?:\s*/\s*|\s+in\s+)(?P<unit>\S+)")
 _SUFFIX = re.compile(r"(?P<name>.*[^_])_(?P<unit>[A-Za-zµμ][A-Za-zµμ0-9]*)")
@@ -169,14 +171,24 @@ def first_row(lines: Sequence[str], dialect: Dialect) -> int:
 
 
 def rows_above(header: Sequence[str], dialect: Dialect) -> list[int]:
-    """Lines of a header that are rows of numbers of a table of several columns."""
+    """Lines of a header that are rows of a table of several columns: whole, or the damaged last."""
     if dialect.width < 2:
         return []
-    return [
+    found = [
         k
         for k, line in enumerate(header)
         if _width(line, dialect.separator, dialect.decimal) == dialect.width
     ]
+    last = len(header) - 1
+    if last > 0 and last not in found:
+        cells = _cells(header[last], dialect.separator)
+        if 2 * sum(map(_like_number, cells)) > max(len(cells), dialect.width):
+            found.append(last)
+    return found
+
+
+def _like_number(cell: str) -> bool:
+    return _LIKE_NUMBER.fullmatch(cell) is not None
 
 
 def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] | None:
@@ -197,10 +209,22 @@ def read_columns(header: Sequence[str], dialect: Dialect) -> tuple[Column, ...] 
         return None
     units: list[str] = [""] * dialect.width
     names = rows.pop()
+    if rows and (all(map(_like_number, filter(None, names))) or _named_after(rows[-1], names)):
+        names = rows.pop()  # the other is a damaged row of numbers
     if _is_unit_row(names):
         units = [plain_unit(cell) for cell in names]
         names = rows.pop() if rows else [f"column {k + 1}" for k in range(dialect.width)]
     return tuple(_column(name, unit) for name, unit in zip(names, units, strict=True))
+
+
+def _named_after(above: Sequence[str], cells: Sequence[str]) -> bool:
+    """Whether only the row above names a time with its unit, and this is no row of units."""
+    first, unit = split_label(above[0])
+    return (
+        bool(unit)
+        and is_clock(first, unit)
+        and not (_is_unit_row(cells) or is_clock(*split_label(cells[0])))
+    )
 
 
 def _header_cells(line: str, dialect: Dialect) -> list[str] | None:

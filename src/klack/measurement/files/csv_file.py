@@ -41,6 +41,8 @@ _STAMP = re.compile(
     rb"\d\d?:\d\d:\d\d[.,]\d+(Z|[+-]\d\d:\d\d)?(?![\d:])"
 )
 _LARGEST_REWRITTEN = 1 << 28  # bytes
+_APART = ".wfm.csv"
+_LENGTHS = (("SignalHardwareRecordLength", "HardwareXStart"), ("RecordLength", "XStart"))
 _HEAD = 1 << 18  # bytes in which the header must end
 _SAMPLE = 1 << 14  # bytes looked at in the middle and at the end
 _BLOCK = 1 << 20  # rows looked at together
@@ -64,7 +66,7 @@ class CsvFile(Recording):
 
     def __init__(self, path: Path, time_step: float | None = None) -> None:
         data = _bytes_of(path)
-        data = _stamps_as_numbers(_beside(data))
+        data = _stamps_as_numbers(_beside(_with_its_header(path, data)))
         dialect, columns, header, texts, start = _survey(path, data)
         self._table = NumberTable(path, data, start, dialect)
         self._column: dict[str, tuple[int, int]] = {}  # and first row
@@ -74,8 +76,8 @@ class CsvFile(Recording):
         notes: list[str] = []
         if above := rows_above(texts, dialect):
             notes.append(
-                f"{path.name}: {len(above)} lines of numbers, the first of them line "
-                f"{above[0] + 1}, stand above others and are left out."
+                f"{path.name}: {len(above)} row{'s' * (len(above) > 1)} above the first whole "
+                f"ones, from line {above[0] + 1} on, left out."
             )
         if len(header.names) == dialect.width:
             columns = tuple(Column(name, "", name) for name in header.names)
@@ -86,6 +88,8 @@ class CsvFile(Recording):
         else:
             clocks = _named_clocks(path, self._table, columns, time_step, notes)
         channels = self._channels(columns, clocks, time_step, header, notes)
+        if not channels and self._table.rows:
+            notes.append("all values are missing or signs of over range")
         longest = max((channel.count for channel in channels), default=0)
         if header.count and longest != header.count:
             notes.append(
@@ -250,6 +254,35 @@ def _beside(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.frombuffer("\n".join(lines).encode("latin-1"), np.uint8)
 
 
+def _with_its_header(path: Path, data: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Table of an R&S RTO or RTE, ``a.Wfm.csv``, under the header that it writes as ``a.csv``."""
+    beside = path.with_name(path.name[: -len(_APART)] + path.suffix)
+    if not path.name.lower().endswith(_APART) or not beside.is_file():
+        return data
+    lines = beside.read_text(encoding="utf-8", errors="replace")[:_HEAD].splitlines()
+    said = {key: values for key, *values in (line.rstrip(":").split(":") for line in lines) if key}
+    text = data.tobytes()
+    count = text.rstrip().count(b"\n") + 1
+    for length, start in _LENGTHS:
+        try:
+            if float(said[length][0]) == count:
+                step, begin = float(said["SignalResolution"][0]), float(said[start][0])
+                break
+        except (KeyError, IndexError, ValueError):
+            continue
+    else:
+        found = said.get(_LENGTHS[0][0], ["none"])
+        raise InputError(
+            f"{path.name}, with its header {beside.name}",
+            got=f"{count} rows, where the header says {' '.join(found)}",
+            expected="one record of one channel: SignalHardwareRecordLength rows",
+            hint="export each channel and each acquisition as a file of its own.",
+        )
+    name = " ".join(said.get("Source", ["value"]))
+    head = f"XIncrement: {step!r}\nXStart: {begin!r}\nSource: {name}\n"
+    return np.frombuffer(head.encode() + text, np.uint8)
+
+
 def _stamps_as_numbers(data: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Table with its time stamps as seconds since the first of them."""
     if data.size > _LARGEST_REWRITTEN:
@@ -301,7 +334,9 @@ def _survey(
             str(path),
             got="no line of numbers",
             expected="a table: values separated by commas, semicolons, tabs or blanks",
-            hint="check the file; MDF4, TDMS, UFF, HDF5 and MATLAB files are recognised as well.",
+            hint=f"give {table.name}, whose header this is."
+            if (table := path.with_name(path.stem + ".Wfm.csv")).is_file()
+            else "check the file; MDF4, TDMS, UFF, HDF5 and MATLAB files are recognised as well.",
         )
     row = first_row(texts, dialect)
     start = mark + sum(len(line) for line in lines[:row])

@@ -19,10 +19,11 @@ __all__ = ["TableHeader", "read_header"]
 _STEPS = (
     *("sample interval", "sampling interval", "sample period", "sampling period", "increment"),
     *("tinc", "xinc", "x inc", "xincrement", "x increment", "delta x", "hresolution", "dt"),
+    "delta(second)",
 )
 _RATES = ("sample rate", "samplerate", "sampling rate", "sampling frequency", "sample frequency")
 _STARTS = ("xorg", "xorigin", "x origin", "x0", "t0", "hoffset", "xstart", "xzero", "start")
-_INDICES = ("zero index", "trigger point")  # samples before the zero of time
+_INDICES = ("zero index", "trigger point", "trigger address")  # samples before the zero of time
 _COUNTS = (
     *("record length", "points", "samples", "blocksize", "nr of samples", "memory length"),
     "segmentsize",

@@ -25,7 +25,7 @@ _MOST_DIGITS = 18  # fit into 64 bits
 
 MISSING = (
     *("", "-", "na", "nan", "n/a", "#n/a", "null", "inf", "infinity", "∞"),
-    *("ol", "ovl", "over", "overflow", "***"),
+    *("ol", "ovl", "ovr", "over", "overflow", "***"),
 )
 """Words for a missing value and signs for "over range", in small letters and without a sign."""
 
