@@ -92,8 +92,8 @@ MISTAKES = {
     "missing section": (("motion: {", "motion_: {"), "valve.yaml:44: motion_", ["'motion'"]),
     "nothing where a section belongs": (
         ("mesh: {size: 1 mm}", "mesh:"),
-        "bodies.housing",
-        ["no key 'mesh'"],
+        "bodies.housing.mesh",
+        ["got nothing", "write its value, or remove 'mesh'"],
     ),
     "value where a section belongs": (
         ("mesh: {size: 1 mm}", "mesh: 1 mm"),
@@ -254,7 +254,36 @@ MISTAKES = {
     "hole": (("motion: {", "motion: "), "valve.yaml:44", ["not YAML"]),
     "tabulator": (("title:", "\ttitle:"), "valve.yaml:2", ["indent with spaces, not tabs"]),
     "colon in a title": (("Two turned", "Two: turned"), "valve.yaml:2", ["not YAML", "quotes"]),
-    "unknown alias": (("steel:", "steel: *x"), "valve.yaml:6", ["not YAML"]),
+    "unknown alias": (("steel:", "steel: *x"), "valve.yaml:6", ["not YAML", "write the value"]),
+    "no colon": (("klack: 1", "klack 1"), "valve.yaml:1", ["without 'key: value'", "a colon"]),
+    "no blank behind the colon": (
+        ("mesh: {size: 1 mm}", "mesh: {size:1 mm}"),
+        "bodies.housing.mesh",
+        ["write a blank behind the colon: size: 1 mm"],
+    ),
+    "no colon in a section": (
+        ("mesh: {size: 1 mm}", "mesh:\n      size 1 mm"),
+        "bodies.housing.mesh",
+        ["write 'size: 1 mm', with a colon"],
+    ),
+    "round brackets": (("mesh: {size: 1 mm}", "mesh: (size: 1 mm)"), "valve.yaml:39", ["round"]),
+    "bracket too many": (("{size: 1 mm}", "{size: 1 mm}}"), "valve.yaml:", ["a bracket too many"]),
+    "no blank behind a dash": (
+        ("- {line: [1.2, 20], name: shaft}", "-{line: [1.2, 20], name: shaft}"),
+        "valve.yaml:17",
+        ["a dash without a blank"],
+    ),
+    "no dash": (
+        ("- {line: [1.2, 20], name: shaft}", "{line: [1.2, 20], name: shaft}"),
+        "valve.yaml:17",
+        ["without its dash"],
+    ),
+    "comma behind": (("{size: 1 mm}", "{size: 1 mm},"), "valve.yaml:", ["a comma behind"]),
+    "a list of keys": (
+        ("mesh: {size: 1 mm}", "mesh:\n      - size: 1 mm"),
+        "bodies.housing.mesh",
+        ["got a list", "remove the dashes"],
+    ),
     "python object": (("title: ", "title: !!python/name:os.system "), "title", ["python"]),
     "date": (("title: Two turned bodies", "title: 2026-01-01"), "title", ["date", "quotes"]),
     "number as key": (("materials:", "5: x\nmaterials:"), "valve.yaml:5", ["the key 5"]),

@@ -329,3 +329,34 @@ def test_packed_data_that_would_be_huge(tmp_path: Path) -> None:
     big = data.replace(b'NumberOfPoints="8"', b'NumberOfPoints="90000000"')
     assert big != data
     assert volume(path, big) is None
+
+
+def test_cards_behind_the_end_are_refused(tmp_path: Path) -> None:
+    """ENDDATA in the middle would leave elements out without a word."""
+    lines = BDF.splitlines()
+    last = next(k for k, line in enumerate(lines) if line.startswith("CHEXA"))
+    path = tmp_path / "a.bdf"
+    path.write_text("\n".join([*lines[:last], "ENDDATA", *lines[last:-1]]), "latin-1")
+    with pytest.raises(InputError, match="CHEXA behind ENDDATA"):
+        read_mesh_file(path, 1e-3)
+    path.write_text(BDF + "\nsome words\n", "latin-1")
+    read_mesh_file(path, 1e-3)
+
+
+def test_a_misspelt_generate_is_refused(tmp_path: Path) -> None:
+    """The first, the last and the step of a range would be three members."""
+    deck = "*NODE\n" + "".join(
+        f"{k + 1},{x},{y},{z}\n"
+        for k, (x, y, z) in enumerate(
+            [(0, 0, 0), (2, 0, 0), (2, 3, 0), (0, 3, 0), (0, 0, 4), (2, 0, 4), (2, 3, 4), (0, 3, 4)]
+        )
+    )
+    deck += (
+        "*ELEMENT, TYPE=C3D8, ELSET=BODY\n1,1,2,3,4,5,6,7,8\n*NSET, NSET=BASE, GEENRATE\n1,4,1\n"
+    )
+    path = tmp_path / "a.inp"
+    path.write_text(deck)
+    with pytest.raises(InputError, match=r"a\.inp:12: \*NSET: got GEENRATE"):
+        read_mesh_file(path, 1e-3)
+    path.write_text(deck.replace("GEENRATE", "generate"))
+    assert read_mesh_file(path, 1e-3).mesh.node_sets.keys() >= {"BASE"}

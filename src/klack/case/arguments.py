@@ -68,7 +68,8 @@ def shown_include(item: CaseInclude, scope: Scope, origin: Origin) -> dict[str, 
         name: tuple(copy[name] for copy in copies) if isinstance(text, list) else copies[0][name]
         for name, text in item.arguments.items()
     }
-    return {"file": item.file, "as": item.name, "count": item.count, "with": values}
+    count = {} if item.count is None else {"count": item.count}
+    return {"file": item.file, "as": item.name, **count, "with": values}
 
 
 def _require_count(item: CaseInclude, values: list[Any], where: str) -> None:

@@ -99,7 +99,7 @@ def _parsed(text: str, path: Path) -> tuple[Any, Lines]:
             hint="close the brackets; write out aliases; shorten numbers.",
         ) from None
     except MarkedYAMLError as error:
-        raise _syntax_error(error, path) from None
+        raise _syntax_error(error, text, path) from None
     except (YAMLError, ValueError, LookupError, TypeError, RecursionError) as error:
         raise InputError(
             str(path),
@@ -229,6 +229,10 @@ _YAML_WORDS = {
         "brackets that are not closed, or values without a comma between them",
         "close the bracket { or [ that was opened here or before; separate values by commas.",
     ),
+    "found undefined alias": (
+        "a value that begins with *, the sign of a value that is named elsewhere",
+        "write the value itself, or put it into quotes.",
+    ),
     "found unexpected end of stream": ("a quote that is not closed", "close it."),
 }
 """Begin of a problem of the parser; what it means, and what to do."""
@@ -237,7 +241,37 @@ _SEEN_LATE = ("could not find expected ':'", "expected ',' or", "found unexpecte
 """Problems that lie where the text begins that the parser was reading."""
 
 
-def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
+_NO_DASH = re.compile(r"\s*(-[^\s-]|[\u2010-\u2015*\u2022]\s)")
+_NO_COLON = re.compile(r"\s*[A-Za-z_][^:#]*(:\S[^:]*)?")
+
+
+def _mistyped(lines: list[str], line: int, column: int) -> tuple[int, str, str] | None:
+    """Line, meaning and advice where the signs about a place tell what was mistyped there."""
+    here = lines[line] if line < len(lines) else ""
+    before = next((k for k in range(line - 1, -1, -1) if lines[k].strip()), None)
+    for k in (line, before):
+        if k is not None and _NO_DASH.match(lines[k]):
+            return k, "a dash without a blank behind it, or another sign", "begin with '- '."
+    if before is not None and lines[before].lstrip().startswith("- ") and here.lstrip()[:1] == "{":
+        return line, "an item of a list without its dash", "begin with '- '."
+    if here[column : column + 1] in ("}", "]") and column:
+        return line, "a bracket too many", "remove it."
+    if here[column : column + 1] == "," and column:
+        meaning = "a comma behind a value that stands in no brackets"
+        return line, meaning, "remove it, or put brackets {...} or [...] around all values."
+    if "(" in here[:column] and ")" in here[column:]:
+        return line, "round brackets", "write {key: value} or [value, value]."
+    if before is not None and not lines[before].lstrip().startswith("- "):
+        if _NO_COLON.fullmatch(lines[before]) and not lines[before].rstrip().endswith((",", "{")):
+            return (
+                before,
+                "a line without 'key: value'",
+                "write a colon and a blank behind the key.",
+            )
+    return None
+
+
+def _syntax_error(error: MarkedYAMLError, text: str, path: Path) -> InputError:
     mark = error.problem_mark or error.context_mark
     if any(words in str(error.problem) for words in _SEEN_LATE):
         mark = error.context_mark or mark
@@ -248,6 +282,9 @@ def _syntax_error(error: MarkedYAMLError, path: Path) -> InputError:
     for problem, (meaning, advice) in _YAML_WORDS.items():
         if problem in str(error.problem):
             said, hint = meaning, advice
+    if mark and (found := _mistyped(text.splitlines(), mark.line, mark.column)):
+        line, said, hint = found
+        where, column = f"{path}:{line + 1}", column * (line == mark.line)
     return InputError(
         where,
         got=f"text that is not YAML{column}: {said}",

@@ -64,7 +64,7 @@ def require_known(
             key,
             got=f"the unknown {what} '{name}'",
             expected=f"one of: {one_of(known)}",
-            hint=nearest(name, known, f"name a {what} that this case defines."),
+            hint=nearest(name, known, f"name a {what} that this case defines, or define it."),
             on_key=on_key,
         )
 

@@ -9,7 +9,7 @@ from pydantic_core import ErrorDetails
 from klack.case.origin import ExpandedCase
 from klack.errors import InputError
 from klack.input.computed import Computed
-from klack.input.problem import CaseProblem, Key, nearest
+from klack.input.problem import CaseProblem, Key, key_text, nearest
 from klack.input.section import Section
 from klack.units import QuantityError
 
@@ -25,6 +25,11 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
     hint = problem.hint
     if problem.on_key and problem.got.startswith("the unknown key") and problem.key:
         hint = _with_its_place(case, key, hint)
+    if problem.got.startswith("no key '"):
+        name = problem.got.split("'")[1]
+        if (path := _elsewhere(found.data, name, ())) and path[:-1] != key:
+            line = found.origin(path).where(on_key=True).removesuffix(f": {key_text(path)}")
+            hint = f"'{name}' stands in '{key_text(path[:-1])}' ({line}): check its indentation."
     if more:
         hint += f"\n({more} more {'problem' if more == 1 else 'problems'} in this file.)"
     got, written = problem.got, found.expressions.get(key)
@@ -32,6 +37,15 @@ def first_error(case: type[Section], error: ValidationError, found: ExpandedCase
         got += f", from '{written.text}'"
     where = found.origin(key).where(on_key=problem.on_key)
     return InputError(where, got=got, expected=problem.expected, hint=hint)
+
+
+def _elsewhere(data: Any, name: str, path: Key) -> Key:
+    """Path of the first key of this name in a case; empty without one."""
+    if not isinstance(data, dict):
+        return ()
+    if name in data:
+        return (*path, name)
+    return next((at for k, v in data.items() if (at := _elsewhere(v, name, (*path, k)))), ())
 
 
 def _with_its_place(case: type[BaseModel], key: Key, hint: str) -> str:
@@ -171,6 +185,10 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
         return "a number without unit", "write the minus as '-'." if minus else _WITHOUT_UNIT
     if kind == "int_type" and isinstance(value, str) and not _is_number(value):
         return "a whole number", "write digits, such as 5."
+    if kind == "tuple_type" and isinstance(value, dict):
+        return "a list", f"write '- ' in front of each item, or [{next(iter(value), '')}, ...]."
+    if kind == "tuple_type" and isinstance(value, str) and not set(value) & set("[]{}"):
+        return "a list", f"write it in brackets: [{value[:80]}]."
     if kind in _TYPES:
         return _TYPES[kind]
     if kind in _BOUNDS:
@@ -196,9 +214,15 @@ def _words(kind: str, context: dict[str, Any], value: Any) -> tuple[str, str]:
     if kind == "too_short":
         return f"at least {context['min_length']} of them", "add what is missing."
     if kind == "too_long":
-        return f"at most {context['max_length']} of them", "remove the surplus value."
+        most = context["max_length"]
+        commas = most == 2 and len(value) in (3, 4) and any(isinstance(x, int) for x in value)
+        hint = "remove the surplus value." + " A decimal sign is a point: [2.5, 1.9]." * commas
+        return f"at most {most} of them", hint
     if kind == "missing":
-        return "a list with one more value", "a point is [r, z], a pair is [first, second]."
+        return (
+            "a list with one more value",
+            "separate values by commas: a point is [r, z], a pair is [first, second].",
+        )
     if kind == "string_too_short":
         return "some text", "write one line."
     return "", ""

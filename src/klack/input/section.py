@@ -1,5 +1,6 @@
 """Base class of all sections of a case: frozen, documented, and strict about their keys."""
 
+import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Self
 
@@ -11,8 +12,10 @@ from pydantic import (
     GetJsonSchemaHandler,
     Strict,
     StringConstraints,
+    ValidationInfo,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
@@ -36,39 +39,51 @@ class Section(BaseModel):
 
     @model_validator(mode="before")
     @classmethod
-    def _known_keys(cls, value: Any) -> Any:
+    def _known_keys(cls, value: Any, info: ValidationInfo) -> Any:
         if isinstance(value, cls):
             return value
-        known = {info.alias or name: info for name, info in cls.model_fields.items()}
+        known = {field.alias or name: field for name, field in cls.model_fields.items()}
         if not isinstance(value, Mapping):
-            hint = "indent the keys below this one, or write {key: value, ...}."
-            required = [key for key, info in known.items() if info.is_required()]
-            if isinstance(value, str) and len(required) == 1:
-                hint = f"write {{{required[0]}: {value[:80]}}}."
+            got, hint = _no_mapping(value, known)
             raise CaseProblem(
                 (),
-                got="nothing" if value is None else f"'{value}'"[:80],
+                got=got,
                 expected=f"a mapping with the keys: {one_of(known)}",
                 hint=hint,
             )
         for key in value:
             if key not in known:
-                otherwise = "remove it, or check its indentation."
-                if str(key)[:1].isdigit():
+                name, colon, rest = str(key).partition(":")
+                if str(key).endswith(")"):
+                    otherwise = "lists stand in square brackets: [1, 2]."
+                elif str(key)[:1].isdigit():
                     otherwise = "a comma separates keys: use a point as decimal sign."
+                else:
+                    otherwise = "remove it, or check its indentation."
+                hint = nearest(str(key), known, otherwise)
+                if colon and name.strip() in known:
+                    hint = f"write a blank behind the colon: {name.strip()}: {rest.strip()}"
                 raise CaseProblem(
                     (key,),
                     got=f"the unknown key '{key}'",
                     expected=f"one of: {one_of(known)}",
-                    hint=nearest(str(key), known, otherwise),
+                    hint=hint,
                     on_key=True,
                 )
-        for key, info in known.items():
-            if info.is_required() and key not in value:
+            own = known[key]  # a key whose default is another value says with null that it is off
+            if value[key] is None and own.get_default() is None and info.context is not None:
+                raise CaseProblem(
+                    (key,),
+                    got="nothing",
+                    expected=f"{key}: {(own.description or '').rstrip('.')}",
+                    hint=f"write its value, or remove '{key}'.",
+                )
+        for key, field in known.items():
+            if field.is_required() and key not in value:
                 raise CaseProblem(
                     (),
                     got=f"no key '{key}'",
-                    expected=f"{key}: {(info.description or '').rstrip('.')}",
+                    expected=f"{key}: {(field.description or '').rstrip('.')}",
                     hint=f"add '{key}' here; klack schema describes every key.",
                 )
         return value
@@ -97,6 +112,21 @@ class Section(BaseModel):
                     on_key=True,
                 )
         return self
+
+
+def _no_mapping(value: Any, known: Mapping[str, FieldInfo]) -> tuple[str, str]:
+    """What stands there in place of a section, and what to write."""
+    if isinstance(value, list):
+        return "a list", "remove the dashes or brackets around its keys."
+    if isinstance(value, str):
+        first, _, rest = re.sub(r"\s*[:=]\s*|\s+", " ", value[:80]).partition(" ")
+        required = [key for key, info in known.items() if info.is_required()]
+        if first in known:
+            return f"'{value}'"[:80], f"write '{first}: {rest}', with a colon and a blank."
+        if len(required) == 1:
+            return f"'{value}'"[:80], f"write {{{required[0]}: {value[:80]}}}."
+    got = "nothing" if value is None else f"'{value}'"[:80]
+    return got, "indent the keys below this one, or write {key: value, ...}."
 
 
 class NamedSection(Section):

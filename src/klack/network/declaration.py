@@ -60,7 +60,11 @@ def read_component(value: Any, context: Any = None) -> Component:
     if not isinstance(value, Mapping) or not isinstance(value.get("type"), str):
         raise CaseProblem(
             (),
-            got="a mapping without the key 'type'" if isinstance(value, Mapping) else f"'{value}'",
+            got=f"'{value}'"
+            if not isinstance(value, Mapping)
+            else f"type: {value['type']}"
+            if "type" in value
+            else "a mapping without the key 'type'",
             expected=f"type: one of {one_of(type_words())}",
             hint="write e.g. {type: spring, stiffness: 5 N/mm, preload: 20 N}.",
         )

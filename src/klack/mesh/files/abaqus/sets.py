@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.input.problem import one_of
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
 from klack.mesh.files.abaqus.names import Names
 from klack.mesh.files.abaqus.numbering import Numbering, distinct
@@ -18,6 +19,7 @@ __all__ = ["NamedSets", "read_members"]
 LARGEST_MEMBERS = 200_000_000
 """Most members of all node sets, or of all element sets, together."""
 
+_FLAGS = {"GENERATE", "INTERNAL", "UNSORTED"}
 _MANY = 50
 _FEW = 100_000
 _PER_ARRAY = 20  # numbers that would take the memory of an empty array
@@ -90,7 +92,15 @@ def read_members(
     resolve : function of a data line and a text to int array
         Rows of a value that is not a number that is known; raises if there is no such set.
     """
-    if "GENERATE" in keyword.parameters:
+    flags = {name for name, value in keyword.parameters.items() if not value}
+    if unknown := flags - _FLAGS:
+        raise InputError(
+            f"{keyword.place}: *{keyword.name}",
+            got=", ".join(sorted(unknown)),
+            expected=one_of(sorted(_FLAGS)),
+            hint="without GENERATE, a range is read as three members of the set.",
+        )
+    if "GENERATE" in flags:
         return _collected(
             numbering.within(*_range(line)) for line in keyword.lines() if line.fields
         )

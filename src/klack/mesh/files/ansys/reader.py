@@ -134,7 +134,7 @@ def _whole(archive: Archive, row: int, text: str) -> int:
     return int(text)
 
 
-_FORMULA = re.compile(r"[A-Za-z_][\w%()*/+-]*|\d+[*/+-][\w%()*/+-]+")
+_FORMULA = re.compile(r"[A-Za-z_(][\w%()*/+-]*|\d+[*/+-][\w%()*/+-]+")
 
 
 def _no_number(archive: Archive, row: int, text: str, expected: str) -> InputError:

@@ -23,6 +23,7 @@ __all__ = ["BulkData", "Card", "read_bulk"]
 
 _WIDEST = 32  # columns of a free field
 _CHUNK = 50_000
+_MESH_CARDS = (b"GRID", b"GRID*", b"CHEXA", b"CHEXA*", b"CTETRA", b"CTETRA*", b"CPENTA", b"CPENTA*")
 
 
 @dataclass(frozen=True, slots=True)
@@ -380,5 +381,15 @@ def _split(
             "whole, as one for INCLUDE, add ENDDATA as its last line.",
         )
     last = first + int(end[0])
+    behind = np.flatnonzero(np.isin(words[last + 1 :], _MESH_CARDS))
+    if len(behind):
+        row = int(filled[last + 1 + behind[0]])
+        raise InputError(
+            lines.place(row),
+            got=f"{words[last + 1 + behind[0]].decode()} behind ENDDATA",
+            expected="ENDDATA as the last line of the bulk data",
+            hint="lines are out of order, or two files in one: write it again, or remove what "
+            "stands behind ENDDATA.",
+        )
     head = tuple(lines.line(row) for row in filled[: max(first - 1, 0)].tolist())
     return head, filled[first:last]
