@@ -133,7 +133,7 @@ def test_bad_arguments_give_one_message_and_exit_2(name, capsys, tmp_path):
         ("count: 20", "count: 0", ":45: reduction.modes.needle.count", "0 modes"),
         ("gap: 0", "gap: -2 um", ":43: contact.gap", "already penetrate"),
         ("title:", "title: a\ntitle:", ":3: title", "a second time"),
-        ("klack: 1", "hello", ":2", "not YAML"),
+        ("klack: 1", "hello", ":1", "without 'key: value'"),  # where it stands
     ],
 )
 @pytest.mark.parametrize("command", ["impact", "reduce"])

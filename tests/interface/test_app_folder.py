@@ -66,8 +66,16 @@ def test_no_link_is_followed(folder):
             folder.write(path, TEXT)
         with pytest.raises(InputError):
             folder.make_file(path, TEXT)
-    assert folder.look().cases == ("valve/case.yaml",)
+    found = folder.look()
+    assert found.cases == ("valve/case.yaml",)
+    assert found.odd == ("link.yaml (a symbolic link)", "up (a symbolic link)")
     assert (folder.path.parent / "secret.yaml").read_text() == "klack: secret\n"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+def test_a_case_of_any_editor_is_listed(folder, encoding):
+    (folder.path / "a.yaml").write_bytes(TEXT.encode(encoding))
+    assert folder.look().cases == ("a.yaml", "valve/case.yaml")
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")

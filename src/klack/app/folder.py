@@ -114,7 +114,8 @@ class OpenFolder:
                 if entry.name.startswith(".") or entry.name in _LEFT_OUT:
                     continue
                 is_folder = entry.is_dir(follow_symlinks=False)
-                if not is_folder and not entry.name.lower().endswith(_ENDINGS):
+                named = is_folder or entry.name.lower().endswith(_ENDINGS)
+                if not named and not (entry.is_symlink() and entry.is_dir()):
                     continue
                 here = Path(entry.path).relative_to(self.path).as_posix()
                 if reason := _oddness(entry, is_folder):
@@ -402,6 +403,9 @@ def _oddness(entry: "os.DirEntry[str]", is_folder: bool) -> str:
         return "gone at this moment"
 
 
+_MARKS = b"\xef\xbb\xbf\xff\xfe"  # that editors put in front of a text
+
+
 def _is_case(path: Path) -> bool:
     """Whether a file begins like a case: with its version, in the first lines."""
     try:
@@ -410,7 +414,8 @@ def _is_case(path: Path) -> bool:
             head = file.read(4096) if is_file else b""
     except OSError:
         return False
-    return any(line.startswith(b"klack:") for line in head.splitlines())
+    text = head.replace(b"\0", b"").lstrip(_MARKS)  # UTF-16 is refused when it is opened
+    return any(line.startswith(b"klack:") for line in text.splitlines())
 
 
 def _too_large(relative: str, size: int, largest: int) -> InputError:
