@@ -1,15 +1,17 @@
 """A server of ``klack app`` and pages of a browser before it; the folder is that of each test."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import psutil
 import pytest
 from browser_pages import watched
 from page_rules import WIDTHS
 from served_app import Served
 
-__all__ = ["LONG", "client", "page", "require_within", "server", "settle"]
+__all__ = ["LONG", "client", "page", "require_within", "server", "settle", "slow"]
 
 LONG = 300_000  # [ms]: a loaded machine meshes, imports and compiles
 
@@ -41,6 +43,24 @@ def page(browser: Any, server: Served) -> Iterator[Any]:
     yield found
     context.close()
     assert said == []
+
+
+@contextmanager
+def slow(server: Served, kind: str) -> Iterator[None]:
+    """A process that computes for the pages answers nothing meanwhile; ``"reader:Reader"``."""
+    found = [
+        child
+        for child in psutil.Process(server.process.pid).children(recursive=True)
+        if f"klack.app.{kind}" in child.cmdline()
+    ]
+    assert found
+    for process in found:
+        process.suspend()
+    try:
+        yield
+    finally:
+        for process in found:
+            process.resume()
 
 
 _SETTLED = """() => {

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-__all__ = ["PAGES", "Place", "made_folder", "watched"]
+__all__ = ["PAGES", "Place", "made_folder", "planned", "watched"]
 
 CASE = "valve/case.yaml"
 _COMPUTED = (
@@ -75,7 +75,7 @@ def _refused(page: Any) -> None:
     page.wait_for_selector("text=not valid, not saved")
 
 
-def _planned(step: int, **other: str) -> Callable[[Path], None]:
+def planned(step: int, **other: str) -> Callable[[Path], None]:
     """The guide at a step, with the drawings of the example and their faces chosen."""
 
     def keep(folder: Path) -> None:
@@ -115,7 +115,7 @@ PAGES = (
     Place("bodies of a result", "/show?path=klack-results/impact", ".ks-view canvas"),
     Place("new valve", "/new", ".k-steps button", before=_unplanned),
     *(
-        Place(f"new valve, {name}", "/new", ready, before=_planned(step, **other))
+        Place(f"new valve, {name}", "/new", ready, before=planned(step, **other))
         for step, name, ready, other in (
             (0, "drawings", "textarea", {}),
             (1, "faces", ".ks-view canvas", {}),

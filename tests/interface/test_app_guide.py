@@ -13,8 +13,8 @@ from klack.case.valve_reader import load_any_case
 from klack.mesh.solid import write_step_revolved
 
 pytest.importorskip("nicegui")
-from app_browser import LONG, require_within, server, settle
-from browser_pages import watched
+from app_browser import LONG, require_within, server, settle, slow
+from browser_pages import planned, watched
 from served_app import Served
 
 __all__ = ["server"]  # fixture
@@ -209,6 +209,24 @@ def test_from_drawings_by_keyboard_and_it_survives(page, server, folder, browser
     page.get_by_role("button", name="Write, open editor").press("Enter")
     page.wait_for_selector("text=valid impact, saved")
     assert (folder / "drawn" / "case.yaml").is_file()
+
+
+def test_what_rests_on_the_checks_cannot_be_pressed_before_they_are_done(page, server, folder):
+    planned(3)(folder)
+    page.goto(f"{server.base}/new")
+    page.wait_for_selector("text=Closing force")
+    with slow(server, "shapes:Shapes"):
+        onward(page, "text=Checking ...")
+        assert page.locator("#k-next").is_disabled()
+        assert page.get_by_role("button", name="6 Case").is_disabled()
+    page.wait_for_selector("text=static hold")
+    assert page.get_by_role("button", name="6 Case").is_enabled()
+    with slow(server, "shapes:Shapes"):
+        onward(page, "text=writing ...")
+        writing = page.get_by_role("button", name="Write")
+        assert [writing.nth(k).is_disabled() for k in range(writing.count())] == [True] * 3
+    page.wait_for_selector("text=klack: 1")
+    assert writing.first.is_enabled()
 
 
 def test_what_is_done_while_parts_are_read_is_kept(page, server):

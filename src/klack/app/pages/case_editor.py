@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from itertools import groupby
 from typing import Any
 from urllib.parse import urlencode
@@ -23,6 +24,7 @@ from klack.app.pages.frame import (
 from klack.app.pages.study_panel import StudyPanel
 from klack.app.state import State
 from klack.errors import KlackError
+from klack.input.problem import Key
 
 __all__ = ["case_editor_page"]
 
@@ -56,15 +58,24 @@ def _begins_a_study(text: str) -> bool:
 
 
 class _Editor:
-    """Form and text of one case; the text is the truth, the form follows from it."""
+    """Form and text of one case; the text is the truth, the form follows from it.
+
+    The browser counts what is typed there (``klackTyped``, ``klackChanged``).  Values of boxes are
+    written into the text one after another.  A text that was typed before the browser had one with
+    a value gets this value again, and an answer that is older than what was typed changes nothing.
+    """
 
     def __init__(self, state: State, case: str, saved: str) -> None:
         self._state, self._case, self._saved = state, case, saved
         self._draft = draft = state.notes.draft(case)
         self._text = saved if draft is None else draft
-        self._changes = 0
+        self._count = 0  # of the last change that came from the browser
+        self._turn = asyncio.Lock()  # of who writes values into the text, and checks it
+        self._values: dict[Key, tuple[int, str]] = {}  # of boxes, with their counts
+        self._waiting: dict[Key, str] = {}  # those of them that the text does not have yet
         self._is_too_long = False  # what is seen is longer than the text that is known here
-        self._given: dict[str, str] = {}
+        self._keys: frozenset[FormField] = frozenset()
+        self._items: dict[str, FormField] = {}  # of all boxes so far, by their names in the page
         self._open = {"case", "motion", "contact", "parameters", "objectives"}
 
     def build(self) -> None:
@@ -89,6 +100,13 @@ class _Editor:
             with ui.element("section"):
                 heading("Form").classes("k-sr")
                 self._form = ui.element("div").classes("k-sheet k-form")
+                # not of each box: what one tells as the form is made again would be dropped
+                for event in ("change", "focusout"):
+                    self._form.on(
+                        event,
+                        self._changed,
+                        js_handler="(e) => window.klackChanged(e, emit)",
+                    )
             with ui.element("section").classes("k-sheet"):
                 heading("YAML").classes("k-sr")
                 self._area = plain(self._text, "textarea")
@@ -98,30 +116,63 @@ class _Editor:
                 self._area.on(
                     "input",
                     self._typed,
-                    js_handler=f"(e) => emit(JSON.stringify(e.target.value).length > {_LONGEST} "
-                    "? null : e.target.value)",
+                    js_handler=f"(e) => emit(window.klackTyped(e.target, {_LONGEST}))",
                 )
-        ui.timer(0.05, self._check, once=True)
+        ui.timer(0.05, self._settle, once=True)
 
     # ----------------------------------------------------------------------- from the text
 
     async def _typed(self, event: Any) -> None:
-        self._changes += 1
-        self._is_too_long = event.args is None
+        text, self._count, known = event.args
+        self._is_too_long = text is None
         if self._is_too_long:
             self._status.set_text("too long, not kept")
             self._status.classes(remove="good fair", add="out")
             self._message.set_text(_TOO_LONG)
             return
-        self._text = str(event.args)
-        mine = self._changes
+        self._text = str(text)
+        self._waiting = {key: value for key, (at, value) in self._values.items() if at > known}
+        mine = self._begin()
         await asyncio.sleep(_REST)
-        if mine == self._changes:
+        if mine == self._count:
+            await self._settle()
+
+    def _begin(self) -> int:
+        """Say that what is seen is not checked yet; return the count of this change."""
+        self._status.classes(remove="good fair out")
+        self._status.set_text("checking ...")
+        return self._count
+
+    async def _settle(self) -> None:
+        """Write what waits, then check the text: a check waits for the one before it."""
+        async with self._turn:
+            await self._write()
             await self._check()
 
+    async def _write(self) -> None:
+        """Write the values that wait into the text, each into the one that has come by then."""
+        if not self._waiting:
+            return
+        while self._waiting:
+            place, value = next(iter(self._waiting.items()))
+            text = self._text
+            try:
+                found = await self._state.reader.call("exchange", text, self._path, place, value)
+            except KlackError as error:
+                with self._form:
+                    show_error(error)
+                self._values.pop(place, None)
+                found = text
+            if text != self._text:  # typed meanwhile, and what waits now is another list
+                continue
+            self._text = found
+            if self._waiting.get(place) == value:
+                del self._waiting[place]
+        self._show_text()
+
     async def _check(self) -> None:
-        """Keep the draft; say what the checker says; make the form of a valid text."""
-        text, mine = self._text, self._changes
+        """Keep the draft; say what the checker says; show a valid text in the form."""
+        text, mine = self._text, self._count
         trouble = ""
         try:
             if not await self._keep(text if text != self._saved else None):
@@ -131,9 +182,11 @@ class _Editor:
         try:
             found: Checked = await self._state.reader.call("check", text, self._path)
         except (KlackError, OSError) as error:
-            show_error(error)
+            self._status.set_text("not checked")
+            with self._form:
+                show_error(error)
             return
-        if mine != self._changes:
+        if mine != self._count or self._is_too_long:
             return
         with self._form:
             self._message.set_text("\n".join(filter(None, (found.error, trouble))))
@@ -142,8 +195,6 @@ class _Editor:
             valid = "not valid" if found.error else f"valid {found.kind}"
             self._status.set_text(f"{valid}, {unsaved}")
             if not found.error:
-                self._form.clear()
-                self._given.clear()
                 self._show_form(found.fields)
                 self._of_case.set_visibility(found.kind != "study")
                 self._above.set_visibility(found.has_study)
@@ -164,31 +215,45 @@ class _Editor:
     # ----------------------------------------------------------------------- from the form
 
     def _show_form(self, fields: tuple[FormField, ...]) -> None:
+        """Show the values; the form is made again only where the text has other keys now."""
+        keys = frozenset(replace(item, written=_kind_of_box(item), default="") for item in fields)
+        if keys != self._keys:
+            self._keys = keys
+            self._form.clear()
+            self._make_form(fields)
+        found = {f"f-{item.key}": item for item in fields}
+        self._items |= found
+        values = {box: (item.written, item.default or item.example) for box, item in found.items()}
+        self._tell("klackBoxes", values)
+
+    def _make_form(self, fields: tuple[FormField, ...]) -> None:
         ordered = sorted(fields, key=lambda item: item.section != "case")
         sections: dict[str, list[FormField]] = {}
         for name, items in groupby(ordered, key=lambda item: item.section):
             sections.setdefault(name, []).extend(items)
         for name, found in sections.items():
-            with ui.element("details") as part:
-                if name in self._open:
-                    part.props["open"] = True
-                part.on(
-                    "toggle",
-                    lambda event, name=name: self._toggled(name, bool(event.args)),
-                    js_handler="(e) => emit(e.target.open)",
-                )
-                plain(name.replace("_", " "), "summary")
+            with self._folded(name, name.replace("_", " ")):
                 for item in (item for item in found if item.written):
                     self._show_field(item)
                 further = [item for item in found if not item.written]
                 if further:
-                    with ui.element("details"):
-                        plain(f"further keys: {len(further)}", "summary").classes("k-soft")
+                    with self._folded(f"{name}/", f"further keys: {len(further)}", "k-soft"):
                         for item in further:
                             self._show_field(item)
 
-    def _toggled(self, name: str, is_open: bool) -> None:
-        (self._open.add if is_open else self._open.discard)(name)
+    def _folded(self, name: str, words: str, more: str = "") -> ui.element:
+        """A part that is open where it was open before."""
+        part = ui.element("details")
+        if name in self._open:
+            part.props["open"] = True
+        part.on(
+            "toggle",
+            lambda event: (self._open.add if event.args else self._open.discard)(name),
+            js_handler="(e) => emit(e.target.open)",
+        )
+        with part:
+            plain(words, "summary").classes(more)
+        return part
 
     def _show_field(self, item: FormField) -> None:
         with ui.element("div").classes("k-field"):
@@ -206,7 +271,7 @@ class _Editor:
 
     def _show_entry(self, item: FormField) -> None:
         box: ui.element
-        if item.choices and (item.written in item.choices or not item.written):
+        if _kind_of_box(item) == "select":
             box = ui.element("select")
             with box:
                 for word in (("",) if not item.written else ()) + item.choices:
@@ -220,53 +285,42 @@ class _Editor:
             if not item.written:
                 box.props["placeholder"] = item.default or item.example
         box.classes("k-input").props["id"] = f"f-{item.key}"
-        box.on(
-            "change",
-            lambda event: self._exchange(item, str(event.args)),
-            js_handler="(e) => emit(e.target.value)",
-        )
+        box.props["data-told"] = item.written
 
-    async def _exchange(self, item: FormField, value: str) -> None:
+    async def _changed(self, event: Any) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
-        now = self._given.get(item.key, item.written)
-        if value == now:
-            return
-        if not value.strip():  # to remove a key is for the text, which shows what goes with it
-            self._fill(item, now)
+        box, value, count = event.args
+        item = self._items[box]
+        if not value:  # to remove a key is for the text, which shows what goes with it
             ui.notify(f"{item.label} stays as it was. To remove the key, delete it in the text.")
             return
-        try:
-            text = await self._state.reader.call(
-                "exchange", self._text, self._path, item.place, value
-            )
-        except KlackError as error:
-            show_error(error)
+        self._count = count
+        if self._is_too_long:
+            self._message.set_text(f"{item.label} is not changed. {_TOO_LONG}")
             return
-        self._given[item.key] = value  # the form of a text that is not valid stays as it was
-        self._set(text)
-        await self._check()
+        self._values[item.place] = count, value
+        self._waiting[item.place] = value
+        self._begin()
+        await self._settle()
 
-    def _fill(self, item: FormField, value: str) -> None:
-        """Show a value in the box of the form again."""
-        self._area.client.run_javascript(
-            f"document.getElementById({json.dumps(f'f-{item.key}')}).value = {json.dumps(value)}"
-        )
+    def _show_text(self) -> None:
+        self._tell("klackText", self._text)
 
-    def _set(self, text: str) -> None:
-        self._text, self._is_too_long = text, False
-        self._changes += 1
-        self._area.client.run_javascript(
-            f"document.getElementById('k-yaml').value = {json.dumps(text)}"
-        )
+    def _tell(self, function: str, what: object) -> None:
+        """Hand something to the page, with the last change that it knows."""
+        call = f"{function}({json.dumps(what)}, {self._count})"
+        self._area.client.run_javascript(f"window.{call}")
 
     # ----------------------------------------------------------------------- keeping it
 
     async def _save(self) -> bool:
         """Replace the file as a whole; what another program wrote meanwhile is not overwritten."""
-        text = self._text
         if self._is_too_long:
             self._message.set_text(f"Not saved. {_TOO_LONG}")
             return False
+        async with self._turn:
+            await self._write()
+        text = self._text
         try:
             now = await asyncio.to_thread(self._state.folder.case_text, self._case)
             if now not in (self._saved, text):
@@ -281,7 +335,7 @@ class _Editor:
             show_error(error)
             return False
         self._saved = text
-        await self._check()
+        await self._settle()
         return True
 
     async def _run(self) -> None:
@@ -289,6 +343,8 @@ class _Editor:
         if self._is_too_long:
             self._message.set_text(f"Not run. {_TOO_LONG}")
             return
+        async with self._turn:
+            await self._write()
         try:
             saved = await asyncio.to_thread(self._state.folder.case_text, self._case)
         except KlackError as error:
@@ -331,10 +387,18 @@ class _Editor:
         ui.navigate.to("/")
 
     async def _discard(self) -> None:
-        try:
-            self._saved = await asyncio.to_thread(self._state.folder.case_text, self._case)
-        except KlackError as error:
-            show_error(error)
-            return
-        self._set(self._saved)
-        await self._check()
+        async with self._turn:
+            try:
+                self._saved = await asyncio.to_thread(self._state.folder.case_text, self._case)
+            except KlackError as error:
+                show_error(error)
+                return
+            self._text, self._is_too_long = self._saved, False
+            self._values.clear()
+            self._waiting.clear()
+            self._show_text()
+            await self._check()
+
+
+def _kind_of_box(item: FormField) -> str:
+    return "select" if item.choices and item.written in ("", *item.choices) else "input"

@@ -55,6 +55,7 @@ class _Guide:
         self._state, self._plan = state, plan
         self._facts: dict[str, PartFacts | str] = {}
         self._writing, self._turn = asyncio.Lock(), asyncio.Lock()
+        self._is_checking = False  # the step that is shown has not its answer yet
 
     def build(self) -> None:
         """Make the page, then read the parts while it is shown already."""
@@ -187,9 +188,10 @@ class _Guide:
         for number, found in enumerate(self._steps):
             found.props["aria-current"] = "step" if number == self._plan.step else "false"
         for found, is_off in (
-            *((found, number > furthest) for number, found in enumerate(self._steps)),
+            *((found, number > furthest) for number, found in enumerate(self._steps[:_LAST])),
+            (self._steps[_LAST], furthest < _LAST or self._is_checking),
             (self._back, self._plan.step == 0),
-            (self._next, self._plan.step >= min(furthest, _LAST)),
+            (self._next, self._plan.step >= furthest or self._is_checking),
         ):
             found.props["disabled"] = is_off
             found.update()
@@ -201,6 +203,7 @@ class _Guide:
     async def _show(self) -> None:
         if self._plan.step > self._furthest():
             self._plan = replace(self._plan, step=self._furthest())
+        self._is_checking = STEPS[self._plan.step] == "Check"
         self._show_steps()
         shown = (
             self._show_parts,
@@ -336,10 +339,16 @@ class _Guide:
 
         async def checked() -> None:
             try:
-                found = await self._review()
+                found: Review | None = await self._review()
             except KlackError as error:
                 waiting.set_text(str(error))
                 waiting.classes("k-error")
+                found = None
+            if waiting.is_deleted:  # another step is shown, or the checks are made again
+                return
+            self._is_checking = False
+            self._show_steps()
+            if found is None:
                 return
             counts = [sum(f.grade == grade for f in found.findings) for grade in _TITLES]
             waiting.set_text(
@@ -380,6 +389,8 @@ class _Guide:
                 button("Write, open sliders", partial(self._write, "sliders")),
                 button("Write, open editor", partial(self._write, "case")),
             ]
+        for each in (write, *others):  # until there is a case to write
+            each.props["disabled"] = True
         message = plain("", "p").classes("k-error").props("role=alert")
         text = plain("writing ...", "pre").classes("k-sheet k-pad k-yaml")
         text.props["tabindex"] = "0"
@@ -395,10 +406,9 @@ class _Guide:
             if errors:
                 message.set_text("\n".join(f"{f.what}: {f.words}" for f in errors))
             text.set_text(found.text or "No case: see the checks.")
-            if not found.text:
-                for each in (write, *others):
-                    each.props["disabled"] = True
-                    each.update()
+            for each in (write, *others):
+                each.props["disabled"] = not found.text
+                each.update()
 
         ui.timer(0.05, written, once=True)
 

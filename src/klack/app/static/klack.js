@@ -55,7 +55,9 @@
     last = { e, id: named(e), tag: e.tagName, words: e.getAttribute("aria-label") || e.textContent.trim(), given: e.value };
   };
   document.addEventListener("focusin", (event) => remember(event.target));
-  document.addEventListener("change", (event) => { if (last && last.e === event.target) last.given = last.e.value; });
+  document.addEventListener("change", ({ target }) => queueMicrotask(() => {  // it comes at a removal, too
+    if (last && last.e === target && target.isConnected) last.given = target.value;
+  }));
   document.addEventListener("pointerdown", (event) => {
     if (!event.target.closest("a, button, input, select, textarea, summary, label, [tabindex], [role=dialog]")) last = null;
   });
@@ -64,13 +66,59 @@
     const found = last.id ? document.querySelector(last.id) : [...document.getElementsByTagName(last.tag)].find(same);
     if (!found) return;
     const { e, given } = last, half = e.value !== given && e.value !== undefined;
+    const from = e.selectionStart, to = e.selectionStart === 0 && e.selectionEnd === e.value?.length ? Infinity : e.selectionEnd;
     found.focus({ preventScroll: true });
     if (half) {
       found.value = e.value;
       last.given = given;  // still to be told at the end
-      if (e.selectionStart != null) found.setSelectionRange(e.selectionStart, e.selectionEnd);
     }
+    if (from != null && found.value !== undefined) found.setSelectionRange(from, Math.min(to, found.value.length));
   }).observe(document.documentElement, { childList: true, subtree: true });
+})();
+// The editor: changes of boxes and text are counted, and an answer that knows less of them comes too late for what they changed.
+(() => {
+  let count = 0;
+  window.klackTyped = (area, longest) => {
+    area.at = ++count;
+    return [JSON.stringify(area.value).length > longest ? null : area.value, count, area.known ?? 0];
+  };
+  window.klackChanged = ({ type, target: box }, emit) => queueMicrotask(() => {  // later than a removal, which tells both events
+    const told = box.dataset.told, isLeft = type === "focusout";
+    if (told === undefined || !box.isConnected || isLeft && document.activeElement === box) return;
+    if (box.value !== told && box.value.trim()) {
+      box.at = ++count;
+      box.dataset.told = box.value;
+      delete box.late;
+      emit([box.id, box.value, count]);
+    } else if (box.value !== told) {
+      box.value = told;
+      emit([box.id, "", count]);
+    } else if (isLeft && box.late !== undefined) {
+      box.value = box.dataset.told = box.late;
+      delete box.late;
+    }
+  });
+  window.klackBoxes = (values, known) => {
+    for (const [id, [value, instead]] of Object.entries(values)) {
+      const box = document.getElementById(id);
+      if (!box || box.at > known) continue;
+      if (box.placeholder !== undefined) box.placeholder = instead;
+      if (document.activeElement === box) box.late = value;
+      else if (box.value !== value || box.dataset.told !== value) box.value = box.dataset.told = value;
+    }
+  };
+  window.klackText = (text, known) => {
+    const area = document.getElementById("k-yaml"), old = area.value;
+    if (area.at > known) return;
+    area.known = known;
+    if (old === text) return;
+    let from = 0, end = 0;
+    const most = Math.min(old.length, text.length);
+    while (from < most && old[from] === text[from]) from++;
+    while (end < most - from && old[old.length - 1 - end] === text[text.length - 1 - end]) end++;
+    area.setRangeText(text.slice(from, text.length - end), from, old.length - end, "preserve");  // the cursor stays
+  };
+  addEventListener("beforeunload", () => document.activeElement?.blur());  // half typed: told before the page goes
 })();
 // The Tab key goes round within a dialog.
 document.addEventListener("keydown", (event) => {
