@@ -49,6 +49,61 @@ def test_cases_are_listed_and_copied(page, folder):
     require_within(page)
 
 
+MOVING = """document.addEventListener("click", () => {
+  const more = document.createElement("div");
+  more.style.height = document.querySelector(".k-row").getBoundingClientRect().height + "px";
+  document.getElementById("k-body").prepend(more);
+}, { once: true })"""
+
+
+def test_a_double_click_starts_what_was_under_the_pointer_and_only_once(page, server, folder):
+    """The list moves by a row at the first click, as it does once the run is shown above it."""
+    text = (folder / CASE).read_text("utf-8")
+    for name in ("a", "b"):
+        (folder / "valve" / f"{name}.yaml").write_text(text, "utf-8")
+    jobs = Jobs(OpenFolder(folder))
+    for move in (True, False):
+        page.goto(f"{server.base}/")
+        run = page.get_by_role("button", name="Run valve/b.yaml")
+        run.scroll_into_view_if_needed()
+        page.get_by_role("button", name=f"Note {CASE}").wait_for()
+        box = run.bounding_box()
+        if move:
+            page.evaluate(MOVING)
+        page.mouse.dblclick(box["x"] + 5, box["y"] + 5, delay=20)
+        page.wait_for_selector("text=klack impact valve/b.yaml")
+        page.wait_for_timeout(700)
+        (job,) = jobs.all()
+        jobs.cancel(job.name)
+        page.get_by_role("button", name="Dismiss").click()
+        assert job.case == "valve/b.yaml"
+        assert page.locator(".q-notification").count() == 0
+        page.wait_for_selector("text=klack impact valve/b.yaml", state="detached")
+    for name in ("a", "b"):
+        (folder / "valve" / f"{name}.yaml").unlink()
+
+
+def test_all_of_a_long_list_is_found_by_a_part_of_its_name(page, server, folder):
+    (folder / "many").mkdir()
+    for number in range(130):
+        (folder / "many" / f"c{number:03}.yaml").write_text(f"klack: 1\ntitle: {number}\n")
+    page.goto(f"{server.base}/")
+    rows = page.locator(".k-row")
+    page.wait_for_selector("text=The first 100 of 131")
+    page.get_by_label("Find").focus()
+    page.keyboard.type("C12", delay=30)
+    page.wait_for_function("document.querySelectorAll('.k-row').length === 10")
+    assert "c129.yaml" in rows.last.inner_text()
+    page.get_by_label("Find").fill("none of them")
+    page.wait_for_selector("text=No case has this in its name.")
+    page.get_by_label("Find").fill("")
+    page.wait_for_selector("text=The first 100 of 131")
+    page.get_by_role("button", name="Show 31 more").press("Enter")
+    page.wait_for_function("document.querySelectorAll('.k-row').length === 131")
+    require_within(page)
+    shutil.rmtree(folder / "many")
+
+
 def test_form_and_text_follow_each_other_and_survive(page, server, folder):
     page.goto(f"{server.base}/case?path={CASE}")
     page.wait_for_selector("text=valid impact, saved")

@@ -102,7 +102,8 @@ class OpenFolder:
         steps: list[str] = []
         odd: list[str] = []
         seen = 0
-        waiting = [(self.path, 0)]
+        waiting = [(str(self.path), 0)]
+        start = len(os.path.join(self.path, ""))
         while waiting and seen < _MOST:
             place, depth = waiting.pop()
             try:
@@ -117,15 +118,15 @@ class OpenFolder:
                 named = is_folder or entry.name.lower().endswith(_ENDINGS)
                 if not named and not (entry.is_symlink() and entry.is_dir()):
                     continue
-                here = Path(entry.path).relative_to(self.path).as_posix()
+                here = entry.path[start:].replace(os.sep, "/")
                 if reason := _oddness(entry, is_folder):
                     odd.append(f"{_shown(here)} ({reason})")
                 elif is_folder:
                     if entry.name == RESULT_NAME:
                         results.append(str(PurePosixPath(here).parent))
                     elif depth < _DEEPEST:
-                        waiting.append((Path(entry.path), depth + 1))
-                elif entry.name.endswith(_CASE_ENDINGS) and _is_case(Path(entry.path)):
+                        waiting.append((entry.path, depth + 1))
+                elif entry.name.endswith(_CASE_ENDINGS) and _is_case(entry.path):
                     cases.append(here)
                 elif entry.name.lower().endswith(_STEP_ENDINGS):
                     steps.append(here)
@@ -406,7 +407,7 @@ def _oddness(entry: "os.DirEntry[str]", is_folder: bool) -> str:
 _MARKS = b"\xef\xbb\xbf\xff\xfe"  # that editors put in front of a text
 
 
-def _is_case(path: Path) -> bool:
+def _is_case(path: str) -> bool:
     """Whether a file begins like a case: with its version, in the first lines."""
     try:
         with os.fdopen(os.open(path, os.O_RDONLY | SAFELY), "rb") as file:

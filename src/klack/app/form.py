@@ -22,8 +22,8 @@ _MOST = 400
 _LONGEST_NUMBER = 40  # characters
 
 
-def checked_text(text: str, path: str) -> Checked:
-    """Check the text of a case as every command does, and make its form."""
+def checked_text(text: str, path: str, *, has_form: bool = True) -> Checked:
+    """Check the text of a case as every command does, and make its form where it is asked for."""
     try:
         tree = tree_of(text, Path(path))
         if is_study(tree.data):
@@ -36,7 +36,7 @@ def checked_text(text: str, path: str) -> Checked:
         has_objectives=case.study is not None and bool(case.study.objectives),
         title=case.title or case.name,
         kind="stroke" if "network" in tree.data else "impact",
-        fields=tuple(form_of(case, tree)),
+        fields=tuple(form_of(case, tree)) if has_form else (),
     )
 
 

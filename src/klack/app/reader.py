@@ -48,9 +48,9 @@ class Reader:
     def __init__(self) -> None:
         self._points = StudyPoints()
 
-    def check(self, text: str, path: str) -> Checked:
+    def check(self, text: str, path: str, has_form: bool = True) -> Checked:
         """See :func:`klack.app.form.checked_text`."""
-        return checked_text(text, path)
+        return checked_text(text, path, has_form=has_form)
 
     def exchange(self, text: str, path: str, place: Key, written: str) -> str:
         """See :func:`klack.app.form.exchanged_text`."""

@@ -93,7 +93,7 @@ class _Editor:
                 link("Show", f"/show?{urlencode({'path': self._case})}")
                 link("New study", f"/new-study?{urlencode({'path': self._case})}")
                 link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
-                button("Run", self._run)
+                button("Run", self._run).props("data-once")
             button("Save", self._save, main=True).props("id=k-save")
         self._message = plain("", "p").classes("k-error").props("role=alert")
         with ui.element("div").classes("k-editor"):

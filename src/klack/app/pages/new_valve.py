@@ -390,7 +390,7 @@ class _Guide:
                 button("Write, open editor", partial(self._write, "case")),
             ]
         for each in (write, *others):  # until there is a case to write
-            each.props["disabled"] = True
+            each.props("data-once disabled")
         message = plain("", "p").classes("k-error").props("role=alert")
         text = plain("writing ...", "pre").classes("k-sheet k-pad k-yaml")
         text.props["tabindex"] = "0"

@@ -3,9 +3,10 @@
 import asyncio
 import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
 from pathlib import PurePosixPath
+from typing import Any
 from urllib.parse import urlencode
 
 from nicegui import ui
@@ -35,6 +36,10 @@ _EVERY = 1.0  # [s] that runs are looked at
 _SHORT, _LINES = 400, 8  # characters and lines of a note that is shown whole
 _AT_ONCE = 100  # rows of a list
 _NAMED = 5  # files that are left out
+_FEW = 10  # rows that are read first, and found without a search
+_REST = 0.2  # [s] without a key until names are searched
+_NONE = Found((), (), is_whole=True)
+_Row = tuple[str, ui.element]
 _HEAD = 120  # characters of one that is folded
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
 _WORDS = {
@@ -63,11 +68,15 @@ class _Overview:
         self._ended: set[str] | None = None
         self._progress: dict[str, Callable[[Job], None]] = {}
         self._most = _AT_ONCE
+        self._found, self._sought = _NONE, ""
 
     async def build(self) -> None:
         """Make the page, then fill it while it is shown already."""
         self._jobs = ui.element("section").classes("k-section")
-        self._cases = ui.element("section").classes("k-section")
+        with ui.element("section").classes("k-section"):
+            self._head = ui.element("div")
+            self._search = _search_box(self._find)
+            self._cases = ui.element("div")
         self._results = ui.element("section").classes("k-section")
         self._show_jobs()
         with self._cases:
@@ -77,16 +86,39 @@ class _Overview:
         ui.timer(_EVERY, self._follow)
 
     async def _fill(self) -> None:
-        found = await asyncio.to_thread(self._state.folder.look)
-        with self._cases:
-            self._cases.clear()
-            await self._show_cases(found)
+        """Look for what the folder has, and show it."""
+        self._found = await asyncio.to_thread(self._state.folder.look)
         if self._results.is_deleted:
             return
+        with self._head:
+            self._head.clear()
+            self._show_head()
+        await self._show_lists()
+        self._state.start_spare()
+
+    async def _show_lists(self) -> None:
+        self._search.set_visibility(len(self._found.cases) + len(self._found.results) > _FEW)
+        with self._cases:
+            self._cases.clear()
+            await self._show_cases()
+        if not self._results.is_deleted:
+            await self._fill_results()
+
+    async def _fill_results(self) -> None:
         with self._results:
             self._results.clear()
-            await self._show_results(found.results)
-        self._state.start_spare()
+            await self._show_results()
+
+    async def _find(self, event: Any) -> None:
+        """Show the cases and results with a part of a name, of all that were found."""
+        self._sought = mine = str(event.args)[:200].lower()
+        await asyncio.sleep(_REST)
+        if mine == self._sought and self._found is not _NONE:
+            self._most = _AT_ONCE
+            await self._show_lists()
+
+    def _shown(self, names: tuple[str, ...]) -> tuple[str, ...]:
+        return tuple(name for name in names if self._sought in name.lower())
 
     async def _follow(self) -> None:
         """Show the progress of runs; look again for results where one ended."""
@@ -101,8 +133,10 @@ class _Overview:
                     self._progress[job.name](job)
         has_new = self._ended is not None and not ended <= self._ended
         self._seen, self._ended = states, ended
-        if has_new:
-            await self._fill()
+        if has_new:  # the cases stay under the pointer
+            self._found = await asyncio.to_thread(self._state.folder.look)
+            if not self._results.is_deleted:
+                await self._fill_results()
 
     # ----------------------------------------------------------------------- runs
 
@@ -153,7 +187,7 @@ class _Overview:
 
         async def more() -> None:
             self._most += _AT_ONCE
-            await self._fill()
+            await self._show_lists()
 
         with ui.element("div").classes("k-row"):
             plain(f"The first {self._most} of {count}").classes("k-soft")
@@ -161,11 +195,11 @@ class _Overview:
 
     # ----------------------------------------------------------------------- cases
 
-    async def _show_cases(self, found: Found) -> None:
-        cases = found.cases
+    def _show_head(self) -> None:
+        found = self._found
         with ui.element("div").classes("k-head"):
             heading("Cases")
-            link("New valve", "/new").classes("k-main-btn" if not cases else "")
+            link("New valve", "/new").classes("k-main-btn" if not found.cases else "")
             button("New case", self._ask_new)
         if found.odd:
             more = f" and {len(found.odd) - _NAMED} more" if len(found.odd) > _NAMED else ""
@@ -178,30 +212,36 @@ class _Overview:
                 "name, or start klack app with its new one.",
                 "p",
             ).classes("k-error").props("role=alert")
-            return
-        if not cases:
+        elif not found.cases:
             plain(
                 "No case file (YAML) below this folder yet. New valve makes one from STEP files "
                 "or drawings; New case copies one that comes with klack.",
                 "p",
             ).classes("k-soft")
+
+    async def _show_cases(self) -> None:
+        cases = self._shown(self._found.cases)
+        if not cases:
+            if self._found.cases:
+                plain("No case has this in its name.", "p").classes("k-soft")
             return
         with ui.element("div").classes("k-sheet"):
             rows = [(case, _reading(case)) for case in cases[: self._most]]
             self._offer_more(len(cases))
-        for case, row in rows:
-            checked = await self._checked(case)
-            if row.is_deleted:  # the list is made anew meanwhile, or the page is left
+        for some in _parts(rows):
+            found = [await self._checked(case) for case, _ in some]
+            if some[0][1].is_deleted:  # the list is made anew meanwhile, or the page is left
                 return
-            row.clear()
-            with row:
-                self._show_case(case, checked)
+            for (case, row), checked in zip(some, found, strict=True):
+                row.clear()
+                with row:
+                    self._show_case(case, checked)
 
     async def _checked(self, case: str) -> Checked:
         try:
             text = await asyncio.to_thread(self._state.folder.case_text, case)
             found: Checked = await self._state.reader.call(
-                "check", text, str(self._state.folder.path / case)
+                "check", text, str(self._state.folder.path / case), False
             )
             return found
         except KlackError as error:
@@ -220,7 +260,7 @@ class _Overview:
         with ui.element("div").classes("k-tools"):
             is_study = checked.kind == "study"
             if not checked.error and not is_study:
-                button("Run", partial(self._run, case, checked.kind), of=case)
+                button("Run", partial(self._run, case, checked.kind), of=case).props("data-once")
                 link("Show", f"/show?{query}", of=case)
                 link("Sliders", f"/sliders?{query}", of=case)
                 link("New study", f"/new-study?{query}", of=case)
@@ -313,13 +353,15 @@ class _Overview:
 
     # ----------------------------------------------------------------------- results
 
-    async def _show_results(self, results: tuple[str, ...]) -> None:
+    async def _show_results(self) -> None:
+        results = self._shown(self._found.results)
         with ui.element("div").classes("k-head"):
             heading("Results")
             compare = link("Compare two", "#").props("id=k-compare aria-disabled=true")
         if not results:
             compare.delete()
-            plain("None yet: run a case.", "p").classes("k-soft")
+            words = "No result has this in its name." if self._sought else "None yet: run a case."
+            plain(words, "p").classes("k-soft")
             return
         self._chosen = [name for name in self._chosen if name in results]
         self._commands = {}
@@ -342,14 +384,15 @@ class _Overview:
                 words[min(len(self._chosen), 3)] if len(kinds) < 2 else "Compare: two of one kind"
             )
 
-        for name, row in rows:
-            card = await self._card(name)
-            if row.is_deleted:
+        for some in _parts(rows):
+            cards = [await self._card(name) for name, _ in some]
+            if some[0][1].is_deleted:
                 return
-            row.clear()
-            with row:
-                self._show_result(name, card, chosen)
-        chosen()
+            for (name, row), card in zip(some, cards, strict=True):
+                row.clear()
+                with row:
+                    self._show_result(name, card, chosen)
+            chosen()
 
     async def _card(self, name: str) -> ResultCard | str:
         place = self._state.folder.path / name
@@ -457,6 +500,25 @@ class _Overview:
                 button("Cancel", dialog.close)
                 button("Keep", keep, main=True)
         dialog.open()
+
+
+def _search_box(find: Callable[[Any], Awaitable[None]]) -> ui.element:
+    """Where a part of a name is typed."""
+    with ui.element("label").classes("k-search") as label:
+        plain("Find ").classes("k-soft")
+        box = ui.element("input").classes("k-input").props("type=search maxlength=200")
+        box.props["placeholder"] = "part of the name of a case or result"
+        box.on("input", find, js_handler="(e) => emit(e.target.value)")
+    label.set_visibility(False)
+    return label
+
+
+def _parts(rows: list[_Row]) -> Iterator[list[_Row]]:
+    """Rows that are shown together: the page is drawn again for each part, not for each row."""
+    begin, count = 0, _FEW
+    while begin < len(rows):
+        yield rows[begin : begin + count]
+        begin, count = begin + count, 3 * count
 
 
 def _reading(name: str) -> ui.element:

@@ -44,7 +44,7 @@ class StudyPanel:
                 self._study = button("Start the study", partial(self._start, "study"), main=True)
                 self._search = button("Search for the best", partial(self._start, "optimise"))
                 for found in (self._study, self._search):
-                    found.props["disabled"] = True
+                    found.props("data-once disabled")
             self._told = plain("", "p").classes("k-soft").props("role=status")
             self._problem = plain("", "p").classes("k-error").props("role=alert")
             self._runs = ui.element("div")

@@ -120,6 +120,21 @@
   };
   addEventListener("beforeunload", () => document.activeElement?.blur());  // half typed: told before the page goes
 })();
+// The second click of a double click is for what the first one has hit: not for what has come under the pointer since, nor for what starts but once.
+(() => {
+  let presses = 0, first = { at: -1e9 };
+  document.addEventListener("pointerdown", () => { presses++; }, true);
+  document.addEventListener("click", (event) => {
+    if (!event.detail) return;  // by a key
+    const hit = event.target.closest("button, a, label, summary"), { timeStamp: at, clientX: x, clientY: y } = event;
+    const isSecond = presses !== first.presses && at - first.at < 500 && Math.hypot(x - first.x, y - first.y) < 5;
+    if (!isSecond) first = { at, x, y, presses, hit };
+    else if (hit !== first.hit || hit?.dataset.once !== undefined) {
+      event.preventDefault();
+      event.stopImmediatePropagation();
+    }
+  }, true);
+})();
 // The Tab key goes round within a dialog.
 document.addEventListener("keydown", (event) => {
   const dialogs = event.key === "Tab" ? document.querySelectorAll("[role=dialog][aria-modal=true]") : [];
