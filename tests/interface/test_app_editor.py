@@ -33,7 +33,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def editor(page: Any, server: Served, folder: Path) -> Iterator[Any]:
     """The page of the case as it is saved, all of its form open."""
-    page.set_default_timeout(20_000)
+    page.set_default_timeout(30_000)
     page.goto(f"{server.base}/case?path={CASE}")
     page.wait_for_selector("text=valid impact, saved")
     page.evaluate("document.querySelectorAll('details').forEach(part => { part.open = true; })")
@@ -170,3 +170,27 @@ def test_a_key_that_was_not_there_is_written_and_its_neighbour_typed(editor):
     for key, value in (("crown", "1 um"), ("tilt", "0.1 deg")):
         box = editor.locator(f"[id='f-contact.{key}']")
         assert (box.input_value(), box.is_visible()) == (value, True)
+
+
+def test_a_text_of_several_lines_stays_until_it_is_changed_and_then_it_alone_changes(editor):
+    text = text_of(editor)
+    editor.locator("[id='f-title']").focus()
+    for _ in range(3):  # through its box
+        editor.keyboard.press("Tab")
+    enter(editor, "description", "Short.", end="Tab")
+
+    begin, end = text.index("description: "), text.index("materials:")
+    require(editor, f'{text[:begin]}description: "Short."\n{text[end:]}', description="Short.")
+
+
+def test_what_was_typed_at_the_moment_of_a_reload_is_there_again(editor):
+    enter(editor, SPEED, "0.4 m/s", end="")
+    editor.reload()
+    editor.wait_for_selector("text=valid impact, not saved")
+    assert 'speed: "0.4 m/s"' in text_of(editor)
+    editor.get_by_label("case file, YAML").focus()
+    editor.keyboard.press("Control+End")
+    editor.keyboard.type("# mine")
+    editor.reload()
+    editor.wait_for_selector("text=valid impact, not saved")
+    assert text_of(editor).endswith("# mine")

@@ -3,13 +3,16 @@
 import asyncio
 import os
 import socket
+import subprocess
 import sys
+import time
 from contextlib import chdir
 from pathlib import Path
 
 import pytest
 
 from klack.app import folder as app_folder
+from klack.app import jobs as jobs_module
 from klack.app.folder import OpenFolder
 from klack.app.jobs import Jobs
 from klack.app.state import Notes
@@ -86,6 +89,42 @@ def test_what_is_behind_a_planted_link_stays_as_it_was(planted, act, folder, out
 
     with pytest.raises(InputError, match="a link"):
         act(folder)
+    assert _content(outside) == before
+
+
+_WAITING = """
+import pathlib, sys, time
+while not pathlib.Path("go").exists():
+    time.sleep(0.02)
+from klack.cli.job_process import run
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="folders are named by handles on Linux")
+def test_a_run_writes_nothing_behind_a_link_that_takes_the_place_of_its_folder(
+    folder, outside, monkeypatch
+):
+    """Exact: what is behind the link stays, and the folder that was moved gets the ending."""
+    real = subprocess.Popen
+    monkeypatch.setattr(
+        jobs_module.subprocess,
+        "Popen",
+        lambda words, **more: real([*words[:2], "-c", _WAITING, *words[4:]], **more),
+    )
+    jobs, before = Jobs(folder), _content(outside)
+    jobs.start("impact", "case.yaml", "klack-results/case")
+    (place,) = (folder.path / ".klack-app" / "jobs").iterdir()
+    place.rename(folder.path / "moved")
+    place.symlink_to(outside, target_is_directory=True)
+    (folder.path / "go").touch()
+    for _ in range(1200):
+        if (folder.path / "moved" / "ending.json").exists():
+            break
+        time.sleep(0.05)
+
+    assert (folder.path / "moved" / "ending.json").exists()
     assert _content(outside) == before
 
 

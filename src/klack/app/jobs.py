@@ -182,7 +182,8 @@ class Jobs:
 
     def _launch(self, name: str, held: HeldFolder, arguments: list[str]) -> None:
         """Start the process of a run, and write down which one it is."""
-        place, new = self._place / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL
+        # by its handle where the system can: nothing is written behind a link in its place
+        place, new = held.steady_path, os.O_WRONLY | os.O_CREAT | os.O_EXCL
         with (
             os.fdopen(held.open("stdout", new), "wb") as output,
             os.fdopen(held.open("stderr", new), "wb") as errors,
@@ -196,6 +197,7 @@ class Jobs:
                 stdout=output,
                 stderr=errors,
                 start_new_session=True,
+                pass_fds=() if held.handle is None else (held.handle,),
             )
         self._children[name] = child
         begun = psutil.Process(child.pid).create_time()

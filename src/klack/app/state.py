@@ -5,6 +5,8 @@ import secrets
 from collections import OrderedDict
 from dataclasses import dataclass, field
 from hashlib import sha256
+from typing import Any
+from weakref import WeakSet
 
 from klack.app.answers import ResultCard
 from klack.app.folder import OpenFolder
@@ -139,6 +141,7 @@ class State:
         self.listener = Worker(_LISTENER)
         self.points: dict[str, tuple[str, bytes]] = {}
         self.cards: dict[str, tuple[str, ResultCard]] = {}
+        self.editors: WeakSet[Any] = WeakSet()
         self._spare = Worker(_EXPLORER)
         self._explorers: dict[Worker, bool] = {}  # and whether its page was left
 

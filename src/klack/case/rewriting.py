@@ -42,7 +42,9 @@ def rewritten(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> st
     pieces = []
     for key, text in values.items():
         node = _node(root, key)
-        pieces.append((node.start_mark.index, node.end_mark.index, text))
+        start, end = node.start_mark.index, node.end_mark.index
+        end = start + len(tree.text[start:end].rstrip())  # a block ends with the line
+        pieces.append((start, end, text))
     result = tree.text
     for start, end, text in sorted(set(pieces), reverse=True):
         result = result[:start] + text + result[end:]

@@ -3,6 +3,7 @@
 import asyncio
 import json
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from itertools import groupby
 from typing import Any
@@ -47,6 +48,8 @@ async def case_editor_page(state: State, given: Mapping[str, str]) -> None:
     """The page of one case."""
     case = given.get("path", "")
     text = await asyncio.to_thread(state.folder.case_text, case)
+    for editor in tuple(state.editors):  # of a page that was reloaded, it may be at its last text
+        await editor.keep_now(case)
     with frame(state, "Study" if _begins_a_study(text) else "Case", case):
         _Editor(state, case, text).build()
 
@@ -67,6 +70,7 @@ class _Editor:
 
     def __init__(self, state: State, case: str, saved: str) -> None:
         self._state, self._case, self._saved = state, case, saved
+        state.editors.add(self)
         self._draft = draft = state.notes.draft(case)
         self._text = saved if draft is None else draft
         self._count = 0  # of the last change that came from the browser
@@ -200,6 +204,14 @@ class _Editor:
                 self._above.set_visibility(found.has_study)
         await self._panel.checked(text, found)
 
+    async def keep_now(self, case: str) -> None:
+        """Write what waits, and keep the text, if this is the case."""
+        if case == self._case:
+            with suppress(KlackError, OSError):
+                async with self._turn:
+                    await self._write()
+                    await self._keep(self._text if self._text != self._saved else None)
+
     async def _keep(self, draft: str | None) -> bool:
         """Keep what is not saved, unless a page elsewhere does; whether it is kept."""
         notes, known = self._state.notes, self._draft
@@ -223,7 +235,9 @@ class _Editor:
             self._make_form(fields)
         found = {f"f-{item.key}": item for item in fields}
         self._items |= found
-        values = {box: (item.written, item.default or item.example) for box, item in found.items()}
+        values = {
+            box: (_in_a_line(item), item.default or item.example) for box, item in found.items()
+        }
         self._tell("klackBoxes", values)
 
     def _make_form(self, fields: tuple[FormField, ...]) -> None:
@@ -281,11 +295,11 @@ class _Editor:
                         option.props["selected"] = True
         else:
             box = ui.element("input").props("type=text maxlength=4000")
-            box.props[START_VALUE] = item.written
+            box.props[START_VALUE] = _in_a_line(item)
             if not item.written:
                 box.props["placeholder"] = item.default or item.example
         box.classes("k-input").props["id"] = f"f-{item.key}"
-        box.props["data-told"] = item.written
+        box.props["data-told"] = _in_a_line(item)
 
     async def _changed(self, event: Any) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
@@ -398,6 +412,11 @@ class _Editor:
             self._waiting.clear()
             self._show_text()
             await self._check()
+
+
+def _in_a_line(item: FormField) -> str:
+    """A value as its box has it: a browser would take the ends of lines out."""
+    return " ".join(item.written.splitlines())
 
 
 def _kind_of_box(item: FormField) -> str:
