@@ -276,6 +276,20 @@ def test_edges_of_a_drawing_come_back_from_its_mesh(mesher):
     np.testing.assert_allclose(np.degrees(top.angle[top.corners]), 90.0, atol=6.0)
 
 
+@pytest.mark.parametrize("angle", [0.5, 5.0])
+def test_straight_facets_of_an_arc_are_no_edges(angle):
+    """Their edges, of some degrees each, are alike."""
+    mesh = mesh_meridian({"ball": HALF}, MeshSizing(size=np.radians(angle) * 1e-3))
+    points = mesh.points.copy()
+    for block in mesh.surface("tip").blocks:
+        first, last, middle = block.connectivity.T
+        points[middle] = 0.5 * (points[first] + points[last])
+
+    faceted = replace(mesh, points=points)
+
+    assert None not in surface_edges(faceted, faceted.surface("tip")).neighbour
+
+
 def test_a_set_of_faces_in_a_mesh_is_known_by_its_name():
     mesh = mesh_meridian({"ball": HALF}, MeshSizing(size=0.3e-3))
     rest = surface_edges(mesh, mesh.surface("tip"))

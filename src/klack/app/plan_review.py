@@ -299,7 +299,7 @@ def _placing(
 def _first_touch(meeting: _Meeting) -> Finding:
     if meeting.sharp:
         advice = "draw its real radius, an arc of 10 to 100 um, and choose that face."
-        words = f"on a sharp edge, {meeting.sharp}: pressure and force depend on the mesh"
+        words = f"on a sharp edge, {meeting.sharp}: its pressure is that of the mesh"
         return _doubt("first touch", words, advice, _FACES)
     if not meeting.touch.lower:
         advice = "give one face its crown if it has one; docs/how-to/flat-faces.md."
