@@ -368,8 +368,6 @@ class Checked:
     ----------
     error : str
         Its message; empty for a valid case.
-    line : int
-        That the message names; 0 for none.
     title, kind : str
         Of a valid case; ``"impact"`` or ``"stroke"``; ``"study"`` of a study in a file of its own.
     fields : tuple of FormField
@@ -381,7 +379,6 @@ class Checked:
     """
 
     error: str = ""
-    line: int = 0
     title: str = ""
     kind: str = ""
     fields: tuple[FormField, ...] = ()

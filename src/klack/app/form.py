@@ -30,7 +30,7 @@ def checked_text(text: str, path: str, *, has_form: bool = True) -> Checked:
             return _checked_study(text, path)
         case = tree.any_case()
     except KlackError as error:
-        return Checked(error=str(error), line=_line_in(str(error), path))
+        return Checked(error=str(error))
     return Checked(
         has_study=case.study is not None,
         has_objectives=case.study is not None and bool(case.study.objectives),
@@ -183,10 +183,3 @@ def _scalar(text: str, *, is_text: bool) -> str:
     except ValueError:
         return plain if plain in ("true", "false") else json.dumps(plain, ensure_ascii=False)
     return plain
-
-
-def _line_in(message: str, path: str) -> int:
-    """Line that a message names: ``case.yaml:12: ...``."""
-    _, _, rest = message.partition(f"{path}:")
-    digits = rest[: len(rest) - len(rest.lstrip("0123456789"))]
-    return int(digits) if digits else 0

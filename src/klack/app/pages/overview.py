@@ -14,6 +14,7 @@ from nicegui import ui
 from klack.app.answers import Checked, ResultCard
 from klack.app.folder import RESULT_NAME, Found
 from klack.app.jobs import OF_STUDIES, Job
+from klack.app.pages.fields import choice_field
 from klack.app.pages.frame import (
     START_VALUE,
     asking,
@@ -324,7 +325,11 @@ class _Overview:
         with asking(title) as dialog:
             plain(words, "p").classes("k-soft")
             if sources:
-                _choice("Copy of", sources, source, lambda value: values.update(source=value))
+
+                async def choose(value: str) -> None:
+                    values.update(source=value)
+
+                choice_field("Copy of", {word: word for word in sources}, source, choose)
             _entry("Name", name, lambda value: values.update(name=value))
             problem = plain("", "p").classes("k-error")
 
@@ -560,23 +565,6 @@ def _entry(label: str, value: str, change: Callable[[str], None]) -> None:
         box.props[START_VALUE] = value
         box.on(
             "input", lambda event: change(str(event.args)), js_handler="(e) => emit(e.target.value)"
-        )
-
-
-def _choice(label: str, words: tuple[str, ...], value: str, change: Callable[[str], None]) -> None:
-    with ui.element("label"):
-        plain(label).classes("k-soft")
-        box = ui.element("select").classes("k-input")
-        with box:
-            for word in words:
-                option = plain(word, "option")
-                option.props["value"] = word
-                if word == value:
-                    option.props["selected"] = True
-        box.on(
-            "change",
-            lambda event: change(str(event.args)),
-            js_handler="(e) => emit(e.target.value)",
         )
 
 
