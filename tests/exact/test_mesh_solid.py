@@ -195,6 +195,9 @@ def test_files_that_are_not_usable(step, tmp_path):
     with pytest.raises(InputError, match=r"(?s)starts with 'solid ascii stl.*ISO-10303-21"):
         mesh_step(other, COARSE)
     other.write_text(step.read_text()[:4000])
+    with pytest.raises(InputError, match=r"damaged STEP file: entity #\d+ is missing"):
+        mesh_step(other, COARSE)
+    other.write_text("ISO-10303-21;\n")
     with pytest.raises(InputError, match="that OpenCASCADE cannot read"):
         mesh_step(other, COARSE)
     with pytest.raises(InputError, match="one of: brim, joint, rim, shank, tip, top"):

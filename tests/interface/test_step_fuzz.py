@@ -65,6 +65,42 @@ def test_damaged_files(whole: bytes, tmp_path: Path):
     assert 0 < refused
 
 
+def test_a_lost_or_doubled_entity_is_named(whole: bytes, tmp_path: Path):
+    """Of each that another one names; OpenCASCADE makes some other solid of what is left."""
+    path, lines = tmp_path / "part.step", whole.split(b"\n")
+    entities = {n: line for n, line in enumerate(lines) if line.startswith(b"#")}
+    found = 0
+    for n, line in entities.items():
+        number = line.partition(b" ")[0]
+        if not re.search(number + rb"[,)]", whole):
+            continue
+        found += 1
+        path.write_bytes(b"\n".join(lines[:n] + lines[n + 1 :]))
+        with pytest.raises(InputError, match=f"entity {number.decode()} is missing"):
+            require_readable_step(path)
+    assert found > 100
+    path.write_bytes(b"\n".join([*lines[:n], line, *lines[n:]]))
+    with pytest.raises(InputError, match=f"entity {number.decode()} is there twice"):
+        require_readable_step(path)
+
+
+def test_a_face_without_area_is_refused(tmp_path: Path):
+    """As one wrong digit makes it in the seam of a bore; the other faces keep theirs."""
+    from netgen.occ import Cylinder, Pnt, Z
+
+    path = tmp_path / "part.step"
+    (Cylinder(Pnt(0, 0, 0), Z, r=3, h=10) - Cylinder(Pnt(0, 0, -1), Z, r=1, h=5)).WriteStep(
+        str(path)
+    )
+    assert len(read_step(path).faces) == 5
+    text = path.read_text()
+    seam = "#82 = CARTESIAN_POINT('',(0.,0.,0.));"
+    assert seam in text
+    path.write_text(text.replace(seam, seam.replace("(0.", "(5.")))
+    with pytest.raises(InputError, match=r"face 'face\d' without area"):
+        read_step(path)
+
+
 def test_a_break_of_the_reader_is_an_error(whole: bytes, tmp_path: Path, monkeypatch):
     path = tmp_path / "part.step"
     path.write_bytes(whole)

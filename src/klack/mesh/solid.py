@@ -36,6 +36,7 @@ __all__ = [
 # Elements per radius of curvature.  Netgen's default of 2 leaves flat elements with four nodes on a
 # cylinder (scaled Jacobian down to -0.01 on a needle), 2.5 none (0.15 or more).
 _PER_RADIUS = 2.5
+_NO_AREA = 1e-9  # mm^2
 
 
 def mesh_step(path: str | Path, sizing: MeshSizing) -> Mesh:
@@ -140,7 +141,19 @@ def read_step(path: Path) -> Any:
             expected="at least one closed solid",
             hint="export solids, not surfaces or a wire frame.",
         )
+    _require_areas(str(path), shape)
     return _glued(str(path), list(shape.solids))
+
+
+def _require_areas(where: str, shape: Any) -> None:
+    for face, name in zip(shape.faces, face_names(shape), strict=True):
+        if not face.mass > _NO_AREA:
+            raise InputError(
+                where,
+                got=f"face '{name}' without area",
+                expected="closed solids",
+                hint="export it again; open it in a CAD program and repair it.",
+            )
 
 
 def _glued(where: str, solids: list[Any]) -> Any:

@@ -7,8 +7,10 @@ takes as long as the first; meshing takes far longer.  A file that passed is not
 process until it changes.
 """
 
+import re
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
 from pathlib import Path
 
@@ -16,6 +18,8 @@ from klack.errors import InputError
 
 __all__ = ["require_readable_step"]
 
+_TEXT = re.compile(rb"'[^']*'|/\*.*?\*/", re.DOTALL)
+_ENTITY = re.compile(rb"#(\d+)(\s*=)?")
 _PATIENCE = 600.0  # s; a part of 20 MB takes some seconds
 _PROGRAM = """
 import os, sys
@@ -36,12 +40,24 @@ def require_readable_step(path: Path, patience: float = _PATIENCE) -> None:
     Raises
     ------
     InputError
-        If OpenCASCADE breaks on it, or does not come to an end within ``patience`` [s].
+        If an entity is missing or there twice, which OpenCASCADE passes over, if it breaks on the
+        file, or does not come to an end within ``patience`` [s].
     """
+    _require_entities(path)
     if not sys.executable:  # inside of another program
         return
     state = path.stat()
     _try(path, patience, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
+
+
+def _require_entities(path: Path) -> None:
+    defined, named = Counter[int](), set[int]()
+    for number, defines in _ENTITY.findall(_TEXT.sub(b"", path.read_bytes())):
+        (defined.update if defines else named.update)((int(number),))
+    if missing := named - defined.keys():
+        raise _refuse(path, f"a damaged STEP file: entity #{min(missing)} is missing")
+    if twice := [number for number, count in defined.items() if count > 1]:
+        raise _refuse(path, f"a damaged STEP file: entity #{min(twice)} is there twice")
 
 
 @cache  # a file that was refused is tried again: memory may have been short
