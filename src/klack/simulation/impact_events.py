@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from klack.compiling.jit import inner, njit
 from klack.network.rows import GROUND, BodyRow, Rows
-from klack.simulation.network_result import ImpactEvent
+from klack.simulation.network_interfaces import FORCE_ROUND_OFF
+from klack.simulation.network_result import ChannelData, ImpactEvent
 from klack.simulation.rest import effective_mass, longest_period, mobility, rest_time
 
 __all__ = ["ImpactFinder"]
@@ -133,18 +134,22 @@ class ImpactFinder:
             )
             self._found += [self._event(c, row) for row in out[:count]]
 
-    def events(self) -> tuple[ImpactEvent, ...]:
+    def events(self, channels: Mapping[str, ChannelData]) -> tuple[ImpactEvent, ...]:
         """All impacts so far, in order of time, complete or not.
 
         One that is not over yet is reported again, whole, by a finder that resumes from
-        :attr:`state`; it has the same stop and the same time.
+        :attr:`state`; it has the same stop and the same time.  Not those that are no harder than
+        the round-off of the largest force in the ``channels``: nothing presses a contact there.
         """
+        forces = [np.abs(data.values).max() for data in channels.values() if data.unit == "N"]
+        least = FORCE_ROUND_OFF * float(max(forces, default=0.0))
         out = np.empty((2, len(_EVENT)))
         open_ones: list[ImpactEvent] = []
         for c in range(len(self._stops)):
             count = _unfinished(self._state, c, self._period[c], out)
             open_ones += [self._event(c, row) for row in out[:count]]
-        return tuple(sorted((*self._found, *open_ones), key=lambda event: event.time))
+        found = sorted((*self._found, *open_ones), key=lambda event: event.time)
+        return tuple(event for event in found if not event.peak_force <= least)
 
     def told(self) -> None:
         """Mark all impacts so far as reported; only changed ones are reported again."""

@@ -230,9 +230,9 @@ def simulate_network(
         raise failure
     time = step * (first_step + np.arange(records + 1) * (grid.looks * grid.look_steps))
     books = balance_since(network, before)
-    events = finder.events()
-    finder.told()
     channels = recorder.channels(records)
+    events = finder.events(channels)
+    finder.told()
     if network.moving is not None:
         for row, added in zip(rows.interfaces, network.moving.gap(), strict=True):
             channels[f"{row.component} gap"].values[:] += added

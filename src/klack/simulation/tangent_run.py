@@ -179,11 +179,12 @@ class TangentRun:
         speeds = {name: np.ascontiguousarray(points[:, i]) for name, i in moving.items()}
         finder.feed(time, speeds, fine)
         heavier = self._heavier(direction, amount)
+        result = self._result(time, points, at(self._means), fine)
         events = tuple(
             replace(event, energy_loss=heavier.get(event.stop, 1.0) * event.energy_loss)
-            for event in finder.events()
+            for event in finder.events(result.channels)
         )
-        return replace(self._result(time, points, at(self._means), fine), events=events)
+        return replace(result, events=events)
 
     def _heavier(self, direction: int, amount: float) -> dict[str, float]:
         """Mass of the relative motion at each stop over that of the run, where it changes."""

@@ -87,7 +87,7 @@ def _valve() -> None:
     from klack.case.valve_reader import load_valve_case
 
     case = load_valve_case(find_case("demo-stroke"))
-    short = case.run.model_copy(update={"duration": 2e-6})
+    short = case.run.model_copy(update={"duration": 2e-6, "check_steps": False})
     run_stroke(case.model_copy(update={"run": short}))
 
 

@@ -101,7 +101,7 @@ network:
 motion: three-dimensional
 guide: {surface: shaft, heights: [2 mm, 6 mm], clearance: 4 um, friction: 0.1, film: {length: 1 mm}}
 placement: {seed: 3}
-run: {duration: 20 us, variants: [wet, dry]}
+run: {duration: 20 us, variants: [wet, dry], check_steps: false}
 """
 
 
