@@ -409,8 +409,10 @@ def run_many(
     """Compute measures of a stroke or an impact at many points of the parameter space of a case.
 
     Every number is that of :func:`run_stroke`, :func:`run_impact` or :func:`run_shots` of the
-    changed case, to the last bit, whatever the number of threads and the order of the points.  A
-    point that cannot be computed is a row with its error.
+    changed case, to the last bit, whatever the number of threads and the order of the points.
+    Steps of strokes are checked, and halved, for the impacts that the measures depend on: those of
+    :func:`run_stroke` may be shorter for later ones.  A point that cannot be computed is a row with
+    its error.
 
     Parameters
     ----------

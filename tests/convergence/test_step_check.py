@@ -5,18 +5,20 @@ Truth: errors against fine steps alone, extrapolated from three lengths; definit
 
 import runpy
 from dataclasses import fields, replace
-from math import isnan, nan
+from math import inf, isnan, nan
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
+import klack
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.measures import steps_told
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
-from klack.analyses.stroke.step_check import ImpactChange, impact_changes, told
+from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact_changes, told
 from klack.analyses.stroke.summary import stroke_to_json
 from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.errors import InputError
@@ -84,6 +86,22 @@ def test_an_impact_of_the_longer_steps_alone_is_told():
     assert "there is an impact 2 on 'seat'" in told(
         seen, impact_changes(seen, seen), "normal", [*seen, impact(2e-3)]
     )
+
+
+def test_impacts_later_than_what_is_asked_for_do_not_count():
+    """Neither one that changes nor one that longer steps have alone."""
+    end = np.array([5e-3])
+    run: Any = SimpleNamespace(events=(impact(1e-3), impact(3e-3)), time=end)
+    longer: Any = SimpleNamespace(events=(impact(1e-3), impact(3e-3, peak_force=0.9)), time=end)
+    more: Any = SimpleNamespace(events=(*run.events, impact(4e-3)), time=end)
+
+    for other in (longer, more):
+        assert checked_steps(run, other, "normal", 0).doubt != ""
+        early = checked_steps(run, other, "normal", 2, until=2e-3)
+        assert [change.number for change in early.changes] == [1, 0]
+        assert (early.doubt, early.certificate("normal")) == ("", (2, 0.0))
+    assert checked_steps(run, longer, "normal", 0).certificate("normal")[1] == pytest.approx(200.0)
+    assert checked_steps(run, more, "normal", 0).certificate("normal") == (0, inf)
 
 
 def test_the_end_of_a_run_cuts_off_what_still_grows():
@@ -174,6 +192,27 @@ def test_steps_that_are_too_long_are_halved_until_impacts_are_right(truth):
         long.result.sizes, step=long.result.sizes.step / 2**checked.halvings
     )
     assert told(checked.result.events, checked.changes, "normal") == ""
+
+
+@pytest.mark.slow
+def test_points_of_a_study_are_computed_in_steps_that_are_short_enough(truth):
+    """Unasked, for the impacts that their measures are of; as they are where the case says so."""
+    names = ["opening.1.peak_force", "opening.2.peak_force"]
+    case = klack.load_case(HOW_TO / "small_valve.yaml").with_value("run.step", "100 ns")
+    peaks = [peak for _, peak in truth[:2]]
+
+    found = klack.run_many(case, [{}], names, variant="dry")
+    plain = klack.run_many(case.with_value("run.check_steps", False), [{}], names, variant="dry")
+
+    off = [
+        [abs(t[name][0] / peak - 1.0) for name, peak in zip(names, peaks, strict=True)]
+        for t in (found, plain)
+    ]
+    assert max(off[0]) < 5e-4 < min(off[1])
+    assert found["halvings"][0] > 0.0
+    assert 0.0 < found["step_change"][0] <= 0.5
+    assert plain["halvings"][0] == 0.0
+    assert isnan(plain["step_change"][0])
 
 
 @pytest.mark.slow

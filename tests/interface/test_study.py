@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,11 @@ import pytest
 import klack
 from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.kinds import ask
+from klack.analyses.study.log import KeptPoint, point_key
 from klack.analyses.study.parameters import parameters_of, short_names
+from klack.analyses.study.point_row import PointRow, PointSteps
+from klack.analyses.study.summary import study_to_json
+from klack.analyses.study.wording import steps_texts
 from klack.case.reader import parse
 from klack.case.study import CaseStudy
 from klack.case.study_source import StudySource
@@ -151,6 +156,49 @@ class TestNumbers:
         with pytest.raises(InputError, match="none of which can be computed") as caught:
             klack.run_study(SMALL, write(tmp_path, text))
         assert str(caught.value).count("Try:") == 1
+
+
+class TestSteps:
+    """Truth: what single strokes say of their steps, and the definition of a certificate."""
+
+    def test_each_point_tells_how_its_steps_were_checked(self, tmp_path):
+        text = f"""
+  parameters:
+    {PRELOAD}: {{values: [10 N, 14 N]}}
+    run.step: {{values: [20 ns, 200 ns]}}
+  measures: [opening.peak_force]
+  design: {{kind: grid}}
+  variant: dry
+"""
+        record = klack.run_study(SMALL, write(tmp_path, text)).record
+        steps = columns(record, "parameters")["run.step"]
+        np.testing.assert_array_equal(record.halvings > 0.0, steps == 200e-9)
+        assert (record.step_changes <= 0.5).all()
+        found = study_to_json(record)
+        assert found["halvings"] == record.halvings.tolist()
+        assert found["step_changes"] == record.step_changes.tolist()
+        (told,) = steps_texts(record)
+        assert "checked at 4 of 4 points, halved at 2; their measures are certified" in told
+        doubtful = replace(record, step_changes=np.array([0.1, np.inf, 0.6, 0.2]))
+        assert "2 not certified: 1, 2." in next(steps_texts(doubtful))
+
+        plain = write(tmp_path, text, "plain.yaml")
+        out, numbers = str(tmp_path / "out"), str(tmp_path / "numbers.json")
+        words = ["study", str(SMALL), "--study", str(plain), "--out", out, "--no-report"]
+        assert main([*words, "--no-check-steps", "--json", numbers]) == 0
+        found = json.loads(Path(numbers).read_text())
+        assert (found["halvings"], found["step_changes"]) == ([0.0] * 4, [None] * 4)
+        assert "was not checked" in next(steps_texts(klack.load_result(out).record))
+
+    def test_points_with_and_without_a_check_are_not_taken_for_each_other(self):
+        tree = klack.load_case(SMALL).tree
+        assert point_key(tree, "dry", {}) != point_key(tree, "dry", {}, checks=False)
+
+    def test_a_kept_point_has_the_worse_certificate_of_two_runs(self):
+        first = PointRow((1.0,), steps=PointSteps(0, 0.3))
+        point = KeptPoint(values={}, failure="", notes=()).with_row(("one",), first)
+        both = point.with_row(("two",), PointRow((2.0,), steps=PointSteps(2, 0.1)))
+        assert both.row(("one", "two")).steps == PointSteps(2, 0.3)
 
 
 class TestKept:
@@ -454,7 +502,6 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
         record = klack.run_study(case, write(tmp_path, text)).record
         found = columns(record)
         changed = klack.load_case(case).with_value(PRELOAD, "6 N").with_value(mount, "20 N/um")
-        changed = changed.with_value("run.check_steps", False)  # as in points
         noise = klack.noise_of(klack.run_stroke(changed, ["dry"]))
         (truth,) = (
             numbers for name, numbers in noise.measures.items() if "rod" in name and "," not in name
@@ -497,7 +544,6 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
         place = best.point
         preload = f"{float(columns(record, 'parameters')[PRELOAD][place])!r} N"
         changed = klack.load_case(case).with_value(PRELOAD, preload)
-        changed = changed.with_value("run.check_steps", False)  # as in points
         noise = klack.noise_of(klack.run_stroke(changed, ["dry"])).record
         np.testing.assert_array_equal(best.pressure.values, noise.designs[0].sound.pressure.values)
         result.save(tmp_path / "kept")
@@ -649,6 +695,8 @@ class TestOptimum:
             better = found.kept & (time <= time[i]) & (force <= force[i])
             assert not (better & ((time < time[i]) | (force < force[i]))).any()
         assert found.best in found.front
+        assert (record.step_changes[found.front] <= 0.5).all()  # the others as they are
+        assert np.isnan(record.step_changes).sum() > 40
         assert record.count > 80  # refinements came after the generations
         again = klack.optimise(SMALL, file, folder=tmp_path / "out").record
         assert again.computed == 0

@@ -67,6 +67,9 @@ class PointTable:
         Why a point has no measures: the error of its run; empty where it was computed.
     warnings : tuple of tuple of str
         Doubts about the numbers of each point.
+    steps : tuple of PointColumn
+        Of strokes: how often their steps were halved, and the largest change over what the accuracy
+        promises that is left with steps twice as long (certified up to 0.5).
     """
 
     case: str
@@ -75,14 +78,15 @@ class PointTable:
     measures: tuple[PointColumn, ...]
     failures: tuple[str, ...]
     warnings: tuple[tuple[str, ...], ...]
+    steps: tuple[PointColumn, ...] = ()
 
     def __len__(self) -> int:
         return len(self.failures)
 
     @property
     def columns(self) -> tuple[PointColumn, ...]:
-        """Points, then measures."""
-        return (*self.points, *self.measures)
+        """Points, then measures, then what the check of their steps has found."""
+        return (*self.points, *self.measures, *self.steps)
 
     def __getitem__(self, name: str) -> NDArray[Any]:
         """Values of a key or a measure, shape (points,).

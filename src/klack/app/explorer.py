@@ -360,7 +360,7 @@ class _Strokes:
         roles = find_roles(case, network)
         variant = case.one_variant(self.run)
         with collected_warnings() as caught:
-            run = one_variant(valve, roles, variant, silent)
+            run = one_variant(valve, roles, variant, silent, check=False)
             study = study_of_run(valve, roles, variant, run, self._bodies, self._stops)
             source = stroke_sources(study, case=case)[0]
         found, time = run.variant, run.variant.result.time

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "CaseArgument",
+    "CheckSteps",
     "Components",
     "Json",
     "Levels",
@@ -51,6 +52,15 @@ Threads = Annotated[
 StudyPath = Annotated[
     Path | None,
     Parameter(name="--study", help="File with a section 'study'. [default: that of the case]"),
+]
+CheckSteps = Annotated[
+    bool | None,
+    Parameter(
+        name="--check-steps",
+        help="Run strokes again with all steps twice as long; halve them where that changes first "
+        "impacts by more than half of what the accuracy promises. [default: as in the case, or "
+        "yes; of a search its front alone]",
+    ),
 ]
 Components = Annotated[
     list[str] | None,

@@ -15,10 +15,10 @@ from klack.analyses.sensitivities.record import (
     MeasureSlopes,
     SensitivityRecord,
 )
-from klack.analyses.sensitivities.slopes import TIMES, SlopeRunner, has_slope, measured
+from klack.analyses.sensitivities.slopes import SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.study.chosen_measures import ChosenMeasure
-from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
+from klack.analyses.study.stroke_measures import TIMES, StrokeOfPoint, stroke_measures
 from klack.case.case_tree import CaseTree
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial

@@ -23,7 +23,7 @@ from klack.analyses.stroke.run import (
     variant_of,
 )
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
-from klack.analyses.study.stroke_measures import StrokeOfPoint
+from klack.analyses.study.stroke_measures import TIMES, StrokeOfPoint
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
 from klack.case.points import case_at, checked_parts, points_of
@@ -37,10 +37,7 @@ from klack.simulation.network_run import has_python_steps
 from klack.simulation.tangent_numbers import Direction
 from klack.simulation.tangent_run import DIRECTIONS, TangentRun, compile_tangents, run_tangents
 
-__all__ = ["TIMES", "SlopeRunner", "has_slope", "measured"]
-
-TIMES = ("opening_time", "closing_time")
-"""Measures of a stroke, beside those of its impacts, that have derivatives."""
+__all__ = ["SlopeRunner", "has_slope", "measured"]
 
 _OF_NOISE = ("J", "dB", "dBA")
 """Units of measures of the noise that do: energies and levels."""

@@ -8,7 +8,7 @@ from cyclopts import Parameter
 from klack.analyses.ending import Ending
 from klack.analyses.operating_point.asked import STEADY, SteadyAsked
 from klack.network.accuracy import Accuracy
-from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.options import CaseArgument, CheckSteps, Components, imported
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
@@ -46,14 +46,6 @@ _Accuracy = Annotated[
         help="normal, or fine with steps a quarter to half as long. [default: as in the case]",
     ),
 ]
-_CheckSteps = Annotated[
-    bool | None,
-    Parameter(
-        name="--check-steps",
-        help="Run again with all steps twice as long; halve them where that changes first impacts "
-        "by more than half of what the accuracy promises. [default: as in the case, or yes]",
-    ),
-]
 _Continue = Annotated[
     Path | None,
     Parameter(
@@ -80,7 +72,7 @@ def stroke(
     duration: _Duration = None,
     step: _Step = None,
     accuracy: _Accuracy = None,
-    check_steps: _CheckSteps = None,
+    check_steps: CheckSteps = None,
     continued: _Continue = None,
     component: Components = None,
     controller: _Controllers = None,

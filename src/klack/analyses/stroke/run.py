@@ -194,11 +194,14 @@ class VariantRun:
     rows : Rows
     failure : ConvergenceError or None
         With ``variant`` up to there.
+    steps : CheckedSteps or None
+        None where they were not checked.
     """
 
     variant: StrokeVariant
     rows: Rows
     failure: ConvergenceError | None
+    steps: CheckedSteps | None = None
 
 
 def _without_path(run: VariantRun) -> VariantRun:
@@ -313,10 +316,9 @@ def _runs(
 ) -> tuple[dict[Variant, VariantRun], ConvergenceError | None]:
     """Variants up to the first one that fails, with what there is of it, and its error."""
     runs: dict[Variant, VariantRun] = {}
-    check = valve.case.run.check_steps is not False
     for name, after in begins.items():
         try:
-            runs[name] = one_variant(valve, roles, name, progress, after=after, check=check)
+            runs[name] = one_variant(valve, roles, name, progress, after=after)
         except ConvergenceError as error:
             if not runs:
                 raise
@@ -334,12 +336,25 @@ def one_variant(
     progress: Progress,
     *,
     after: NetworkResult | None = None,
-    check: bool | None = None,
+    sizes: StepSizes | None = None,
+    check: bool = True,
+    until: Callable[[StrokeVariant], float] = lambda variant: inf,
 ) -> VariantRun:
     """Compute one variant of a valve, from rest or from the end of a run.
 
-    ``check`` is whether its steps are checked, and halved where impacts depend on them; by default
-    where the case asks for it.
+    Parameters
+    ----------
+    valve : Valve
+    roles : ValveRoles
+    name : Variant
+    progress : callable
+    after : NetworkResult, optional
+    sizes : StepSizes, optional
+        Of steps that are not checked.
+    check : bool
+        Whether steps are checked, and halved where impacts depend on them, unless the case says.
+    until : callable
+        Time [s] of a run until which impacts have to be right.
 
     Raises
     ------
@@ -349,26 +364,32 @@ def one_variant(
         Before the first record.
     """
     begin = perf_counter()
-    checked = bool(valve.case.run.check_steps) if check is None else check
+    asked = valve.case.run.check_steps
+    checked = sizes is None and (check if asked is None else asked)
     progress(f"run {name}", 0.0)
     kept: AbstractContextManager[Warned] = trial() if checked else nullcontext([])
     with kept as caught:
-        run = _attempt(valve, name, progress, after=after)
+        run = _attempt(valve, name, progress, after=after, sizes=sizes)
     setup_time = perf_counter() - begin - run.result.wall_time
-    steps = CheckedSteps()
+    steps: CheckedSteps | None = None
     if checked and after is not None:
         reason = "the run continues another one, whose state belongs to its steps"
         steps = not_checked(run.result.events, reason)
     elif checked and run.failure is None:
-        run, caught, steps = _in_checked_steps(valve, name, progress, run, caught)
+
+        def end(found: _Attempt) -> float:
+            return until(variant_of(valve, roles, name, found.rows, found.result))
+
+        run, caught, steps = _in_checked_steps(valve, name, progress, run, caught, end)
     elif checked:
         steps = not_checked(run.result.events, "the run ended early")
     show(caught)
-    if steps.doubt:
-        warnings.warn(f"'{name}': {steps.doubt}", AccuracyWarning, stacklevel=2)
     variant = variant_of(valve, roles, name, run.rows, run.result, setup_time)
-    variant = replace(variant, changes=steps.changes, halvings=steps.halvings)
-    return VariantRun(variant=variant, rows=run.rows, failure=run.failure)
+    if steps is not None:
+        variant = replace(variant, changes=steps.changes, halvings=steps.halvings)
+        if steps.doubt:
+            warnings.warn(f"'{name}': {steps.doubt}", AccuracyWarning, stacklevel=2)
+    return VariantRun(variant=variant, rows=run.rows, failure=run.failure, steps=steps)
 
 
 class _Attempt(NamedTuple):
@@ -407,15 +428,21 @@ def _attempt(
 
 
 def _in_checked_steps(
-    valve: Valve, name: Variant, progress: Progress, run: _Attempt, caught: Warned
+    valve: Valve,
+    name: Variant,
+    progress: Progress,
+    run: _Attempt,
+    caught: Warned,
+    until: Callable[[_Attempt], float],
 ) -> tuple[_Attempt, Warned, CheckedSteps]:
     """Halve all steps until impacts do not depend on them.
 
     As often as :data:`_HALVINGS`, and on to :data:`_MOST_HALVINGS` where that is short, longer if
     the largest change falls: an error that depends on where a step happens to lie need not fall.
-    In three dimensions steps are never halved: a run takes some 10 s there, not 0.1 s.
+    No run is short in three dimensions, where a step takes a thousand times as long.
     """
-    most = _MOST_HALVINGS if valve.spatial is None else 0
+    most = _MOST_HALVINGS if valve.spatial is None else _HALVINGS
+    accuracy = valve.case.run.accuracy
 
     def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
         try:
@@ -431,8 +458,8 @@ def _in_checked_steps(
     halvings, before = 0, inf
     while True:
         if longer is not None:
-            steps = checked_steps(run.result, longer.result, valve.case.run.accuracy, halvings)
-            largest = steps.largest(valve.case.run.accuracy)
+            steps = checked_steps(run.result, longer.result, accuracy, halvings, until(run))
+            largest = steps.largest(accuracy)
             is_short = run.result.steps.taken < (_FALLING_RUN if largest < before else _SHORT_RUN)
             if not steps.doubt or halvings >= (most if is_short else min(most, _HALVINGS)):
                 return run, caught, steps

@@ -20,6 +20,7 @@ from klack.simulation.network_result import ImpactEvent, NetworkResult
 __all__ = [
     "CHANGE_MEASURES",
     "NOTICED",
+    "SHARE",
     "CheckedSteps",
     "ImpactChange",
     "checked_steps",
@@ -31,11 +32,14 @@ __all__ = [
 NOTICED = 0.02
 """Share of the fastest impact on a stop from which an impact counts as one."""
 
+SHARE = 0.5
+"""Of what is promised: differences of that size went with errors above the promise."""
+
 _PROMISED = 3  # impacts on each stop
-_SHARE = 0.5  # of what is promised; differences of that size went with errors above the promise
 _TOLD = 3  # impacts in a sentence
 _LATE = 0.75  # of a contact that is not over: a peak after that may still grow
 _SLOW = "slower than 2 % of the fastest impact on this stop"
+_AFTER = "after all that was asked for"
 _OPEN = "not over when the run ends"
 
 
@@ -46,7 +50,7 @@ class ImpactChange:
     Parameters
     ----------
     number : int
-        On its stop, from 1; 0 for a touch too slow to be counted.
+        On its stop, from 1; 0 for a touch too slow to be counted, or later than what is asked for.
     time : float [s]
         Of the first touch, above zero where it comes later; nan, as those below, where there is
         none.
@@ -81,7 +85,7 @@ class ImpactChange:
 
     def doubtful(self, accuracy: Accuracy) -> bool:
         """Whether it changes by more than half of what the accuracy promises, or has no pair."""
-        return self.over_promise(accuracy) > _SHARE
+        return self.over_promise(accuracy) > SHARE
 
 
 CHANGE_MEASURES: tuple[Measure[ImpactChange], ...] = described_in(
@@ -165,15 +169,27 @@ class CheckedSteps(NamedTuple):
         """Largest change over what is promised."""
         return max((change.over_promise(accuracy) for change in self.changes), default=0.0)
 
+    def certificate(self, accuracy: Accuracy) -> tuple[int, float]:
+        """How often all steps were halved, and the change over the promise: inf in other doubt."""
+        largest = self.largest(accuracy)
+        return self.halvings, inf if self.doubt and largest <= SHARE else largest
+
 
 def checked_steps(
-    run: NetworkResult, longer: NetworkResult, accuracy: Accuracy, halvings: int
+    run: NetworkResult, longer: NetworkResult, accuracy: Accuracy, halvings: int, until: float = inf
 ) -> CheckedSteps:
-    """Compare a run with one in steps twice as long, up to where the first of them ends."""
-    end = min(float(one.time[-1]) for one in (run, longer))
-    others = [event for event in longer.events if event.time < end]
-    changes = impact_changes(run.events, longer.events)
-    return CheckedSteps(changes, told(run.events, changes, accuracy, others), halvings)
+    """Compare a run with one in steps twice as long, up to where the first of them ends.
+
+    What comes after ``until`` [s] does not count: nothing was asked for there.
+    """
+    end = min(until, *(float(one.time[-1]) for one in (run, longer)))
+    late = ImpactChange(number=0, reason=_AFTER)
+    changes = tuple(
+        change if event.time <= until else late
+        for event, change in zip(run.events, impact_changes(run.events, longer.events), strict=True)
+    )
+    doubt = told(run.events, changes, accuracy, longer.events, end)
+    return CheckedSteps(changes, doubt, halvings)
 
 
 def not_checked(events: Sequence[ImpactEvent], reason: str) -> CheckedSteps:
@@ -244,10 +260,11 @@ def told(
     changes: Sequence[ImpactChange],
     accuracy: Accuracy,
     others: Sequence[ImpactEvent] = (),
+    end: float = inf,
 ) -> str:
     """Sentence on the promised impacts that depend on the steps; empty if none does.
 
-    ``others`` are those with longer steps, as long as both runs last.
+    ``others`` are those with longer steps, of which all before ``end`` [s] have to be there.
     """
     found = [
         f"impact {change.number} on '{event.stop}' {_words(change)}"
@@ -257,7 +274,7 @@ def told(
     found += [
         f"there is an impact {len(counted) + 1} on '{stop}'"
         for stop, (counted, of_other) in _by_stop(events, others).items()
-        if len(counted) < min(len(of_other), _PROMISED)
+        if len(counted) < min(sum(event.time < end for event in of_other), _PROMISED)
     ]
     if not found:
         return ""
@@ -265,8 +282,8 @@ def told(
     more = f"; and {len(found) - _TOLD} more" if len(found) > _TOLD else ""
     return (
         f"with all time steps twice as long {'; '.join(found[:_TOLD])}{more}. The steps are short "
-        f"enough for accuracy: {accuracy} where that changes less than {100 * _SHARE * peak:g} % "
-        f"and {1e6 * _SHARE * time:g} us. Try: a shorter run.step; or run.coarse: 1, which takes "
+        f"enough for accuracy: {accuracy} where that changes less than {100 * SHARE * peak:g} % "
+        f"and {1e6 * SHARE * time:g} us. Try: a shorter run.step; or run.coarse: 1, which takes "
         "many times as long."
     )
 

@@ -185,6 +185,8 @@ class AskedPoints(Generic[CaseT]):
     chosen : tuple of ChosenMeasure
     variant : str
         Of the stroke; of an impact its level, ``"shots"``, or both.
+    checks : bool
+        Whether time steps of strokes are checked, unless the case says.
     """
 
     kind: PointKind[CaseT, Any] = field(compare=False)
@@ -193,6 +195,7 @@ class AskedPoints(Generic[CaseT]):
     points: Points
     chosen: tuple[ChosenMeasure, ...]
     variant: str
+    checks: bool = True
 
     def failed(self, error: BaseException) -> PointRow:
         """Row of a point without measures."""

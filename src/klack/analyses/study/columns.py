@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TypedDict
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.point_row import PointRow
@@ -20,6 +21,7 @@ __all__ = [
     "point_fields",
     "require_some",
     "row_warnings",
+    "step_columns",
 ]
 
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -54,6 +56,8 @@ class PointFields(TypedDict):
     failures: tuple[str, ...]
     notes: tuple[str, ...]
     model: str
+    halvings: NDArray[np.float64]
+    step_changes: NDArray[np.float64]
 
 
 def point_fields(
@@ -65,6 +69,7 @@ def point_fields(
 ) -> PointFields:
     """Values of the parameters and of what follows from them, and how each point ended."""
     known = space.known()
+    steps = step_columns(rows)
     return PointFields(
         variant=asked.variant,
         parameters=tuple(
@@ -78,7 +83,19 @@ def point_fields(
         failures=tuple(row.failure for row in rows),
         notes=tuple("\n".join(row.notes) for row in rows),
         model=_model(rows, today),
+        halvings=steps[0],
+        step_changes=steps[1],
     )
+
+
+def step_columns(rows: Sequence[PointRow]) -> NDArray[np.float64]:
+    """What the check of the steps of each stroke has found, shape (2, points); (2, 0) of impacts.
+
+    Rows: see :class:`~klack.analyses.study.point_row.PointSteps`; nan where nothing was computed.
+    """
+    if all(row.steps is None for row in rows):
+        return np.zeros((2, 0))
+    return np.array([row.steps or (np.nan, np.nan) for row in rows], dtype=float).T
 
 
 def _model(rows: Sequence[PointRow], today: PointRow) -> str:

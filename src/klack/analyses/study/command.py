@@ -10,7 +10,14 @@ from cyclopts import Parameter
 from klack.analyses.ending import Ending
 from klack.analyses.named import named
 from klack.errors import require_positive
-from klack.terminal.options import CaseArgument, Components, StudyPath, imported, require_files
+from klack.terminal.options import (
+    CaseArgument,
+    CheckSteps,
+    Components,
+    StudyPath,
+    imported,
+    require_files,
+)
 from klack.terminal.progress import PROGRESS_FILE
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
@@ -18,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from klack.analyses.study.record import StudyRecord
+    from klack.case.case_tree import CaseTree
     from klack.progress import Progress
 
 __all__ = ["optimise", "study"]
@@ -55,11 +63,13 @@ def study(
     made: _Made = None,
     workers: _Workers = None,
     dask: _Dask = None,
+    check_steps: CheckSteps = None,
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Compute measures of a stroke or an impact at many points: ranges, designs, tolerances."""
-    return _run("study.run:run_study", "study", case, study, component, wanted, workers, dask, made)
+    tree = _tree(case, component, check_steps)
+    return _run("study.run:run_study", "study", tree, study, wanted, workers, dask, made)
 
 
 def optimise(
@@ -69,12 +79,28 @@ def optimise(
     study: StudyPath = None,
     workers: _Workers = None,
     dask: _Dask = None,
+    check_steps: CheckSteps = None,
     component: Components = None,
     wanted: WantedResult = WANTED_RESULT,
 ) -> int:
     """Search the ranges of a study for the best points: one to four objectives, within bounds."""
-    words = (case, study, component, wanted, workers, dask)
+    tree = _tree(case, component, check_steps)
+    words = (tree, study, wanted, workers, dask)
     return _run("study.optimise:run_optimisation", "optimum", *words, is_search=True)
+
+
+def _tree(case: Path, component: Components, check_steps: bool | None) -> "CaseTree":
+    """Case as it was written, with the check of the steps that the command line asks for."""
+    from klack.case.case_tree import read_case_tree, tree_of
+    from klack.case.inserting import with_values
+    from klack.case.shipped import find_case
+
+    own = imported(component)
+    tree = read_case_tree(find_case(case), own)
+    if check_steps is None:
+        return tree
+    value = "true" if check_steps else "false"
+    return tree_of(with_values(tree, {("run", "check_steps"): value}), tree.path, own)
 
 
 @contextmanager
@@ -97,9 +123,8 @@ def _live(progress: "Progress") -> "Iterator[dict[str, Any]]":
 def _run(
     run: str,
     name: str,
-    case: Path,
+    tree: "CaseTree",
     file: Path | None,
-    component: Components,
     wanted: WantedResult,
     workers: int | None,
     dask: str | None,
@@ -111,11 +136,8 @@ def _run(
     if file is not None:
         require_files("--study", [file])
 
-    from klack.case.case_tree import read_case_tree
-    from klack.case.shipped import find_case
     from klack.case.study_source import study_of
 
-    tree = read_case_tree(find_case(case), imported(component))
     checked = tree.any_case()
     source = study_of(checked, tree, file)
     if made is not None:

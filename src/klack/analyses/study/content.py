@@ -30,6 +30,7 @@ from klack.analyses.study.wording import (
     on_page,
     rate_text,
     short_labels,
+    steps_texts,
     surrogate_cells,
     variant_words,
 )
@@ -433,7 +434,8 @@ def _point_table(record: StudyRecord, labels: dict[str, str]) -> Table:
 
 
 def _left(record: StudyRecord) -> tuple[str, ...]:
-    text = [f"Model: {record.model}.", rate_text(record)] if record.model else [rate_text(record)]
+    text = [f"Model: {record.model}."] if record.model else []
+    text += [*steps_texts(record), rate_text(record)]
     if record.count > _LISTED:
         text.append(
             f"The first {_LISTED} of {count(record.count)}; klack export writes all of them as CSV."

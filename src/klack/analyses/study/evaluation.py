@@ -81,7 +81,10 @@ class Evaluation:
         """Rows of all points that are asked for, equal ones computed once."""
         begin = perf_counter()
         measures = tuple(item.name for item in asked.chosen)
-        keys = [point_key(asked.tree, asked.variant, row) for row in asked.points.written]
+        keys = [
+            point_key(asked.tree, asked.variant, row, checks=asked.checks)
+            for row in asked.points.written
+        ]
         self.so_far = rows = [self._known(key, measures) for key in keys]
         first: dict[str, int] = {}
         for place, (key, row) in enumerate(zip(keys, rows, strict=True)):

@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.point_row import PointRow, PointSteps
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.any_case import AnyCase
 from klack.case.bodies import CaseBody
@@ -34,6 +34,7 @@ class KeptPoint:
     failure : str
     notes : tuple of str
     model : str
+    steps : PointSteps or None
         See :class:`~klack.analyses.study.point_row.PointRow`.
     """
 
@@ -41,21 +42,26 @@ class KeptPoint:
     failure: str
     notes: tuple[str, ...]
     model: str = ""
+    steps: PointSteps | None = None
 
     def row(self, measures: tuple[str, ...]) -> PointRow | None:
         """Row of a table of these measures; None if one of them is not known."""
         if self.failure:
-            return PointRow((None,) * len(measures), self.failure, self.notes)
+            return PointRow((None,) * len(measures), self.failure, self.notes, steps=self.steps)
         if not all(name in self.values for name in measures):
             return None
         values = tuple(self.values[name] for name in measures)
-        return PointRow(values, "", self.notes, model=self.model)
+        return PointRow(values, "", self.notes, model=self.model, steps=self.steps)
 
     def with_row(self, measures: tuple[str, ...], row: PointRow) -> "KeptPoint":
         """The same with what was computed now; doubts of what was there before stay."""
         values = dict(self.values) | dict(zip(measures, row.values, strict=True))
-        notes = tuple(dict.fromkeys((*self.notes, *row.notes)))
-        return KeptPoint(values=values, failure=row.failure, notes=notes, model=row.model)
+        notes, steps = tuple(dict.fromkeys((*self.notes, *row.notes))), row.steps
+        if steps is not None and self.steps is not None:
+            steps = steps.with_other(self.steps)
+        return KeptPoint(
+            values=values, failure=row.failure, notes=notes, model=row.model, steps=steps
+        )
 
 
 PointLog = UnfinishedLog[str, KeptPoint]
@@ -68,7 +74,7 @@ def point_log_form(case: AnyCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoin
     return (
         LogForm(
             file=f"points-{mark[:12]}.jsonl",
-            format="klack points 1",
+            format="klack points 2",
             parts="computed points",
             data=_data,
             read=_kept,
@@ -77,10 +83,16 @@ def point_log_form(case: AnyCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoin
     )
 
 
-def point_key(tree: CaseTree, variant: str, written: Mapping[str, PointValue]) -> str:
-    """What tells a point of a case from all others: its values, with the content of files."""
+def point_key(
+    tree: CaseTree, variant: str, written: Mapping[str, PointValue], *, checks: bool = True
+) -> str:
+    """What tells a point of a case from all others: its values, with the content of files.
+
+    And whether its steps were checked.
+    """
     marks = {name: _with_content(tree.path.parent, value) for name, value in written.items()}
-    return json.dumps([variant, dict(sorted(marks.items()))], separators=(",", ":"))
+    way = variant if checks else f"{variant}, steps as they are"
+    return json.dumps([way, dict(sorted(marks.items()))], separators=(",", ":"))
 
 
 def _with_content(folder: Path, value: PointValue) -> PointValue | list[str]:
@@ -121,7 +133,10 @@ def _data(key: str, point: KeptPoint) -> Mapping[str, Any]:
         "values": dict(point.values),
         "failure": point.failure,
         "notes": list(point.notes),
-    } | ({"model": point.model} if point.model else {})
+    } | (
+        ({"model": point.model} if point.model else {})
+        | ({"steps": list(map(str, point.steps))} if point.steps is not None else {})
+    )
 
 
 def _kept(data: Mapping[str, Any]) -> tuple[str, KeptPoint]:
@@ -133,4 +148,7 @@ def _kept(data: Mapping[str, Any]) -> tuple[str, KeptPoint]:
         failure=str(data["failure"]),
         notes=tuple(map(str, data["notes"])),
         model=str(data.get("model", "")),
+        steps=PointSteps(int(data["steps"][0]), float(data["steps"][1]))
+        if "steps" in data
+        else None,
     )

@@ -34,6 +34,7 @@ from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
+from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
@@ -52,6 +53,8 @@ _REFINED = 8
 """Most points of the front that are refined."""
 _PLAYED = 8
 """Points of the front whose sound is kept, beside the recommended one and that of today."""
+_ROUNDS = 8
+"""In which points of the front are computed with their steps checked."""
 _POLLS = 4
 """Rounds about each of them that have to fit into the points allowed."""
 
@@ -70,7 +73,8 @@ def run_optimisation(
     """Search for the best points of a study, and refine those of the front.
 
     The points depend on nothing but the study and the case: an interrupted search asks for the same
-    points again and finds those that were computed.
+    points again and finds those that were computed.  Strokes are searched in steps as they are;
+    those of the front are then computed again with their steps checked.
 
     Parameters
     ----------
@@ -120,6 +124,7 @@ def run_optimisation(
         known = {item.name: item.measure for item in asked.chosen}
         front = _Front(goals_of(source, known, dict(zip(known, today.numbers, strict=True))))
         robust_today = made.row_of_today(front.goals.sides, work.rows) if made else None
+        work.checks = False
         search = Search(settings, [space.today()])
 
         def record(
@@ -156,6 +161,7 @@ def run_optimisation(
                 for cube in refinement:
                     refinement.tell(*work.told(cube, front))
         ended = _polish(source, work, front, slopes, clock) if slopes is not None else []
+        work.check(front)
         sounds = _sounds(work, front, clock)
     return record(sounds, (*ended, *notes))
 
@@ -208,7 +214,7 @@ class _Work:
         self._pace = Pace(progress, self._most)
         self._shown = tuple(source.study.objectives)
         self._units = {item.name: item.measure.unit for item in self.asked_today.chosen}
-        self.done = 0
+        self.done, self.checks = 0, True
         self.now_and_then: Callable[[], None] = lambda: None
         self.always: Callable[[], None] = lambda: None
 
@@ -223,7 +229,8 @@ class _Work:
             For a measure that does not exist.
         """
         today = self.asked_today
-        return asked_of(today.case, today.tree, self._source, written, names)
+        asked = asked_of(today.case, today.tree, self._source, written, names)
+        return replace(asked, checks=self.checks)
 
     def rows(
         self, written: Sequence[Mapping[str, PointValue]], names: Sequence[str]
@@ -242,25 +249,57 @@ class _Work:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Objectives and violations of points of the unit cube, which join the front."""
         values = [self.space.at(point) for point in cube]
-        rows = self.rows([self.space.written(point) for point in values], self.names)
-        sides, table = front.goals.sides, np.array([row.numbers for row in rows])
-        columns = {side: table[:, self.names.index(side[0])] for side in sides}
-        if self._made is not None:
-            made = self._made.rows(values, sides, self.rows)
-            columns = dict(zip(sides, np.array([row.numbers for row in made]).T, strict=True))
-            rows = [
-                replace(row, notes=(*row.notes, *of_made.notes))
-                for row, of_made in zip(rows, made, strict=True)
-            ]
-            self.made_rows += made
+        rows, made, columns = self._computed(values, front.goals.sides)
         self.values += values
         self.found += rows
+        self.made_rows += made
         self.cubes += list(cube)
         objectives, violations = front.add(columns)
         if self._pace.tell(self.done, self.evaluation.computed, self._best_words(front)):
             self.now_and_then()
         self.always()
         return objectives, violations
+
+    def check(self, front: "_Front") -> None:
+        """Compute strokes of the front again with their steps checked, which may change the front.
+
+        A few times, until all of it are; then those that are keep it among themselves.
+        """
+        case = self.asked_today.case
+        if not isinstance(case, ValveCase) or case.run.check_steps is not None:
+            return  # the search has done as the case says
+        self.checks = True
+        checked = np.zeros(len(self.found), dtype=bool)
+        for _ in range(_ROUNDS):
+            places = front.points[~checked[front.points]].tolist()
+            if not places:
+                return
+            values = [self.values[i] for i in places]
+            rows, made, columns = self._computed(values, front.goals.sides)
+            for k, i in enumerate(places):
+                self.found[i] = rows[k]
+                if made:
+                    self.made_rows[i] = made[k]
+            checked[places] = True
+            front.exchange(places, columns)
+        front.choose(np.flatnonzero(checked))
+
+    def _computed(
+        self, values: Sequence[Values], sides: Sequence[Side]
+    ) -> tuple[list[PointRow], list[PointRow], Mapping[Side, NDArray[np.float64]]]:
+        """Rows of designs and of their made valves, and the columns that goals are held against."""
+        rows = self.rows([self.space.written(point) for point in values], self.names)
+        table = np.array([row.numbers for row in rows])
+        columns = {side: table[:, self.names.index(side[0])] for side in sides}
+        if self._made is None:
+            return rows, [], columns
+        made = self._made.rows(values, sides, self.rows)
+        columns = dict(zip(sides, np.array([row.numbers for row in made]).T, strict=True))
+        rows = [
+            replace(row, notes=(*row.notes, *of_made.notes))
+            for row, of_made in zip(rows, made, strict=True)
+        ]
+        return rows, made, columns
 
     def _best_words(self, front: "_Front") -> str:
         """The best point so far; empty without one that keeps all bounds."""
@@ -295,10 +334,19 @@ class _Front:
         new = np.arange(len(self.objectives), len(self.objectives) + len(objectives))
         self.objectives = np.vstack([self.objectives, objectives])
         self.violations = np.vstack([self.violations, violations])
-        places = np.append(self.points, new)
+        self.choose(np.append(self.points, new))
+        return objectives, violations
+
+    def exchange(self, places: Sequence[int], columns: Mapping[Side, NDArray[np.float64]]) -> None:
+        """Take other measures of some points."""
+        self.objectives[places] = self.goals.objective_values(columns)
+        self.violations[places] = self.goals.violations(columns)
+        self.choose(np.arange(len(self.objectives)))
+
+    def choose(self, places: NDArray[np.int64]) -> None:
+        """Find the front among some points."""
         found = find_front(self.objectives[places], self.violations[places])
         self.points, self.feasible = places[found.points], found.feasible
-        return objectives, violations
 
     def row(self, point: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Objectives and violations of a point."""

@@ -35,6 +35,7 @@ class PointOrder:
         All that the points of the study exchange.
     measures : tuple of str
     variant : str
+    checks : bool
     written : tuple of mapping of str to value
         What each point exchanges.
     """
@@ -42,6 +43,7 @@ class PointOrder:
     keys: tuple[PointKey, ...]
     measures: tuple[str, ...]
     variant: str
+    checks: bool
     written: tuple[Mapping[str, PointValue], ...]
 
     @classmethod
@@ -51,6 +53,7 @@ class PointOrder:
             asked.points.keys,
             tuple(item.name for item in asked.chosen),
             asked.variant,
+            asked.checks,
             tuple(asked.points.written[i] for i in places),
         )
 
@@ -104,6 +107,7 @@ class _CaseAtWork:
             points=Points(order.keys, order.written),
             chosen=kind.measures(self._case, order.measures),
             variant=order.variant,
+            checks=order.checks,
         )
         return tuple(self._sent(row) for row in compute_alone(asked, self._builds))
 

@@ -3,10 +3,35 @@
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import nan
+from typing import NamedTuple
 
 from klack.errors import AccuracyWarning
 
-__all__ = ["PointRow", "doubts_in", "others_in"]
+__all__ = ["UNCHECKED", "PointRow", "PointSteps", "doubts_in", "others_in"]
+
+
+class PointSteps(NamedTuple):
+    """What a check of the time steps of a stroke has found.
+
+    Parameters
+    ----------
+    halvings : int
+        How often all steps were halved.
+    change : float [-]
+        Largest change of the impacts that the measures depend on with all steps twice as long, over
+        what the accuracy promises; inf where one has no counterpart, nan where nothing was checked.
+    """
+
+    halvings: int = 0
+    change: float = nan
+
+    def with_other(self, other: "PointSteps") -> "PointSteps":
+        """Of two runs of one point, for different measures."""
+        return PointSteps(max(self.halvings, other.halvings), max(self.change, other.change))
+
+
+UNCHECKED = PointSteps()
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +53,8 @@ class PointRow:
         of the user's own has failed.
     model : str
         What the numbers come from, in words: level, modes and meshes of an impact.
+    steps : PointSteps or None
+        Of a stroke.
     """
 
     values: tuple[float | None, ...]
@@ -36,6 +63,7 @@ class PointRow:
     others: tuple[warnings.WarningMessage, ...] = ()
     by_chance: bool = False
     model: str = ""
+    steps: PointSteps | None = None
 
     @property
     def numbers(self) -> tuple[float, ...]:

@@ -1,6 +1,6 @@
 """Record of ``klack study``: parameters and measures of every point, in columns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -316,6 +316,9 @@ class StudyRecord(CaseRecord):
     model : str
         What the numbers of an impact come from: level, modes and meshes of the case as it is, and
         at how many points they differ; empty for strokes.
+    halvings, step_changes : array, shape (points,)
+        Of strokes, see :class:`~klack.analyses.study.point_row.PointSteps`; nan without a stroke.
+        Empty for impacts.
     """
 
     study_text: str
@@ -338,6 +341,8 @@ class StudyRecord(CaseRecord):
     sounds: tuple[PointSound, ...] = ()
     workers: str = "threads"
     model: str = ""
+    halvings: Column = field(default_factory=lambda: np.zeros(0))
+    step_changes: Column = field(default_factory=lambda: np.zeros(0))
 
     @property
     def count(self) -> int:

@@ -4,8 +4,10 @@ from collections.abc import Iterable, Sequence
 
 from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
 from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.columns import step_columns
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.table import steps_of
 from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
@@ -113,4 +115,5 @@ def _row_table(asked: AskedPoints, found: Sequence[PointRow | None]) -> PointTab
         ),
         failures=tuple(row.failure for row in rows),
         warnings=tuple(row.notes for row in rows),
+        steps=steps_of(*step_columns(rows)),
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from math import inf, isnan
 from operator import attrgetter
 
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
@@ -22,7 +23,10 @@ from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.simulation.network_result import ImpactEvent
 
-__all__ = ["StrokeOfPoint", "stroke_measure_names", "stroke_measures"]
+__all__ = ["TIMES", "StrokeOfPoint", "stroke_measure_names", "stroke_measures", "told_until"]
+
+TIMES = ("opening_time", "closing_time")
+"""Measures of a stroke, beside those of its impacts, that end with a touch."""
 
 _OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
 _OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
@@ -109,3 +113,21 @@ def _known_words(stops: list[str]) -> str:
         f"{words}; or of the first impact on a stop, {stops[0]}.KEY (of the second one "
         f"{stops[0]}.2.KEY), with a stop of: {one_of(stops)}, and a key of: {one_of(_OF_IMPACTS)}"
     )
+
+
+def told_until(chosen: Iterable[ChosenMeasure], run: StrokeOfPoint) -> float:
+    """Time [s] of a stroke until which its measures depend on impacts: later ones do not matter.
+
+    The end of the last impact that one is of, or a time of opening or closing between stops; inf
+    for all others, and for a measure without a value.
+    """
+    ends = [0.0]
+    for item in chosen:
+        end = None
+        if item.of == "impact":
+            event: ImpactEvent | None = item.part(run)
+            end = None if event is None else event.separation_time
+        elif item.name.partition("_at_")[0] in TIMES and run.variant.needle_times.between_stops:
+            end = item.measure.read(run.variant)
+        ends.append(inf if end is None or isnan(end) else end)
+    return max(ends)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import NoiseSource, stroke_sources
-from klack.analyses.stroke.record import StopSummary
+from klack.analyses.stroke.record import StopSummary, StrokeVariant
 from klack.analyses.stroke.rest import rest_note
 from klack.analyses.stroke.run import (
     body_summaries,
@@ -19,8 +19,14 @@ from klack.analyses.stroke.run import (
 )
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
 from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
-from klack.analyses.study.point_row import PointRow, doubts_in, others_in
-from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures
+from klack.analyses.study.point_row import (
+    UNCHECKED,
+    PointRow,
+    PointSteps,
+    doubts_in,
+    others_in,
+)
+from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures, told_until
 from klack.analyses.threads import Stopped, never_stopped
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
@@ -219,7 +225,7 @@ class _Strokes:
     ) -> PointRow:
         """Compute one point, in whichever thread."""
         try:
-            whole, roles = _point_run(asked, built, place, check)
+            whole, steps, roles = _point_run(asked, built, place, check)
             values = tuple(item.value(whole) for item in asked.chosen)
         except Stopped:
             raise
@@ -232,7 +238,8 @@ class _Strokes:
         notes = [*built.notes, *doubts_in(caught), *whole.noise.notes]
         notes += [note for note in begun if not any(note in other for other in notes)]
         notes += [rest] if rest else []
-        return PointRow(values, notes=tuple(dict.fromkeys(notes)), others=others_in(caught))
+        told = tuple(dict.fromkeys(notes))
+        return PointRow(values, notes=told, others=others_in(caught), steps=steps)
 
     def pressure(
         self, asked: AskedPoints[ValveCase], built: _Built, place: int
@@ -257,25 +264,42 @@ def _valve_at(asked: AskedPoints[ValveCase], built: _Built, i: int) -> Valve:
 
 def _point_run(
     asked: AskedPoints[ValveCase], built: _Built, i: int, check: Callable[[], None]
-) -> tuple[StrokeOfPoint, ValveRoles]:
-    """Stroke of a point."""
+) -> tuple[StrokeOfPoint, PointSteps, ValveRoles]:
+    """Stroke of a point, and the check of its steps."""
     valve = _valve_at(asked, built, i)
-    return _stroke_of(valve.case, valve, asked.variant, built, check)
+    return _stroke_of(valve.case, valve, asked, built, check)
 
 
 @tells_place
 def _stroke_of(
-    case: ValveCase, valve: Valve, wanted: str, built: _Built, check: Callable[[], None]
-) -> tuple[StrokeOfPoint, ValveRoles]:
+    case: ValveCase,
+    valve: Valve,
+    asked: AskedPoints[ValveCase],
+    built: _Built,
+    check: Callable[[], None],
+) -> tuple[StrokeOfPoint, PointSteps, ValveRoles]:
     """Stroke of a valve of this case, in one variant."""
     roles = find_roles(case, valve.network)
-    variant = case.one_variant(wanted)
-    run = one_variant(valve, roles, variant, lambda stage, fraction: check())
-    if run.failure is not None:
-        raise run.failure
+    variant = case.one_variant(asked.variant)
 
     def source() -> NoiseSource:
         study = study_of_run(valve, roles, variant, run, built.bodies, built.stops)
         return stroke_sources(study, case=case)[0]
 
-    return StrokeOfPoint(run.variant, PointNoise(source, built.transfers)), roles
+    def whole(found: StrokeVariant) -> StrokeOfPoint:
+        return StrokeOfPoint(found, PointNoise(source, built.transfers))
+
+    run = one_variant(
+        valve,
+        roles,
+        variant,
+        lambda stage, fraction: check(),
+        check=asked.checks,
+        until=lambda found: told_until(asked.chosen, whole(found)),
+    )
+    if run.failure is not None:
+        raise run.failure
+    steps = UNCHECKED
+    if run.steps is not None:
+        steps = PointSteps(*run.steps.certificate(case.run.accuracy))
+    return whole(run.variant), steps, roles

@@ -31,6 +31,7 @@ from klack.analyses.study.wording import (
     largest_first,
     missed_cells,
     rate_text,
+    steps_texts,
     surrogate_cells,
     variant_words,
 )
@@ -154,6 +155,17 @@ class StudyJson(TypedDict):
     optimum: Annotated[OptimumJson | None, Field(description="Of klack optimise.")]
     failures: Annotated[list[str], Field(description="Empty where a point was computed.")]
     notes: Annotated[list[str], Field(description="Doubts about the numbers of each point.")]
+    halvings: Annotated[
+        list[Real], Field(description="How often all steps of each stroke were halved.")
+    ]
+    step_changes: Annotated[
+        list[Real],
+        Field(
+            description="Largest change of the impacts that the measures of a stroke depend on, "
+            "with all steps twice as long, over what the accuracy promises: certified up to 0.5; "
+            "null where nothing was checked, or an impact has no counterpart."
+        ),
+    ]
     wall_time_s: Real
     point_time_s: Real
     computed: Annotated[int, Field(description="Points computed now.")]
@@ -189,6 +201,8 @@ def study_to_json(record: StudyRecord) -> StudyJson:
         "optimum": None if record.optimum is None else _optimum(record.optimum),
         "failures": list(record.failures),
         "notes": list(record.notes),
+        "halvings": list(map(number_or_none, record.halvings)),
+        "step_changes": list(map(number_or_none, record.step_changes)),
         "wall_time_s": record.wall_time,
         "point_time_s": record.point_time,
         "computed": record.computed,
@@ -342,6 +356,7 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
             )
     if record.model:
         yield f"Model: {record.model}."
+    yield from steps_texts(record)
     yield rate_text(record)
 
 

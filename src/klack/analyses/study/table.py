@@ -1,9 +1,12 @@
 """The points of a study as a table: for CSV, for pandas."""
 
+import numpy as np
+from numpy.typing import NDArray
+
 from klack.analyses.point_table import PointColumn, PointTable, column_of
 from klack.analyses.study.record import StudyColumn, StudyRecord
 
-__all__ = ["study_table"]
+__all__ = ["steps_of", "study_table"]
 
 
 def study_table(record: StudyRecord) -> PointTable:
@@ -15,7 +18,16 @@ def study_table(record: StudyRecord) -> PointTable:
         measures=tuple(_column(item) for item in record.measures),
         failures=record.failures,
         warnings=tuple(tuple(text.splitlines()) for text in record.notes),
+        steps=steps_of(record.halvings, record.step_changes),
     )
+
+
+def steps_of(
+    halvings: NDArray[np.float64], changes: NDArray[np.float64]
+) -> tuple[PointColumn, ...]:
+    """Columns of what the check of the steps has found; none of impacts."""
+    named = (("halvings", halvings), ("step_change", changes))
+    return tuple(PointColumn(name, "1", values) for name, values in named if len(values))
 
 
 def _column(item: StudyColumn) -> PointColumn:

@@ -1,10 +1,11 @@
 """Words for the columns and points of a study."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import isfinite
 
 import numpy as np
 
+from klack.analyses.stroke.step_check import SHARE
 from klack.analyses.study.record import (
     MissedBound,
     Screening,
@@ -32,9 +33,13 @@ __all__ = [
     "rate_text",
     "short_labels",
     "shown_unit",
+    "steps_texts",
     "surrogate_cells",
     "variant_words",
 ]
+
+
+_TOLD = 8  # points in a sentence
 
 
 def shown_unit(unit: str) -> tuple[str, float]:
@@ -182,6 +187,24 @@ def rate_text(record: StudyRecord) -> str:
     if failed:
         parts.append(f"{failed} have no measures")
     return "; ".join(parts) + "."
+
+
+def steps_texts(record: StudyRecord) -> Iterator[str]:
+    """What the check of the steps of strokes has found; nothing for impacts."""
+    known = ~np.isnan(record.step_changes)
+    if not known.any():
+        if len(known) > record.failed.sum():
+            yield "Time steps as they are: what measures depend on them by was not checked."
+        return
+    halved = int(np.sum(record.halvings[known] > 0))
+    doubtful = np.flatnonzero(known & (record.step_changes > SHARE))
+    text = f"Time steps checked at {known.sum()} of {len(known)} points, halved at {halved}; "
+    if not len(doubtful):
+        yield f"{text}their measures are certified."
+        return
+    named = ", ".join(map(str, doubtful[:_TOLD]))
+    more = f" and {len(doubtful) - _TOLD} more" if len(doubtful) > _TOLD else ""
+    yield f"{text}{len(doubtful)} not certified: {named}{more}."
 
 
 def short_labels(record: StudyRecord) -> dict[str, str]:
