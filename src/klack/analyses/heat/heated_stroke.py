@@ -70,7 +70,7 @@ def heated_stroke(
     """
     warm = warm_valve(valve, at)
     with trial():  # its warnings are those of the same stroke of klack stroke
-        run = one_variant(warm.valve, roles, variant, silent)
+        run = one_variant(warm.valve, roles, variant, silent, check=False)
     if run.failure is not None:
         shown = {
             f"{name} {T - 273.15:.4g} °C" for nodes in at.values() for name, T in nodes.items()
