@@ -149,7 +149,8 @@ def test_thermal_components_leave_a_stroke_as_it_is(valve):
     assert len(other.network.components) == len(valve.network.components) - 2
 
     runs = [
-        one_variant(v, find_roles(v.case), "dry", silent).variant.result for v in (valve, other)
+        one_variant(v, find_roles(v.case), "dry", silent, check=False).variant.result
+        for v in (valve, other)
     ]
 
     for name, channel in runs[0].channels.items():
@@ -159,7 +160,7 @@ def test_thermal_components_leave_a_stroke_as_it_is(valve):
 
 def test_at_20_degrees_it_is_the_stroke_of_the_case(valve):
     roles = find_roles(valve.case)
-    plain = one_variant(valve, roles, "dry", silent).variant
+    plain = one_variant(valve, roles, "dry", silent, check=False).variant
 
     found = heated_stroke(valve, roles, "dry", {a: COLD for a in aspects_of(valve.case)})
 

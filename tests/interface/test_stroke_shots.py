@@ -72,7 +72,7 @@ def test_a_stroke_is_that_of_the_same_placement(valve, starts, alone):
     assert placement == pytest.approx(start.placement, rel=1e-9, abs=1e-18)
 
     spatial = replace(valve.spatial, placement=placement)
-    run = one_variant(replace(valve, spatial=spatial), find_roles(CASE), "dry", silent)
+    run = one_variant(replace(valve, spatial=spatial), find_roles(CASE), "dry", silent, check=False)
     first = run.variant.impacts("opening")[0]
     # round-off of the placement grows about a thousandfold until the end of an impact
     for key in ("peak_force", "contact_time", "impulse", "restitution", "approach_speed"):
