@@ -121,7 +121,8 @@ class StrokeRun(Section):
         "that changes in each impact, and halve all steps, three times or in short runs six, "
         "until the first three impacts on each stop change by less than half of what the "
         "accuracy promises; by default in single strokes, in points of studies for the impacts "
-        "that their measures depend on, and on the front of a search.",
+        "that their measures depend on, and on the front of a search; in three dimensions steps "
+        "are halved only where this is true.",
     )
     record: Time = Field(
         default=1e-6,

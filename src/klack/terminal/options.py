@@ -59,7 +59,7 @@ CheckSteps = Annotated[
         name="--check-steps",
         help="Run strokes again with all steps twice as long; halve them where that changes first "
         "impacts by more than half of what the accuracy promises. [default: as in the case, or "
-        "yes; of a search its front alone]",
+        "yes; of a search its front alone; in three dimensions compared only]",
     ),
 ]
 Components = Annotated[

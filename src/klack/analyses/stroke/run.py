@@ -439,10 +439,11 @@ def _in_checked_steps(
 
     As often as :data:`_HALVINGS`, and on to :data:`_MOST_HALVINGS` where that is short, longer if
     the largest change falls: an error that depends on where a step happens to lie need not fall.
-    No run is short in three dimensions, where a step takes a thousand times as long.
+    In three dimensions, where a step takes a thousand times as long, steps are compared, and halved
+    where the case asks for the check; no run is short there.
     """
-    most = _MOST_HALVINGS if valve.spatial is None else _HALVINGS
-    accuracy = valve.case.run.accuracy
+    accuracy, is_asked = valve.case.run.accuracy, valve.case.run.check_steps is True
+    most = _MOST_HALVINGS if valve.spatial is None else is_asked * _HALVINGS
 
     def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
         try:
