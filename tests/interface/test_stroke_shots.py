@@ -218,10 +218,10 @@ def test_a_row_starts_where_it_has_ended(setup, starts):
 def test_a_failed_stroke_costs_its_row_alone(setup, starts, monkeypatch):
     real = one_stroke.one_variant
 
-    def failing(valve, *args):
+    def failing(valve, *args, **more):
         if np.array_equal(valve.spatial.placement, starts.drawn(0).placement):
             raise ConvergenceError("needle: no contact forces found.\nTry: a shorter step.")
-        return real(valve, *args)
+        return real(valve, *args, **more)
 
     monkeypatch.setattr(one_stroke, "one_variant", failing)
     log = STROKE_LOG.open(None, "")
