@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from klack.errors import InputError
 from klack.mesh.files.abaqus.deck import read_deck
 from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.mesh import Mesh
@@ -215,3 +216,9 @@ def test_nodes_in_a_frame(tmp_path, text, expected):
     )
 
     np.testing.assert_allclose(mesh.points, expected, atol=1e-15)
+
+
+def test_quadrilaterals_of_meshio_are_named_as_such(tmp_path):
+    text = ROW + "*ELEMENT, TYPE=CAX4P\n7, 1, 2, 3, 4\n"
+    with pytest.raises(InputError, match=r"got TYPE=CAX4P(?s:.*)meshio writes quadrilaterals so"):
+        read(tmp_path / "cube.inp", text)

@@ -157,7 +157,8 @@ def _family(keyword: Keyword, kind: str) -> tuple[str, bool]:
     for family, pattern in _SURFACES.items():
         if re.fullmatch(pattern, kind):
             return family, False
-    _refuse(keyword, kind, "remove elements of other kinds from the file.")
+    of_meshio = " meshio writes quadrilaterals so." if kind == "CAX4P" else ""
+    _refuse(keyword, kind, f"remove elements of other kinds from the file.{of_meshio}")
 
 
 def _refuse(keyword: Keyword, kind: str, hint: str) -> NoReturn:
