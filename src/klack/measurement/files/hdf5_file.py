@@ -6,11 +6,11 @@ own data.
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.errors import InputError, MissingExtraError
 from klack.measurement.files.foreign import foreign_reading
@@ -18,12 +18,10 @@ from klack.measurement.files.stored_arrays import (
     ArrayRecording,
     StoredArray,
     StoredGroup,
-    held_array,
+    stored_array,
 )
 
 __all__ = ["Hdf5File", "NetCdf3File"]
-
-Vector = NDArray[np.float64]
 
 _DEEPEST = 8
 _LONGEST_TEXT = 200
@@ -83,7 +81,7 @@ class NetCdf3File(ArrayRecording):
                 elif values.size == 1:
                     about[name.lower()] = float(values.ravel()[0])
                 elif values.ndim in (1, 2) and values.size:
-                    arrays.append(held_array(name, values, _attributes(variable._attributes)))
+                    arrays.append(stored_array(name, values, _attributes(variable._attributes)))
                 else:
                     unread.append(name)
         reasons = {"no vector or matrix of real numbers": unread} if unread else {}
@@ -142,26 +140,8 @@ def _group(node: Any, path: str, depth: int) -> StoredGroup:
 
 def _array(name: str, item: Any) -> StoredArray:
     _check_size(name, item)
-
-    def read(line: int, axis: int, first: int, last: int) -> Vector:
-        with _damage(f"{Path(item.file.filename).name}: '{name}'"):
-            if item.ndim == 1:
-                values = item[first:last]
-            else:
-                values = item[first:last, line] if axis == 0 else item[line, first:last]
-        return np.asarray(values, dtype=np.float64)
-
-    def whole(first: int, last: int) -> NDArray[np.int64]:
-        with _damage(f"{Path(item.file.filename).name}: '{name}'"):
-            return np.asarray(item[first:last], dtype=np.int64)
-
-    return StoredArray(
-        name=name,
-        shape=item.shape,
-        read=read,
-        whole=whole if item.ndim == 1 and item.dtype.kind in "iu" else None,
-        about=_attributes(item.attrs),
-    )
+    words = f"{Path(item.file.filename).name}: '{name}'"
+    return stored_array(name, item, _attributes(item.attrs), partial(_damage, words))
 
 
 def _check_size(name: str, item: Any) -> None:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.measurement.files.stored_arrays import ArrayRecording, StoredGroup, held_array
+from klack.measurement.files.stored_arrays import ArrayRecording, StoredGroup, stored_array
 from klack.model_files.mat5 import MatValue, read_mat5
 
 __all__ = ["MatlabFile"]
@@ -50,7 +50,7 @@ def _group(fields: dict[str, MatValue], path: str, depth: int) -> StoredGroup:
         elif value.size == 1:
             about[key.lower()] = float(value.ravel()[0])
         elif value.size and value.ndim == 2:
-            arrays.append(held_array(key, value))
+            arrays.append(stored_array(key, value))
         else:
             unread.append(below)
     reasons = {"no vector or matrix of real numbers": unread} if unread else {}

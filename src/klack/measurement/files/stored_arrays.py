@@ -12,6 +12,7 @@ Such files have no fixed form.  Understood are
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -33,7 +34,7 @@ from klack.measurement.files.scales import PACKED, unknown_scales, unpacked
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
 
-__all__ = ["ArrayRecording", "StoredArray", "StoredGroup", "held_array"]
+__all__ = ["ArrayRecording", "StoredArray", "StoredGroup", "stored_array"]
 
 Vector = NDArray[np.float64]
 
@@ -82,17 +83,24 @@ class StoredArray:
     about: Mapping[str, str | float] = field(default_factory=dict)
 
 
-def held_array(
-    name: str, values: NDArray[Any], about: Mapping[str, str | float] | None = None
+def stored_array(
+    name: str,
+    values: Any,
+    about: Mapping[str, str | float] | None = None,
+    reading: Callable[[], AbstractContextManager[Any]] = nullcontext,
 ) -> StoredArray:
-    """Array of a file that is read as a whole."""
+    """Vector or matrix that is held, or one of a file that each ``reading`` reads a part of."""
 
     def read(line: int, axis: int, first: int, last: int) -> Vector:
-        part = values if values.ndim == 1 else values[:, line] if axis == 0 else values[line]
-        return np.asarray(part[first:last], dtype=np.float64)
+        part: tuple[Any, ...] = (slice(first, last),)
+        if values.ndim == 2:
+            part = (*part, line) if axis == 0 else (line, *part)
+        with reading():
+            return np.asarray(values[part], dtype=np.float64)
 
     def whole(first: int, last: int) -> NDArray[np.int64]:
-        return np.asarray(values[first:last], dtype=np.int64)
+        with reading():
+            return np.asarray(values[first:last], dtype=np.int64)
 
     return StoredArray(
         name=name,
