@@ -43,9 +43,6 @@ def require_readable_step(path: Path, patience: float = _PATIENCE) -> None:
         If an entity is missing or there twice, which OpenCASCADE passes over, if it breaks on the
         file, or does not come to an end within ``patience`` [s].
     """
-    _require_entities(path)
-    if not sys.executable:  # inside of another program
-        return
     state = path.stat()
     _try(path, patience, (state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns))
 
@@ -62,7 +59,10 @@ def _require_entities(path: Path) -> None:
 
 @cache  # a file that was refused is tried again: memory may have been short
 def _try(path: Path, patience: float, state: tuple[int, ...]) -> None:
-    """Start the child; ``state`` identifies a version of the file."""
+    """Look for what is lost, and start the child; ``state`` identifies a version of the file."""
+    _require_entities(path)
+    if not sys.executable:  # inside of another program
+        return
     try:
         done = subprocess.run(
             [sys.executable, "-c", _PROGRAM, str(path.absolute())],
