@@ -442,8 +442,9 @@ def _in_checked_steps(
     In three dimensions, where a step takes a thousand times as long, steps are compared, and halved
     where the case asks for the check; no run is short there.
     """
-    accuracy, is_asked = valve.case.run.accuracy, valve.case.run.check_steps is True
-    most = _MOST_HALVINGS if valve.spatial is None else is_asked * _HALVINGS
+    accuracy, most = valve.case.run.accuracy, _MOST_HALVINGS
+    if valve.spatial is not None:
+        most = _HALVINGS if valve.case.run.check_steps else 0
 
     def again(factor: float) -> tuple[_Attempt | None, Warned, str]:
         try:
