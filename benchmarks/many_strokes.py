@@ -54,7 +54,7 @@ PARTS = {
     "time loop": "klack.simulation.network_run.run_network",
     "impact finder": "klack.simulation.impact_events.ImpactFinder.feed",
     "times of the lift": "klack.analyses.stroke.run.all_lift_times",
-    "measures": "klack.analyses.study.chosen_measures.ChosenMeasure.value",
+    "measures": "klack.analyses.study.measures.ChosenMeasure.value",
 }
 """Parts of a stroke, and the functions that take their time."""
 

@@ -35,11 +35,11 @@ from unittest.mock import patch
 from number import Number, Size
 
 import klack
-from klack.analyses.study import process_workers
+from klack.analyses.study import where as where_module
+from klack.analyses.study.asked_points import PointRow
+from klack.analyses.study.computing import PointWorkers
 from klack.analyses.study.dask_workers import DaskWorkers, _TaskSize
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.point_row import PointRow
-from klack.analyses.study.point_workers import PointWorkers
 from klack.analyses.study.where import Where
 from klack.case.valve import ValveCase
 from klack.progress import silent
@@ -155,13 +155,13 @@ def race(
 def seconds_of_workers() -> Iterator[list[float]]:
     """Seconds that processes take for each answer meanwhile."""
     spent: list[float] = []
-    keep = process_workers._keep
+    keep = where_module._keep
 
     def noted(asked: Any, item: Any, found: Any, tally: Any) -> None:
         spent.append(found.seconds)
         keep(asked, item, found, tally)
 
-    with patch.object(process_workers, "_keep", noted):
+    with patch.object(where_module, "_keep", noted):
         yield spent
 
 

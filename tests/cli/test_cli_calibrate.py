@@ -8,8 +8,7 @@ import pytest
 from rigid_valve import write_bench
 
 from klack.analyses.calibration.analysis import CALIBRATION
-from klack.analyses.calibration.log import TRIAL_LOG
-from klack.analyses.calibration.motion import MotionModel
+from klack.analyses.calibration.motion import TRIAL_LOG, MotionModel
 from klack.case.valve_reader import load_valve_case
 from klack.cli.main import main
 

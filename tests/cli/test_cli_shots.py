@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import klack.analyses.shots.run as workflow
-from klack.analyses.shots.log import SHOT_LOG
+from klack.analyses.shots.one_shot import SHOT_LOG
 from klack.cli.main import main
 
 pytestmark = pytest.mark.slow

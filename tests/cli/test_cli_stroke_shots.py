@@ -11,7 +11,7 @@ import pytest
 from shots_valve import valve_text
 
 import klack.analyses.stroke_shots.run as workflow
-from klack.analyses.stroke_shots.log import STROKE_LOG
+from klack.analyses.stroke_shots.one_stroke import STROKE_LOG
 from klack.api import load_result
 from klack.cli.main import main
 

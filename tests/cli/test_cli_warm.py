@@ -24,7 +24,7 @@ STROKES = (
 )
 COUNT = """
 import json, sys
-from klack.warming.counted import counted
+from klack.warming.run import counted
 from klack.cli.main import main
 for words in json.loads(sys.argv[1]):
     with counted() as count:

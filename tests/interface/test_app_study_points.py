@@ -9,10 +9,9 @@ import pytest
 import yaml
 from made_study import made_study
 
-from klack.analyses.study import live_record
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.evaluation import Evaluation
-from klack.analyses.study.live_record import LiveRecord
+from klack.analyses.study.live import LiveRecord
 from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.run import asked_points, run_study
 from klack.app import study_points
@@ -174,7 +173,9 @@ def test_a_study_offers_its_points_while_they_come(tmp_path):
 
 def test_the_live_record_is_written_seldom_and_ends_no_study(tmp_path, monkeypatch):
     made = []
-    monkeypatch.setattr(live_record, "STUDY", type("S", (), {"save": lambda *given: None}))
+    monkeypatch.setattr(
+        "klack.analyses.study.live.STUDY", type("S", (), {"save": lambda *given: None})
+    )
     live = LiveRecord(tmp_path, silent)
     for _ in range(5):
         live.offer(lambda: made.append(1))

@@ -34,7 +34,7 @@ part = called.part
 RUN = """
 import json, os, sys, warnings
 sys.path.insert(0, {folder!r})
-from klack.warming.counted import counted
+from klack.warming.run import counted
 from numba.core import event
 warnings.simplefilter("always")
 import calls

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 from rigid_valve import write_bench
 
-from klack.analyses.calibration.log import TRIAL_LOG, TrialKey, trial_log
-from klack.analyses.calibration.motion import Motion
+from klack.analyses.calibration.motion import TRIAL_LOG, Motion, TrialKey, trial_log
 from klack.analyses.catalogue import load_result
 from klack.analyses.result_folder import is_result
 from klack.errors import CacheWarning, InputError

@@ -11,7 +11,7 @@ import pytest
 import klack
 from klack.cli.main import main
 from klack.errors import InputError
-from klack.studies.robust import RobustValue
+from klack.studies.samples import RobustValue
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 PRELOAD = "network.components.spring.preload"

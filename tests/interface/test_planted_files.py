@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 from rigid_valve import write_bench
 
-from klack.analyses.calibration.log import TRIAL_LOG, trial_log
-from klack.analyses.calibration.motion import Motion
+from klack.analyses.calibration.motion import TRIAL_LOG, Motion, trial_log
 from klack.analyses.catalogue import load_result
-from klack.analyses.shots.log import SHOT_LOG, shot_log
+from klack.analyses.shots.one_shot import SHOT_LOG, shot_log
 from klack.cache.entry import Entry
 from klack.cache.result_cache import ResultCache
 from klack.cli.main import main

@@ -12,16 +12,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from klack.analyses.shots.analysis import SHOTS
+from klack.analyses.shots.analysis import SHOTS, shots_to_json
 from klack.analyses.shots.content import shots_content
 from klack.analyses.shots.draw import centric_draw, draw_shot
-from klack.analyses.shots.log import shot_log
-from klack.analyses.shots.measures import RESULTS
 from klack.analyses.shots.model import build_shots
-from klack.analyses.shots.one_shot import columns_of, run_shot, simulate_shot
+from klack.analyses.shots.one_shot import columns_of, run_shot, shot_log, simulate_shot
+from klack.analyses.shots.record import RESULTS
 from klack.analyses.shots.record import ShotColumns as Shots
 from klack.analyses.shots.run import run_shots, run_shots_on
-from klack.analyses.shots.summary import shots_to_json
 from klack.case import read_case
 from klack.case.distribution import Distribution
 from klack.case.schema import Case

@@ -11,16 +11,15 @@ import pytest
 import yaml
 
 import klack
-from klack.analyses.shots.log import shot_log
-from klack.analyses.shots.measures import RESULTS
+from klack.analyses.shots.analysis import shots_to_json
 from klack.analyses.shots.model import build_shots
-from klack.analyses.shots.record import ShotColumns
+from klack.analyses.shots.one_shot import shot_log
+from klack.analyses.shots.record import RESULTS, ShotColumns
 from klack.analyses.shots.run import DroppedShots, drop_shots, run_shots
-from klack.analyses.shots.summary import shots_to_json
 from klack.analyses.study import impacts
 from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.evaluation import asked_of
-from klack.analyses.study.shot_measures import SHOT_NAMES, shot_measure, shot_notes
+from klack.analyses.study.measures import SHOT_NAMES, shot_measure, shot_notes
 from klack.case.study_source import study_of
 from klack.cli.main import main
 from klack.progress import silent

@@ -10,8 +10,13 @@ from shots_valve import valve_case
 import klack.analyses.stroke_shots.one_stroke as one_stroke
 from klack.analyses.stroke.run import one_variant
 from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
-from klack.analyses.stroke_shots.log import STROKE_LOG, strokes_mark
-from klack.analyses.stroke_shots.one_stroke import StrokeTask, rebound_height, run_one_stroke
+from klack.analyses.stroke_shots.one_stroke import (
+    STROKE_LOG,
+    StrokeTask,
+    rebound_height,
+    run_one_stroke,
+    strokes_mark,
+)
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.stroke_shots.run import compute_strokes, run_stroke_shots, stroke_setup
 from klack.analyses.stroke_shots.starts import CENTRED, Starts

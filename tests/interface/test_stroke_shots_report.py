@@ -10,13 +10,13 @@ import pytest
 from json_schema_check import require_documented
 
 import klack
-from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
-from klack.analyses.stroke_shots.highest import highest_rebound
+from klack.analyses.stroke_shots.analysis import STROKE_SHOTS, stroke_shots_to_json
 from klack.analyses.stroke_shots.record import (
     StopColumns,
     StrokeColumns,
     StrokeShotsStudy,
     VariantShots,
+    highest_rebound,
 )
 from klack.analyses.stroke_shots.run import missing_notes
 from klack.analyses.stroke_shots.scatter import (
@@ -25,7 +25,6 @@ from klack.analyses.stroke_shots.scatter import (
     scatter_ratio,
     scattered,
 )
-from klack.analyses.stroke_shots.summary import stroke_shots_to_json
 from klack.analyses.stroke_shots.wording import stroke_answers
 from klack.errors import InputError
 from klack.exchange.results.dataset import dataset_of

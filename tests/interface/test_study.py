@@ -17,12 +17,11 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.study.asked_points import groups_of
+from klack.analyses.study.analysis import study_to_json
+from klack.analyses.study.asked_points import PointRow, PointSteps, groups_of
+from klack.analyses.study.evaluation import KeptPoint, point_key
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.log import KeptPoint, point_key
-from klack.analyses.study.parameters import parameters_of, short_names
-from klack.analyses.study.point_row import PointRow, PointSteps
-from klack.analyses.study.summary import study_to_json
+from klack.analyses.study.points import parameters_of, short_names
 from klack.analyses.study.wording import steps_texts
 from klack.case.reader import parse
 from klack.case.study import CaseStudy
@@ -227,7 +226,7 @@ class TestKept:
         assert klack.run_study(SMALL, study, folder=tmp_path / "out").record.computed == 0
 
     def test_a_changed_file_is_another_point(self, tmp_path):
-        from klack.analyses.study.log import point_key
+        from klack.analyses.study.evaluation import point_key
         from klack.case.case_tree import read_case_tree
 
         case = tmp_path / "case.yaml"
@@ -267,14 +266,14 @@ class TestKept:
 
     @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
     def test_ctrl_c_says_what_is_kept(self, study, tmp_path, capsys, monkeypatch):
-        from klack.analyses.study import point_workers
+        from klack.analyses.study import computing
 
         def stopped(asked, places, *others):
             real(asked, list(places)[:3], *others)
             signal.raise_signal(signal.SIGINT)
 
-        real = point_workers.compute_points
-        monkeypatch.setattr(point_workers, "compute_points", stopped)
+        real = computing.compute_points
+        monkeypatch.setattr(computing, "compute_points", stopped)
         # a suite in the background ignores it
         signal.signal(signal.SIGINT, signal.default_int_handler)
         code = main(["study", str(SMALL), "--study", str(study), "--out", str(tmp_path / "out")])
@@ -727,7 +726,7 @@ class TestOptimum:
         out = tmp_path / "out"
         file = write(tmp_path, text)
         command = ["optimise", str(SMALL), "--study", str(file), "--out", str(out)]
-        monkeypatch.setattr("klack.analyses.study.pace._FIRST", 0.0)
+        monkeypatch.setattr("klack.analyses.study.live._FIRST", 0.0)
         assert main([*command, "--json", str(tmp_path / "o.json")]) == 0
         told = capsys.readouterr()
         assert "best so far" in told.err
@@ -754,8 +753,8 @@ class TestOptimum:
             write_report(content, path)
             pages.append((content, path.read_text()))
 
-        monkeypatch.setattr("klack.analyses.study.pace._FIRST", 0.0)
-        monkeypatch.setattr("klack.analyses.study.progress_page.write_report", seen)
+        monkeypatch.setattr("klack.analyses.study.live._FIRST", 0.0)
+        monkeypatch.setattr("klack.report.html.write_report", seen)
         out = tmp_path / "out"
         command = ["optimise", str(SMALL), "--study", str(write(tmp_path, OPTIMUM))]
         assert main([*command, "--out", str(out)]) == 0
@@ -770,7 +769,7 @@ class TestOptimum:
         def broken(content, path):
             raise OSError("no space left")
 
-        monkeypatch.setattr("klack.analyses.study.progress_page.write_report", broken)
+        monkeypatch.setattr("klack.report.html.write_report", broken)
         assert main([*command, "--out", str(tmp_path / "other")]) == 0
         assert capsys.readouterr().err.count("no space left") == 1
 

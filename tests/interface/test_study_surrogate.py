@@ -53,7 +53,7 @@ def test_leave_one_out_errors_are_those_of_fresh_strokes(record, tmp_path):
     """Truth: 40 other points; the surrogate that is judged is rebuilt from the record."""
     from klack.studies.spread import Normal, Range
     from klack.studies.surrogate import fit_surrogate
-    from klack.studies.surrogate_axis import SurrogateAxis
+    from klack.studies.surrogate_model import SurrogateAxis
 
     spreads = (Range(10.0, 14.0), Normal(3e-3, 1e-4), Range(90e-6, 110e-6))
     axes = [SurrogateAxis.of(spread) for spread in spreads]

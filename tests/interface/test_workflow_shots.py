@@ -11,19 +11,24 @@ from energy_ledger import allowed
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.shots import one_shot
-from klack.analyses.shots.analysis import SHOTS
-from klack.analyses.shots.draw import centric_draw, draw_shot
-from klack.analyses.shots.log import SHOT_LOG, shot_log, shots_mark
-from klack.analyses.shots.measures import FIRST_IMPACT
-from klack.analyses.shots.model import build_shots
-from klack.analyses.shots.one_shot import columns_of, run_shot, simulate_shot
-from klack.analyses.shots.record import ShotColumns
-from klack.analyses.shots.run import DroppedShots, judge_rule, run_shots, run_shots_on, shot_doubts
-from klack.analyses.shots.summary import (
+from klack.analyses.shots.analysis import (
     DISTRIBUTION_COLUMNS,
+    SHOTS,
     distribution_rows,
     shots_to_json,
 )
+from klack.analyses.shots.draw import centric_draw, draw_shot
+from klack.analyses.shots.model import build_shots
+from klack.analyses.shots.one_shot import (
+    SHOT_LOG,
+    columns_of,
+    run_shot,
+    shot_log,
+    shots_mark,
+    simulate_shot,
+)
+from klack.analyses.shots.record import FIRST_IMPACT, ShotColumns
+from klack.analyses.shots.run import DroppedShots, judge_rule, run_shots, run_shots_on, shot_doubts
 from klack.analyses.store import stored_format
 from klack.api import Result
 from klack.assembling.modes import mode_pools

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from rigid_valve import NO_PROFILE, SCATTER, TEXT, TRUTH, measured, tree_of
 
-from klack.analyses.calibration.calibrated_case import calibrated_text
-from klack.analyses.calibration.run import _repeatable, run_calibration
+from klack.analyses.calibration.run import _repeatable, calibrated_text, run_calibration
 from klack.measurement.fit_window import FitWindow
 from klack.measurement.stroke_set import MeasuredStroke
 

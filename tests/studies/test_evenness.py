@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from klack.studies.designs import sobol_sequence
-from klack.studies.evenness import unevenness
+from klack.studies.designs import sobol_sequence, unevenness
 
 
 @pytest.mark.parametrize(("count", "parameters"), [(20, 1), (30, 3), (64, 6)])

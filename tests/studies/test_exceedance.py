@@ -7,9 +7,13 @@ import pytest
 from draws import each
 
 from klack.errors import InputError
-from klack.studies.exceedance import count_exceedance, exceedance_of
-from klack.studies.margins import mean_and_margin
-from klack.studies.quantiles import runs_for_quantile, sample_quantile
+from klack.studies.samples import (
+    count_exceedance,
+    exceedance_of,
+    mean_and_margin,
+    runs_for_quantile,
+    sample_quantile,
+)
 
 
 def binomial(counts, runs, probability):

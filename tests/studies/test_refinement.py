@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.studies.achievement import achievement
-from klack.studies.refinement import Refinement, RefinementSettings
-from klack.studies.secants import Secants
+from klack.studies.refinement import Refinement, RefinementSettings, Secants, achievement
 
 
 def rosenbrock(x):

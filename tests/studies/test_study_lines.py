@@ -2,10 +2,10 @@
 
 import pytest
 
-from klack.analyses.study import pace
+from klack.analyses.study import live
+from klack.analyses.study.asked_points import PointRow
 from klack.analyses.study.columns import row_warnings
-from klack.analyses.study.pace import Pace, duration_text
-from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.live import Pace, duration_text
 
 
 def row(*notes):
@@ -39,7 +39,7 @@ class _Heard:
 def test_pace_counts_what_is_computed_and_what_is_left(monkeypatch):
     """Truth: 100 points computed in 10 s are 36 000 in an hour; 300 more take 30 s."""
     now = 0.0
-    monkeypatch.setattr(pace, "perf_counter", lambda: now)
+    monkeypatch.setattr(live, "perf_counter", lambda: now)
     heard = _Heard()
     told = Pace(heard, 500)
     now = 4.0
@@ -62,7 +62,7 @@ def test_durations(seconds, text):
 
 def test_lines_of_nothing_computed_have_no_rate(monkeypatch):
     now = 0.0
-    monkeypatch.setattr(pace, "perf_counter", lambda: now)
+    monkeypatch.setattr(live, "perf_counter", lambda: now)
     heard = _Heard()
     told = Pace(heard, 10)
     now = 9.0

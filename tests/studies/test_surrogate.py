@@ -10,9 +10,8 @@ from klack.studies.designs import latin_hypercube, sobol_sequence
 from klack.studies.sensitivity import saltelli_design, sobol_indices
 from klack.studies.spread import Listed, Normal, Range
 from klack.studies.surrogate import fewest_points, fit_surrogate
-from klack.studies.surrogate_axis import SurrogateAxis
 from klack.studies.surrogate_chaos import ChaosFit
-from klack.studies.surrogate_model import share_estimates
+from klack.studies.surrogate_model import SurrogateAxis, share_estimates
 from klack.studies.surrogate_process import ProcessFit
 
 KINDS = ("polynomial-chaos", "gaussian-process")

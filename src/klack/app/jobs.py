@@ -45,7 +45,7 @@ OF_STUDIES = ("study", "optimise")
 """Those of them that are stopped and resumed."""
 
 LIVE = "live"
-"""Of :mod:`klack.analyses.study.live_record`, whose import takes seconds."""
+"""Of :mod:`klack.analyses.study.live`, whose import takes seconds."""
 
 _RUNS = "jobs"
 _NAME = re.compile(r"[0-9]{8}-[0-9]{6}-[0-9a-f]{8}")

@@ -20,8 +20,7 @@ from klack.expressions.dimension import (
     Dimension,
     dimension_of,
 )
-from klack.expressions.syntax import FUNCTIONS, Node, nodes, syntax_tree
-from klack.expressions.tokens import UnreadableError
+from klack.expressions.syntax import FUNCTIONS, Node, UnreadableError, nodes, syntax_tree
 from klack.input.problem import nearest, one_of
 
 __all__ = ["RESERVED", "Expression", "ordered"]

@@ -38,7 +38,7 @@ def polish(
     .. math:: \min_{x, t} \; t + \rho \sum_i \frac{f_i(x) - z_i}{w_i}, \qquad
               \frac{f_i(x) - z_i}{w_i} \le t, \quad g_j(x) \le 0
 
-    the augmented achievement of :func:`~klack.studies.achievement.achievement` without its kink.
+    the augmented achievement of :func:`~klack.studies.refinement.achievement` without its kink.
     Every step solves a quadratic programme with the derivatives at its point (SLSQP).  The end is a
     local optimum where the functions are smooth and the steps suffice.  There is no result: the
     caller has seen all points, and keeps the best.

@@ -7,14 +7,135 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
-from klack.studies.achievement import achievement
 from klack.studies.batches import Batches, highest, points_in_cube
-from klack.studies.counts import require_count
 from klack.studies.designs import random_of
-from klack.studies.secants import Secants
-from klack.studies.values import PointValues, table_of_numbers, values_of_points
+from klack.studies.values import PointValues, require_count, table_of_numbers, values_of_points
 
-__all__ = ["Refinement", "RefinementSettings"]
+__all__ = ["Refinement", "RefinementSettings", "Secants", "achievement"]
+
+
+def achievement(
+    objectives: ArrayLike, reference: ArrayLike, scales: ArrayLike, *, sum_weight: float = 1e-3
+) -> NDArray[np.float64]:
+    r"""Augmented achievement function of every point, to be minimised.
+
+    .. math:: s = \max_i \frac{f_i - z_i}{w_i} + \rho \sum_i \frac{f_i - z_i}{w_i}
+
+    Its minimum is on the front for any reference ``z``, reachable or not, also where the front is
+    not convex; a weighted sum misses such parts.  With one objective it is that objective, shifted
+    and scaled.
+
+    Parameters
+    ----------
+    objectives : array_like, shape (points, objectives)
+        Numbers to minimise; nan gives nan.
+    reference : array_like, shape (objectives,) or (points, objectives)
+        Wished-for value ``z`` of each objective, in its unit.
+    scales : array_like, shape (objectives,)
+        What counts as one in each objective ``w``, above zero, in its unit: its range on the front.
+    sum_weight : float
+        ``rho``, zero or more: which loss in one objective is traded for gains in the others.
+
+    Raises
+    ------
+    InputError
+        If the shapes do not fit, the reference is not finite or a scale is not above zero.
+
+    Notes
+    -----
+    Wierzbicki (1980), in: Multiple Criteria Decision Making, Theory and Application, 468-486.
+    """
+    values = values_of_points(objectives, None).objectives
+    goal, unit = np.asarray(reference, dtype=float), np.asarray(scales, dtype=float)
+    if goal.shape not in (values.shape, values.shape[1:]) or not np.all(np.isfinite(goal)):
+        raise InputError(
+            "reference of an achievement function",
+            got=f"{goal}",
+            expected=f"{values.shape[1]} finite numbers, one per objective",
+            hint="take the objectives of the point to improve, or the best value of each.",
+        )
+    if unit.shape != values.shape[1:] or not np.all((unit > 0.0) & np.isfinite(unit)):
+        raise InputError(
+            "scales of an achievement function",
+            got=f"{unit}",
+            expected=f"{values.shape[1]} numbers above zero, one per objective",
+            hint="take the range of each objective on the front, and its size where that is zero.",
+        )
+    if not (sum_weight >= 0.0 and np.isfinite(sum_weight)):
+        raise InputError(
+            "weight of the sum in an achievement function",
+            got=f"{sum_weight:g}",
+            expected="zero or more",
+            hint="0.001 is usual.",
+        )
+    with np.errstate(over="ignore", invalid="ignore"):  # huge values give infinity, or nan
+        distances = (values - goal) / unit
+        return np.asarray(distances.max(axis=1) + sum_weight * distances.sum(axis=1))
+
+
+_LEAST = 1e-12
+"""Smallest cosine between a move and the change of slope that counts as curvature."""
+
+
+class Secants:
+    r"""Inverse second derivatives ``H`` from moves ``s`` and changes of slope ``y`` (BFGS).
+
+    .. math::
+
+        H' = H + \left(1 + \frac{y^T H y}{s^T y}\right) \frac{s s^T}{s^T y}
+               - \frac{H y s^T + s (H y)^T}{s^T y}
+
+    A move without positive curvature changes nothing.  All sums are exact before rounding
+    (:func:`math.fsum`): the same bits with every library and processor.
+
+    Notes
+    -----
+    Nocedal and Wright (2006), Numerical Optimization, chapter 6.
+    """
+
+    def __init__(self) -> None:
+        self._inverse: NDArray[np.float64] | None = None
+        self._last: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+
+    def forget(self) -> None:
+        """Begin anew, for another function."""
+        self._inverse = self._last = None
+
+    def descent(
+        self, point: NDArray[np.float64], slope: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """Move to the lowest point of the quadratic through what was seen.
+
+        Parameters
+        ----------
+        point, slope : NDArray of float, shape (parameters,)
+            Where the function has which derivatives.
+
+        Returns
+        -------
+        NDArray of float, shape (parameters,)
+            Zero until two points with positive curvature between them are known.
+        """
+        if self._last is not None:
+            self._update(point - self._last[0], slope - self._last[1])
+        self._last = (point, slope)
+        return np.zeros(len(slope)) if self._inverse is None else -_times(self._inverse, slope)
+
+    def _update(self, move: NDArray[np.float64], change: NDArray[np.float64]) -> None:
+        product, size = math.fsum(move * change), math.fsum(change**2)
+        if not product > _LEAST * math.sqrt(math.fsum(move**2) * size):
+            return
+        if self._inverse is None:
+            self._inverse = product / size * np.eye(len(move))
+        turned = _times(self._inverse, change)
+        along = (1.0 + math.fsum(change * turned) / product) / product * np.outer(move, move)
+        across = np.outer(turned, move) / product
+        self._inverse = self._inverse + along - across - across.T
+
+
+def _times(matrix: NDArray[np.float64], vector: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Product with sums that are exact before rounding."""
+    return np.array([math.fsum(row) for row in matrix * vector])
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +191,7 @@ class Refinement(Batches):
     the second goes to where the first leads: lowest points of the parabolas, a quasi-Newton step
     with slopes by central differences in five lengths, the last move again.  All points are clipped
     to the cube.  The best of both replaces ``x`` if it is better by Deb's rule: less violated, or
-    equally and with a smaller :func:`~klack.studies.achievement.achievement`.  The step ``h``
+    equally and with a smaller :func:`~klack.studies.refinement.achievement`.  The step ``h``
     follows the length of the move.  Without a better point the directions ``e_i`` are turned once
     (where two objectives balance, no parameter alone leads down), then ``h`` is halved.
 

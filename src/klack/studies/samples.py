@@ -1,11 +1,28 @@
-"""Values of one measure in many runs: those that failed apart from the others."""
+"""One measure in many runs: margins, quantiles, how often it exceeds a limit; failures apart."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import Literal, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
+from klack.studies.values import require_count
 
-__all__ = ["require_level", "split_failed"]
+__all__ = [
+    "Exceedance",
+    "Margin",
+    "RobustValue",
+    "SampleQuantile",
+    "count_exceedance",
+    "exceedance_of",
+    "mean_and_margin",
+    "runs_for_quantile",
+    "sample_quantile",
+]
 
 
 def split_failed(values: ArrayLike) -> tuple[NDArray[np.float64], int]:
@@ -44,3 +61,450 @@ def require_level(where: str, confidence: float) -> None:
             expected="0.5 to below 1",
             hint="0.95 is usual; percent are divided by 100.",
         )
+
+
+@dataclass(frozen=True, slots=True)
+class Margin:
+    """Mean, scatter and their sum, with standard errors.
+
+    Attributes
+    ----------
+    mean, deviation : float
+        Of the runs with a value, in the unit of the measure; the standard deviation with ``n - 1``.
+    multiple : float
+        ``k``.
+    value : float
+        ``mean + k deviation``.
+    mean_error, deviation_error, value_error : float
+        Standard errors: standard deviations of the three over repetitions of all runs.
+    runs, failed : int
+        Runs with a value, and runs without one, which are not among ``runs``.
+    """
+
+    mean: float
+    deviation: float
+    multiple: float
+    value: float
+    mean_error: float
+    deviation_error: float
+    value_error: float
+    runs: int
+    failed: int
+
+
+def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
+    r"""Mean plus ``k`` standard deviations of independent runs, for any distribution.
+
+    With the central moments ``m_3`` and ``m_4`` of the sample and ``s`` its standard deviation,
+
+    .. math::
+
+        \sigma^2(\bar x) = \frac{s^2}{n}, \quad
+        \sigma^2(s) = \frac{1}{4 s^2 n} \left(m_4 - s^4 \frac{n - 3}{n - 1}\right), \quad
+        \mathrm{cov}(\bar x, s) = \frac{m_3}{2 s n}
+
+    and ``sigma^2(x + k s) = sigma^2(x) + 2 k cov(x, s) + k^2 sigma^2(s)``: exact for the mean, to
+    first order in ``1 / n`` for the others.  With fewer than about 30 runs, or rare large values
+    that no run has met yet, the errors of ``s`` come out too small; a quantile does not share this.
+
+    Parameters
+    ----------
+    values : array_like, shape (runs,)
+        In one unit; what is not finite is a failed run.
+    multiple : float
+        ``k``, of either sign.
+
+    Raises
+    ------
+    InputError
+        With fewer than two values, or if ``k`` is not finite.
+
+    Notes
+    -----
+    Cramer (1946), Mathematical Methods of Statistics, sections 27.4 to 27.7.
+    """
+    if not math.isfinite(multiple):
+        raise InputError(
+            "multiple of the standard deviation",
+            got=f"{multiple}",
+            expected="a finite number",
+            hint="3 is usual.",
+        )
+    found, failed = split_failed(values)
+    count = len(found)
+    if count < 2:
+        raise InputError(
+            "values of a measure",
+            got=f"{count} runs with a value, {failed} without",
+            expected="two runs with a value or more",
+            hint="compute more runs, or look at the reasons of the failed ones.",
+        )
+    mean = math.fsum(found / count)
+    size = float(np.abs(found - mean).max())
+    if size == 0.0:
+        return Margin(mean, 0.0, multiple, mean, 0.0, 0.0, 0.0, count, failed)
+    scaled = (found - mean) / size  # so that fourth powers of small numbers keep their digits
+    variance = math.fsum(scaled**2) / (count - 1)
+    third, fourth = math.fsum(scaled**3) / count, math.fsum(scaled**4) / count
+    spread = math.sqrt(variance)
+    of_mean = variance / count
+    of_spread = (fourth - variance**2 * (count - 3) / (count - 1)) / (4.0 * variance * count)
+    of_spread = max(of_spread, 0.0)
+    common = third / (2.0 * spread * count)
+    of_value = max(of_mean + 2.0 * multiple * common + multiple**2 * of_spread, 0.0)
+    return Margin(
+        mean=mean,
+        deviation=size * spread,
+        multiple=multiple,
+        value=mean + multiple * size * spread,
+        mean_error=size * math.sqrt(of_mean),
+        deviation_error=size * math.sqrt(of_spread),
+        value_error=size * math.sqrt(of_value),
+        runs=count,
+        failed=failed,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class SampleQuantile:
+    """Value that a measure stays below in a given part of the runs.
+
+    Attributes
+    ----------
+    probability : float
+        That part.
+    estimate : float
+        In the unit of the measure.
+    low, high : float
+        Two values of the sample that enclose the quantile; infinite where the sample is too small
+        to bound it.
+    confidence : float
+        Asked for.
+    coverage : float
+        Exact probability that the interval encloses the quantile, at least ``confidence``.
+    runs, failed : int
+        Runs with a value, and runs without one, which are not among ``runs``.
+    low_if_low, high_if_high : float
+        The ends if the values of all failed runs were below all others, or above all others.
+    """
+
+    probability: float
+    estimate: float
+    low: float
+    high: float
+    confidence: float
+    coverage: float
+    runs: int
+    failed: int
+    low_if_low: float
+    high_if_high: float
+
+
+def sample_quantile(
+    values: ArrayLike, probability: float, *, confidence: float = 0.95
+) -> SampleQuantile:
+    r"""Quantile from independent runs, with an interval between two values of the sample.
+
+    The estimate interpolates between the sorted values at ``(n + 1/3) q + 1/3``, about the median
+    of its distribution for any continuous one.  With the sorted values ``x_1 ... x_n``, the
+    quantile of probability ``q`` is above ``x_l`` and below ``x_u`` with probability
+
+    .. math:: \sum_{i=l}^{u-1} \binom{n}{i} q^i (1 - q)^{n-i}
+
+    for every continuous distribution, and at least that for others.  ``l`` is the largest and
+    ``u`` the smallest rank that leave at most ``(1 - confidence) / 2`` on either side.
+
+    Parameters
+    ----------
+    values : array_like, shape (runs,)
+        In one unit; what is not finite is a failed run.
+    probability : float
+        ``q``, between 0 and 1: 0.99 for the value that 1 % exceed.
+    confidence : float
+        0.5 to below 1.
+
+    Raises
+    ------
+    InputError
+        If no run has a value, or a number is out of range.
+
+    Notes
+    -----
+    Hyndman and Fan (1996), The American Statistician 50, 361-365, definition 8; David and Nagaraja
+    (2003), Order Statistics, section 7.1.
+    """
+    require_level("confidence of a quantile", confidence)
+    _require_probability(probability)
+    found, failed = split_failed(values)
+    if not len(found):
+        raise InputError(
+            "values of a measure",
+            got=f"{failed} runs without a value",
+            expected="one run with a value or more",
+            hint="look at the reasons of the failed runs.",
+        )
+    ranked = np.sort(found)
+    tail = (1.0 - confidence) / 2.0
+    lower, upper = _ranks(len(ranked), probability, tail)
+    low_all, high_all = _ranks(len(ranked) + failed, probability, tail)
+    reached = _at_least(np.array([lower, upper]), len(ranked), probability)
+    return SampleQuantile(
+        probability=probability,
+        estimate=float(np.quantile(ranked, probability, method="median_unbiased")),
+        low=_value(ranked, lower),
+        high=_value(ranked, upper),
+        confidence=confidence,
+        coverage=float(reached[0] - reached[1]),
+        runs=len(ranked),
+        failed=failed,
+        low_if_low=_value(ranked, max(low_all - failed, 0)),
+        high_if_high=_value(ranked, high_all),
+    )
+
+
+def runs_for_quantile(probability: float, *, confidence: float = 0.95) -> int:
+    r"""Fewest runs with which :func:`sample_quantile` bounds a quantile on both sides.
+
+    The smallest ``n`` with ``q^n`` and ``(1 - q)^n`` at most ``(1 - confidence) / 2``.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range.
+
+    Notes
+    -----
+    Wilks (1941), Annals of Mathematical Statistics 12, 91-96.
+    """
+    require_level("confidence of a quantile", confidence)
+    _require_probability(probability)
+    tail = (1.0 - confidence) / 2.0
+    return int(np.ceil(np.log(tail) / np.log(max(probability, 1.0 - probability))))
+
+
+def _require_probability(probability: float) -> None:
+    if not 0.0 < probability < 1.0:
+        raise InputError(
+            "probability of a quantile",
+            got=f"{probability:g}",
+            expected="above 0, below 1",
+            hint="0.99 is the value that 1 % exceed.",
+        )
+
+
+def _ranks(runs: int, probability: float, tail: float) -> tuple[int, int]:
+    """Ranks of the ends, from 1; 0 and ``runs + 1`` where the sample does not reach."""
+    ranks = np.arange(1, runs + 1)
+    at_least = _at_least(ranks, runs, probability)  # falls with the rank
+    lower = int(np.count_nonzero(1.0 - at_least <= tail))
+    beyond = np.flatnonzero(at_least <= tail)
+    return lower, int(ranks[beyond[0]]) if beyond.size else runs + 1
+
+
+def _at_least(counts: NDArray[np.int64], runs: int, probability: float) -> NDArray[np.float64]:
+    """Probability that as many values or more are below the quantile, for every count."""
+    inside = np.clip(counts, 1, runs)
+    found = scipy.special.betainc(inside, runs - inside + 1, probability)
+    return np.asarray(np.where(counts < 1, 1.0, np.where(counts > runs, 0.0, found)))
+
+
+def _value(ranked: NDArray[np.float64], rank: int) -> float:
+    """Value of a rank from 1; infinite outside."""
+    if rank < 1:
+        return -np.inf
+    return float(ranked[rank - 1]) if rank <= len(ranked) else np.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Exceedance:
+    """Probability that a measure exceeds its limit.
+
+    Attributes
+    ----------
+    exceeded, runs, failed : int
+        Runs above the limit, runs with a value, and runs without one, which are not among ``runs``.
+    confidence : float
+        Of the interval and of the bound.
+    estimate : float
+        ``exceeded / runs``.
+    low, high : float
+        Exact two-sided interval from the runs with a value.
+    at_most : float
+        Exact one-sided upper bound.  It is the number to quote where no run exceeded; with
+        ``runs`` of 100 and more it is then close to ``3 / runs`` at 95 %.
+    low_if_none, high_if_all : float
+        The interval of all runs, the failed ones counted as not above the limit (its lower end) and
+        as above it (its upper end).  Far from ``low`` and ``high``, failures leave the result in
+        doubt: failed runs are seldom like the others.
+    """
+
+    exceeded: int
+    runs: int
+    failed: int
+    confidence: float
+    estimate: float
+    low: float
+    high: float
+    at_most: float
+    low_if_none: float
+    high_if_all: float
+
+
+def exceedance_of(values: ArrayLike, limit: float, *, confidence: float = 0.95) -> Exceedance:
+    """Probability that a measure is above a limit, from its values in independent runs.
+
+    Parameters
+    ----------
+    values : array_like, shape (runs,)
+        In one unit; what is not finite is a failed run.
+    limit : float
+        In the unit of the values.  A value equal to it does not exceed it.
+    confidence : float
+        0.5 to below 1.
+
+    Raises
+    ------
+    InputError
+        If the limit is nan, or as in :func:`count_exceedance`.
+    """
+    if np.isnan(limit):
+        raise InputError(
+            "limit of a measure",
+            got="nan",
+            expected="a number in the unit of the measure",
+            hint="state the limit that the measure must keep.",
+        )
+    found, failed = split_failed(values)
+    exceeded = int(np.count_nonzero(found > limit))
+    return count_exceedance(exceeded, len(found), failed=failed, confidence=confidence)
+
+
+def count_exceedance(
+    exceeded: int, runs: int, *, failed: int = 0, confidence: float = 0.95
+) -> Exceedance:
+    r"""Probability of an event seen ``exceeded`` times in ``runs`` independent runs.
+
+    The ends of the interval solve, with ``alpha = 1 - confidence``,
+
+    .. math::
+
+        \sum_{i=k}^{n} \binom{n}{i} p_{low}^i (1 - p_{low})^{n-i} = \alpha / 2, \quad
+        \sum_{i=0}^{k} \binom{n}{i} p_{high}^i (1 - p_{high})^{n-i} = \alpha / 2
+
+    and the one-sided bound the second with ``alpha``.  The interval holds the true probability at
+    least as often as stated, whatever it is, and mostly more often.
+
+    Raises
+    ------
+    InputError
+        If there is no run with a value, more exceeded than ran, or the confidence is out of range.
+
+    Notes
+    -----
+    Clopper and Pearson (1934), Biometrika 26, 404-413; rule of three: Hanley and Lippman-Hand
+    (1983), JAMA 249, 1743-1745.
+    """
+    runs = require_count("runs with a value", runs, 1, 10**15)
+    failed = require_count("failed runs", failed, 0, 10**15)
+    exceeded = require_count("runs above the limit", exceeded, 0, runs)
+    require_level("confidence of an exceedance", confidence)
+    tail = (1.0 - confidence) / 2.0
+    return Exceedance(
+        exceeded=exceeded,
+        runs=runs,
+        failed=failed,
+        confidence=confidence,
+        estimate=exceeded / runs,
+        low=_lower(exceeded, runs, tail),
+        high=_upper(exceeded, runs, tail),
+        at_most=_upper(exceeded, runs, 2.0 * tail),
+        low_if_none=_lower(exceeded, runs + failed, tail),
+        high_if_all=_upper(exceeded + failed, runs + failed, tail),
+    )
+
+
+def _lower(count: int, runs: int, tail: float) -> float:
+    """Probability at which ``count`` or more events have the probability ``tail``."""
+    return 0.0 if count == 0 else float(scipy.special.betaincinv(count, runs - count + 1, tail))
+
+
+def _upper(count: int, runs: int, tail: float) -> float:
+    """Probability at which ``count`` or fewer events have the probability ``tail``."""
+    return (
+        1.0
+        if count == runs
+        else float(scipy.special.betaincinv(count + 1, runs - count, 1.0 - tail))
+    )
+
+
+_MARGIN = re.compile(r"mean\s*\+\s*(?P<number>\d+(?:\.\d*)?)\s*sd")
+_QUANTILE = re.compile(r"quantile\s+(?P<number>\d+(?:\.\d*)?)\s*%")
+_MOST_MULTIPLE = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class RobustValue:
+    """What stands for the values of many valves.
+
+    Parameters
+    ----------
+    kind : "margin" or "quantile"
+        Mean and a multiple of the standard deviation
+        (:func:`~klack.studies.samples.mean_and_margin`), or a quantile
+        (:func:`~klack.studies.samples.sample_quantile`).
+    number : float
+        The multiple, or the probability, above one half.
+
+    Examples
+    --------
+    >>> RobustValue.parse("mean + 2 sd", "robust").of([1.0, 2.0, 3.0], high=True)
+    4.0
+    >>> RobustValue.parse("quantile 90 %", "robust").words(high=False)
+    'quantile 10 %'
+    """
+
+    kind: Literal["margin", "quantile"]
+    number: float
+
+    @classmethod
+    def parse(cls, text: str, where: str) -> Self:
+        """Read ``mean + 2 sd`` or ``quantile 95 %``.
+
+        Raises
+        ------
+        InputError
+            For another text, a multiple above 10, and a probability outside of 50 to 100 %.
+        """
+        margin, quantile = _MARGIN.fullmatch(text.strip()), _QUANTILE.fullmatch(text.strip())
+        if margin is not None and float(margin["number"]) <= _MOST_MULTIPLE:
+            return cls("margin", float(margin["number"]))
+        if quantile is not None and 50.0 < float(quantile["number"]) < 100.0:
+            return cls("quantile", float(quantile["number"]) / 100.0)
+        raise InputError(
+            where,
+            got=f"'{text}'",
+            expected="'mean + K sd' with K up to 10, or 'quantile P %' with P between 50 and 100",
+            hint="mean + 2 sd; the side is that of the objective or bound.",
+        )
+
+    def of(self, values: ArrayLike, *, high: bool) -> float:
+        """Value of one sample on its high or low side; nan if one of its runs has none.
+
+        A design one of whose valves cannot be computed has no value, however good the others are.
+        """
+        found = np.asarray(values, dtype=float)
+        if not np.isfinite(found).all():
+            return float("nan")
+        if self.kind == "margin":
+            return mean_and_margin(found, self.number if high else -self.number).value
+        return sample_quantile(found, self.number if high else 1.0 - self.number).estimate
+
+    def of_rows(self, table: NDArray[np.float64], *, high: bool) -> NDArray[np.float64]:
+        """The same for every row, shape (designs, valves) to (designs,)."""
+        return np.array([self.of(row, high=high) for row in table])
+
+    def words(self, *, high: bool) -> str:
+        """As it is written, with the sign of the side."""
+        if self.kind == "margin":
+            return f"mean {'+' if high else '-'} {self.number:g} sd"
+        return f"quantile {100.0 * (self.number if high else 1.0 - self.number):g} %"

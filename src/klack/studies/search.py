@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, MissingExtraError
 from klack.studies.batches import Batches, highest, points_in_cube
-from klack.studies.counts import require_count
-from klack.studies.values import PointValues
+from klack.studies.values import PointValues, require_count
 
 __all__ = ["Search", "SearchSettings", "require_pymoo"]
 

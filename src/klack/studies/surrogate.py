@@ -15,9 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError
 from klack.studies.designs import random_of
 from klack.studies.sensitivity import Estimates
-from klack.studies.surrogate_axis import SurrogateAxis
 from klack.studies.surrogate_chaos import ChaosFit
-from klack.studies.surrogate_model import SurrogateModel, share_estimates
+from klack.studies.surrogate_model import SurrogateAxis, SurrogateModel, share_estimates
 from klack.studies.surrogate_process import ProcessFit
 
 __all__ = ["GOOD", "Surrogate", "SurrogateKind", "fewest_points", "fit_surrogate"]

@@ -14,9 +14,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.studies.surrogate_axis import SurrogateAxis
-from klack.studies.surrogate_library import require_scikit_learn
-from klack.studies.surrogate_model import Shares
+from klack.studies.surrogate_model import Shares, SurrogateAxis, require_scikit_learn
 
 __all__ = ["ProcessFit", "ProcessModel"]
 

@@ -1,4 +1,4 @@
-"""Objectives and constraints of evaluated points, checked; failures and violations among them."""
+"""Checks of whole numbers and tables: objectives and constraints, failures and violations."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,20 @@ from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 
-__all__ = ["PointValues", "table_of_numbers", "values_of_points"]
+__all__ = ["PointValues", "require_count", "table_of_numbers", "values_of_points"]
+
+
+def require_count(where: str, value: object, low: int, high: int) -> int:
+    """Return a whole number from ``low`` to ``high``; raise :class:`InputError` for others."""
+    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
+    if not (whole and low <= int(value) <= high):  # type: ignore[call-overload]
+        raise InputError(
+            where,
+            got=f"{value}",
+            expected=f"a whole number from {low} to {high}",
+            hint="change this number.",
+        )
+    return int(value)  # type: ignore[call-overload]
 
 
 @dataclass(frozen=True, slots=True)

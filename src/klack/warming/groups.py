@@ -28,7 +28,7 @@ class Group:
 
 def _loop() -> None:
     from klack.simulation.network_run import simulate_network
-    from klack.warming.small_valve import small_valve
+    from klack.warming.small_valves import small_valve
 
     case = small_valve()
     run = case.run
@@ -38,7 +38,7 @@ def _loop() -> None:
 
 def _rest() -> None:
     from klack.simulation.network_run import simulate_network
-    from klack.warming.small_valve import small_valve
+    from klack.warming.small_valves import small_valve
 
     case = small_valve()
     rows = case.network.network().rows()
@@ -58,7 +58,7 @@ def _derivatives() -> None:
     from klack.analyses.linearisation.run import run_linearisation
     from klack.simulation.tangent_loop import tangent_address
     from klack.simulation.tangent_run import compile_tangents
-    from klack.warming.small_valve import small_valve
+    from klack.warming.small_valves import small_valve
 
     case = small_valve()
     compile_tangents(case.network.network().rows(), step=case.run.step)
@@ -93,7 +93,7 @@ def _valve() -> None:
 
 def _spatial() -> None:
     from klack.analyses.stroke.run import run_stroke
-    from klack.warming.spatial_valve import spatial_valve
+    from klack.warming.small_valves import spatial_valve
 
     run_stroke(spatial_valve("axisymmetric"))
     run_stroke(spatial_valve("swept"))

@@ -3,9 +3,13 @@
 from collections.abc import Iterable
 from math import isfinite
 
-from klack.analyses.calibration.correlation_figure import correlation_figure
-from klack.analyses.calibration.figures import profile_chart, stroke_chart, window_chart
-from klack.analyses.calibration.measures import (
+from klack.analyses.calibration.figures import (
+    correlation_figure,
+    profile_chart,
+    stroke_chart,
+    window_chart,
+)
+from klack.analyses.calibration.record import (
     BOUNDS,
     CALIBRATION_MEASURES,
     FITTED_MEASURES,
@@ -14,8 +18,6 @@ from klack.analyses.calibration.measures import (
     STANDARD_ERROR,
     START,
     VALUE,
-)
-from klack.analyses.calibration.record import (
     CalibratedParameter,
     CalibrationStudy,
     ProfileCurve,

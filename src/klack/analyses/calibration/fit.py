@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.calibration.motion import Motion
-from klack.analyses.calibration.pool import TrialPool
+from klack.analyses.calibration.motion import Motion, TrialPool
 from klack.case.free_parameters import FreeParameter
 from klack.measurement.computed_stroke import recorded_stroke
 from klack.measurement.sensor import LiftSensor

@@ -1,15 +1,20 @@
 """One stroke with other values of its parameters: what a calibration computes many times.
 
 Meshes, modes and contact laws do not depend on what can be calibrated; they are made once.  A trial
-checks the changed case as a whole, joins its network anew and runs it.
+checks the changed case as a whole, joins its network anew and runs it.  Trials that were computed
+are kept on disk: the same command asks for the same ones, and comes to where it was.
 """
 
-from collections.abc import Mapping, Sequence
+from base64 import b64decode, b64encode
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.many import LoggedWork
+from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.stops import StopFaces
 from klack.assembling.valve import filled_network
@@ -19,11 +24,22 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.errors import InputError
 from klack.input.problem import Key, one_of
+from klack.measurement.stroke_set import StrokeSet
 from klack.network.network import Network
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_run import simulate_network
 
-__all__ = ["Motion", "MotionModel", "channel_names"]
+__all__ = [
+    "TRIAL_LOG",
+    "Motion",
+    "MotionModel",
+    "TrialKey",
+    "TrialPool",
+    "calibration_mark",
+    "channel_names",
+    "trial_log",
+]
+
 
 _FINER, _MOST_COARSE = 2, 256
 """The instant of a touch falls between two fine steps; as parameters move, that makes the lift
@@ -163,3 +179,101 @@ def channel_names(
             )
         result[role] = names[0]
     return result
+
+
+TrialKey = tuple[float, ...]
+"""Duration [s] and parameter values [SI], to the last bit."""
+
+TrialLog = UnfinishedLog[TrialKey, Motion]
+"""Computed trials by duration and values."""
+
+
+def calibration_mark(case: ValveCase, strokes: StrokeSet) -> str:
+    """Digest of all that decides a trial: the case and the measured strokes."""
+    return fingerprint(case, _deciding(case, strokes))
+
+
+def _deciding(case: ValveCase, strokes: StrokeSet) -> Iterator[bytes]:
+    for name, digest in case.own_components.items():
+        yield f"{name} {digest}".encode()
+    yield strokes.time.tobytes()
+    for stroke in strokes.strokes:
+        for role, values in stroke.values.items():
+            yield role.encode()
+            yield np.ascontiguousarray(values).tobytes()
+
+
+def _data(key: TrialKey, motion: Motion) -> Mapping[str, Any]:
+    return {
+        "trial": list(key),
+        "step": motion.step,
+        "channels": {
+            role: b64encode(values.astype("<f4").tobytes()).decode()
+            for role, values in motion.channels.items()
+        },
+        "impacts": {stop: list(times) for stop, times in motion.impacts.items()},
+    }
+
+
+def _trial(data: Mapping[str, Any]) -> tuple[TrialKey, Motion]:
+    motion = Motion(
+        step=float(data["step"]),
+        channels={
+            str(role): np.frombuffer(b64decode(text, validate=True), dtype="<f4")
+            for role, text in data["channels"].items()
+        },
+        impacts={str(stop): tuple(map(float, t)) for stop, t in data["impacts"].items()},
+    )
+    return tuple(map(float, data["trial"])), motion
+
+
+TRIAL_LOG = LogForm(
+    file="calibration.unfinished.jsonl",
+    format="klack calibration 1",
+    parts="computed strokes",
+    data=_data,
+    read=_trial,
+)
+"""How computed trials are kept."""
+trial_log = TRIAL_LOG.open
+
+
+class TrialPool(LoggedWork[TrialKey, Motion]):
+    """Computes trials that the log does not hold yet, and keeps them there.
+
+    Parameters
+    ----------
+    model : MotionModel
+    workers : int
+    log : TrialLog
+    """
+
+    def __init__(self, model: MotionModel, workers: int, log: TrialLog) -> None:
+        super().__init__(_run, model, workers, log, self._name_of)
+        self.model = model
+        self.used: set[TrialKey] = set()
+
+    def motions(self, values: Sequence[Sequence[float]], duration: float) -> list[Motion]:
+        """Motions for several parameter vectors [SI], in their order.
+
+        Raises
+        ------
+        InputError, ConvergenceError
+            Of a trial that cannot be computed; its parameters are named.
+        """
+        keys: list[TrialKey] = [(duration, *map(float, item)) for item in values]
+        self.used.update(keys)
+        for _ in self.completed({key: key for key in keys}):
+            pass
+        return [self.log.done[key] for key in keys]
+
+    def _name_of(self, key: TrialKey) -> str:
+        values = ", ".join(
+            f"{parameter.name} = {value:.6g} {parameter.unit}".rstrip()
+            for parameter, value in zip(self.model.parameters, key[1:], strict=True)
+        )
+        return f"trial with {values}"
+
+
+def _run(model: MotionModel, key: TrialKey) -> Motion:
+    return model.run(key[1:], key[0])

@@ -9,9 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.calibration.fit import StrokeModel
-from klack.analyses.calibration.log import calibration_mark, trial_log
-from klack.analyses.calibration.motion import Motion, MotionModel, channel_names
-from klack.analyses.calibration.pool import TrialPool
+from klack.analyses.calibration.motion import (
+    Motion,
+    MotionModel,
+    TrialPool,
+    calibration_mark,
+    channel_names,
+    trial_log,
+)
 from klack.analyses.calibration.record import (
     CalibratedParameter,
     CalibrationStudy,
@@ -27,8 +32,10 @@ from klack.case.case_tree import CaseTree
 from klack.case.free_parameters import FreeParameter, free_parameters
 from klack.case.key_path import written_at
 from klack.case.measurement import CaseMeasurement
+from klack.case.rewriting import moved_files, rewritten, written_quantity
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
+from klack.case.valve_reader import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.cores import available_cores
 from klack.errors import InputError
@@ -52,8 +59,10 @@ from klack.measurement.shot_covariance import ShotCovariance, noise_covariance, 
 from klack.measurement.stroke_set import StrokeSet
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
+from klack.units import format_si
 
-__all__ = ["calibration_of", "run_calibration"]
+__all__ = ["CALIBRATED_NAME", "calibrated_text", "calibration_of", "run_calibration"]
+
 
 Vector = NDArray[np.float64]
 Impacts = Mapping[str, Sequence[float]]
@@ -570,3 +579,37 @@ def _doubts(
                 "window: the search did not find the measured stroke. Try: other start values."
             )
     return notes
+
+
+CALIBRATED_NAME = "case_calibrated.yaml"
+
+
+def calibrated_text(tree: CaseTree, study: CalibrationStudy, folder: Path) -> str:
+    """Text of the case with the values found, for a file in ``folder``.
+
+    Comments and order are those of the author; files are named from the new place.
+
+    Raises
+    ------
+    InputError
+        If the new text is no case, or a value cannot be exchanged alone.
+    """
+    found = {item.name: item for item in study.parameters}
+    values = moved_files(tree, folder)
+    lines = [
+        f"Calibrated by klack {study.version}, {study.created[:10]}, to "
+        f"{len(study.strokes)} strokes of {study.source}.",
+        f"Made from {tree.path.name}; only these values were changed:",
+    ]
+    for parameter in free_parameters(tree.case()):
+        item = found[parameter.name]
+        for place in parameter.places:
+            values[place.key] = written_quantity(tree, place, item.value)
+        error = format_si(item.standard_error, item.unit, 2)
+        lines.append(
+            f"  {item.name} = {format_si(item.value, item.unit, 5)}, standard error {error} "
+            f"({', '.join(item.keys)})"
+        )
+    text = rewritten(tree, values, "\n".join(lines))
+    read_valve_case(text, folder / CALIBRATED_NAME, tree.components.values())
+    return text

@@ -25,8 +25,7 @@ from klack.analyses.comparison.shots_record import MeasuredDistribution, Measure
 from klack.analyses.comparison.strokes import compare_numbers, sensor_words
 from klack.analyses.measures import Measure
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.shots.measures import FIRST_IMPACT, Shot
-from klack.analyses.shots.record import ShotColumns, ShotsStudy, ShotTraces
+from klack.analyses.shots.record import FIRST_IMPACT, Shot, ShotColumns, ShotsStudy, ShotTraces
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
 from klack.measurement.impacts import measure_stroke

@@ -26,8 +26,8 @@ from klack.analyses.sensitivities.record import (
     MeasureSlopes,
     SensitivityRecord,
 )
-from klack.analyses.study.impact_measures import impact_measures
 from klack.analyses.study.kinds import kind_of
+from klack.analyses.study.measures import impact_measures
 from klack.analyses.study.run_points import run_points
 from klack.analyses.study.where import Where
 from klack.case.case_tree import CaseTree

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 from math import sqrt
 
 from klack.analyses.sensitivities.record import SlopeParameter
-from klack.analyses.study.parameters import unit_of, written
-from klack.analyses.study.points import Linked, Space, Values, space_of
+from klack.analyses.study.points import Linked, Space, Values, space_of, unit_of, written
 from klack.analyses.study.strokes import STROKES
 from klack.case.any_case import AnyCase
 from klack.case.key_path import quantity_at, split_path

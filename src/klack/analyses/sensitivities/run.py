@@ -17,8 +17,7 @@ from klack.analyses.sensitivities.record import (
 )
 from klack.analyses.sensitivities.slopes import SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
-from klack.analyses.study.chosen_measures import ChosenMeasure
-from klack.analyses.study.stroke_measures import TIMES, StrokeOfPoint, stroke_measures
+from klack.analyses.study.measures import TIMES, ChosenMeasure, StrokeOfPoint, stroke_measures
 from klack.case.case_tree import CaseTree
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial
@@ -68,7 +67,7 @@ def run_sensitivities(
     parameters : sequence of str
         Keys of the case, or parameters of the study.
     measures : sequence of str
-        See :func:`~klack.analyses.study.stroke_measures.stroke_measures`; those of the study by
+        See :func:`~klack.analyses.study.measures.stroke_measures`; those of the study by
         default.
     variant : str, optional
         The first one of the case, or that of the study, by default.

@@ -22,8 +22,7 @@ from klack.analyses.stroke.run import (
     variant_network,
     variant_of,
 )
-from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
-from klack.analyses.study.stroke_measures import TIMES, StrokeOfPoint
+from klack.analyses.study.measures import TIMES, ChosenMeasure, PointNoise, StrokeOfPoint
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
 from klack.case.points import case_at, checked_parts, points_of

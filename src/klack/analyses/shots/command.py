@@ -82,7 +82,7 @@ def shots(
 
     with show_progress(wanted.quiet):
         from klack.analyses.shots.analysis import SHOTS
-        from klack.analyses.shots.log import SHOT_LOG
+        from klack.analyses.shots.one_shot import SHOT_LOG
         from klack.analyses.shots.run import run_shots
 
     with ending.resumable(SHOT_LOG) as progress:
@@ -109,7 +109,7 @@ def _strokes(
     """Many strokes of a whole valve."""
     with show_progress(wanted.quiet):
         from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
-        from klack.analyses.stroke_shots.log import STROKE_LOG
+        from klack.analyses.stroke_shots.one_stroke import STROKE_LOG
         from klack.analyses.stroke_shots.run import run_stroke_shots
         from klack.analyses.stroke_shots.starts import shots_of_valve
         from klack.compiling.ahead import compiling_ahead

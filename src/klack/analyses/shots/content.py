@@ -18,17 +18,18 @@ from klack.analyses.shots.figures import (
     height_traces_chart,
     peak_chart,
     rebound_chart,
+    shots_map,
 )
-from klack.analyses.shots.map import shots_map
-from klack.analyses.shots.measures import (
+from klack.analyses.shots.record import (
     DRAWN,
     FIRST_IMPACT,
     FRICTION_LOSS,
     PLASTIC_LOSS,
     ROCKING,
     Shot,
+    ShotColumns,
+    ShotsStudy,
 )
-from klack.analyses.shots.record import ShotColumns, ShotsStudy
 from klack.analyses.shots.wording import (
     largest_size,
     length_unit,

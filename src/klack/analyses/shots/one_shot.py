@@ -1,7 +1,8 @@
-"""One drop of a valve at the interface level, from a draw to its numbers."""
+"""One drop of a valve at the interface level: from a draw to its numbers, and how they are kept."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,8 @@ from numpy.typing import NDArray
 from klack.analyses.impact.interface_level import set_doubts
 from klack.analyses.shots.draw import ShotDraw, polar
 from klack.analyses.shots.record import ShotColumns, ShotTraces
+from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
+from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.mesh.rigid import rigid_placement
@@ -19,13 +22,18 @@ from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
 
 __all__ = [
+    "SHOT_LOG",
+    "ShotLog",
     "ShotOutcome",
     "ShotSetup",
     "columns_of",
     "run_shot",
+    "shot_log",
+    "shots_mark",
     "simulate_shot",
     "traces_of",
 ]
+
 
 _TRACE_POINTS = 600
 _FORCE_POINTS = 400
@@ -328,3 +336,49 @@ def _rocking(
     v = motion.velocity[after]
     energy = setup.model.mass * float(v[:2] @ v[:2]) + float(v[3:] @ setup.inertia @ v[3:])
     return energy / (setup.model.mass * first.approach_speed**2)
+
+
+ShotLog = UnfinishedLog[int, ShotOutcome]
+"""Shots by their number."""
+
+
+def shots_mark(case: Case, seed: int, threads: int | None) -> str:
+    """Digest of all that decides the numbers of a shot."""
+    return fingerprint(case, (str(seed).encode(), str(threads).encode()))
+
+
+def _data(index: int, outcome: ShotOutcome) -> Mapping[str, Any]:
+    more: dict[str, Any] = {"doubts": list(outcome.doubts)} if outcome.doubts else {}
+    if len(outcome.worn):
+        more["worn"] = outcome.worn.tolist()
+    return {
+        "index": index,
+        "numbers": outcome.numbers,
+        "height": outcome.height.tolist(),
+        "force": outcome.force.tolist(),
+        "approach": outcome.approach,
+    } | more
+
+
+def _outcome(data: Mapping[str, Any]) -> tuple[int, ShotOutcome]:
+    outcome = ShotOutcome(
+        index=int(data["index"]),
+        numbers={str(key): float(value) for key, value in data["numbers"].items()},
+        height=np.array(data["height"], dtype=np.float32),
+        force=np.array(data["force"], dtype=np.float32),
+        approach=float(data["approach"]),
+        doubts=tuple(map(str, data.get("doubts", ()))),
+        worn=np.array(data.get("worn", ()), dtype=float),
+    )
+    return outcome.index, outcome
+
+
+SHOT_LOG = LogForm(
+    file="shots.unfinished.jsonl",
+    format="klack shots 1",
+    parts="finished shots",
+    data=_data,
+    read=_outcome,
+)
+"""How finished shots are kept."""
+shot_log = SHOT_LOG.open

@@ -11,14 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.record import PressureRecord
+from klack.analyses.measures import Measure, described_in
 from klack.analyses.record import CaseRecord
 
 __all__ = [
+    "DRAWN",
+    "FIRST_IMPACT",
+    "FRICTION_LOSS",
+    "PLASTIC_LOSS",
+    "RESULTS",
+    "ROCKING",
+    "RULE_MEASURES",
+    "SHOT_MEASURES",
     "RuleVerdict",
+    "Shot",
     "ShotColumns",
     "ShotTraces",
     "ShotsStudy",
 ]
+
 
 Column = NDArray[np.float64]
 
@@ -238,3 +249,226 @@ class ShotsStudy(CaseRecord):
     pressures: Mapping[str, PressureRecord]
     faces: str = ""
     layer: str = ""
+
+
+Shot = Mapping[str, float]
+"""Numbers of one shot by the name of their column; see :class:`ShotColumns`."""
+
+_THEORY = "theory/interface"
+
+DRAWN: tuple[Measure[Shot], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="eccentricity",
+        symbol="e_0",
+        unit="m",
+        definition="Distance of the axis of the moving body from that of the seat at the height of"
+        " first touch, at the start of the drop.",
+    ),
+    Measure(
+        key="direction",
+        symbol="phi_e",
+        unit="rad",
+        definition="Direction of the eccentricity, from x to y.",
+    ),
+    Measure(
+        key="tilt",
+        symbol="theta",
+        unit="rad",
+        definition="Angle between both axes at the start of the drop.",
+    ),
+    Measure(
+        key="tilt_direction",
+        symbol="phi_t",
+        unit="rad",
+        definition="Direction in which the upper end is tilted, from x to y.",
+    ),
+    Measure(
+        key="force",
+        name="closing force",
+        symbol="F_0",
+        unit="N",
+        definition="Force that closes the valve at first touch.",
+    ),
+    Measure(
+        key="friction",
+        name="friction in the guide",
+        symbol="mu",
+        definition="Coulomb's coefficient in the guide.",
+        form="fixed",
+    ),
+    Measure(
+        key="contact_friction",
+        name="friction between the faces",
+        symbol="mu_f",
+        definition="Coulomb's coefficient between the faces in contact, while they slip.",
+        form="fixed",
+    ),
+    Measure(
+        key="waviness",
+        name="out-of-roundness, rms",
+        symbol="w",
+        unit="m",
+        definition="Root mean square deviation of the ring from a circle.",
+    ),
+)
+"""What differs from shot to shot."""
+
+FIRST_IMPACT: tuple[Measure[Shot], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="restitution",
+        symbol="e",
+        definition="Velocity of the centre of mass along the axis after the first impact over that"
+        " before it.",
+        form="fixed",
+        note="It is a result, never an input. A closing force also works during "
+        "the contact: a strong one raises the restitution of an eccentric impact, even "
+        "above one.",
+    ),
+    Measure(
+        key="rebound_height",
+        symbol="h",
+        unit="m",
+        definition="Highest position of the centre of mass between the first impact and the "
+        "second, above that at first touch.",
+    ),
+    Measure(
+        key="peak_force",
+        symbol="F_max",
+        unit="N",
+        definition="Largest contact force of any time step of the first impact.",
+    ),
+    Measure(
+        key="contact_time",
+        symbol="t_c",
+        unit="s",
+        definition="From first touch to the end of the first uninterrupted contact.",
+    ),
+    Measure(
+        key="impulse",
+        symbol="J",
+        unit="N s",
+        definition="Integral of the contact force over the first impact, with all its contacts.",
+    ),
+)
+"""What is measured of the first impact; the first two tell how high it comes back."""
+
+ROCKING = Measure[Shot](
+    key="rocking",
+    name="lateral motion after it",
+    symbol="E_r/E_0",
+    definition="Kinetic energy of rotation and lateral motion right after the first impact, "
+    "over the energy of approach.",
+    form="share",
+    digits=2,
+    note="The loss of rebound by an eccentric or tilted impact.",
+)
+
+FRICTION_LOSS = Measure[Shot](
+    key="friction_loss",
+    name="lost in friction between the faces",
+    symbol="E_f/E_0",
+    definition="Energy that friction between the faces takes in the first impact, over the energy "
+    "of approach.",
+    form="share",
+    digits=2,
+)
+"""0 for faces without friction."""
+
+PLASTIC_LOSS = Measure[Shot](
+    key="plastic_loss",
+    name="lost in yield of the faces",
+    symbol="E_p/E_0",
+    definition="Energy that faces which yield take in the whole shot, over the energy of approach.",
+    form="share",
+    digits=2,
+)
+"""0 for elastic faces."""
+
+SHOT_MEASURES: tuple[Measure[Shot], ...] = described_in(
+    _THEORY,
+    *DRAWN,
+    Measure(
+        key="approach_speed",
+        symbol="v_0",
+        unit="m/s",
+        definition="Speed of the centre of mass along the axis before the first impact.",
+    ),
+    *FIRST_IMPACT,
+    Measure(
+        key="sub_contacts",
+        symbol="n_c",
+        definition="Contacts of which the first impact consists.",
+        kind="whole",
+    ),
+    ROCKING,
+    FRICTION_LOSS,
+    PLASTIC_LOSS,
+    Measure(
+        key="deepest_set",
+        symbol="w_max",
+        unit="m",
+        definition="Deepest set of a contact point after the shot; every shot meets the faces as "
+        "those before have left them.",
+    ),
+    Measure(
+        key="second_impact",
+        symbol="t_2",
+        unit="s",
+        definition="Time from the first touch to that of the second impact.",
+    ),
+    Measure(key="impacts", symbol="n", definition="Impacts until the shot ended.", kind="whole"),
+    Measure(
+        key="energy_residual",
+        symbol="r_E",
+        definition="Residual of the energy balance over the initial energy, of the whole shot: "
+        "round-off in a correct run.",
+        form="power",
+    ),
+)
+"""All columns of a shot, in their order."""
+
+RESULTS = tuple(item for item in SHOT_MEASURES if item not in DRAWN)
+"""What a shot ends with."""
+
+RULE_MEASURES: tuple[Measure[RuleVerdict], ...] = described_in(
+    "theory/measurement",
+    Measure(
+        key="restitution_bias",
+        symbol="e_h - e_0",
+        definition="Restitution of the shot with the highest rebound minus that of the centred "
+        "shot.",
+        form="signed",
+    ),
+    Measure(
+        key="rebound_height_bias",
+        symbol="h_h - h_0",
+        unit="m",
+        definition="Highest rebound minus that of the centred shot.",
+        json_name="rebound_height_bias",
+    ),
+    Measure(
+        key="relative_restitution_bias",
+        symbol="e_h/e_0 - 1",
+        definition="Restitution of the shot with the highest rebound over that of the centred "
+        "shot, minus 1.",
+        form="signed share",
+        digits=2,
+    ),
+    Measure(
+        key="relative_rebound_height_bias",
+        symbol="h_h/h_0 - 1",
+        definition="Highest rebound over that of the centred shot, minus 1.",
+        form="signed share",
+        digits=2,
+    ),
+    Measure(
+        key="rank",
+        symbol="n_h",
+        definition="Shots that rebound at least as high as the centred one.",
+        kind="whole",
+        json_name="shots_at_least_as_high_as_centric",
+    ),
+)
+"""Of the rule that takes the highest rebound of all shots for the centred one."""

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import PressureRecord
-from klack.analyses.logged_work import LoggedWork
+from klack.analyses.many import LoggedWork, grouped_doubts
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.shots.doubts import grouped_doubts
 from klack.analyses.shots.draw import (
     ShotDraw,
     centric_draw,
@@ -22,13 +21,15 @@ from klack.analyses.shots.draw import (
     face_friction,
     shots_of,
 )
-from klack.analyses.shots.log import ShotLog, shot_log, shots_mark
 from klack.analyses.shots.model import ShotModel, build_shots
 from klack.analyses.shots.one_shot import (
+    ShotLog,
     ShotOutcome,
     ShotSetup,
     columns_of,
     run_shot,
+    shot_log,
+    shots_mark,
     simulate_shot,
     traces_of,
 )

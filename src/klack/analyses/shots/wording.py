@@ -3,8 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from klack.analyses.shots.measures import FIRST_IMPACT
-from klack.analyses.shots.record import ShotsStudy
+from klack.analyses.shots.record import FIRST_IMPACT, ShotsStudy
 from klack.report.wording import quantity, signed_share
 
 __all__ = ["largest_size", "length_unit", "shot_name", "shots_answer"]

@@ -7,17 +7,22 @@ import numpy as np
 from klack.analyses.measures import Measure
 from klack.analyses.page import page_of
 from klack.analyses.schematic_section import schematic_section
-from klack.analyses.stroke_shots.figures import lift_chart, rebound_chart
-from klack.analyses.stroke_shots.highest import highest_rebound
-from klack.analyses.stroke_shots.measures import AT_TOUCH, COMPARED, RESULTS, Row
-from klack.analyses.stroke_shots.pictures import histograms, touch_map
-from klack.analyses.stroke_shots.record import StrokeShotsStudy, VariantShots
-from klack.analyses.stroke_shots.scatter import scattered
-from klack.analyses.stroke_shots.summary import (
+from klack.analyses.stroke_shots.analysis import (
     RATIO_COLUMNS,
     correlation_rows,
     ratio_rows,
 )
+from klack.analyses.stroke_shots.figures import histograms, lift_chart, rebound_chart, touch_map
+from klack.analyses.stroke_shots.record import (
+    AT_TOUCH,
+    COMPARED,
+    RESULTS,
+    Row,
+    StrokeShotsStudy,
+    VariantShots,
+    highest_rebound,
+)
+from klack.analyses.stroke_shots.scatter import scattered
 from klack.analyses.stroke_shots.wording import highest_answers, ratio_answers, scatter_answers
 from klack.report.page import Content, Section, Table
 from klack.report.wording import count, power, quantity, sentence

@@ -1,7 +1,8 @@
-"""One stroke of many: from its start to its numbers."""
+"""One stroke of many: from its start to its numbers, and how they are kept while others run."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -18,8 +19,10 @@ from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
 from klack.analyses.stroke.summary import first_impact
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.stroke_shots.starts import CENTRED, StrokeStart
+from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve
+from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.case.variants import Variant
 from klack.contact.friction import Friction
@@ -32,13 +35,18 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.spatial_run import SpatialValve
 
 __all__ = [
+    "STROKE_LOG",
+    "StrokeKey",
+    "StrokeLog",
     "StrokeOutcome",
     "StrokeSetup",
     "StrokeTask",
     "rebound_height",
     "run_one_stroke",
     "stop_columns",
+    "strokes_mark",
 ]
+
 
 Vector = NDArray[np.float64]
 Numbers = dict[str, float]
@@ -335,3 +343,58 @@ def rebound_height(
     if not others and away[-1] > highest:  # it still rises
         return _NAN
     return highest
+
+
+StrokeKey = tuple[str, int]
+"""Variant and number of a stroke."""
+StrokeLog = UnfinishedLog[StrokeKey, StrokeOutcome]
+
+
+def strokes_mark(case: ValveCase, seed: int, threads: int | None) -> str:
+    """Digest of all that decides the numbers of a stroke."""
+    files = (path.read_bytes() for path in case.component_files.values())
+    own = (f"{name} {digest}".encode() for name, digest in case.own_components.items())
+    run = case.run.model_dump_json().encode()
+    return fingerprint(case, (run, str(seed).encode(), str(threads).encode(), *own, *files))
+
+
+def _data(key: StrokeKey, outcome: StrokeOutcome) -> Mapping[str, Any]:
+    return {
+        "variant": outcome.variant,
+        "label": outcome.label,
+        "index": outcome.index,
+        "stroke": outcome.stroke,
+        "stops": outcome.stops,
+        "lift": outcome.lift.tolist(),
+        "end": outcome.end.tolist(),
+        "failure": outcome.failure,
+        "doubts": list(outcome.doubts),
+    }
+
+
+def _outcome(data: Mapping[str, Any]) -> tuple[StrokeKey, StrokeOutcome]:
+    outcome = StrokeOutcome(
+        variant=str(data["variant"]),
+        label=str(data["label"]),
+        index=int(data["index"]),
+        stroke={str(key): float(value) for key, value in data["stroke"].items()},
+        stops={
+            str(stop): {str(key): float(value) for key, value in numbers.items()}
+            for stop, numbers in data["stops"].items()
+        },
+        lift=np.array(data["lift"], dtype=np.float32),
+        end=np.array(data["end"], dtype=float),
+        failure=str(data["failure"]),
+        doubts=tuple(map(str, data["doubts"])),
+    )
+    return (outcome.variant, outcome.index), outcome
+
+
+STROKE_LOG = LogForm(
+    file="strokes.unfinished.jsonl",
+    format="klack strokes 1",
+    parts="finished strokes",
+    data=_data,
+    read=_outcome,
+)
+"""How finished strokes are kept."""

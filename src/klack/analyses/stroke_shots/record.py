@@ -10,9 +10,26 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.measures import Measure, described_in
 from klack.analyses.record import CaseRecord
 
-__all__ = ["StopColumns", "StrokeColumns", "StrokeShotsStudy", "VariantShots"]
+__all__ = [
+    "AT_TOUCH",
+    "COMPARED",
+    "FIRST_TOUCH_MEASURES",
+    "HIGHEST_MEASURES",
+    "RESULTS",
+    "STARTED",
+    "STROKE_MEASURES",
+    "HighestRebound",
+    "Row",
+    "StopColumns",
+    "StrokeColumns",
+    "StrokeShotsStudy",
+    "VariantShots",
+    "highest_rebound",
+]
+
 
 Column = NDArray[np.float64]
 
@@ -214,3 +231,345 @@ class StrokeShotsStudy(CaseRecord):
     def count(self) -> int:
         """Number of strokes of each variant."""
         return next(iter(self.variants.values())).strokes.count
+
+
+@dataclass(frozen=True, slots=True)
+class HighestRebound:
+    """Highest rebound from one stop, against the most centred stroke and the centred one.
+
+    Parameters
+    ----------
+    stroke : int
+        Its number.
+    rebound_height, eccentricity : float [m]
+        Its own; the eccentricity is that at first touch.
+    place : int
+        In the order of that eccentricity; 1 is the most centred.
+    count : int
+        Strokes with a rebound.
+    most_centred : int
+        Number of the most centred stroke among them.
+    most_centred_height, most_centred_eccentricity : float [m]
+    centred_height : float [m]
+        Of the stroke that starts centred.
+    relative_height_bias : float [-]
+        Highest rebound over that, minus 1.
+    restitution_bias : float [-]
+        Restitution minus that of the stroke that starts centred.
+    """
+
+    stroke: int
+    rebound_height: float
+    eccentricity: float
+    place: int
+    count: int
+    most_centred: int
+    most_centred_height: float
+    most_centred_eccentricity: float
+    centred_height: float
+    relative_height_bias: float
+    restitution_bias: float
+
+    @property
+    def is_most_centred(self) -> bool:
+        """Whether the highest rebound is that of the most centred stroke."""
+        return self.stroke == self.most_centred
+
+
+def highest_rebound(shots: VariantShots, stop: str) -> HighestRebound | None:
+    """Find the highest rebound of all strokes of a variant; None where no stroke has one."""
+    columns, alone = shots.stops[stop], shots.centric_stops[stop]
+    height, off = columns.rebound_height, columns.eccentricity
+    known = np.flatnonzero(np.isfinite(height) & np.isfinite(off))
+    if not known.size or not np.any(height[known] > 0.0):
+        return None
+    best = int(known[np.argmax(height[known])])
+    centred = int(known[np.argmin(off[known])])
+    middle = float(alone.rebound_height[0])
+    return HighestRebound(
+        stroke=best,
+        rebound_height=float(height[best]),
+        eccentricity=float(off[best]),
+        place=1 + int(np.sum(off[known] < off[best])),
+        count=int(known.size),
+        most_centred=centred,
+        most_centred_height=float(height[centred]),
+        most_centred_eccentricity=float(off[centred]),
+        centred_height=middle,
+        relative_height_bias=float(height[best]) / middle - 1.0 if middle > 0.0 else float("nan"),
+        restitution_bias=float(columns.restitution[best] - alone.restitution[0]),
+    )
+
+
+Row = Mapping[str, float]
+"""Numbers of one stroke by the name of their column."""
+
+_THEORY = "theory/stroke-in-three-dimensions"
+
+STARTED: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="eccentricity",
+        symbol="e_0",
+        unit="m",
+        definition="Distance of the axis of the needle from that of the valve at the height of the "
+        "seat, at the start.",
+    ),
+    Measure(
+        key="direction",
+        symbol="phi_e",
+        unit="rad",
+        definition="Direction of the eccentricity, from x to y.",
+    ),
+    Measure(
+        key="tilt", symbol="theta", unit="rad", definition="Angle between both axes at the start."
+    ),
+    Measure(
+        key="tilt_direction",
+        symbol="phi_t",
+        unit="rad",
+        definition="Direction in which the upper end is tilted, from x to y.",
+    ),
+    Measure(
+        key="friction",
+        name="friction in the guide",
+        symbol="mu",
+        definition="Coulomb's coefficient in the guide.",
+        form="fixed",
+        digits=3,
+    ),
+    Measure(
+        key="contact_friction",
+        name="friction between the faces",
+        symbol="mu_c",
+        definition="Coulomb's coefficient between the faces of all stops, where it is drawn.",
+        form="fixed",
+        digits=3,
+    ),
+)
+"""What differs from stroke to stroke."""
+
+RESULTS: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="opening_time",
+        symbol="t_o",
+        unit="s",
+        definition="From time zero to the first touch of the opening stop in the first whole "
+        "stroke, else in the longest; none where it is not touched.",
+        digits=5,
+    ),
+    Measure(
+        key="closing_time",
+        symbol="t_c",
+        unit="s",
+        definition="From time zero to the first touch of the seat after the largest lift of that "
+        "stroke; none where the needle stays closed or the run ends before.",
+        digits=5,
+    ),
+    Measure(
+        key="impact_loss",
+        name="lost in impacts",
+        symbol="W",
+        unit="J",
+        definition="Kinetic energy of the centre of mass that all impacts take: into rotation, "
+        "lateral motion and vibration.",
+    ),
+    Measure(
+        key="guide_loss",
+        name="lost in the guide",
+        symbol="W_g",
+        unit="J",
+        definition="Energy that friction in the guide takes in the whole stroke.",
+    ),
+    Measure(
+        key="faces_loss",
+        name="lost between the faces",
+        symbol="W_f",
+        unit="J",
+        definition="Energy that friction between the faces of all stops takes in the whole stroke; "
+        "missing without friction there.",
+    ),
+    Measure(
+        key="injected_energy",
+        name="structure-borne energy",
+        symbol="W_in",
+        unit="J",
+        definition="Work of the stops on the modes of the held bodies, along the axis.",
+    ),
+    Measure(
+        key="radiated_energy",
+        name="sound energy radiated (estimate)",
+        symbol="W_rad",
+        unit="J",
+        definition="Sound energy that the surfaces radiate during one stroke; missing in a case "
+        "without a section noise.",
+    ),
+)
+"""Of the whole of a stroke, with a distribution of their own."""
+
+STROKE_MEASURES: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
+    *STARTED,
+    *RESULTS,
+    Measure(key="impacts", symbol="n", definition="Impacts on all stops.", kind="whole"),
+    Measure(
+        key="energy_residual",
+        symbol="r_E",
+        definition="Residual of the energy balance over the throughput: round-off in a correct "
+        "run.",
+        form="power",
+    ),
+)
+"""All columns of a stroke."""
+
+AT_TOUCH: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="eccentricity",
+        name="eccentricity at touch",
+        symbol="e_1",
+        unit="m",
+        definition="Distance of the axis of the needle from that of the valve at the height of the "
+        "stop, at first touch.",
+        digits=3,
+    ),
+    Measure(
+        key="direction",
+        name="direction at touch",
+        symbol="phi_1",
+        unit="rad",
+        definition="Direction of that eccentricity, from x to y.",
+        digits=3,
+    ),
+    Measure(
+        key="tilt",
+        name="tilt at touch",
+        symbol="theta_1",
+        unit="rad",
+        definition="Angle between both axes at first touch.",
+        digits=3,
+    ),
+    Measure(
+        key="tilt_direction",
+        name="direction of tilt at touch",
+        symbol="phi_t1",
+        unit="rad",
+        definition="Direction in which the upper end is tilted then, from x to y.",
+        digits=3,
+    ),
+)
+"""Position of the needle when it touches a stop."""
+
+COMPARED: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="approach_speed",
+        symbol="v_0",
+        unit="m/s",
+        definition="Speed of the centre of mass along the axis before the impact.",
+    ),
+    Measure(
+        key="peak_force",
+        symbol="F_max",
+        unit="N",
+        definition="Largest contact force along the axis.",
+    ),
+    Measure(
+        key="contact_time",
+        symbol="t_c",
+        unit="s",
+        definition="Time closed, all contacts of the impact together.",
+    ),
+    Measure(
+        key="impulse",
+        symbol="J",
+        unit="N s",
+        definition="Integral of the contact force along the axis.",
+    ),
+    Measure(
+        key="restitution",
+        symbol="e",
+        definition="Opening speed over approach speed of the centre of mass; 0 where it comes to "
+        "rest.",
+        form="fixed",
+    ),
+    Measure(
+        key="rebound_height",
+        symbol="h",
+        unit="m",
+        definition="Farthest turn of the centre of mass from the stop after the impact and before "
+        "another stop is touched, from its place at first touch; 0 where it comes to rest, missing "
+        "where the stroke ends before a turn.",
+    ),
+    Measure(
+        key="energy_loss",
+        symbol="W_1",
+        unit="J",
+        definition="Kinetic energy of the centre of mass that the impact takes.",
+    ),
+)
+"""Of the first impact on a stop, with a distribution of their own."""
+
+FIRST_TOUCH_MEASURES: tuple[Measure[Row], ...] = described_in(
+    _THEORY,
+    *AT_TOUCH,
+    *COMPARED,
+    Measure(
+        key="impacts",
+        name="impacts on the stop",
+        symbol="n",
+        definition="Impacts on this stop in the whole stroke, the first one among them.",
+        kind="whole",
+    ),
+)
+"""All columns of the first impact on a stop."""
+
+HIGHEST_MEASURES: tuple[Measure[HighestRebound], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="stroke",
+        symbol="k_h",
+        definition="Number of the stroke with the highest rebound, from 0.",
+        kind="whole",
+    ),
+    Measure(
+        key="rebound_height",
+        symbol="h_h",
+        unit="m",
+        definition="Its rebound height.",
+    ),
+    Measure(
+        key="eccentricity",
+        symbol="e_h",
+        unit="m",
+        definition="Its eccentricity at first touch of the stop.",
+    ),
+    Measure(
+        key="place",
+        symbol="n_h",
+        definition="Its place among the strokes in the order of that eccentricity; 1 is the most "
+        "centred one.",
+        kind="whole",
+    ),
+    Measure(
+        key="most_centred",
+        symbol="k_c",
+        definition="Number of the most centred stroke at first touch.",
+        kind="whole",
+    ),
+    Measure(
+        key="relative_height_bias",
+        symbol="h_h/h_0 - 1",
+        definition="Highest rebound over that of the stroke that starts centred, minus 1.",
+        form="signed share",
+    ),
+    Measure(
+        key="restitution_bias",
+        symbol="e_h - e_0",
+        definition="Restitution of the stroke with the highest rebound minus that of the stroke "
+        "that starts centred.",
+        form="signed",
+    ),
+)
+"""Of the stroke with the highest rebound from a stop."""

@@ -8,18 +8,20 @@ from time import perf_counter
 
 import numpy as np
 
-from klack.analyses.logged_work import LoggedWork
+from klack.analyses.many import LoggedWork, grouped_doubts
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.shots.doubts import grouped_doubts
 from klack.analyses.shots.run import guide_in_words
 from klack.analyses.stroke.run import body_summaries, stop_summaries
-from klack.analyses.stroke_shots.log import STROKE_LOG, StrokeKey, StrokeLog, strokes_mark
 from klack.analyses.stroke_shots.one_stroke import (
+    STROKE_LOG,
+    StrokeKey,
+    StrokeLog,
     StrokeOutcome,
     StrokeSetup,
     StrokeTask,
     run_one_stroke,
     stop_columns,
+    strokes_mark,
 )
 from klack.analyses.stroke_shots.record import StrokeColumns, StrokeShotsStudy, VariantShots
 from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve

@@ -8,9 +8,14 @@ from numpy.typing import NDArray
 
 from klack.analyses.measures import Measure
 from klack.analyses.sample import rank_correlation
-from klack.analyses.stroke_shots.measures import COMPARED, RESULTS, Row
-from klack.analyses.stroke_shots.record import StrokeShotsStudy, VariantShots
-from klack.studies.quantiles import sample_quantile
+from klack.analyses.stroke_shots.record import (
+    COMPARED,
+    RESULTS,
+    Row,
+    StrokeShotsStudy,
+    VariantShots,
+)
+from klack.studies.samples import sample_quantile
 
 __all__ = [
     "ScatterRatio",

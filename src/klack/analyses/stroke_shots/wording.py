@@ -4,8 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from klack.analyses.stroke_shots.highest import HighestRebound, highest_rebound
-from klack.analyses.stroke_shots.record import StrokeShotsStudy
+from klack.analyses.stroke_shots.record import HighestRebound, StrokeShotsStudy, highest_rebound
 from klack.analyses.stroke_shots.scatter import Scattered, scatter_ratio, scattered, wet_and_dry
 from klack.units import format_si
 

@@ -8,8 +8,7 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.study.asked_points import AskedPoints
-from klack.analyses.study.point_row import PointRow
+from klack.analyses.study.asked_points import AskedPoints, PointRow
 from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
 from klack.case.study_source import StudySource
@@ -91,7 +90,7 @@ def point_fields(
 def step_columns(rows: Sequence[PointRow]) -> NDArray[np.float64]:
     """What the check of the steps of each stroke has found, shape (2, points); (2, 0) of impacts.
 
-    Rows: see :class:`~klack.analyses.study.point_row.PointSteps`; nan where nothing was computed.
+    Rows: see :class:`~klack.analyses.study.asked_points.PointSteps`; nan where none was computed.
     """
     if all(row.steps is None for row in rows):
         return np.zeros((2, 0))

@@ -110,7 +110,7 @@ def _live(progress: "Progress") -> "Iterator[dict[str, Any]]":
     if not file:
         yield {}
         return
-    from klack.analyses.study.live_record import LIVE, LiveRecord
+    from klack.analyses.study.live import LIVE, LiveRecord
 
     live = LiveRecord(Path(file).parent / LIVE, progress)
     try:
@@ -145,14 +145,14 @@ def _run(
     ending = Ending.of(wanted, f"{checked.name}-{name}")
 
     from klack.analyses.study.analysis import STUDY
-    from klack.analyses.study.log import point_log_form
+    from klack.analyses.study.evaluation import point_log_form
     from klack.analyses.study.where import Where
 
     where = Where(threads=wanted.threads, workers=workers, dask=dask, is_free=True)
     with ending.resumable(point_log_form(checked, tree)[0]) as progress, _live(progress) as seen:
         page = None
         if is_search and ending.report:
-            from klack.analyses.study.progress_page import ProgressPage
+            from klack.analyses.study.live import ProgressPage
 
             page = ProgressPage(ending.folder, progress)
             seen["seen"] = page.write

@@ -6,15 +6,13 @@ depend neither on the number of threads nor on the other points.
 """
 
 import warnings
-from collections import OrderedDict
-from collections.abc import Callable, Iterable
+from collections import OrderedDict, deque
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext, suppress
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
-from klack.analyses.study.asked_points import AskedPoints, PointGroup, groups_of
-from klack.analyses.study.point_row import PointRow
-from klack.analyses.study.tally import Tally
+from klack.analyses.study.asked_points import AskedPoints, PointGroup, PointRow, groups_of
 from klack.analyses.threads import (
     never_stopped,
     on_threads,
@@ -23,12 +21,114 @@ from klack.analyses.threads import (
 )
 from klack.case.points import case_at, with_changes
 from klack.closing import Closing
+from klack.cores import available_cores
 from klack.errors import InputError, KlackError
 from klack.progress import Progress, silent
 from klack.signals import TimeSeries
-from klack.stages import FAILURES
+from klack.stages import FAILURES, show
 
-__all__ = ["Builds", "compute_alone", "compute_points", "sounds_of"]
+__all__ = [
+    "Agenda",
+    "Builds",
+    "PointWorkers",
+    "Tally",
+    "ThreadWorkers",
+    "compute_alone",
+    "sounds_of",
+]
+
+
+class Agenda:
+    """Hands points out.
+
+    A worker gets the next points of the bodies that it has; then bodies that no worker has begun
+    with; then those that others have begun with the longest ago.
+
+    Parameters
+    ----------
+    groups : sequence of sequence of int
+        Places of the points that share their bodies.
+    """
+
+    def __init__(self, groups: Sequence[Sequence[int]]) -> None:
+        self._groups = [deque(group) for group in groups]
+        self._open = deque(range(len(groups)))
+        self._last: dict[object, int] = {}
+        self.left = sum(map(len, self._groups))
+
+    def take(self, worker: object = None, most: int = 1) -> tuple[int, ...]:
+        """Next points for a worker, all with the same bodies; none if no point is left.
+
+        Parameters
+        ----------
+        worker : object
+            Compared with those of other calls; None for one that has no bodies yet.
+        most : int
+            Points at a time.
+        """
+        group = self._group_for(worker)
+        if group is None:
+            return ()
+        if worker is not None:
+            self._last[worker] = group
+        left = self._groups[group]
+        taken = tuple(left.popleft() for _ in range(min(most, len(left))))
+        self.left -= len(taken)
+        return taken
+
+    def _group_for(self, worker: object) -> int | None:
+        last = self._last.get(worker)
+        if last is not None and self._groups[last]:
+            return last
+        while self._open:
+            group = self._open.popleft()
+            if self._groups[group]:
+                self._open.append(group)
+                return group
+        return None
+
+
+_STAGE = "points"
+
+
+class Tally(Closing):
+    """Hands rows on as they come, and shows their warnings at the end, each once.
+
+    Parameters
+    ----------
+    whole : int
+        Points of the study.
+    wanted : int
+        Of them, those that are not known yet.
+    keep : callable
+        Gets the place of a point and its row.
+    progress : callable
+    """
+
+    def __init__(
+        self,
+        whole: int,
+        wanted: int,
+        keep: Callable[[int, PointRow], None],
+        progress: Progress,
+    ) -> None:
+        self._whole, self._done = whole, whole - wanted
+        self._keep, self._progress = keep, progress
+        self._others: dict[str, warnings.WarningMessage] = {}
+
+    def __call__(self, place: int, row: PointRow) -> None:
+        """Take the row of a point."""
+        self._keep(place, row)
+        self._done += 1
+        self._others.update({str(item.message): item for item in row.others})
+
+    def tell(self) -> None:
+        """Report the share of the points that are done."""
+        self._progress(_STAGE, self._done / self._whole)
+
+    def close(self) -> None:
+        """Show the warnings that are no doubts about numbers."""
+        show(self._others.values())
 
 
 class Builds(Closing):
@@ -227,3 +327,88 @@ def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None
                 done += 1
             asked.kind.close(built)
     return tuple(found)
+
+
+class PointWorkers(Protocol):
+    """Threads, processes or a cluster that compute points.
+
+    A row does not depend on who computes it: every point is computed alone, by one thread.
+    """
+
+    @property
+    def count(self) -> int:
+        """Points that are computed at a time."""
+        ...
+
+    @property
+    def words(self) -> str:
+        """What they are: ``threads``, ``processes``."""
+        ...
+
+    def compute(
+        self,
+        asked: AskedPoints,
+        places: Sequence[int],
+        keep: Callable[[int, PointRow], None],
+        progress: Progress,
+    ) -> None:
+        """Compute some of the points.
+
+        Parameters
+        ----------
+        asked : AskedPoints
+        places : sequence of int
+            Of the points that are wanted.
+        keep : callable
+            Called in this thread with each place and its row, once, in the order of their end.
+        progress : callable
+
+        Raises
+        ------
+        InputError
+            Where no point can be computed: the memory is too small, a file is missing there.
+        KeyboardInterrupt
+            Ctrl-C, after the rows that were finished have been kept.
+        """
+        ...
+
+    def close(self) -> None:
+        """End them."""
+        ...
+
+
+class ThreadWorkers(Closing):
+    """Threads of this process: strokes run outside of the interpreter.
+
+    Parameters
+    ----------
+    threads : int, optional
+        All cores by default.
+    """
+
+    words = "threads"
+
+    def __init__(self, threads: int | None = None) -> None:
+        self._threads, self._builds = threads, Builds()
+        self._most = 0
+
+    @property
+    def count(self) -> int:
+        """Threads that computed points at a time, at most; those that may before the first."""
+        return self._most or self._threads or available_cores()
+
+    def compute(
+        self,
+        asked: AskedPoints,
+        places: Sequence[int],
+        keep: Callable[[int, PointRow], None],
+        progress: Progress,
+    ) -> None:
+        """Compute some of the points, those with the same bodies one after another."""
+        threads, builds = self._threads, self._builds
+        most = compute_points(asked, places, keep, threads, progress, builds)
+        self._most = max(self._most, most)
+
+    def close(self) -> None:
+        """Forget the bodies."""
+        self._builds.close()

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner, has_slope
-from klack.analyses.study.chosen_measures import ChosenMeasure
 from klack.analyses.study.goals import Goals
+from klack.analyses.study.measures import ChosenMeasure
 from klack.analyses.study.points import Space
 from klack.analyses.study.strokes import AskedPoints
 from klack.case.study_source import StudySource

@@ -19,14 +19,26 @@ from klack.analyses.impact.summary import no_estimate
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import impact_sources
 from klack.analyses.shots.draw import shots_of
-from klack.analyses.shots.log import shot_log
 from klack.analyses.shots.model import shot_bodies, shot_model
+from klack.analyses.shots.one_shot import shot_log
 from klack.analyses.shots.run import drop_shots, shot_doubts
-from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
-from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
-from klack.analyses.study.impact_measures import ImpactOfPoint, impact_measures
-from klack.analyses.study.point_row import PointRow, doubts_in, others_in
-from klack.analyses.study.shot_measures import SHOTS, shot_notes
+from klack.analyses.study.asked_points import (
+    AskedPoints,
+    PointGroup,
+    PointRow,
+    Taken,
+    doubts_in,
+    others_in,
+    require_same_for_all,
+)
+from klack.analyses.study.measures import (
+    SHOTS,
+    ChosenMeasure,
+    ImpactOfPoint,
+    PointNoise,
+    impact_measures,
+    shot_notes,
+)
 from klack.analyses.threads import Stopped, never_stopped
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, case_at

@@ -4,9 +4,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from klack.analyses.study.asked_points import AskedPoints, PointKind
-from klack.analyses.study.impact_measures import impact_measure_names
 from klack.analyses.study.impacts import IMPACTS
-from klack.analyses.study.stroke_measures import stroke_measure_names
+from klack.analyses.study.measures import impact_measure_names, stroke_measure_names
 from klack.analyses.study.strokes import STROKES
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree

@@ -1,23 +1,233 @@
-"""Designs by what the valves made after them do."""
+"""Valves that are made after a design, about whose values theirs scatter; what they make of it."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from klack.analyses.study.asked_points import PointRow
 from klack.analyses.study.goals import Side
-from klack.analyses.study.point_row import PointRow
-from klack.analyses.study.points import Space, Values
+from klack.analyses.study.points import Parameter, Space, Values, written
 from klack.analyses.study.record import StudyColumn
-from klack.analyses.study.scatter import Scatter, made_space, scatter_of
 from klack.case.any_case import AnyCase
+from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
+from klack.case.study import StudyRobust
 from klack.case.study_source import StudySource
 from klack.errors import InputError
-from klack.studies.robust import RobustValue
+from klack.input.problem import CaseProblem, nearest, one_of
+from klack.studies.designs import sobol_sequence
+from klack.studies.samples import RobustValue
+from klack.studies.spread import Listed, Normal
+from klack.units import Kind, format_si, parse_quantity
 
-__all__ = ["Compute", "MadeValves", "made_valves_of"]
+__all__ = ["Compute", "MadeValves", "made_space", "made_valves_of"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _Scattered:
+    """A value that scatters: a parameter of the study, or another key of the case.
+
+    Parameters
+    ----------
+    name : str
+    kind : Kind
+    deviation : float [SI]
+        Standard deviation of made valves.
+    today : float or None [SI]
+        In the case; None for a word whose value there is not known.
+    """
+
+    name: str
+    kind: Kind
+    deviation: float
+    today: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Scatter:
+    """What scatters from valve to valve, the same for every design.
+
+    Parameters
+    ----------
+    space : Space
+        Of the study.
+    values : tuple of _Scattered
+    cube : array, shape (valves, values)
+        Shares of probability of each valve.
+    """
+
+    space: Space
+    values: tuple[_Scattered, ...]
+    cube: NDArray[np.float64]
+
+    def made(self, design: Values) -> list[dict[str, PointValue]]:
+        """What the case file has for each valve made after a design.
+
+        Raises
+        ------
+        InputError
+            For an expression without a value.
+        """
+        own = {item.name: design[item.name] for item in self.space.parameters}
+        return [self._valve(own, shares) for shares in self.cube]
+
+    def _valve(self, design: Values, shares: NDArray[np.float64]) -> dict[str, PointValue]:
+        shifted = {
+            item.name: Normal(
+                float(design.get(item.name, item.today)),  # type: ignore[arg-type]
+                item.deviation,
+            ).at(float(share))
+            for item, share in zip(self.values, shares, strict=True)
+        }
+        inside = {name: shifted.get(name, value) for name, value in design.items()}
+        others = {
+            item.name: written(shifted[item.name], item.kind)
+            for item in self.values
+            if item.name not in design
+        }
+        return {**self.space.written(self.space.completed(inside)), **others}
+
+
+def scatter_of(case: AnyCase, source: StudySource, space: Space) -> Scatter | None:
+    """Scatter of made valves; None for a study without.
+
+    Raises
+    ------
+    InputError
+        With file, line and key: for an unknown name, a key that follows from parameters, and a
+        deviation of another unit or not above zero.
+    """
+    given = source.study.robust
+    if given is None:
+        return None
+    values = _scattered(case, source, space, given)
+    return Scatter(
+        space=space,
+        values=values,
+        cube=sobol_sequence(given.valves, len(values), given.seed),
+    )
+
+
+def made_space(case: AnyCase, source: StudySource, space: Space) -> Space:
+    """Parameters of valves made after the case as it is: what scatters, about its value there.
+
+    Keys that follow from what scatters follow here too; all others keep their value.
+
+    Raises
+    ------
+    InputError
+        With file, line and key: without a scatter, for a word that has no value in the case, and
+        those of :func:`scatter_of`.
+    """
+    given = source.study.robust
+    if given is None:
+        raise InputError(
+            source.where(()),
+            got="no scatter of made valves",
+            expected="robust: {scatter: {network.components.spring.preload: 0.3 N}}",
+            hint="give standard deviations of what scatters from valve to valve.",
+        )
+    values = _scattered(case, source, space, given)
+    names = {item.name for item in values}
+    linked = []
+    for item in space.linked:
+        if names & set(item.words.values()):
+            linked.append(item)
+            names.add(item.name)
+    known = space.known()
+    needed = {name for item in linked for name in item.words.values()} - names
+    own = {item.name for item in values if item.today is not None}
+    for name in (*needed, *(item.name for item in values)):
+        if name not in known and name not in own:
+            raise InputError(
+                source.where(("robust", "scatter")),
+                got=f"'{name}', a word whose value in the case is not known",
+                expected="words that a key of the case follows from by themselves",
+                hint=f"scatter the keys that follow from '{name}', or link one: a.key: {name}.",
+            )
+    return Space(
+        parameters=tuple(
+            Parameter(
+                name=item.name,
+                kind=item.kind,
+                spread=Normal(_today(item, known), item.deviation),
+                today=_today(item, known),
+            )
+            for item in values
+        ),
+        linked=tuple(linked),
+        constants={name: float(known[name]) for name in needed},
+    )
+
+
+def _today(item: _Scattered, known: Values) -> float:
+    return float(known[item.name]) if item.today is None else item.today
+
+
+def _scattered(
+    case: AnyCase, source: StudySource, space: Space, given: StudyRobust
+) -> tuple[_Scattered, ...]:
+    parameters = {item.name: item for item in space.parameters}
+    linked = {item.name for item in space.linked}
+    return tuple(
+        _one(case, source, parameters, linked, name, deviation)
+        for name, deviation in given.scatter.items()
+    )
+
+
+def _one(
+    case: AnyCase,
+    source: StudySource,
+    parameters: Mapping[str, Parameter],
+    linked: set[str],
+    name: str,
+    given: object,
+) -> _Scattered:
+    at = ("robust", "scatter", name)
+    if name in linked:
+        raise InputError(
+            source.where(at, on_key=True),
+            got="a key that follows from parameters",
+            expected="a parameter, or a key that stands by itself",
+            hint="give the scatter of what it follows from.",
+        )
+    own = parameters.get(name)
+    if own is not None:
+        listed = isinstance(own.spread, Listed) and not own.is_fixed
+        if own.kind is None or listed:
+            raise InputError(
+                source.where(at, on_key=True),
+                got="a list of values" if listed else "words",
+                expected="a parameter with a range, or a key with a quantity",
+                hint="what is chosen from a list does not scatter; leave it out.",
+            )
+        kind, today = own.kind, None if own.today is None else float(own.today)
+    elif "." not in name:
+        raise InputError(
+            source.where(at, on_key=True),
+            got=f"'{name}'",
+            expected=f"the path of a key, or a parameter: {one_of(parameters)}",
+            hint=nearest(name, list(parameters), "write the path of the key."),
+        )
+    else:
+        try:
+            quantity = quantity_at(case, split_path(name))
+        except CaseProblem as problem:
+            raise source.refuse(at, problem) from None
+        kind, today = quantity.kind, quantity.value
+    deviation = source.read(at, lambda: parse_quantity(given, kind))
+    if deviation <= 0.0:
+        raise InputError(
+            source.where(at),
+            got=format_si(deviation, kind.unit),
+            expected="more than 0",
+            hint="leave out what does not scatter.",
+        )
+    return _Scattered(name=name, kind=kind, deviation=deviation, today=today)
+
 
 Written = Mapping[str, PointValue]
 Compute = Callable[[Sequence[Written], Sequence[str]], list[PointRow]]

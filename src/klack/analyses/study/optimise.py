@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.sensitivities.parameters import SlopeSpace
-from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.asked_points import AskedPoints, PointRow
 from klack.analyses.study.columns import (
     measure_columns,
     point_fields,
@@ -18,14 +18,11 @@ from klack.analyses.study.columns import (
     row_warnings,
 )
 from klack.analyses.study.computing import sounds_of
-from klack.analyses.study.evaluation import Evaluation, asked_of
+from klack.analyses.study.evaluation import Evaluation, asked_of, point_log_form
 from klack.analyses.study.goals import Goals, Side, goals_of, require_objectives
 from klack.analyses.study.gradients import Gradients, require_gradients
-from klack.analyses.study.live_record import Seen
-from klack.analyses.study.log import point_log_form
+from klack.analyses.study.live import Pace, Seen
 from klack.analyses.study.made_valves import MadeValves, made_valves_of
-from klack.analyses.study.pace import Pace
-from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.points import Space, Values, require_varied, space_of
 from klack.analyses.study.record import Optimum, PointSound, StudyColumn, StudyRecord
 from klack.analyses.study.where import HERE, Where

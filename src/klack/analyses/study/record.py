@@ -317,8 +317,8 @@ class StudyRecord(CaseRecord):
         What the numbers of an impact come from: level, modes and meshes of the case as it is, and
         at how many points they differ; empty for strokes.
     halvings, step_changes : array, shape (points,)
-        Of strokes, see :class:`~klack.analyses.study.point_row.PointSteps`; nan without a stroke.
-        Empty for impacts.
+        Of strokes, see :class:`~klack.analyses.study.asked_points.PointSteps`; nan without one, and
+        empty for impacts.
     """
 
     study_text: str

@@ -4,29 +4,27 @@ from pathlib import Path
 from time import perf_counter
 
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.asked_points import AskedPoints, PointRow
 from klack.analyses.study.columns import (
     measure_columns,
     point_fields,
     require_some,
     row_warnings,
 )
-from klack.analyses.study.evaluation import Evaluation, asked_of
-from klack.analyses.study.goals import bounds_of, is_by_today
-from klack.analyses.study.live_record import Seen
-from klack.analyses.study.log import point_log_form
-from klack.analyses.study.pace import Pace
-from klack.analyses.study.point_row import PointRow
-from klack.analyses.study.points import StudyPoints, points_in, space_of
-from klack.analyses.study.record import NOT_YET, StudyRecord
-from klack.analyses.study.robustness import missed_bounds
-from klack.analyses.study.scatter import made_space
-from klack.analyses.study.sensitivity import screenings_of, sensitivities_of
-from klack.analyses.study.surrogates import (
+from klack.analyses.study.evaluation import Evaluation, asked_of, point_log_form
+from klack.analyses.study.findings import (
+    missed_bounds,
     require_surrogates,
+    screenings_of,
+    sensitivities_of,
     surrogate_warnings,
     surrogates_of,
 )
+from klack.analyses.study.goals import bounds_of, is_by_today
+from klack.analyses.study.live import Pace, Seen
+from klack.analyses.study.made_valves import made_space
+from klack.analyses.study.points import StudyPoints, points_in, space_of
+from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree

@@ -3,10 +3,9 @@
 from collections.abc import Iterable, Sequence
 
 from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
-from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.asked_points import AskedPoints, PointRow
 from klack.analyses.study.columns import step_columns
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.point_row import PointRow
 from klack.analyses.study.table import steps_of
 from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase
@@ -40,8 +39,8 @@ def run_points(
     points : sequence of mappings, or mapping of sequences
         Key of the case to a value with its unit, for every point; or a list of values by key.
     measures : iterable of str
-        See :func:`~klack.analyses.study.stroke_measures.stroke_measures` and
-        :func:`~klack.analyses.study.impact_measures.impact_measures`.
+        See :func:`~klack.analyses.study.measures.stroke_measures` and
+        :func:`~klack.analyses.study.measures.impact_measures`.
     variant : str, optional
         The first one of the case by default; of an impact its level, ``reduced`` by default.
     where : Where

@@ -17,16 +17,24 @@ from klack.analyses.stroke.run import (
     study_of_run,
     variant_network,
 )
-from klack.analyses.study.asked_points import AskedPoints, PointGroup, Taken, require_same_for_all
-from klack.analyses.study.chosen_measures import ChosenMeasure, PointNoise
-from klack.analyses.study.point_row import (
+from klack.analyses.study.asked_points import (
     UNCHECKED,
+    AskedPoints,
+    PointGroup,
     PointRow,
     PointSteps,
+    Taken,
     doubts_in,
     others_in,
+    require_same_for_all,
 )
-from klack.analyses.study.stroke_measures import StrokeOfPoint, stroke_measures, told_until
+from klack.analyses.study.measures import (
+    ChosenMeasure,
+    PointNoise,
+    StrokeOfPoint,
+    stroke_measures,
+    told_until,
+)
 from klack.analyses.threads import Stopped, never_stopped
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from klack.analyses.shots.measures import SHOT_MEASURES
-from klack.analyses.shots.record import ShotsStudy
+from klack.analyses.shots.record import SHOT_MEASURES, ShotsStudy
 from klack.exchange.results.variables import Variable, about_measure
 
 __all__ = ["shots_variables"]

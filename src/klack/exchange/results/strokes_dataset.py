@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from klack.analyses.measures import Measure
-from klack.analyses.stroke_shots.measures import FIRST_TOUCH_MEASURES, STROKE_MEASURES
-from klack.analyses.stroke_shots.record import VariantShots
+from klack.analyses.stroke_shots.record import FIRST_TOUCH_MEASURES, STROKE_MEASURES, VariantShots
 from klack.exchange.results.variables import Variable, about_measure
 
 __all__ = ["strokes_variables"]

@@ -1,6 +1,7 @@
 """Parts of a long work on all cores, each computed once and kept in a log."""
 
-from collections.abc import Callable, Iterator, Mapping
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any, Generic, TypeVar
 
@@ -9,7 +10,8 @@ from klack.analyses.workers import Failure, WorkerDied, WorkerPool, answer, shar
 from klack.closing import Closing
 from klack.errors import ConvergenceError
 
-__all__ = ["LoggedWork"]
+__all__ = ["LoggedWork", "grouped_doubts"]
+
 
 Key = TypeVar("Key")
 Part = TypeVar("Part")
@@ -87,3 +89,33 @@ def _in_a_worker(run: Callable[[Any, Any], Part], item: tuple[Any, Any]) -> Part
 
 def _attempt(run: Callable[[Any, Any], Part], given: Any, item: Any) -> Part | Failure:
     return answer(lambda: run(given, item))
+
+
+_NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
+
+
+def grouped_doubts(doubts: Iterable[tuple[int, Iterable[str]]], shots: str) -> list[str]:
+    """How many shots have each doubt, and the first of them.
+
+    Parameters
+    ----------
+    doubts : iterable of (int, iterable of str)
+        Number of each shot, and its doubts.
+    shots : str
+        What they are called, ``"shots"``.
+
+    Examples
+    --------
+    >>> grouped_doubts([(0, ["off by 2 %"]), (1, ["off by 3.5 %"]), (2, [])], "shots")
+    ['2 of 3 shots, first shot 0: off by 2 %']
+    """
+    alike: dict[str, list[tuple[int, str]]] = {}
+    count = 0
+    for index, own in doubts:
+        count += 1
+        for doubt in own:
+            alike.setdefault(_NUMBER.sub("#", doubt), []).append((index, doubt))
+    return [
+        f"{len(found)} of {count} {shots}, first {shots.rstrip('s')} {found[0][0]}: {found[0][1]}"
+        for found in alike.values()
+    ]

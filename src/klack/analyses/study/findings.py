@@ -1,23 +1,116 @@
-"""Surrogates of the measures of a study, over the parameters that vary."""
+"""What follows from all points of a study: sensitivities, missed bounds, surrogates."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.study.goals import Bound, bound_text
 from klack.analyses.study.points import StudyPoints, require_varied
-from klack.analyses.study.record import StudyColumn, StudySurrogate, SurrogateEffect
+from klack.analyses.study.record import (
+    MissedBound,
+    Screening,
+    Sensitivity,
+    StudyColumn,
+    StudySurrogate,
+    SurrogateEffect,
+)
 from klack.case.study_source import StudySource
 from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.progress import Progress
-from klack.studies.evenness import unevenness
+from klack.studies.designs import unevenness
+from klack.studies.samples import exceedance_of
+from klack.studies.screening import elementary_effects
+from klack.studies.sensitivity import sobol_indices
 from klack.studies.spread import Listed
 from klack.studies.surrogate import Surrogate, SurrogateKind, fit_surrogate
-from klack.studies.surrogate_axis import SurrogateAxis
-from klack.studies.surrogate_library import require_scikit_learn
+from klack.studies.surrogate_model import SurrogateAxis, require_scikit_learn
 
-__all__ = ["require_surrogates", "surrogate_warnings", "surrogates_of"]
+__all__ = [
+    "missed_bounds",
+    "require_surrogates",
+    "screenings_of",
+    "sensitivities_of",
+    "surrogate_warnings",
+    "surrogates_of",
+]
+
+
+def sensitivities_of(
+    measures: Sequence[StudyColumn], parameters: Sequence[str]
+) -> tuple[Sensitivity, ...]:
+    """Indices of each measure over the points of Saltelli's design, in the order of the design."""
+    return tuple(_sensitivity(item, tuple(parameters)) for item in measures)
+
+
+def _sensitivity(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivity:
+    found = sobol_indices(item.values, len(parameters))
+    return Sensitivity(
+        measure=item.name,
+        parameters=parameters,
+        first=found.first.value,
+        first_low=found.first.low,
+        first_high=found.first.high,
+        total=found.total.value,
+        total_low=found.total.low,
+        total_high=found.total.high,
+        rows=found.rows,
+        discarded=found.discarded,
+        confidence=found.confidence,
+        reason=found.reason,
+    )
+
+
+def screenings_of(
+    measures: Sequence[StudyColumn], parameters: Sequence[str], cube: NDArray[np.float64]
+) -> tuple[Screening, ...]:
+    """Elementary effects of each parameter on each measure, over the trajectories of Morris."""
+    return tuple(_screening(item, tuple(parameters), cube) for item in measures)
+
+
+def _screening(
+    item: StudyColumn, parameters: tuple[str, ...], cube: NDArray[np.float64]
+) -> Screening:
+    found = elementary_effects(cube, item.values)
+    return Screening(
+        measure=item.name,
+        parameters=parameters,
+        size=found.mean_size,
+        size_error=found.mean_size_error,
+        mean=found.mean,
+        scatter=found.scatter,
+        effects=found.effects,
+    )
+
+
+def missed_bounds(
+    bounds: Sequence[Bound], columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str]
+) -> tuple[MissedBound, ...]:
+    """Share of points that miss each bound, with its interval.
+
+    The interval takes the points for independent draws; Sobol points and a Latin hypercube scatter
+    less, so that it tends to be wider than claimed.
+    """
+    return tuple(_missed(bound, columns[bound.measure], units[bound.measure]) for bound in bounds)
+
+
+def _missed(bound: Bound, values: NDArray[np.float64], unit: str) -> MissedBound:
+    sign = 1.0 if bound.is_most else -1.0
+    found = exceedance_of(sign * values, sign * bound.value)
+    return MissedBound(
+        bound=f"{bound.measure} {bound_text(bound, unit)}",
+        missed=found.exceeded,
+        points=found.runs,
+        failed=found.failed,
+        probability=found.estimate,
+        low=found.low,
+        high=found.high,
+        at_most=found.at_most,
+        low_if_none=found.low_if_none,
+        high_if_all=found.high_if_all,
+    )
+
 
 _DESIGNS = ("sobol", "latin-hypercube", "made", "file")
 """Designs that may fill the ranges evenly; a grid hides what is between its levels."""

@@ -1,0 +1,160 @@
+"""What a long study shows meanwhile: lines on its pace, its points on disk, the page of a search."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+
+from klack.analyses.study.analysis import STUDY
+from klack.analyses.study.record import StudyRecord
+from klack.progress import PointCount, Progress, counted, remark
+
+__all__ = ["LIVE", "LiveRecord", "Pace", "ProgressPage", "Seen", "duration_text"]
+
+
+_FIRST, _LONGEST = 5.0, 60.0  # [s] until the first line, and between later ones
+
+
+class Pace:
+    """Tells now and then how an evaluation of points gets on.
+
+    Parameters
+    ----------
+    progress : Progress
+    most : int
+        Points that will have been asked for at the end.
+    """
+
+    def __init__(self, progress: Progress, most: int) -> None:
+        self._progress, self._most = progress, most
+        self._begin = self._last = perf_counter()
+        self._wait = _FIRST
+
+    def tell(self, done: int, computed: int, best: str = "") -> bool:
+        """A line, unless the last one was just now; whether there was one.
+
+        Parameters
+        ----------
+        done : int
+            Points that have their values.
+        computed : int
+            Of them computed since the begin; the others were there.
+        best : str
+            The best one so far, in words.
+        """
+        now = perf_counter()
+        rate = computed / max(now - self._begin, 1e-9)
+        left = (self._most - done) / rate if computed else None
+        counted(self._progress, PointCount(done=done, most=self._most, left=left, best=best))
+        if now - self._last < self._wait or done >= self._most:
+            return False
+        self._last, self._wait = now, min(2.0 * self._wait, _LONGEST)
+        text = f"{done} of {self._most} points"
+        if left is not None:
+            text += f", {3600.0 * rate:.3g} in an hour"
+            text += f", {duration_text(left)} left"
+        remark(self._progress, f"{text}; {best}" if best else text)
+        return True
+
+
+def duration_text(seconds: float) -> str:
+    """``1 h 40 min``, ``5 min``, ``40 s``: to two digits or so."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    minutes = round(seconds / 60.0)
+    return f"{minutes} min" if minutes < 100 else f"{minutes // 60} h {minutes % 60} min"
+
+
+LIVE = "live"
+"""Folder of the record, beside the file of the progress."""
+
+Seen = Callable[[Callable[[], StudyRecord]], None]
+"""Is offered what was found so far, and makes a record of it where it wants one."""
+
+_OFTEN = 1.5  # [s] between two records
+_SHARE = 20.0  # times what a record costs, so that it slows the study by 5 % at most
+
+
+class LiveRecord:
+    """Writes the record of an unfinished study again as points come.
+
+    No fault of it ends the study: it is told, and the record written no more.
+
+    Parameters
+    ----------
+    folder : Path
+    progress : callable
+        Is told of a fault.
+    """
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        self._folder, self._progress = folder, progress
+        self._next, self._failed = 0.0, False
+        self._latest: Callable[[], StudyRecord] | None = None
+
+    def offer(self, make: Callable[[], StudyRecord]) -> None:
+        """Take what was found so far, unless the last record was just now."""
+        self._latest = make
+        begin = perf_counter()
+        if begin >= self._next and not self._failed:
+            self.write()
+            now = perf_counter()
+            self._next = now + max(_OFTEN, _SHARE * (now - begin))
+
+    def write(self) -> None:
+        """Write what was found so far: at the end of an interrupted study, too."""
+        if self._latest is None or self._failed:
+            return
+        try:
+            STUDY.save(self._latest(), self._folder)
+        except Exception as error:  # of whatever kind: the study continues
+            self._failed = True
+            with suppress(Exception):
+                remark(self._progress, f"points are not shown while the study runs: {error}")
+
+
+_FILE = "progress.html"
+
+
+class ProgressPage:
+    """A page in the folder of the results, written again as points come.
+
+    No fault of the page ends the search: it is told, and the page written no more.
+
+    Parameters
+    ----------
+    folder : Path
+    progress : callable
+        Is told where the page is.
+    """
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        self._page, self._progress = folder / _FILE, progress
+        self._written, self._failed = False, False
+
+    def write(self, record: StudyRecord) -> None:
+        """Show what was found so far."""
+        found = record.optimum
+        if self._failed or found is None or found.best < 0:
+            return
+        from klack.analyses.study.content import study_content
+        from klack.report.html import write_report
+
+        content = study_content(replace(record, design=f"{record.design}; the search is running"))
+        try:
+            write_report(content, self._page)
+        except Exception as error:  # of whatever kind: the search continues
+            self._failed = True
+            remark(self._progress, f"no page of the search while it runs: {error}")
+            return
+        if not self._written:
+            self._written = True
+            remark(
+                self._progress, f"the best so far as a picture: {self._page}, renewed each minute"
+            )
+
+    def remove(self) -> None:
+        """Once the result and its report stand."""
+        with suppress(OSError):
+            self._page.unlink(missing_ok=True)

@@ -1,0 +1,514 @@
+"""Measures of a point by their names: of strokes, impacts and shots, and of the noise of each.
+
+A statistic of shots holds for all shots of a point.  Where one of them ended too early to have the
+number, there is none: shots without a rebound are mostly those that rebound highest, and a mean
+over the others would be too low.
+"""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import inf, isnan
+from operator import attrgetter
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+
+from klack.acoustics.signal_statistics import SoundStatistics, sound_statistics
+from klack.analyses.impact.measures import LEVEL_MEASURES
+from klack.analyses.impact.record import LevelResult
+from klack.analyses.measures import Measure
+from klack.analyses.noise.body import Transfers
+from klack.analyses.noise.measures import CLICK_MEASURES, DESIGN_MEASURES
+from klack.analyses.noise.record import NoiseDesign
+from klack.analyses.noise.run import click_sound, noise_design
+from klack.analyses.noise.source import NoiseSource
+from klack.analyses.sample import STATISTICS, Statistic
+from klack.analyses.shots.record import RESULTS, RULE_MEASURES, RuleVerdict
+from klack.analyses.shots.run import DroppedShots, highest_of, judge_rule
+from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
+from klack.analyses.stroke.record import StrokeVariant
+from klack.analyses.stroke.summary import first_impact
+from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import END_STOP
+from klack.errors import InputError, KlackError
+from klack.input.problem import nearest, one_of
+from klack.signals import TimeSeries
+from klack.simulation.network_result import ImpactEvent
+
+__all__ = [
+    "SHOTS",
+    "SHOT_NAMES",
+    "TIMES",
+    "ChosenMeasure",
+    "ImpactOfPoint",
+    "PointNoise",
+    "StrokeOfPoint",
+    "impact_measure_names",
+    "impact_measures",
+    "shot_measure",
+    "shot_notes",
+    "stroke_measure_names",
+    "stroke_measures",
+    "told_until",
+]
+
+
+Found = TypeVar("Found")
+
+_NOISE = "noise"
+"""Before the names of measures of noise."""
+
+_OF_CLICKS = {measure.key: measure for measure in CLICK_MEASURES}
+_OF_DESIGNS = {measure.key: measure for measure in DESIGN_MEASURES}
+NOISE_NAMES = tuple(f"{_NOISE}.{key}" for key in _OF_DESIGNS)
+NOISE_WORDS = f"of the noise {_NOISE}.KEY with a key of: {one_of(_OF_DESIGNS)}"
+
+
+class PointNoise:
+    """Noise of a point, computed once a measure asks for it.
+
+    Parameters
+    ----------
+    source : callable
+        Makes what the noise comes from.
+    transfers : Transfers
+        Of the bodies, as far as they are known.
+    """
+
+    def __init__(self, source: Callable[[], NoiseSource], transfers: Transfers) -> None:
+        self._make, self._transfers = source, transfers
+        self.notes: list[str] = []
+
+    @cached_property
+    def _source(self) -> NoiseSource:
+        return self._make()
+
+    @cached_property
+    def pressure(self) -> TimeSeries | None:
+        """Sound of a click; None, with a note, where it cannot be had."""
+        return self._noted(lambda: click_sound(self._source, self._transfers))
+
+    @cached_property
+    def click(self) -> SoundStatistics | None:
+        """Levels of a click; None where there is no sound."""
+        return None if self.pressure is None else sound_statistics(self.pressure)
+
+    @cached_property
+    def design(self) -> NoiseDesign | None:
+        """Noise as a whole; None, with a note, where it cannot be had."""
+        return self._noted(lambda: noise_design(self._source))
+
+    def _noted(self, make: Callable[[], Found]) -> Found | None:
+        try:
+            return make()
+        except KlackError as error:  # the other measures stand
+            self.notes.append(f"noise: {error}")
+            return None
+
+
+@dataclass(frozen=True, slots=True)
+class ChosenMeasure:
+    """A measure of the run of a point.
+
+    Parameters
+    ----------
+    name : str
+        In the study.
+    measure : Measure
+    of : str
+        What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
+        an impact, all of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
+    part : callable
+        Of a run, what the measure is read from; None where the run does not have it.
+    """
+
+    name: str
+    measure: Measure[Any]
+    of: Literal["variant", "impact", "level", "shots", "click", "design"]
+    part: Callable[[Any], Any]
+
+    @property
+    def is_noise(self) -> bool:
+        """Whether it takes the noise."""
+        return self.of in ("click", "design")
+
+    def value(self, run: object) -> float | None:
+        """Value in the unit of the measure; None where the run does not have it."""
+        part = self.part(run)
+        if part is None or not self.measure.given(part):
+            return None
+        value = self.measure.read(part)
+        return None if value is None else float(value)
+
+
+def noise_measure(name: str) -> ChosenMeasure | None:
+    """Measure of the noise of a run, which has a :class:`PointNoise`; None for another name."""
+    stem, _, key = name.partition(".")
+    if stem == _NOISE and key in _OF_CLICKS:
+        return ChosenMeasure(name, _OF_CLICKS[key], "click", attrgetter("noise.click"))
+    if stem == _NOISE and key in _OF_DESIGNS:
+        return ChosenMeasure(name, _OF_DESIGNS[key], "design", attrgetter("noise.design"))
+    return None
+
+
+def choose_measures(
+    names: Iterable[str],
+    find: Callable[[str], ChosenMeasure | None],
+    known: Sequence[str],
+    words: str,
+    example: str,
+) -> tuple[ChosenMeasure, ...]:
+    """Find measures by their names, each once.
+
+    Parameters
+    ----------
+    names : iterable of str
+    find : callable
+        Of a name; None where there is no such measure.
+    known : sequence of str
+        All names, for the nearest one.
+    words : str
+        What names are known.
+    example : str
+        One of them.
+
+    Raises
+    ------
+    InputError
+        For a name that does not exist, with the nearest one; for none at all.
+    """
+    wanted = list(dict.fromkeys([names] if isinstance(names, str) else names))
+    if not wanted:
+        raise InputError(
+            "measures",
+            got="no measure",
+            expected=words,
+            hint=f'write e.g. measures=["{example}"].',
+        )
+    chosen = []
+    for name in wanted:
+        found = find(name) if isinstance(name, str) else None
+        if found is None:
+            raise InputError(
+                "measures",
+                got=f"'{name}'",
+                expected=words,
+                hint=nearest(str(name), known, "the reference of the measures describes each."),
+            )
+        chosen.append(found)
+    return tuple(chosen)
+
+
+SHOTS = "shots"
+"""Before the names of measures of shots."""
+_CENTRIC, _RULE = "centric", "rule"
+_JUDGED = ("restitution", "rebound_height")
+"""What the rule compares."""
+
+_RESULTS = {item.key: item for item in RESULTS}
+_RULES = {item.key: item for item in RULE_MEASURES}
+_STATISTICS = {item.key: item for item in STATISTICS}
+
+SHOT_NAMES = (
+    *(f"{SHOTS}.{key}.{statistic}" for key in _RESULTS for statistic in _STATISTICS),
+    *(f"{SHOTS}.{_CENTRIC}.{key}" for key in _RESULTS),
+    *(f"{SHOTS}.{_RULE}.{key}" for key in _RULES),
+)
+SHOT_WORDS = (
+    f"of the shots {SHOTS}.KEY.STATISTIC with a key of: {one_of(_RESULTS)}, and a statistic of: "
+    f"{one_of(_STATISTICS)}; of the centred shot {SHOTS}.{_CENTRIC}.KEY; of the highest rebound "
+    f"{SHOTS}.{_RULE}.KEY with a key of: {one_of(_RULES)}"
+)
+
+
+def shot_measure(name: str) -> ChosenMeasure | None:
+    """Measure of the shots of a point; None for another name.
+
+    ``"shots.restitution.mean"``, ``"shots.centric.restitution"``,
+    ``"shots.rule.relative_restitution_bias"``.
+
+    Raises
+    ------
+    InputError
+        For a result of the shots without a statistic.
+    """
+    stem, _, rest = name.partition(".")
+    of, _, key = rest.partition(".")
+    if stem != SHOTS:
+        return None
+    if of == _CENTRIC and key in _RESULTS:
+        return _chosen(name, _RESULTS[key], "centred shot", lambda found: found.centric.row(0)[key])
+    if of == _RULE and key in _RULES:
+        rule = _RULES[key]
+        return _chosen(name, rule, "highest of the shots", lambda found: _judged(found, rule))
+    if of in _RESULTS and key in _STATISTICS:
+        statistic = _STATISTICS[key]
+        return _chosen(
+            name,
+            _RESULTS[of],
+            f"{statistic.name} of the shots",
+            lambda found: statistic.of(getattr(found.shots, of)),
+        )
+    if of in _RESULTS and not key:
+        raise InputError(
+            "measures",
+            got=f"'{name}', which every shot has",
+            expected=f"a statistic behind it: {one_of(_STATISTICS)}",
+            hint=f"write {name}.mean, or {SHOTS}.{_CENTRIC}.{of} of the centred shot.",
+        )
+    return None
+
+
+def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
+    """Why measures of these names have no value, or tell less than they are called.
+
+    Parameters
+    ----------
+    names : iterable of str
+        Of measures of the shots.
+    found : DroppedShots
+    """
+    parts = [name.split(".")[1:] for name in names]
+    columns = dict.fromkeys(of for of, _ in parts if of in _RESULTS)
+    single = dict.fromkeys(key for of, key in parts if of == _CENTRIC)
+    if any(of == _RULE for of, _ in parts):
+        columns, single = columns | dict.fromkeys(_JUDGED), single | dict.fromkeys(_JUDGED)
+    statistics = dict.fromkeys(_STATISTICS[key] for of, key in parts if of in _RESULTS)
+    return (
+        *_missing(columns, found),
+        *(
+            f"The centred shot ended before its {_RESULTS[key].name} was known. "
+            "Try: a longer shots.duration."
+            for key in single
+            if not np.isfinite(found.centric.row(0)[key])
+        ),
+        *_too_few(statistics, found.shots.count),
+    )
+
+
+def _chosen(
+    name: str, measure: Measure[Any], words: str, read: Callable[[DroppedShots], float | None]
+) -> ChosenMeasure:
+    titled = replace(measure, name=f"{measure.name}, {words}", read=read)
+    return ChosenMeasure(name, titled, "shots", lambda run: run.shots)
+
+
+def _judged(found: DroppedShots, measure: Measure[RuleVerdict]) -> float | None:
+    """Number of the rule; None unless all shots and the centred one have a rebound."""
+    every = (getattr(columns, key) for columns in (found.shots, found.centric) for key in _JUDGED)
+    highest = highest_of(found.shots)
+    if highest is None or not all(np.isfinite(values).all() for values in every):
+        return None
+    value = measure.read(judge_rule(found.shots, found.centric, highest))
+    return None if value is None else float(value)
+
+
+def _missing(columns: Iterable[str], found: DroppedShots) -> Iterable[str]:
+    count = found.shots.count
+    for key in columns:
+        missing = int(np.sum(~np.isfinite(getattr(found.shots, key))))
+        if missing:
+            yield (
+                f"{missing} of {count} shots ended before their {_RESULTS[key].name} was known: "
+                "there are no statistics of the others alone. Try: a longer shots.duration."
+            )
+
+
+def _too_few(statistics: Iterable[Statistic], count: int) -> Iterable[str]:
+    for item in statistics:
+        if count < item.fewest:
+            yield (
+                f"{count} shots are too few for their {item.name}, which takes {item.fewest}. "
+                "Try: a larger shots.count."
+            )
+
+
+_OF_THE_CLOCK = ("wall_time", "setup_time")
+"""Differ from run to run."""
+_OF_LEVELS = {item.key: item for item in LEVEL_MEASURES if item.key not in _OF_THE_CLOCK}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImpactOfPoint:
+    """What the measures of a point are read from, as far as they ask for it.
+
+    Parameters
+    ----------
+    level : LevelResult, optional
+        Of the impact.
+    noise : PointNoise, optional
+        Of that impact.
+    shots : DroppedShots, optional
+    """
+
+    level: LevelResult | None = None
+    noise: PointNoise | None = None
+    shots: DroppedShots | None = None
+
+
+def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
+    """Find measures of an impact by their names, each once.
+
+    ``"peak_force"`` of the level; ``"noise.radiated_energy"``; ``"shots.restitution.mean"``.
+
+    Raises
+    ------
+    InputError
+        For a name that an impact does not have, with the nearest one; for none at all; for noise
+        of bodies without surfaces, and shots of a case without them.
+    """
+    known, words = impact_measure_names(case), f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}"
+    if case.shots is not None:
+        words = f"{words}; {SHOT_WORDS}"
+    chosen = choose_measures(
+        names, lambda name: _impact_measure(case, name), known, words, "peak_force"
+    )
+    for item in chosen:
+        if item.is_noise and not case.has_surfaces:
+            raise InputError(
+                "measures",
+                got=f"'{item.name}', of bodies without surfaces",
+                expected=f"one of: {one_of(_OF_LEVELS)}",
+                hint="noise needs bodies with meshes.",
+            )
+    return chosen
+
+
+def impact_measure_names(case: Case) -> tuple[str, ...]:
+    """Names of the measures of an impact, of its noise, and of the shots of a case with them."""
+    return (*_OF_LEVELS, *NOISE_NAMES, *(SHOT_NAMES if case.shots is not None else ()))
+
+
+def _impact_measure(case: Case, name: str) -> ChosenMeasure | None:
+    if name in _OF_LEVELS:
+        return ChosenMeasure(name, _OF_LEVELS[name], "level", attrgetter("level"))
+    if name.partition(".")[0] == SHOTS:
+        if case.shots is None:
+            raise InputError(
+                "measures",
+                got=f"'{name}', of a case without the section 'shots'",
+                expected=f"one of: {one_of(_OF_LEVELS)}; {NOISE_WORDS}",
+                hint="add 'shots: {count: 50}' to the case, and a 'guide', or 'eccentricity' and "
+                "'tilt'.",
+            )
+        return shot_measure(name)
+    noise = noise_measure(name)
+    own = name.rpartition(".")[2]
+    if noise is None and own in _OF_LEVELS:
+        raise InputError(
+            "measures",
+            got=f"'{name}', as measures of a stroke are called",
+            expected="a measure of an impact, which has one contact",
+            hint=f"write {own}.",
+        )
+    return noise
+
+
+TIMES = ("opening_time", "closing_time")
+"""Measures of a stroke, beside those of its impacts, that end with a touch."""
+
+_OF_VARIANTS = {measure.key: measure for measure in VARIANT_MEASURES}
+_OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrokeOfPoint:
+    """Stroke of a point, and its noise.
+
+    Parameters
+    ----------
+    variant : StrokeVariant
+    noise : PointNoise
+    """
+
+    variant: StrokeVariant
+    noise: PointNoise
+
+
+def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
+    """Find measures of a stroke by their names, each once.
+
+    ``"opening_time"``; ``"seat.peak_force"`` of the first impact on the stop ``seat`` that is no
+    mere tremble, see :func:`~klack.analyses.stroke.summary.first_impact`; ``"seat.2.peak_force"``
+    of the second one in the list of all impacts; ``"noise.sound_exposure_level_weighted"``.
+
+    Raises
+    ------
+    InputError
+        For a name that a stroke of this case does not have, with the nearest one; for none at all.
+    """
+    stops, known = _stops(case), stroke_measure_names(case)
+    return choose_measures(
+        names, lambda name: _stroke_measure(name, stops), known, _known_words(stops), "opening_time"
+    )
+
+
+def stroke_measure_names(case: ValveCase) -> tuple[str, ...]:
+    """Names of the measures of a stroke, of the first impact on each stop, and of the noise."""
+    of_impacts = (f"{stop}.{key}" for stop in _stops(case) for key in _OF_IMPACTS)
+    return (*_OF_VARIANTS, *of_impacts, *NOISE_NAMES)
+
+
+def _stops(case: ValveCase) -> list[str]:
+    return [name for name, part in case.network.components.items() if part.type == END_STOP]
+
+
+def _stroke_measure(name: str, stops: list[str]) -> ChosenMeasure | None:
+    if name in _OF_VARIANTS:
+        return ChosenMeasure(name, _OF_VARIANTS[name], "variant", attrgetter("variant"))
+    stop, _, rest = name.partition(".")
+    *number, key = rest.split(".")
+    if stop in stops and key in _OF_IMPACTS and len(number) < 2:
+        if not number:
+            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, 0))
+        if number[0].isascii() and number[0].isdecimal() and int(number[0]) > 0:
+            return ChosenMeasure(name, _OF_IMPACTS[key], "impact", _impact_on(stop, int(number[0])))
+    if stop == SHOTS and stop not in stops:
+        raise InputError(
+            "measures",
+            got=f"'{name}' in the study of a whole valve",
+            expected=_known_words(stops),
+            hint="shots are drops of two bodies: study a case of an impact with a section 'shots'.",
+        )
+    return noise_measure(name)
+
+
+def _impact_on(stop: str, number: int) -> Callable[[StrokeOfPoint], ImpactEvent | None]:
+    """Impact on a stop of this number from 1; for 0 the first one that is no mere tremble."""
+
+    def impact(run: StrokeOfPoint) -> ImpactEvent | None:
+        if number:
+            return next(iter(run.variant.impacts(stop)[number - 1 :]), None)
+        return first_impact(run.variant, stop)
+
+    return impact
+
+
+def _known_words(stops: list[str]) -> str:
+    words = f"one of: {one_of(_OF_VARIANTS)}; {NOISE_WORDS}"
+    if not stops:
+        return words
+    return (
+        f"{words}; or of the first impact on a stop, {stops[0]}.KEY (of the second one "
+        f"{stops[0]}.2.KEY), with a stop of: {one_of(stops)}, and a key of: {one_of(_OF_IMPACTS)}"
+    )
+
+
+def told_until(chosen: Iterable[ChosenMeasure], run: StrokeOfPoint) -> float:
+    """Time [s] of a stroke until which its measures depend on impacts: later ones do not matter.
+
+    The end of the last impact that one is of, or a time of opening or closing between stops; inf
+    for all others, and for a measure without a value.
+    """
+    ends = [0.0]
+    for item in chosen:
+        end = None
+        if item.of == "impact":
+            event: ImpactEvent | None = item.part(run)
+            end = None if event is None else event.separation_time
+        elif item.name.partition("_at_")[0] in TIMES and run.variant.needle_times.between_stops:
+            end = item.measure.read(run.variant)
+        ends.append(inf if end is None or isnan(end) else end)
+    return max(ends)
