@@ -16,7 +16,7 @@ from klack.analyses.shots.analysis import SHOTS, shots_to_json
 from klack.analyses.shots.content import shots_content
 from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
-from klack.analyses.shots.one_shot import columns_of, run_shot, shot_log, simulate_shot
+from klack.analyses.shots.one_shot import ShotOutcome, run_shot, shot_log, simulate_shot
 from klack.analyses.shots.record import RESULTS
 from klack.analyses.shots.record import ShotColumns as Shots
 from klack.analyses.shots.run import run_shots, run_shots_on
@@ -54,6 +54,10 @@ def rubbing():
 @pytest.fixture(scope="module")
 def study():
     return run_shots(case(UNIFORM), workers=1, threads=1)
+
+
+def columns_of(outcomes: list[ShotOutcome]) -> Shots:
+    return Shots.of([outcome.numbers for outcome in outcomes])
 
 
 def same(one: Shots, other: Shots) -> None:

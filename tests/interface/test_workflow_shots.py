@@ -21,7 +21,7 @@ from klack.analyses.shots.draw import centric_draw, draw_shot
 from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import (
     SHOT_LOG,
-    columns_of,
+    ShotOutcome,
     run_shot,
     shot_log,
     shots_mark,
@@ -80,6 +80,10 @@ def study(tmp_path_factory):
     SHOT_LOG.remove(folder)
     assert not (folder / SHOT_LOG.file).exists()
     return done
+
+
+def columns_of(outcomes: list[ShotOutcome]) -> ShotColumns:
+    return ShotColumns.of([outcome.numbers for outcome in outcomes])
 
 
 def same(one: ShotColumns, other: ShotColumns) -> None:

@@ -1,7 +1,7 @@
 """One drop of a valve at the interface level: from a draw to its numbers, and how they are kept."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.interface_level import set_doubts
 from klack.analyses.shots.draw import ShotDraw, polar
-from klack.analyses.shots.record import ShotColumns, ShotTraces
+from klack.analyses.shots.record import ShotTraces
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
@@ -26,7 +26,6 @@ __all__ = [
     "ShotLog",
     "ShotOutcome",
     "ShotSetup",
-    "columns_of",
     "run_shot",
     "shot_log",
     "shots_mark",
@@ -255,16 +254,6 @@ def run_shot(
         approach=result.approach,
         doubts=(*doubts, *set_doubts(setup.model, result)),
         worn=result.worn,
-    )
-
-
-def columns_of(outcomes: Sequence[ShotOutcome]) -> ShotColumns:
-    """Numbers of several shots as columns."""
-    return ShotColumns(
-        **{
-            field.name: np.array([outcome.numbers[field.name] for outcome in outcomes])
-            for field in fields(ShotColumns)
-        }
     )
 
 

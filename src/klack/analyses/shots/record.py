@@ -5,7 +5,7 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from klack.analyses.impact.record import PressureRecord
 from klack.analyses.measures import Measure, described_in
 from klack.analyses.record import CaseRecord
+from klack.analyses.run_columns import Columns, with_columns
 
 __all__ = [
     "DRAWN",
@@ -32,122 +33,6 @@ __all__ = [
 
 
 Column = NDArray[np.float64]
-
-
-def _not_kept() -> Column:
-    """Column of a result that has none."""
-    return np.zeros(0)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ShotColumns:
-    """Shots in rows: drawn quantities and results.
-
-    Every field is an array of shape (n,).
-
-    Parameters
-    ----------
-    eccentricity, direction : array [m], [rad]
-        Distance of the axis of the moving body from that of the seat at the height of first touch,
-        and where to (from x towards y), at the start.
-    tilt, tilt_direction : array [rad]
-        Angle between the axes, and direction in which the upper end is tilted.
-    force : array [N]
-        Closing force at first touch.
-    friction : array [-]
-        Coulomb's coefficient in the guide.
-    contact_friction : array [-]
-        That between the faces, while they slip; 0 in results without it.
-    waviness : array [m]
-        Root mean square out-of-roundness of the ring.
-    approach_speed : array [m/s]
-        Of the first impact.
-    restitution : array [-]
-    rebound_height : array [m]
-        Highest position of the centre of mass between the first impact and the second, above that
-        at first touch; nan if the shot ended on the way up.
-    peak_force, contact_time, impulse : array [N], [s], [N s]
-        Of the first impact; the impulse of all its contacts.
-    sub_contacts : array [-]
-        Contacts of which the first impact consists.
-    rocking : array [-]
-        Kinetic energy of rotation and lateral motion right after the first impact, over the energy
-        of approach.
-    friction_loss : array [-]
-        Energy that friction between the faces takes in the first impact, over the energy of
-        approach; 0 in results without it.
-    plastic_loss : array [-]
-        Energy that faces which yield take in the whole shot, over the energy of approach; 0 in
-        results without it.
-    deepest_set : array [m]
-        Of a contact point, after the shot; likewise.
-    second_impact : array [s]
-        Time from the first touch to that of the second impact; nan if there was none.
-    impacts : array [-]
-        Impacts until the shot ended.
-    energy_residual : array [-]
-        Energy from nowhere over the initial energy, of the whole shot.
-    """
-
-    eccentricity: Column
-    direction: Column
-    tilt: Column
-    tilt_direction: Column
-    force: Column
-    friction: Column
-    contact_friction: Column = field(default_factory=_not_kept)
-    waviness: Column
-    approach_speed: Column
-    restitution: Column
-    rebound_height: Column
-    peak_force: Column
-    contact_time: Column
-    impulse: Column
-    sub_contacts: Column
-    rocking: Column
-    friction_loss: Column = field(default_factory=_not_kept)
-    plastic_loss: Column = field(default_factory=_not_kept)
-    deepest_set: Column = field(default_factory=_not_kept)
-    second_impact: Column
-    impacts: Column
-    energy_residual: Column
-
-    def __post_init__(self) -> None:
-        """Fill in what results of klack up to 0.1 do not have: smooth, elastic faces."""
-        for name in ("contact_friction", "friction_loss", "plastic_loss", "deepest_set"):
-            if not len(getattr(self, name)):
-                object.__setattr__(self, name, np.zeros(self.count))
-
-    @property
-    def count(self) -> int:
-        """Number of shots."""
-        return len(self.restitution)
-
-    def row(self, index: int) -> dict[str, float]:
-        """Return all numbers of one shot by the name of their column."""
-        return {item.name: float(getattr(self, item.name)[index]) for item in fields(self)}
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ShotTraces:
-    """Motion and first impact over time, one row per shot, on grids that all rows share.
-
-    Parameters
-    ----------
-    time : array, shape (k,) [s]
-        From the first touch.
-    height : float32 array, shape (n, k) [m]
-        Of the centre of mass, above that at first touch; nan after the end of the shot.
-    force_time : array, shape (m,) [s]
-        From the first touch.
-    force : float32 array, shape (n, m) [N]
-        Axial contact force of the first impact.
-    """
-
-    time: Column
-    height: NDArray[np.float32]
-    force_time: Column
-    force: NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,78 +62,6 @@ class RuleVerdict:
     rank: int
     holds: bool
     sentence: str
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class ShotsStudy(CaseRecord):
-    """All shots of one valve, side by side.
-
-    Parameters
-    ----------
-    shot_time : float [s]
-        Wall time of the shots alone, on ``workers`` processes.
-    seed : int
-    workers : int
-    resumed : int
-        Shots that an earlier, interrupted run had finished.
-    speed : float [m/s]
-        At the start, ``start_height`` [m] above first touch.
-    step : float [s]
-        Of the time loop.
-    distributions : mapping of str to str
-        Distributions, in words.
-    surfaces : str
-        For example ``"needle.tip on housing.seat"``.
-    guide : str
-        The guide in words; empty without one.
-    faces : str
-        Friction between the faces in words; empty without.
-    layer : str
-        Asperities of rough faces in words; empty for smooth ones.
-    mass : float [kg]
-        Of the moving body.
-    modes : tuple of int
-        Kept elastic modes of the moving body and of the one it hits.
-    points : int
-        Contact points.
-    approach : float [m]
-        Largest approach of any shot.
-    shots : ShotColumns
-    centric : ShotColumns
-        One row: no eccentricity, tilt, waviness or Coulomb friction in the guide, the mean force,
-        and the mean coefficient of friction between the faces.
-    shot_traces, centric_traces : ShotTraces
-    highest : int
-        Row of the shot with the highest rebound.
-    rule : RuleVerdict
-    pressures : mapping of str to PressureRecord
-        Contact forces point by point of the first impact: ``"centric"`` and ``"highest"``, and
-        ``"lowest"`` for the shot with the lowest restitution.
-    """
-
-    shot_time: float
-    seed: int
-    workers: int
-    resumed: int
-    speed: float
-    start_height: float
-    step: float
-    distributions: Mapping[str, str]
-    surfaces: str
-    guide: str
-    mass: float
-    modes: tuple[int, ...]
-    points: int
-    approach: float
-    shots: ShotColumns
-    centric: ShotColumns
-    shot_traces: ShotTraces
-    centric_traces: ShotTraces
-    highest: int
-    rule: RuleVerdict
-    pressures: Mapping[str, PressureRecord]
-    faces: str = ""
-    layer: str = ""
 
 
 Shot = Mapping[str, float]
@@ -472,3 +285,109 @@ RULE_MEASURES: tuple[Measure[RuleVerdict], ...] = described_in(
     ),
 )
 """Of the rule that takes the highest rebound of all shots for the centred one."""
+
+
+@with_columns(
+    SHOT_MEASURES,
+    later=("contact_friction", "friction_loss", "plastic_loss", "deepest_set"),
+    filled=0.0,
+)
+class ShotColumns(Columns):
+    """Shots in rows: drawn quantities and results; results of klack up to 0.1 lack some columns.
+
+    The rebound height is nan if the shot ended on the way up, the second impact if there was none.
+    """
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShotTraces:
+    """Motion and first impact over time, one row per shot, on grids that all rows share.
+
+    Parameters
+    ----------
+    time : array, shape (k,) [s]
+        From the first touch.
+    height : float32 array, shape (n, k) [m]
+        Of the centre of mass, above that at first touch; nan after the end of the shot.
+    force_time : array, shape (m,) [s]
+        From the first touch.
+    force : float32 array, shape (n, m) [N]
+        Axial contact force of the first impact.
+    """
+
+    time: Column
+    height: NDArray[np.float32]
+    force_time: Column
+    force: NDArray[np.float32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ShotsStudy(CaseRecord):
+    """All shots of one valve, side by side.
+
+    Parameters
+    ----------
+    shot_time : float [s]
+        Wall time of the shots alone, on ``workers`` processes.
+    seed : int
+    workers : int
+    resumed : int
+        Shots that an earlier, interrupted run had finished.
+    speed : float [m/s]
+        At the start, ``start_height`` [m] above first touch.
+    step : float [s]
+        Of the time loop.
+    distributions : mapping of str to str
+        Distributions, in words.
+    surfaces : str
+        For example ``"needle.tip on housing.seat"``.
+    guide : str
+        The guide in words; empty without one.
+    faces : str
+        Friction between the faces in words; empty without.
+    layer : str
+        Asperities of rough faces in words; empty for smooth ones.
+    mass : float [kg]
+        Of the moving body.
+    modes : tuple of int
+        Kept elastic modes of the moving body and of the one it hits.
+    points : int
+        Contact points.
+    approach : float [m]
+        Largest approach of any shot.
+    shots : ShotColumns
+    centric : ShotColumns
+        One row: no eccentricity, tilt, waviness or Coulomb friction in the guide, the mean force,
+        and the mean coefficient of friction between the faces.
+    shot_traces, centric_traces : ShotTraces
+    highest : int
+        Row of the shot with the highest rebound.
+    rule : RuleVerdict
+    pressures : mapping of str to PressureRecord
+        Contact forces point by point of the first impact: ``"centric"`` and ``"highest"``, and
+        ``"lowest"`` for the shot with the lowest restitution.
+    """
+
+    shot_time: float
+    seed: int
+    workers: int
+    resumed: int
+    speed: float
+    start_height: float
+    step: float
+    distributions: Mapping[str, str]
+    surfaces: str
+    guide: str
+    mass: float
+    modes: tuple[int, ...]
+    points: int
+    approach: float
+    shots: ShotColumns
+    centric: ShotColumns
+    shot_traces: ShotTraces
+    centric_traces: ShotTraces
+    highest: int
+    rule: RuleVerdict
+    pressures: Mapping[str, PressureRecord]
+    faces: str = ""
+    layer: str = ""

@@ -26,7 +26,6 @@ from klack.analyses.shots.one_shot import (
     ShotLog,
     ShotOutcome,
     ShotSetup,
-    columns_of,
     run_shot,
     shot_log,
     shots_mark,
@@ -191,7 +190,7 @@ class DroppedShots:
     @cached_property
     def shots(self) -> ShotColumns:
         """Numbers of the shots as columns."""
-        return columns_of(self.outcomes)
+        return ShotColumns.of([item.numbers for item in self.outcomes])
 
     def worn_before(self, index: int) -> Worn | None:
         """Set of the faces [m] that a shot meets; None for new or elastic ones."""
@@ -201,7 +200,7 @@ class DroppedShots:
     @cached_property
     def centric(self) -> ShotColumns:
         """Numbers of the centred shot as columns of one row."""
-        return columns_of([self.alone])
+        return ShotColumns.of([self.alone.numbers])
 
 
 def drop_shots(

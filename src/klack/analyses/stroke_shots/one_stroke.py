@@ -1,7 +1,7 @@
 """One stroke of many: from its start to its numbers, and how they are kept while others run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,6 @@ __all__ = [
     "StrokeTask",
     "rebound_height",
     "run_one_stroke",
-    "stop_columns",
     "strokes_mark",
 ]
 
@@ -172,22 +171,14 @@ def _faces(spatial: SpatialValve, start: StrokeStart) -> InterfaceModel:
     return replace(model, friction=(Friction.coulomb(start.contact_friction),) * len(spatial.stops))
 
 
-def stop_columns(rows: Sequence[Numbers]) -> StopColumns:
-    """First impacts of several strokes on one stop as columns."""
-    names = [item.name for item in fields(StopColumns)]
-    return StopColumns(**{name: np.array([row[name] for row in rows]) for name in names})
-
-
 def _nothing(setup: StrokeSetup, task: StrokeTask, failure: str) -> StrokeOutcome:
     """Outcome of a stroke that could not begin."""
-    names = [item.name for item in fields(StrokeColumns)]
-    missing = dict.fromkeys([item.name for item in fields(StopColumns)], _NAN)
     return StrokeOutcome(
         variant=task.variant,
         label=task.variant,
         index=task.start.index,
-        stroke={**dict.fromkeys(names, _NAN), **_started(task.start)},
-        stops={stop: dict(missing) for stop in setup.spatial.stops},
+        stroke={**dict.fromkeys(StrokeColumns.keys(), _NAN), **_started(task.start)},
+        stops={stop: dict.fromkeys(StopColumns.keys(), _NAN) for stop in setup.spatial.stops},
         lift=np.full(_TRACE_POINTS + 1, np.nan, dtype=np.float32),
         end=np.full(6, np.nan),
         failure=" ".join(failure.split()),
@@ -288,7 +279,7 @@ def _stop_numbers(
     event, side = first_impact(variant, stop), -1.0 if above else 1.0
     if event is None:
         return {
-            **dict.fromkeys([item.name for item in fields(StopColumns)], _NAN),
+            **dict.fromkeys(StopColumns.keys(), _NAN),
             "impacts": float(len(variant.impacts(stop))),
         }
     at = path.position_at(np.array([event.time]))[0]

@@ -2,7 +2,6 @@
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields
 from pathlib import Path
 from time import perf_counter
 
@@ -20,10 +19,14 @@ from klack.analyses.stroke_shots.one_stroke import (
     StrokeSetup,
     StrokeTask,
     run_one_stroke,
-    stop_columns,
     strokes_mark,
 )
-from klack.analyses.stroke_shots.record import StrokeColumns, StrokeShotsStudy, VariantShots
+from klack.analyses.stroke_shots.record import (
+    StopColumns,
+    StrokeColumns,
+    StrokeShotsStudy,
+    VariantShots,
+)
 from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
@@ -245,21 +248,14 @@ def _variant(setup: StrokeSetup, name: Variant, count: int, log: StrokeLog) -> V
     return VariantShots(
         name=name,
         label=begun[0].label if begun else name,
-        strokes=_stroke_columns(outcomes),
-        stops={stop: stop_columns([item.stops[stop] for item in outcomes]) for stop in order},
-        centric=_stroke_columns([alone]),
-        centric_stops={stop: stop_columns([alone.stops[stop]]) for stop in order},
+        strokes=StrokeColumns.of([item.stroke for item in outcomes]),
+        stops={stop: StopColumns.of([item.stops[stop] for item in outcomes]) for stop in order},
+        centric=StrokeColumns.of([alone.stroke]),
+        centric_stops={stop: StopColumns.of([alone.stops[stop]]) for stop in order},
         time=setup.trace_time,
         lift=np.stack([item.lift for item in outcomes]),
         centric_lift=alone.lift,
         failures={str(item.index): item.failure for item in outcomes if item.failure},
-    )
-
-
-def _stroke_columns(outcomes: Sequence[StrokeOutcome]) -> StrokeColumns:
-    names = [item.name for item in fields(StrokeColumns)]
-    return StrokeColumns(
-        **{name: np.array([item.stroke[name] for item in outcomes]) for name in names}
     )
 
 

@@ -1,4 +1,4 @@
-"""What a long study shows meanwhile: lines on its pace, its points on disk, the page of a search."""
+"""What a long study shows meanwhile: lines on its pace, its points on disk, a page of the search."""
 
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,0 +1,85 @@
+"""Many runs in rows: a column for each of their measures."""
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import field, fields, make_dataclass
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.measures import Measure
+
+__all__ = ["Columns", "with_columns"]
+
+Column = NDArray[np.float64]
+Kind = TypeVar("Kind", bound="type[Columns]")
+
+
+class Columns:
+    """Runs in rows; what a run does not reach is nan.  See :func:`with_columns`."""
+
+    filled: ClassVar[float]
+
+    if TYPE_CHECKING:
+
+        def __init__(self, **columns: Column) -> None: ...
+
+        def __getattr__(self, key: str) -> Column: ...
+
+    def __post_init__(self) -> None:
+        """Fill in the columns that earlier versions of klack have not stored."""
+        for name in self.keys():
+            if not len(getattr(self, name)):
+                object.__setattr__(self, name, np.full(self.count, self.filled))
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[str, float]]) -> Self:
+        """Columns of the numbers of each run."""
+        return cls(**{name: np.array([row[name] for row in rows]) for name in cls.keys()})
+
+    @classmethod
+    def keys(cls) -> tuple[str, ...]:
+        """Names of the columns, in their order."""
+        return tuple(item.name for item in fields(cast(Any, cls)))
+
+    @property
+    def count(self) -> int:
+        """Number of runs."""
+        return len(getattr(self, self.keys()[0]))
+
+    def row(self, index: int) -> dict[str, float]:
+        """Return all numbers of one run by the name of their column."""
+        return {name: float(getattr(self, name)[index]) for name in self.keys()}
+
+
+def with_columns(
+    measures: Iterable[Measure[Any]],
+    later: Collection[str] = (),
+    filled: float = float("nan"),
+) -> Callable[[Kind], Kind]:
+    """Give a class a column, an array of shape (runs,), for each measure, in its unit.
+
+    Parameters
+    ----------
+    measures : iterable of Measure
+        In the order in which the columns are stored.
+    later : collection of str
+        Columns that earlier versions have not stored.
+    filled : float
+        What stands in such a column instead.
+    """
+    members = [
+        (item.key, Column, field(default_factory=lambda: np.zeros(0)))
+        if item.key in later
+        else (item.key, Column, field())
+        for item in measures
+    ]
+
+    def extended(kind: Kind) -> Kind:
+        found: Any = make_dataclass(
+            kind.__name__, members, bases=(kind,), frozen=True, kw_only=True, eq=False
+        )
+        found.__module__, found.__doc__, found.filled = kind.__module__, kind.__doc__, filled
+        return cast(Kind, found)
+
+    return extended
