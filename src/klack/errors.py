@@ -8,6 +8,7 @@ __all__ = [
     "KlackError",
     "LeftAloneWarning",
     "MissingExtraError",
+    "refuse_if",
     "require_nonnegative",
     "require_positive",
 ]
@@ -73,6 +74,12 @@ class MissingExtraError(KlackError, ImportError):
         super().__init__(
             f"{purpose} needs the package '{package}', which is not installed.\nTry: {way}."
         )
+
+
+def refuse_if(wrong: object, where: str, *, got: str, expected: str, hint: str) -> None:
+    """Raise :class:`InputError` where a value from the user cannot be used."""
+    if wrong:
+        raise InputError(where, got=got, expected=expected, hint=hint)
 
 
 def require_positive(where: str, value: float, unit: str) -> None:

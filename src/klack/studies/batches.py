@@ -6,7 +6,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.studies.values import PointValues, table_of_numbers, values_of_points
 
 __all__ = ["Batches", "highest", "points_in_cube"]
@@ -74,13 +74,13 @@ class Batches(ABC):
             )
         values = values_of_points(objectives, constraints)
         expected = (len(self._asked), self._columns)
-        if values.objectives.shape != expected:
-            raise InputError(
-                "objectives told to a search",
-                got=f"a table of shape {values.objectives.shape}",
-                expected=f"shape {expected}: a row per point asked for, a column per objective",
-                hint="give rows in the order of the points, nan for those that failed.",
-            )
+        refuse_if(
+            values.objectives.shape != expected,
+            "objectives told to a search",
+            got=f"a table of shape {values.objectives.shape}",
+            expected=f"shape {expected}: a row per point asked for, a column per objective",
+            hint="give rows in the order of the points, nan for those that failed.",
+        )
         self._take(self._asked, values)
         self._asked = None
         self._told += 1
@@ -96,13 +96,13 @@ class Batches(ABC):
         while (points := self.ask()) is not None:
             told = self._told
             yield points
-            if self._told == told:
-                raise InputError(
-                    "search",
-                    got="no values of the last batch",
-                    expected="one call of tell for each batch",
-                    hint="call tell within the loop, with nan for points that failed.",
-                )
+            refuse_if(
+                self._told == told,
+                "search",
+                got="no values of the last batch",
+                expected="one call of tell for each batch",
+                hint="call tell within the loop, with nan for points that failed.",
+            )
 
     @abstractmethod
     def _next_points(self) -> NDArray[np.float64] | None:
@@ -127,13 +127,13 @@ def points_in_cube(points: ArrayLike, parameters: int, where: str) -> NDArray[np
         If the shape does not fit or a coordinate is outside 0 to 1.
     """
     table = table_of_numbers(points, where)
-    if table.shape[1] != parameters:
-        raise InputError(
-            where,
-            got=f"an array of shape {table.shape}",
-            expected=f"rows of {parameters} numbers, one per parameter",
-            hint="give one row per point, also for a single one.",
-        )
+    refuse_if(
+        table.shape[1] != parameters,
+        where,
+        got=f"an array of shape {table.shape}",
+        expected=f"rows of {parameters} numbers, one per parameter",
+        hint="give one row per point, also for a single one.",
+    )
     outside = np.argwhere(~((table >= 0.0) & (table <= 1.0)))
     if outside.size:
         row, column = outside[0]

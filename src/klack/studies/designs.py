@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 
 __all__ = [
     "balanced",
@@ -120,13 +120,13 @@ def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
         For a count, number of parameters or seed that cannot be used.
     """
     require_size(count, parameters)
-    if parameters > scipy.stats.qmc.Sobol.MAXDIM:
-        raise InputError(
-            "design",
-            got=f"a Sobol sequence of {parameters} columns",
-            expected=f"at most {scipy.stats.qmc.Sobol.MAXDIM}",
-            hint="use a Latin hypercube, or fewer parameters.",
-        )
+    refuse_if(
+        parameters > scipy.stats.qmc.Sobol.MAXDIM,
+        "design",
+        got=f"a Sobol sequence of {parameters} columns",
+        expected=f"at most {scipy.stats.qmc.Sobol.MAXDIM}",
+        hint="use a Latin hypercube, or fewer parameters.",
+    )
     engine = scipy.stats.qmc.Sobol(parameters, scramble=True, bits=_BITS, **_random(seed))
     whole = 1 << (int(count) - 1).bit_length()  # a power of two: SciPy warns of any other number
     return engine.random(whole)[:count] + 0.5 / 2**_BITS
@@ -153,13 +153,13 @@ def random_of(seed: int, *stream: int) -> np.random.Generator:
     InputError
         If the seed is no whole number of 0 or more.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
-        raise InputError(
-            "seed",
-            got=f"{seed!r}",
-            expected="a whole number of 0 or more",
-            hint="any will do, e.g. 1; the same seed gives the same points.",
-        )
+    refuse_if(
+        isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0,
+        "seed",
+        got=f"{seed!r}",
+        expected="a whole number of 0 or more",
+        hint="any will do, e.g. 1; the same seed gives the same points.",
+    )
     return np.random.default_rng([int(seed), *stream] if stream else int(seed))
 
 
@@ -179,26 +179,26 @@ def _random_keyword() -> str:
 
 
 def _require(count: int, what: str) -> None:
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise InputError(
-            "design",
-            got=f"{count!r} {what}",
-            expected="a whole number of 1 or more",
-            hint=f"give the number of {what}.",
-        )
+    refuse_if(
+        isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1,
+        "design",
+        got=f"{count!r} {what}",
+        expected="a whole number of 1 or more",
+        hint=f"give the number of {what}.",
+    )
 
 
 def require_size(count: int, parameters: int) -> None:
     """Raise :class:`InputError` unless so many points of so many parameters make a design."""
     _require(parameters, "parameters")
     _require(count, "points")
-    if count * parameters > _MOST_NUMBERS:
-        raise InputError(
-            "design",
-            got=f"{count:.4g} points of {parameters} parameters",
-            expected=f"at most {_MOST_NUMBERS // parameters:.4g} points",
-            hint="use fewer levels, or a Sobol sequence, whose number of points is free.",
-        )
+    refuse_if(
+        count * parameters > _MOST_NUMBERS,
+        "design",
+        got=f"{count:.4g} points of {parameters} parameters",
+        expected=f"at most {_MOST_NUMBERS // parameters:.4g} points",
+        hint="use fewer levels, or a Sobol sequence, whose number of points is free.",
+    )
 
 
 def unevenness(points: ArrayLike) -> float:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.studies.values import values_of_points
 
 __all__ = ["Front", "compromise", "find_front", "hypervolume", "spread_over"]
@@ -101,13 +101,13 @@ def compromise(objectives: ArrayLike) -> int:
     Yu (1973), Management Science 19, 936-946; Zeleny (1973), compromise programming.
     """
     values = _finite(objectives, "objectives of a front")
-    if not len(values):
-        raise InputError(
-            "objectives of a front",
-            got="no point",
-            expected="one point or more",
-            hint="take the points of a front that is not empty.",
-        )
+    refuse_if(
+        not len(values),
+        "objectives of a front",
+        got="no point",
+        expected="one point or more",
+        hint="take the points of a front that is not empty.",
+    )
     low, high = values.min(axis=0), values.max(axis=0)
     largest = np.maximum(np.abs(low), np.abs(high))
     scale = np.where(largest > 0.0, largest, 1.0)  # ranges of huge numbers stay finite
@@ -162,13 +162,13 @@ def hypervolume(objectives: ArrayLike, reference: ArrayLike) -> float:
     """
     values = values_of_points(objectives, None).objectives
     corner = _finite(np.atleast_1d(np.asarray(reference, dtype=float))[None], "reference point")[0]
-    if corner.shape != (values.shape[1],):
-        raise InputError(
-            "reference point",
-            got=f"{corner.size} numbers",
-            expected=f"{values.shape[1]} numbers, one per objective",
-            hint="give one worst value per objective.",
-        )
+    refuse_if(
+        corner.shape != (values.shape[1],),
+        "reference point",
+        got=f"{corner.size} numbers",
+        expected=f"{values.shape[1]} numbers, one per objective",
+        hint="give one worst value per objective.",
+    )
     values = _finite(values[~np.isnan(values).any(axis=1)], "objectives")
     inside = values[np.all(values < corner, axis=1)]
     return _volume(inside, corner) if len(inside) else 0.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.studies.batches import Batches, highest, points_in_cube
 from klack.studies.designs import random_of
 from klack.studies.values import PointValues, require_count, table_of_numbers, values_of_points
@@ -175,13 +175,13 @@ class RefinementSettings:
             ("last_step", 1e-12 <= self.last_step <= self.first_step, "1e-12 to the first step"),
             ("edge", 0.0 <= self.edge < 0.5, "0 to below 0.5"),
         ):
-            if not good:
-                raise InputError(
-                    f"refinement: {name}",
-                    got=f"{getattr(self, name):g}",
-                    expected=expected,
-                    hint=f"change '{name}' of the refinement.",
-                )
+            refuse_if(
+                not good,
+                f"refinement: {name}",
+                got=f"{getattr(self, name):g}",
+                expected=expected,
+                hint=f"change '{name}' of the refinement.",
+            )
 
 
 class Refinement(Batches):
@@ -238,14 +238,14 @@ class Refinement(Batches):
         where = "start points of a refinement"
         table = table_of_numbers(points, where)
         table = points_in_cube(table, table.shape[1], where)
-        if len(table) != len(values.failed) or values.failed.any() or not table.size:
-            raise InputError(
-                where,
-                got=f"{len(table)} points with {len(values.failed)} values, "
-                f"{values.failed.sum()} of them failed",
-                expected="one point or more, each with finite values",
-                hint="take points of the front.",
-            )
+        refuse_if(
+            len(table) != len(values.failed) or values.failed.any() or not table.size,
+            where,
+            got=f"{len(table)} points with {len(values.failed)} values, "
+            f"{values.failed.sum()} of them failed",
+            expected="one point or more, each with finite values",
+            hint="take points of the front.",
+        )
         wished = values.objectives if reference is None else np.asarray(reference, dtype=float)
         first = achievement(values.objectives, wished, scales)
         self.settings = settings

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.studies.values import require_count
 
 __all__ = [
@@ -54,13 +54,13 @@ def _no_list(got: str) -> InputError:
 
 def require_level(where: str, confidence: float) -> None:
     """Raise :class:`InputError` unless a confidence is 0.5 or more and below 1."""
-    if not 0.5 <= confidence < 1.0:
-        raise InputError(
-            where,
-            got=f"{confidence:g}",
-            expected="0.5 to below 1",
-            hint="0.95 is usual; percent are divided by 100.",
-        )
+    refuse_if(
+        not 0.5 <= confidence < 1.0,
+        where,
+        got=f"{confidence:g}",
+        expected="0.5 to below 1",
+        hint="0.95 is usual; percent are divided by 100.",
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,22 +123,22 @@ def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
     -----
     Cramer (1946), Mathematical Methods of Statistics, sections 27.4 to 27.7.
     """
-    if not math.isfinite(multiple):
-        raise InputError(
-            "multiple of the standard deviation",
-            got=f"{multiple}",
-            expected="a finite number",
-            hint="3 is usual.",
-        )
+    refuse_if(
+        not math.isfinite(multiple),
+        "multiple of the standard deviation",
+        got=f"{multiple}",
+        expected="a finite number",
+        hint="3 is usual.",
+    )
     found, failed = split_failed(values)
     count = len(found)
-    if count < 2:
-        raise InputError(
-            "values of a measure",
-            got=f"{count} runs with a value, {failed} without",
-            expected="two runs with a value or more",
-            hint="compute more runs, or look at the reasons of the failed ones.",
-        )
+    refuse_if(
+        count < 2,
+        "values of a measure",
+        got=f"{count} runs with a value, {failed} without",
+        expected="two runs with a value or more",
+        hint="compute more runs, or look at the reasons of the failed ones.",
+    )
     mean = math.fsum(found / count)
     size = float(np.abs(found - mean).max())
     if size == 0.0:
@@ -236,13 +236,13 @@ def sample_quantile(
     require_level("confidence of a quantile", confidence)
     _require_probability(probability)
     found, failed = split_failed(values)
-    if not len(found):
-        raise InputError(
-            "values of a measure",
-            got=f"{failed} runs without a value",
-            expected="one run with a value or more",
-            hint="look at the reasons of the failed runs.",
-        )
+    refuse_if(
+        not len(found),
+        "values of a measure",
+        got=f"{failed} runs without a value",
+        expected="one run with a value or more",
+        hint="look at the reasons of the failed runs.",
+    )
     ranked = np.sort(found)
     tail = (1.0 - confidence) / 2.0
     lower, upper = _ranks(len(ranked), probability, tail)
@@ -283,13 +283,13 @@ def runs_for_quantile(probability: float, *, confidence: float = 0.95) -> int:
 
 
 def _require_probability(probability: float) -> None:
-    if not 0.0 < probability < 1.0:
-        raise InputError(
-            "probability of a quantile",
-            got=f"{probability:g}",
-            expected="above 0, below 1",
-            hint="0.99 is the value that 1 % exceed.",
-        )
+    refuse_if(
+        not 0.0 < probability < 1.0,
+        "probability of a quantile",
+        got=f"{probability:g}",
+        expected="above 0, below 1",
+        hint="0.99 is the value that 1 % exceed.",
+    )
 
 
 def _ranks(runs: int, probability: float, tail: float) -> tuple[int, int]:
@@ -367,13 +367,13 @@ def exceedance_of(values: ArrayLike, limit: float, *, confidence: float = 0.95) 
     InputError
         If the limit is nan, or as in :func:`count_exceedance`.
     """
-    if np.isnan(limit):
-        raise InputError(
-            "limit of a measure",
-            got="nan",
-            expected="a number in the unit of the measure",
-            hint="state the limit that the measure must keep.",
-        )
+    refuse_if(
+        np.isnan(limit),
+        "limit of a measure",
+        got="nan",
+        expected="a number in the unit of the measure",
+        hint="state the limit that the measure must keep.",
+    )
     found, failed = split_failed(values)
     exceeded = int(np.count_nonzero(found > limit))
     return count_exceedance(exceeded, len(found), failed=failed, confidence=confidence)

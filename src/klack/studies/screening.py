@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.studies.designs import even_levels, random_of, require_size
 
 __all__ = ["Screening", "elementary_effects", "morris_design"]
@@ -252,55 +252,55 @@ def _scatter_error(effects: Floats) -> float:
 
 def _for_each(parameters: int, bounded: ArrayLike) -> NDArray[np.bool_]:
     ends = np.asarray(bounded, dtype=bool)
-    if ends.shape not in ((), (parameters,)):
-        raise InputError(
-            "bounded",
-            got=f"an array of shape {ends.shape}",
-            expected=f"True, False, or one of them for each of {parameters} parameters",
-            hint="say for each parameter whether its range has ends.",
-        )
+    refuse_if(
+        ends.shape not in ((), (parameters,)),
+        "bounded",
+        got=f"an array of shape {ends.shape}",
+        expected=f"True, False, or one of them for each of {parameters} parameters",
+        hint="say for each parameter whether its range has ends.",
+    )
     return np.broadcast_to(ends, (parameters,))
 
 
 def _require_levels(levels: int) -> None:
-    if not 2 <= levels <= _MOST_LEVELS or levels % 2:
-        raise InputError(
-            "levels",
-            got=f"{levels}",
-            expected=f"an even number from 2 to {_MOST_LEVELS}",
-            hint="4 is usual; the jump over half of an even number reaches all levels alike.",
-        )
+    refuse_if(
+        not 2 <= levels <= _MOST_LEVELS or levels % 2,
+        "levels",
+        got=f"{levels}",
+        expected=f"an even number from 2 to {_MOST_LEVELS}",
+        hint="4 is usual; the jump over half of an even number reaches all levels alike.",
+    )
 
 
 def _require_candidates(parameters: int, trajectories: int, candidates: int) -> None:
     most = int(np.sqrt(_MOST_WORK / (parameters * (parameters + 1) ** 2)))
-    if not trajectories < candidates <= most:
-        raise InputError(
-            "candidates",
-            got=f"{candidates} for {trajectories} trajectories of {parameters} parameters",
-            expected=f"more than {trajectories}, at most {most}",
-            hint="ten times the number of trajectories is usual; none takes them as drawn.",
-        )
+    refuse_if(
+        not trajectories < candidates <= most,
+        "candidates",
+        got=f"{candidates} for {trajectories} trajectories of {parameters} parameters",
+        expected=f"more than {trajectories}, at most {most}",
+        hint="ten times the number of trajectories is usual; none takes them as drawn.",
+    )
 
 
 def _require_shapes(x: Floats, y: Floats) -> None:
     fits = x.ndim == 2 and x.shape[1] and x.shape[0] and x.shape[0] % (x.shape[1] + 1) == 0
-    if not fits or y.shape != x.shape[:1]:
-        raise InputError(
-            "points",
-            got=f"points of shape {x.shape} and values of shape {y.shape}",
-            expected="trajectories of parameters + 1 points, and one value for each point",
-            hint="give points and values in the order of the design.",
-        )
+    refuse_if(
+        not fits or y.shape != x.shape[:1],
+        "points",
+        got=f"points of shape {x.shape} and values of shape {y.shape}",
+        expected="trajectories of parameters + 1 points, and one value for each point",
+        hint="give points and values in the order of the design.",
+    )
 
 
 def _require_trajectories(steps: Floats) -> None:
     """Raise unless each step changes one parameter, and each trajectory every one."""
     changed = steps != 0
-    if not (np.all(changed.sum(axis=2) == 1) and np.all(changed.sum(axis=1) == 1)):
-        raise InputError(
-            "points",
-            got="points that are no trajectories",
-            expected="trajectories in which each parameter changes once, one at a time",
-            hint="give the points of the design unchanged and in its order.",
-        )
+    refuse_if(
+        not (np.all(changed.sum(axis=2) == 1) and np.all(changed.sum(axis=1) == 1)),
+        "points",
+        got="points that are no trajectories",
+        expected="trajectories in which each parameter changes once, one at a time",
+        hint="give the points of the design unchanged and in its order.",
+    )

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError, MissingExtraError
+from klack.errors import MissingExtraError, refuse_if
 from klack.studies.batches import Batches, highest, points_in_cube
 from klack.studies.values import PointValues, require_count
 
@@ -61,13 +61,13 @@ class SearchSettings:
         require_count("search: population", self.population, least, 10_000)
         require_count("search: generations", self.generations, 1, 10**9)
         require_count("search: seed", self.seed, 0, 2**63 - 1)
-        if not 0.0 <= self.edge < 0.5:
-            raise InputError(
-                "search: edge",
-                got=f"{self.edge:g}",
-                expected="0 to below 0.5",
-                hint="0.001 leaves out a thousandth at each end of every parameter.",
-            )
+        refuse_if(
+            not 0.0 <= self.edge < 0.5,
+            "search: edge",
+            got=f"{self.edge:g}",
+            expected="0 to below 0.5",
+            hint="0.001 leaves out a thousandth at each end of every parameter.",
+        )
 
     @property
     def algorithm(self) -> str:
@@ -170,13 +170,13 @@ def _start_points(settings: SearchSettings, start: ArrayLike | None) -> NDArray[
     points = points_in_cube(start, settings.parameters, "start points of a search")
     points = np.clip(points, settings.edge, highest(settings.edge))
     points = points[np.sort(np.unique(points, axis=0, return_index=True)[1])]
-    if len(points) > settings.population:
-        raise InputError(
-            "start points of a search",
-            got=f"{len(points)} points",
-            expected=f"at most {settings.population}, the population",
-            hint="choose the best of them, or a larger population.",
-        )
+    refuse_if(
+        len(points) > settings.population,
+        "start points of a search",
+        got=f"{len(points)} points",
+        expected=f"at most {settings.population}, the population",
+        hint="choose the best of them, or a larger population.",
+    )
     return points
 
 

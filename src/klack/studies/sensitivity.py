@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.studies.designs import random_of, require_size, sobol_sequence
 
 __all__ = ["Estimates", "SobolIndices", "saltelli_design", "sobol_indices"]
@@ -234,24 +234,24 @@ def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
 
 
 def _require_arguments(y: Floats, parameters: int, confidence: float, resamples: int) -> None:
-    if parameters < 1 or y.ndim != 1 or y.size == 0 or y.size % (parameters + 2):
-        raise InputError(
-            "values",
-            got=f"values of shape {y.shape} for {parameters} parameters",
-            expected=f"one value for each point: a multiple of {parameters + 2}",
-            hint="give the values in the order of the design, not a number where a point failed.",
-        )
-    if not 0.0 < confidence < 1.0:
-        raise InputError(
-            "confidence",
-            got=f"{confidence:g}",
-            expected="a probability above 0 and below 1",
-            hint="the usual one is 0.95.",
-        )
-    if resamples < 100:
-        raise InputError(
-            "resamples",
-            got=f"{resamples}",
-            expected="100 or more",
-            hint="the usual number is 1000.",
-        )
+    refuse_if(
+        parameters < 1 or y.ndim != 1 or y.size == 0 or y.size % (parameters + 2),
+        "values",
+        got=f"values of shape {y.shape} for {parameters} parameters",
+        expected=f"one value for each point: a multiple of {parameters + 2}",
+        hint="give the values in the order of the design, not a number where a point failed.",
+    )
+    refuse_if(
+        not 0.0 < confidence < 1.0,
+        "confidence",
+        got=f"{confidence:g}",
+        expected="a probability above 0 and below 1",
+        hint="the usual one is 0.95.",
+    )
+    refuse_if(
+        resamples < 100,
+        "resamples",
+        got=f"{resamples}",
+        expected="100 or more",
+        hint="the usual number is 1000.",
+    )

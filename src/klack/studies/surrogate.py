@@ -12,7 +12,7 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.studies.designs import random_of
 from klack.studies.sensitivity import Estimates
 from klack.studies.surrogate_chaos import ChaosFit
@@ -126,13 +126,13 @@ def fit_surrogate(
         For a Gaussian process without scikit-learn.
     """
     t, y = np.asarray(points, dtype=float), np.asarray(values, dtype=float)
-    if t.shape != (len(y), len(axes)) or y.ndim != 1 or not axes or not np.all(np.isfinite(t)):
-        raise InputError(
-            "points",
-            got=f"points of shape {t.shape}, values of shape {y.shape} for {len(axes)} parameters",
-            expected="finite coordinates, a row for each point and a column for each parameter",
-            hint="give one value for each point, not a number where it failed.",
-        )
+    refuse_if(
+        t.shape != (len(y), len(axes)) or y.ndim != 1 or not axes or not np.all(np.isfinite(t)),
+        "points",
+        got=f"points of shape {t.shape}, values of shape {y.shape} for {len(axes)} parameters",
+        expected="finite coordinates, a row for each point and a column for each parameter",
+        hint="give one value for each point, not a number where it failed.",
+    )
     known = np.flatnonzero(np.isfinite(y))
     _, first = np.unique(t[known], axis=0, return_index=True)
     used = known[np.sort(first)]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["PointValues", "require_count", "table_of_numbers", "values_of_points"]
 
@@ -57,25 +57,25 @@ def values_of_points(objectives: ArrayLike, constraints: ArrayLike | None) -> Po
         If a table is not two-dimensional, holds no column of objectives, or the two differ in rows.
     """
     goals = table_of_numbers(objectives, "objectives")
-    if goals.shape[1] == 0:
-        raise InputError(
-            "objectives",
-            got="no column",
-            expected="one column or more",
-            hint="name one measure to minimise.",
-        )
+    refuse_if(
+        goals.shape[1] == 0,
+        "objectives",
+        got="no column",
+        expected="one column or more",
+        hint="name one measure to minimise.",
+    )
     limits = (
         np.empty((len(goals), 0))
         if constraints is None
         else table_of_numbers(constraints, "constraints")
     )
-    if len(limits) != len(goals):
-        raise InputError(
-            "constraints",
-            got=f"{len(limits)} rows",
-            expected=f"{len(goals)} rows, as many as of objectives",
-            hint="give one row per point, nan where it failed.",
-        )
+    refuse_if(
+        len(limits) != len(goals),
+        "constraints",
+        got=f"{len(limits)} rows",
+        expected=f"{len(goals)} rows, as many as of objectives",
+        hint="give one row per point, nan where it failed.",
+    )
     failed = np.logical_not(np.isfinite(np.hstack((goals, limits))).all(axis=1))
     with np.errstate(over="ignore"):
         violation = np.where(limits > 0.0, limits, 0.0).sum(axis=1)
@@ -101,11 +101,11 @@ def table_of_numbers(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
             expected="rows of numbers, one row per point",
             hint="give every row the same number of columns, nan where there is no value.",
         ) from None
-    if table.ndim != 2:
-        raise InputError(
-            where,
-            got=f"an array of {table.ndim} dimensions",
-            expected="rows and columns, one row per point",
-            hint="give a single column as values[:, None], a single row as values[None].",
-        )
+    refuse_if(
+        table.ndim != 2,
+        where,
+        got=f"an array of {table.ndim} dimensions",
+        expected="rows and columns, one row per point",
+        hint="give a single column as values[:, None], a single row as values[None].",
+    )
     return table

@@ -38,7 +38,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_reader import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.cores import available_cores
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
 from klack.measurement.computed_stroke import trigger_instant
 from klack.measurement.fit_window import (
@@ -213,21 +213,21 @@ def _require_written(tree: CaseTree, parameters: Sequence[FreeParameter]) -> Non
 
 def _require_channels(strokes: StrokeSet, section: CaseCalibration) -> None:
     for role in section.channels:
-        if role not in strokes.roles:
-            raise InputError(
-                strokes.source,
-                got=f"strokes without the channel '{role}'",
-                expected=f"the channels of calibration.channels ({one_of(section.channels)}); "
-                f"found: {one_of(strokes.roles)}",
-                hint="name it in measurement.channels, or fit only the lift.",
-            )
-    if "lift" not in strokes.roles:
-        raise InputError(
+        refuse_if(
+            role not in strokes.roles,
             strokes.source,
-            got="strokes without lift",
-            expected="the lift: impacts and windows are found in it",
-            hint="name its channel in measurement.channels.",
+            got=f"strokes without the channel '{role}'",
+            expected=f"the channels of calibration.channels ({one_of(section.channels)}); "
+            f"found: {one_of(strokes.roles)}",
+            hint="name it in measurement.channels, or fit only the lift.",
         )
+    refuse_if(
+        "lift" not in strokes.roles,
+        strokes.source,
+        got="strokes without lift",
+        expected="the lift: impacts and windows are found in it",
+        hint="name its channel in measurement.channels.",
+    )
 
 
 def _motion_model(

@@ -10,7 +10,7 @@ from klack.assembling.spatial import placement_of, seat_height
 from klack.assembling.valve import Valve
 from klack.case.shots import StrokeShots
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.mesh.rigid import rigid_placement
 
 __all__ = ["CENTRED", "Starts", "StrokeStart", "shots_of_valve"]
@@ -149,14 +149,14 @@ def shots_of_valve(case: ValveCase) -> StrokeShots:
         For a motion along the axis, in which all strokes are alike, and without a section.
     """
     where = str(case.path or "case")
-    if case.motion == "axial":
-        raise InputError(
-            f"{where}: motion",
-            got="'axial' in klack shots",
-            expected="motion: three-dimensional, or the case of an impact: along the axis all "
-            "strokes are alike",
-            hint="set 'motion: three-dimensional', add 'guide' and 'shots: {count: 50}'.",
-        )
+    refuse_if(
+        case.motion == "axial",
+        f"{where}: motion",
+        got="'axial' in klack shots",
+        expected="motion: three-dimensional, or the case of an impact: along the axis all "
+        "strokes are alike",
+        hint="set 'motion: three-dimensional', add 'guide' and 'shots: {count: 50}'.",
+    )
     if case.shots is None:
         raise InputError(
             f"{where}: shots",

@@ -16,7 +16,7 @@ from klack.analyses.study.record import (
     SurrogateEffect,
 )
 from klack.case.study_source import StudySource
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
 from klack.progress import Progress
 from klack.studies.designs import unevenness
@@ -135,21 +135,21 @@ def require_surrogates(source: StudySource, points: StudyPoints) -> None:
     if (asked := source.study.surrogate) is None:
         return
     kind, design = asked.kind, source.study.design.kind
-    if design not in _DESIGNS:
-        raise InputError(
-            source.where(("surrogate",)),
-            got=f"a surrogate of the design {design}",
-            expected=f"a design that fills the ranges: {one_of(_DESIGNS)}",
-            hint="use kind: sobol; on few levels, or around few points, a surrogate cannot tell "
-            "how wrong it is elsewhere.",
-        )
-    if len(points.values) > _MOST[kind]:
-        raise InputError(
-            source.where(("surrogate", "kind")),
-            got=f"a {kind} of {len(points.values)} points",
-            expected=f"at most {_MOST[kind]} points",
-            hint="use kind: polynomial-chaos, or fewer points.",
-        )
+    refuse_if(
+        design not in _DESIGNS,
+        source.where(("surrogate",)),
+        got=f"a surrogate of the design {design}",
+        expected=f"a design that fills the ranges: {one_of(_DESIGNS)}",
+        hint="use kind: sobol; on few levels, or around few points, a surrogate cannot tell "
+        "how wrong it is elsewhere.",
+    )
+    refuse_if(
+        len(points.values) > _MOST[kind],
+        source.where(("surrogate", "kind")),
+        got=f"a {kind} of {len(points.values)} points",
+        expected=f"at most {_MOST[kind]} points",
+        hint="use kind: polynomial-chaos, or fewer points.",
+    )
     require_varied(source, points.space.varied)
     require_scikit_learn()
     if design == "file":
@@ -172,22 +172,22 @@ def _require_even(source: StudySource, points: StudyPoints) -> None:
             )
         if isinstance(axis.spread, Listed):
             continue
-        if 2 * len(set(values)) < len(values):
-            raise InputError(
-                where,
-                got=f"{item.name}: {len(set(values))} different values in {len(values)} points",
-                expected="a different one in most points",
-                hint="use kind: sobol; a surrogate cannot tell how wrong it is between few levels.",
-            )
+        refuse_if(
+            2 * len(set(values)) < len(values),
+            where,
+            got=f"{item.name}: {len(set(values))} different values in {len(values)} points",
+            expected="a different one in most points",
+            hint="use kind: sobol; a surrogate cannot tell how wrong it is between few levels.",
+        )
         shares.append([axis.spread.share(float(value)) for value in values])
     found = unevenness(np.array(shares).T) if shares else 0.0
-    if found > _UNEVEN:
-        raise InputError(
-            where,
-            got=f"points with {found:.3g} times the squared discrepancy of random ones",
-            expected=f"points that fill the ranges: at most {_UNEVEN:g} times",
-            hint="use kind: sobol, or give the ranges or distributions that the points have.",
-        )
+    refuse_if(
+        found > _UNEVEN,
+        where,
+        got=f"points with {found:.3g} times the squared discrepancy of random ones",
+        expected=f"points that fill the ranges: at most {_UNEVEN:g} times",
+        hint="use kind: sobol, or give the ranges or distributions that the points have.",
+    )
 
 
 def _is_inside(axis: SurrogateAxis, value: float | str) -> bool:

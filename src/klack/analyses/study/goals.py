@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from klack.analyses.measures import Measure
 from klack.case.study import Written
 from klack.case.study_source import StudySource
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.units import KINDS, RATIO, Kind, format_si, parse_quantity
 
 __all__ = [
@@ -112,13 +112,13 @@ class Goals:
 
 def require_objectives(source: StudySource) -> None:
     """Refuse a study that has nothing to search for, before its first point."""
-    if not source.study.objectives:
-        raise InputError(
-            source.where(()),
-            got="no objectives",
-            expected="one to four measures to minimise or maximise",
-            hint="add 'objectives: {closing_time: minimise}' to the study.",
-        )
+    refuse_if(
+        not source.study.objectives,
+        source.where(()),
+        got="no objectives",
+        expected="one to four measures to minimise or maximise",
+        hint="add 'objectives: {closing_time: minimise}' to the study.",
+    )
 
 
 def goals_of(
@@ -172,13 +172,13 @@ def _bound(where: str, written: Written, unit: str, today: float) -> float:
     by_today = _TODAY.fullmatch(str(written).strip())
     if by_today is None:
         return parse_quantity(written, kind, where)
-    if not np.isfinite(today):
-        raise InputError(
-            where,
-            got=f"'{written}', but the case as it is has no value of this measure",
-            expected="a bound with its unit",
-            hint="write a number, or make the case compute it.",
-        )
+    refuse_if(
+        not np.isfinite(today),
+        where,
+        got=f"'{written}', but the case as it is has no value of this measure",
+        expected="a bound with its unit",
+        hint="write a number, or make the case compute it.",
+    )
     if by_today["sign"] is None:
         return today
     sign = 1.0 if by_today["sign"] == "+" else -1.0

@@ -44,7 +44,7 @@ from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, case_at
 from klack.case.schema import Case
 from klack.case.study import CaseStudy
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.input.problem import Key
 from klack.progress import Progress
 from klack.signals import TimeSeries
@@ -94,13 +94,13 @@ class _Impacts:
 
     def asked_variant(self, study: CaseStudy) -> str | None:
         """The level of the study."""
-        if study.variant is not None:
-            raise InputError(
-                "variant",
-                got=f"'{study.variant}' in the study of an impact",
-                expected="a level; variants are of strokes",
-                hint="write level: reduced, or leave it out.",
-            )
+        refuse_if(
+            study.variant is not None,
+            "variant",
+            got=f"'{study.variant}' in the study of an impact",
+            expected="a level; variants are of strokes",
+            hint="write level: reduced, or leave it out.",
+        )
         return study.level
 
     def variant(self, case: Case, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:

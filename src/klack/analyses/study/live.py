@@ -1,4 +1,4 @@
-"""What a long study shows meanwhile: lines on its pace, its points on disk, a page of the search."""
+"""What a study shows while it runs: lines on its pace, its points on disk, a page of its search."""
 
 from collections.abc import Callable
 from contextlib import suppress

@@ -16,7 +16,7 @@ from klack.case.key_path import quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.study import StudyRobust
 from klack.case.study_source import StudySource
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.studies.designs import sobol_sequence
 from klack.studies.samples import RobustValue
@@ -141,13 +141,13 @@ def made_space(case: AnyCase, source: StudySource, space: Space) -> Space:
     needed = {name for item in linked for name in item.words.values()} - names
     own = {item.name for item in values if item.today is not None}
     for name in (*needed, *(item.name for item in values)):
-        if name not in known and name not in own:
-            raise InputError(
-                source.where(("robust", "scatter")),
-                got=f"'{name}', a word whose value in the case is not known",
-                expected="words that a key of the case follows from by themselves",
-                hint=f"scatter the keys that follow from '{name}', or link one: a.key: {name}.",
-            )
+        refuse_if(
+            name not in known and name not in own,
+            source.where(("robust", "scatter")),
+            got=f"'{name}', a word whose value in the case is not known",
+            expected="words that a key of the case follows from by themselves",
+            hint=f"scatter the keys that follow from '{name}', or link one: a.key: {name}.",
+        )
     return Space(
         parameters=tuple(
             Parameter(
@@ -187,13 +187,13 @@ def _one(
     given: object,
 ) -> _Scattered:
     at = ("robust", "scatter", name)
-    if name in linked:
-        raise InputError(
-            source.where(at, on_key=True),
-            got="a key that follows from parameters",
-            expected="a parameter, or a key that stands by itself",
-            hint="give the scatter of what it follows from.",
-        )
+    refuse_if(
+        name in linked,
+        source.where(at, on_key=True),
+        got="a key that follows from parameters",
+        expected="a parameter, or a key that stands by itself",
+        hint="give the scatter of what it follows from.",
+    )
     own = parameters.get(name)
     if own is not None:
         listed = isinstance(own.spread, Listed) and not own.is_fixed
@@ -219,13 +219,13 @@ def _one(
             raise source.refuse(at, problem) from None
         kind, today = quantity.kind, quantity.value
     deviation = source.read(at, lambda: parse_quantity(given, kind))
-    if deviation <= 0.0:
-        raise InputError(
-            source.where(at),
-            got=format_si(deviation, kind.unit),
-            expected="more than 0",
-            hint="leave out what does not scatter.",
-        )
+    refuse_if(
+        deviation <= 0.0,
+        source.where(at),
+        got=format_si(deviation, kind.unit),
+        expected="more than 0",
+        hint="leave out what does not scatter.",
+    )
     return _Scattered(name=name, kind=kind, deviation=deviation, today=today)
 
 

@@ -32,7 +32,7 @@ from klack.analyses.stroke.summary import first_impact
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP
-from klack.errors import InputError, KlackError
+from klack.errors import InputError, KlackError, refuse_if
 from klack.input.problem import nearest, one_of
 from klack.signals import TimeSeries
 from klack.simulation.network_result import ImpactEvent
@@ -180,13 +180,13 @@ def choose_measures(
         For a name that does not exist, with the nearest one; for none at all.
     """
     wanted = list(dict.fromkeys([names] if isinstance(names, str) else names))
-    if not wanted:
-        raise InputError(
-            "measures",
-            got="no measure",
-            expected=words,
-            hint=f'write e.g. measures=["{example}"].',
-        )
+    refuse_if(
+        not wanted,
+        "measures",
+        got="no measure",
+        expected=words,
+        hint=f'write e.g. measures=["{example}"].',
+    )
     chosen = []
     for name in wanted:
         found = find(name) if isinstance(name, str) else None
@@ -366,13 +366,13 @@ def impact_measures(case: Case, names: Iterable[str]) -> tuple[ChosenMeasure, ..
         names, lambda name: _impact_measure(case, name), known, words, "peak_force"
     )
     for item in chosen:
-        if item.is_noise and not case.has_surfaces:
-            raise InputError(
-                "measures",
-                got=f"'{item.name}', of bodies without surfaces",
-                expected=f"one of: {one_of(_OF_LEVELS)}",
-                hint="noise needs bodies with meshes.",
-            )
+        refuse_if(
+            item.is_noise and not case.has_surfaces,
+            "measures",
+            got=f"'{item.name}', of bodies without surfaces",
+            expected=f"one of: {one_of(_OF_LEVELS)}",
+            hint="noise needs bodies with meshes.",
+        )
     return chosen
 
 

@@ -32,7 +32,7 @@ from klack.case.case_tree import CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
-from klack.errors import InputError
+from klack.errors import refuse_if
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
@@ -176,13 +176,13 @@ def _require_same_draws(source: StudySource) -> None:
         With file, line and key.
     """
     for name in _DRAWS:
-        if name in source.study.parameters:
-            raise InputError(
-                source.where(("parameters", name)),
-                got=f"'{name}' as a parameter of a search, which would find the luckiest draw",
-                expected="the same shots for all points",
-                hint="remove it here; klack study compares seeds.",
-            )
+        refuse_if(
+            name in source.study.parameters,
+            source.where(("parameters", name)),
+            got=f"'{name}' as a parameter of a search, which would find the luckiest draw",
+            expected="the same shots for all points",
+            hint="remove it here; klack study compares seeds.",
+        )
 
 
 class _Work:

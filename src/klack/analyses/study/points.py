@@ -18,7 +18,7 @@ from klack.case.points import PointValue
 from klack.case.reader import text_of
 from klack.case.study import StudyParameter, Written
 from klack.case.study_source import StudySource
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.expressions.expression import RESERVED, Expression, ordered
 from klack.input.problem import CaseProblem, Key, one_of
 from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
@@ -249,30 +249,30 @@ def _spread(source: StudySource, name: str, item: StudyParameter, of: Quantity |
             (*at, "normal", "sd"),
             lambda: _deviation(item.normal.sd, kind),  # type: ignore[union-attr]
         )
-        if deviation <= 0.0:
-            raise InputError(
-                source.where((*at, "normal", "sd")),
-                got=format_si(deviation, kind.unit),
-                expected="more than 0",
-                hint="a value that does not vary is 'fixed'.",
-            )
+        refuse_if(
+            deviation <= 0.0,
+            source.where((*at, "normal", "sd")),
+            got=format_si(deviation, kind.unit),
+            expected="more than 0",
+            hint="a value that does not vary is 'fixed'.",
+        )
         return Normal(mean, deviation)
     if item.lowest is not None:
         low, high = read(item.lowest, "from"), read(item.highest, "to")
-        if not low < high:
-            raise InputError(
-                source.where((*at, "to")),
-                got=f"'{item.highest}'",
-                expected=f"more than 'from', which is '{item.lowest}'",
-                hint="swap them, or check the units.",
-            )
-        if item.scale == "log" and low <= 0.0:
-            raise InputError(
-                source.where((*at, "from")),
-                got=f"'{item.lowest}'",
-                expected="more than 0 for a logarithmic scale",
-                hint="give another lower end, or scale: linear.",
-            )
+        refuse_if(
+            not low < high,
+            source.where((*at, "to")),
+            got=f"'{item.highest}'",
+            expected=f"more than 'from', which is '{item.lowest}'",
+            hint="swap them, or check the units.",
+        )
+        refuse_if(
+            item.scale == "log" and low <= 0.0,
+            source.where((*at, "from")),
+            got=f"'{item.lowest}'",
+            expected="more than 0 for a logarithmic scale",
+            hint="give another lower end, or scale: linear.",
+        )
         return Range(low, high, item.scale == "log")
     if item.values is not None:
         return Listed(tuple(read(value, "values", i) for i, value in enumerate(item.values)))
@@ -474,13 +474,13 @@ def linked_of(
     places = {}
     expressions = {}
     for name, text in given.items():
-        if name in source.study.parameters:
-            raise InputError(
-                source.where(("linked", name)),
-                got="a key that is a parameter as well",
-                expected="a parameter, or an expression",
-                hint="remove one of them.",
-            )
+        refuse_if(
+            name in source.study.parameters,
+            source.where(("linked", name)),
+            got="a key that is a parameter as well",
+            expected="a parameter, or an expression",
+            hint="remove one of them.",
+        )
         try:
             places[name] = quantity_at(case, split_path(name))
         except CaseProblem as problem:
@@ -575,23 +575,23 @@ def _one_at_a_time(varied: Sequence[Parameter], count: int) -> list[list[float |
 
 def require_varied(source: StudySource, varied: Sequence[Parameter]) -> None:
     """Refuse a study in which nothing varies."""
-    if not varied:
-        raise InputError(
-            source.where(("parameters",)),
-            got="no parameter that varies",
-            expected="at least one range, distribution or list of values",
-            hint="write {from: 8 N, to: 20 N}.",
-        )
+    refuse_if(
+        not varied,
+        source.where(("parameters",)),
+        got="no parameter that varies",
+        expected="at least one range, distribution or list of values",
+        hint="write {from: 8 N, to: 20 N}.",
+    )
 
 
 def _require_few(source: StudySource, count: int) -> None:
-    if count > _MOST_POINTS:
-        raise InputError(
-            source.where(("design", "levels")),
-            got=f"a grid of {count} points",
-            expected=f"at most {_MOST_POINTS}",
-            hint="use fewer levels, or kind: sobol.",
-        )
+    refuse_if(
+        count > _MOST_POINTS,
+        source.where(("design", "levels")),
+        got=f"a grid of {count} points",
+        expected=f"at most {_MOST_POINTS}",
+        hint="use fewer levels, or kind: sobol.",
+    )
 
 
 def _rows_of_file(
@@ -624,10 +624,9 @@ def _rows_of_file(
         texts = dict(zip(head, (cell.strip() for cell in cells), strict=True))
         at = f"{file}:{number}"
         rows.append([_cell(f"{at}: {item.name}", texts[item.name], item) for item in varied])
-    if not rows:
-        raise InputError(
-            str(file), got="no row of values", expected="at least one", hint="add the points."
-        )
+    refuse_if(
+        not rows, str(file), got="no row of values", expected="at least one", hint="add the points."
+    )
     return rows, f"from {file.name}"
 
 

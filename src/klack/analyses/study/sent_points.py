@@ -24,7 +24,7 @@ from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, Points, PointValue
 from klack.elasticity.factorization import chosen_backend
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 
 __all__ = ["Answer", "PointOrder", "SentCase", "answered", "versions_here"]
 
@@ -115,26 +115,26 @@ class SentCase:
                 hint="files that the case names must have the same path on every machine: use a "
                 "shared folder.",
             ) from None
-        if point_log_form(case, tree)[1] != self.mark:
-            raise InputError(
-                str(tree.path),
-                got="files or components of the case with another content",
-                expected="the same bytes as where the study was started",
-                hint="share the folder of the case, or copy it to every machine once more.",
-            )
+        refuse_if(
+            point_log_form(case, tree)[1] != self.mark,
+            str(tree.path),
+            got="files or components of the case with another content",
+            expected="the same bytes as where the study was started",
+            hint="share the folder of the case, or copy it to every machine once more.",
+        )
         return case, tree
 
     def _require_versions(self) -> None:
         here = versions_here()
         for name, wanted in self.versions.items():
-            if here.get(name) != wanted:
-                raise InputError(
-                    "version",
-                    got=f"{name} {here.get(name, 'not installed')}",
-                    expected=f"{name} {wanted}, as where the study was started: points are kept "
-                    "by their version",
-                    hint="install the same versions on every machine, and start its workers anew.",
-                )
+            refuse_if(
+                here.get(name) != wanted,
+                "version",
+                got=f"{name} {here.get(name, 'not installed')}",
+                expected=f"{name} {wanted}, as where the study was started: points are kept "
+                "by their version",
+                hint="install the same versions on every machine, and start its workers anew.",
+            )
 
 
 @cache  # of the code that runs, which may not be what stands on the disk later

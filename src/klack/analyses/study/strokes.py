@@ -45,7 +45,7 @@ from klack.case.study import CaseStudy
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
 from klack.cores import available_cores
-from klack.errors import InputError, KlackError
+from klack.errors import KlackError, refuse_if
 from klack.input.problem import Key
 from klack.memory import require_memory
 from klack.progress import Progress
@@ -106,13 +106,13 @@ class _Strokes:
 
     def asked_variant(self, study: CaseStudy) -> str | None:
         """The variant of the study."""
-        if study.level is not None:
-            raise InputError(
-                "level",
-                got=f"'{study.level}' in the study of a whole valve",
-                expected="a variant; levels are of impacts",
-                hint="write variant: wet.",
-            )
+        refuse_if(
+            study.level is not None,
+            "level",
+            got=f"'{study.level}' in the study of a whole valve",
+            expected="a variant; levels are of impacts",
+            hint="write variant: wet.",
+        )
         return study.variant
 
     def variant(self, case: ValveCase, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:

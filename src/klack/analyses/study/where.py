@@ -13,7 +13,7 @@ from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.closing import Closing
 from klack.cores import available_cores
-from klack.errors import ConvergenceError, InputError
+from klack.errors import ConvergenceError, InputError, refuse_if
 from klack.memory import available_memory, require_memory
 from klack.progress import Progress
 
@@ -167,13 +167,13 @@ class Where:
                 )
         given = {"threads": self.threads, "workers": self.workers, "dask": self.dask}
         names = [name for name, value in given.items() if value is not None]
-        if len(names) > 1:
-            raise InputError(
-                " and ".join(names),
-                got="several places for the points",
-                expected="one of: threads, workers (processes of this machine), dask (a cluster)",
-                hint="leave out all but one.",
-            )
+        refuse_if(
+            len(names) > 1,
+            " and ".join(names),
+            got="several places for the points",
+            expected="one of: threads, workers (processes of this machine), dask (a cluster)",
+            hint="leave out all but one.",
+        )
         if self.dask is not None:
             from klack.analyses.study.dask_workers import require_dask
 
