@@ -29,7 +29,7 @@ from number import Number, Size
 from stroke import COARSE, RECORD, STEP, valves
 
 import klack
-from klack.analyses.threads import on_threads
+from klack.analyses.study.computing import on_threads
 from klack.simulation.network_run import simulate_network
 
 __all__ = ["main", "numbers"]

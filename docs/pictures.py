@@ -24,7 +24,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from klack.analyses.calibration.analysis import CALIBRATION
-from klack.analyses.calibration.figures import stroke_chart as calibration_chart
+from klack.analyses.calibration.content import stroke_chart as calibration_chart
 from klack.analyses.heat.analysis import HEAT
 from klack.analyses.heat.figures import heat_charts
 from klack.analyses.impact.analysis import IMPACT

@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from klack.analyses.calibration.analysis import CALIBRATION
-from klack.analyses.calibration.figures import stroke_chart as calibration_chart
+from klack.analyses.calibration.content import stroke_chart as calibration_chart
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.figures import force_chart, spectrum_chart
 from klack.analyses.stroke.analysis import STROKE

@@ -11,7 +11,9 @@ import klack.analyses.stroke_shots.one_stroke as one_stroke
 from klack.analyses.stroke.run import one_variant
 from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
 from klack.analyses.stroke_shots.one_stroke import (
+    CENTRED,
     STROKE_LOG,
+    Starts,
     StrokeTask,
     rebound_height,
     run_one_stroke,
@@ -19,7 +21,6 @@ from klack.analyses.stroke_shots.one_stroke import (
 )
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.stroke_shots.run import compute_strokes, run_stroke_shots, stroke_setup
-from klack.analyses.stroke_shots.starts import CENTRED, Starts
 from klack.assembling.spatial import placement_of
 from klack.assembling.valve import build_valve
 from klack.case.valve_roles import find_roles

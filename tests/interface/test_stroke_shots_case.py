@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from shots_valve import GUIDE, valve_case, valve_text
 
-from klack.analyses.stroke_shots.starts import Starts, shots_of_valve
+from klack.analyses.stroke_shots.one_stroke import Starts, shots_of_valve
 from klack.case.distribution import Distribution
 from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.cli.main import main

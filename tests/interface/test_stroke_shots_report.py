@@ -24,8 +24,8 @@ from klack.analyses.stroke_shots.scatter import (
     median_interval,
     scatter_ratio,
     scattered,
+    stroke_answers,
 )
-from klack.analyses.stroke_shots.wording import stroke_answers
 from klack.errors import InputError
 from klack.exchange.results.dataset import dataset_of
 from klack.report.html import render_html

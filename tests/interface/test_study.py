@@ -30,7 +30,7 @@ from klack.case.valve_reader import load_any_case
 from klack.cli.main import main
 from klack.errors import InputError
 from klack.report.html import write_report
-from klack.studies.spread import Normal
+from klack.studies.designs import Normal
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 PRELOAD = "network.components.spring.preload"

@@ -51,7 +51,7 @@ def record(tmp_path_factory):
 @pytest.mark.slow
 def test_leave_one_out_errors_are_those_of_fresh_strokes(record, tmp_path):
     """Truth: 40 other points; the surrogate that is judged is rebuilt from the record."""
-    from klack.studies.spread import Normal, Range
+    from klack.studies.designs import Normal, Range
     from klack.studies.surrogate import fit_surrogate
     from klack.studies.surrogate_model import SurrogateAxis
 

@@ -25,13 +25,19 @@ from energy_ledger import allowed
 from rod_valve import ROD
 
 import klack
-from klack.analyses.study import dask_workers, sent_points
+from klack.analyses.study import dask_workers
 from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.computing import Agenda
 from klack.analyses.study.dask_workers import DaskTasks
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.sent_points import PointOrder, SentCase, answered
-from klack.analyses.study.where import Where, _Fitting
+from klack.analyses.study.where import (
+    PointOrder,
+    SentCase,
+    Where,
+    _Fitting,
+    answered,
+    versions_here,
+)
 from klack.analyses.workers import Failure
 from klack.case.valve import ValveCase
 from klack.errors import ConvergenceError, InputError, MissingExtraError
@@ -417,8 +423,8 @@ class TestRefused:
             klack.run_many(SMALL, [{}], ["impacts"], dask=address)
 
     def test_another_version_of_klack(self, cluster: str, monkeypatch: pytest.MonkeyPatch):
-        other = dict(sent_points.versions_here()) | {"klack": "9.9"}
-        monkeypatch.setattr(sent_points, "versions_here", lambda: other)
+        other = dict(versions_here()) | {"klack": "9.9"}
+        monkeypatch.setattr("klack.analyses.study.where.versions_here", lambda: other)
         with pytest.raises(InputError, match=r"worker tcp://.*got klack 0.1.0, expected klack 9.9"):
             klack.run_many(SMALL, [{}], ["impacts"], dask=cluster)
 

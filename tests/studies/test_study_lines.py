@@ -4,7 +4,7 @@ import pytest
 
 from klack.analyses.study import live
 from klack.analyses.study.asked_points import PointRow
-from klack.analyses.study.columns import row_warnings
+from klack.analyses.study.evaluation import row_warnings
 from klack.analyses.study.live import Pace, duration_text
 
 

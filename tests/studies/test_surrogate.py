@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError, MissingExtraError
-from klack.studies.designs import latin_hypercube, sobol_sequence
+from klack.studies.designs import Listed, Normal, Range, latin_hypercube, sobol_sequence
 from klack.studies.sensitivity import saltelli_design, sobol_indices
-from klack.studies.spread import Listed, Normal, Range
 from klack.studies.surrogate import fewest_points, fit_surrogate
 from klack.studies.surrogate_chaos import ChaosFit
 from klack.studies.surrogate_model import SurrogateAxis, share_estimates

@@ -66,7 +66,7 @@ def export_result(study: Any, to: str, folder: Path) -> Written:
 
 
 def _export_points(study: "StudyRecord", to: str, folder: Path) -> Written:
-    from klack.analyses.study.table import study_table
+    from klack.analyses.study.record import study_table
 
     if to not in ("csv", "parquet"):
         raise InputError(

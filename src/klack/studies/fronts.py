@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, refuse_if
-from klack.studies.values import values_of_points
+from klack.studies.batches import values_of_points
 
 __all__ = ["Front", "compromise", "find_front", "hypervolume", "spread_over"]
 

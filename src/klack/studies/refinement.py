@@ -7,9 +7,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, refuse_if
-from klack.studies.batches import Batches, highest, points_in_cube
+from klack.studies.batches import (
+    Batches,
+    PointValues,
+    highest,
+    points_in_cube,
+    require_count,
+    table_of_numbers,
+    values_of_points,
+)
 from klack.studies.designs import random_of
-from klack.studies.values import PointValues, require_count, table_of_numbers, values_of_points
 
 __all__ = ["Refinement", "RefinementSettings", "Secants", "achievement"]
 

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, refuse_if
-from klack.studies.values import require_count
+from klack.studies.batches import require_count
 
 __all__ = [
     "Exceedance",

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import MissingExtraError, refuse_if
-from klack.studies.batches import Batches, highest, points_in_cube
-from klack.studies.values import PointValues, require_count
+from klack.studies.batches import Batches, PointValues, highest, points_in_cube, require_count
 
 __all__ = ["Search", "SearchSettings", "require_pymoo"]
 

@@ -8,8 +8,8 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.errors import MissingExtraError
+from klack.studies.designs import CUT, Listed, Normal, Range, Spread
 from klack.studies.sensitivity import Estimates
-from klack.studies.spread import CUT, Listed, Normal, Range, Spread
 
 __all__ = ["Shares", "SurrogateAxis", "SurrogateModel", "require_scikit_learn", "share_estimates"]
 

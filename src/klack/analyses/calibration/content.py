@@ -1,14 +1,16 @@
-"""What a calibration report says, before it is laid out: the same words for screen and paper."""
+"""What a calibration report says and shows before its layout: the same for screen and paper."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from math import isfinite
+from typing import Any
 
-from klack.analyses.calibration.figures import (
-    correlation_figure,
-    profile_chart,
-    stroke_chart,
-    window_chart,
-)
+import numpy as np
+import scipy
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
 from klack.analyses.calibration.record import (
     BOUNDS,
     CALIBRATION_MEASURES,
@@ -20,14 +22,227 @@ from klack.analyses.calibration.record import (
     VALUE,
     CalibratedParameter,
     CalibrationStudy,
+    FittedChannel,
     ProfileCurve,
 )
 from klack.analyses.measures import glossary, page_cells, page_heads
 from klack.analyses.page import page_of
+from klack.measurement.fit_window import FitWindow
+from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
 from klack.report.page import Content, Section, Table
-from klack.report.wording import listed, quantity
+from klack.report.printed import STYLE, plain, svg
+from klack.report.thinning import thinned
+from klack.report.wording import listed, printed_unit, quantity
 
-__all__ = ["calibration_content"]
+__all__ = ["CorrelationFigure", "calibration_content", "stroke_chart"]
+
+
+_WIDTH = 6.7  # [in], text of an A4 page
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CorrelationFigure:
+    """Image and caption."""
+
+    image: bytes
+    note: str
+
+
+def correlation_figure(
+    names: Sequence[str],
+    matrices: Sequence[tuple[str, NDArray[np.float64]]],
+    note: str,
+) -> CorrelationFigure:
+    """Draw correlation matrices side by side; every field carries its number.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the parameters.
+    matrices : sequence of (title, array of shape (p, p))
+    note : str
+    """
+    count = len(names)
+    height = 0.9 + min(0.42 * count, 2.8)
+    with rc_context(STYLE | {"axes.grid": False}):
+        figure = Figure(figsize=(_WIDTH, height), layout="constrained")
+        grid = figure.subplots(1, len(matrices), squeeze=False)[0]
+        for k, (axes, (title, matrix)) in enumerate(zip(grid, matrices, strict=True)):
+            _draw(axes, names if k == 0 else [""] * count, names, title, matrix)
+        return CorrelationFigure(image=svg(figure), note=note)
+
+
+def _draw(
+    axes: Any,
+    rows: Sequence[str],
+    columns: Sequence[str],
+    title: str,
+    matrix: NDArray[np.float64],
+) -> None:
+    axes.imshow(matrix, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
+    axes.set_title(plain(title), fontsize=8)
+    axes.set_yticks(range(len(rows)), [plain(name) for name in rows])
+    axes.set_xticks(range(len(columns)), [plain(name) for name in columns], rotation=35, ha="right")
+    axes.tick_params(length=0)
+    for i in range(len(columns)):
+        for j in range(len(columns)):
+            value = matrix[i, j]
+            axes.text(
+                j,
+                i,
+                f"{value:+.2f}".replace("-", "\N{MINUS SIGN}") if i != j else "1",
+                ha="center",
+                va="center",
+                fontsize=7,
+                color="white" if abs(value) > 0.6 else "black",
+                fontweight="bold" if i != j and abs(value) > 0.95 else "normal",
+            )
+
+
+Floats = NDArray[np.float64]
+
+_MARGIN = 0.05
+_HEADROOM = 1.25
+"""Range of the residual over its largest value, for the legend of nothing but the curve."""
+
+
+def stroke_chart(study: CalibrationStudy, channel: FittedChannel) -> Chart:
+    """The whole stroke of one channel, measured and computed, and what is left."""
+    return _overlay(
+        study,
+        channel,
+        name=f"stroke-{channel.role}",
+        title=f"{channel.role.capitalize()}, measured and computed",
+        span=(float(study.time[0]), float(study.time[-1])),
+        note=(
+            "Shaded: fitted range. Outside, bounces magnify the differences between strokes. "
+            "Below: mean of the measured strokes less computed."
+        ),
+    )
+
+
+def window_chart(study: CalibrationStudy, channel: FittedChannel, window: FitWindow) -> Chart:
+    """One fitted window from near, from where the channel begins to move."""
+    inside = (study.time >= window.first) & (study.time <= window.last)
+    moved = np.abs(channel.mean - channel.mean[inside][0]) > 0.04 * np.ptp(channel.mean[inside])
+    times = study.time[inside & moved]
+    first = float(times[0]) if times.size else window.first
+    length = window.last - first
+    return _overlay(
+        study,
+        channel,
+        name=f"window-{channel.role}-{window.what.split(',')[0]}",
+        title=f"{channel.role.capitalize()}, {window.what.split(',')[0]}",
+        span=(max(first - 0.15 * length, window.first), window.last + 0.03 * length),
+        note="The same, enlarged.",
+    )
+
+
+def _overlay(
+    study: CalibrationStudy,
+    channel: FittedChannel,
+    *,
+    name: str,
+    title: str,
+    span: tuple[float, float],
+    note: str,
+) -> Chart:
+    unit, factor = printed_unit(channel.mean, channel.unit)
+    seen = (study.time >= span[0]) & (study.time <= span[1])
+    time = 1e3 * study.time[seen]
+
+    def curve(values: Floats, **look: object) -> Curve:
+        x, y = thinned(time, factor * values[seen])
+        return Curve(x=x, y=y, **look)  # type: ignore[arg-type]
+
+    band = "90 % of the measured strokes"
+    curves = (
+        curve(channel.low, label=band, colour="sky", width=1.0),
+        curve(channel.high, colour="sky", width=1.0),
+        curve(channel.mean, label="mean of the measured strokes", colour="black", width=2.4),
+        curve(channel.before, label="before", colour="orange", style="dotted", width=2.0),
+        curve(channel.after, label="calibrated", colour="red", style="dashed", width=2.0),
+    )
+    left = factor * (channel.mean - channel.after)
+    fitted = seen & (channel.weight > 0.0)
+    largest = float(np.max(np.abs(left[fitted]))) if fitted.any() else 1.0
+    small, shrink = printed_unit(np.array([largest / factor]), channel.unit)
+    residual = _HEADROOM * largest * shrink / factor
+    windows = tuple(
+        Band(low=1e3 * w.first, high=1e3 * w.last, label=w.what.split(",")[0])
+        for w in study.windows
+    )
+    return Chart(
+        name=name,
+        title=title,
+        x=AxisSpec(label="time since the trigger", unit="ms", range=(1e3 * span[0], 1e3 * span[1])),
+        panels=(
+            Panel(y=AxisSpec(label=channel.role, unit=unit), curves=curves, bands=windows),
+            Panel(
+                y=AxisSpec(label="residual", unit=small, range=(-residual, residual)),
+                curves=(
+                    curve(
+                        (channel.mean - channel.after) * shrink / factor,
+                        label="measured less calibrated",
+                        colour="blue",
+                        width=1.2,
+                    ),
+                ),
+                bands=tuple(Band(low=w.low, high=w.high, label="") for w in windows),
+                marks=(Mark(value=0.0, axis="y"),),
+                share=0.55,
+            ),
+        ),
+        note=note,
+    )
+
+
+def profile_chart(profile: ProfileCurve, parameter: CalibratedParameter) -> Chart:
+    """How much worse the fit becomes when one parameter is held aside."""
+    unit, factor = printed_unit(profile.values, parameter.unit)
+    x = factor * profile.values
+    line = np.linspace(x[0], x[-1], 121)
+    parabola = ((line - factor * parameter.value) / (factor * parameter.standard_error)) ** 2
+    # the signed root of a profile is nearly a straight line
+    root = np.sqrt(profile.excess) * np.sign(x - factor * parameter.value)
+    smooth = scipy.interpolate.PchipInterpolator(x, root)(line) ** 2
+    top = 1.8 * profile.threshold
+    ends = [
+        Mark(value=factor * end, label=f"{factor * end:.5g}")
+        for end in (profile.lower, profile.upper)
+        if isfinite(end)
+    ]
+    return Chart(
+        name=f"profile-{profile.name}",
+        title=f"Profile likelihood of '{profile.name}'",
+        x=AxisSpec(label=profile.name, unit=unit),
+        panels=(
+            Panel(
+                y=AxisSpec(label="excess Λ", range=(-0.03 * top, top)),
+                curves=(
+                    Curve(
+                        x=line,
+                        y=parabola,
+                        label="standard error alone",
+                        colour="grey",
+                        style="dashed",
+                    ),
+                    Curve(x=line, y=smooth, label="profile", colour="blue", width=2.2),
+                    Curve(x=x, y=profile.excess, colour="blue", width=2.0, drawn="points"),
+                ),
+                marks=(
+                    *ends,
+                    Mark(value=profile.threshold, axis="y", label="95 %"),
+                ),
+            ),
+        ),
+        note=(
+            "All other parameters are fitted again at each point. The interval is where the curve "
+            "stays below the horizontal line; where it leaves the dashed parabola, the standard "
+            "error alone would mislead."
+        ),
+    )
+
 
 _STOPS = {"opening": "opening stop", "seat": "seat"}
 

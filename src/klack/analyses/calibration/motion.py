@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.many import LoggedWork
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
+from klack.analyses.workers import LoggedWork
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.stops import StopFaces
 from klack.assembling.valve import filled_network

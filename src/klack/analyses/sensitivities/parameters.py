@@ -14,7 +14,7 @@ from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
-from klack.studies.spread import Normal, Range, Spread
+from klack.studies.designs import Normal, Range, Spread
 from klack.units import RATIO, Kind
 
 __all__ = ["SlopeSpace", "VariedKey", "slope_space"]

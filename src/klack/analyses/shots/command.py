@@ -109,9 +109,8 @@ def _strokes(
     """Many strokes of a whole valve."""
     with show_progress(wanted.quiet):
         from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
-        from klack.analyses.stroke_shots.one_stroke import STROKE_LOG
+        from klack.analyses.stroke_shots.one_stroke import STROKE_LOG, shots_of_valve
         from klack.analyses.stroke_shots.run import run_stroke_shots
-        from klack.analyses.stroke_shots.starts import shots_of_valve
         from klack.compiling.ahead import compiling_ahead
 
     shots_of_valve(case)

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import PressureRecord
-from klack.analyses.many import LoggedWork, grouped_doubts
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.draw import (
     ShotDraw,
@@ -33,7 +32,7 @@ from klack.analyses.shots.one_shot import (
     traces_of,
 )
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
-from klack.analyses.workers import answer, unwrapped
+from klack.analyses.workers import LoggedWork, answer, grouped_doubts, unwrapped
 from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.placed_errors import tells_place

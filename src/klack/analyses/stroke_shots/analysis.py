@@ -28,13 +28,15 @@ from klack.analyses.stroke_shots.record import (
 from klack.analyses.stroke_shots.record import VariantShots as Variant
 from klack.analyses.stroke_shots.scatter import (
     Scattered,
+    Told,
     correlations,
     median_interval,
     scatter_ratio,
     scattered,
+    stroke_answers,
+    told_value,
     wet_and_dry,
 )
-from klack.analyses.stroke_shots.wording import Told, stroke_answers, told_value
 from klack.terminal.tables import TextTable
 
 __all__ = [

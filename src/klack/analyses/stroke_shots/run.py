@@ -7,18 +7,21 @@ from time import perf_counter
 
 import numpy as np
 
-from klack.analyses.many import LoggedWork, grouped_doubts
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.run import guide_in_words
 from klack.analyses.stroke.run import body_summaries, stop_summaries
 from klack.analyses.stroke_shots.one_stroke import (
+    CENTRED,
     STROKE_LOG,
+    Starts,
     StrokeKey,
     StrokeLog,
     StrokeOutcome,
     StrokeSetup,
+    StrokeStart,
     StrokeTask,
     run_one_stroke,
+    shots_of_valve,
     strokes_mark,
 )
 from klack.analyses.stroke_shots.record import (
@@ -27,7 +30,7 @@ from klack.analyses.stroke_shots.record import (
     StrokeShotsStudy,
     VariantShots,
 )
-from klack.analyses.stroke_shots.starts import CENTRED, Starts, StrokeStart, shots_of_valve
+from klack.analyses.workers import LoggedWork, grouped_doubts
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
 from klack.case.placed_errors import tells_place

@@ -235,9 +235,9 @@ class PointKind(Protocol[CaseT, Built]):
         built : object
         place : int
         check : callable
-            Called now and then; raises :class:`~klack.analyses.threads.Stopped` to give up.
+            Called now and then; raises :class:`~klack.analyses.study.computing.Stopped` to give up.
         taken : callable
-            See :func:`klack.analyses.threads.warnings_of_threads`.
+            See :func:`klack.analyses.study.computing.warnings_of_threads`.
         """
 
     def pressure(self, asked: "AskedPoints[CaseT]", built: Built, place: int) -> TimeSeries | None:

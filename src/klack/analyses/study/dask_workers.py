@@ -14,8 +14,7 @@ from uuid import uuid4
 import klack
 from klack.analyses.study.asked_points import AskedPoints, PointRow, groups_of
 from klack.analyses.study.computing import Agenda, Tally
-from klack.analyses.study.sent_points import Answer, PointOrder, SentCase, answered
-from klack.analyses.study.where import died_row
+from klack.analyses.study.where import Answer, PointOrder, SentCase, answered, died_row
 from klack.analyses.workers import Failure, unwrapped
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree

@@ -16,8 +16,8 @@ from klack.case.valve import ValveCase
 from klack.errors import InputError, KlackError
 from klack.input.problem import one_of
 from klack.progress import Progress
+from klack.studies.designs import Listed
 from klack.studies.polish import NoValue
-from klack.studies.spread import Listed
 
 __all__ = ["Gradients", "require_gradients"]
 

@@ -31,6 +31,7 @@ from klack.analyses.study.asked_points import (
     others_in,
     require_same_for_all,
 )
+from klack.analyses.study.computing import Stopped, never_stopped
 from klack.analyses.study.measures import (
     SHOTS,
     ChosenMeasure,
@@ -39,7 +40,6 @@ from klack.analyses.study.measures import (
     impact_measures,
     shot_notes,
 )
-from klack.analyses.threads import Stopped, never_stopped
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, case_at
 from klack.case.schema import Case

@@ -18,9 +18,8 @@ from klack.case.study import StudyRobust
 from klack.case.study_source import StudySource
 from klack.errors import InputError, refuse_if
 from klack.input.problem import CaseProblem, nearest, one_of
-from klack.studies.designs import sobol_sequence
+from klack.studies.designs import Listed, Normal, sobol_sequence
 from klack.studies.samples import RobustValue
-from klack.studies.spread import Listed, Normal
 from klack.units import Kind, format_si, parse_quantity
 
 __all__ = ["Compute", "MadeValves", "made_space", "made_valves_of"]

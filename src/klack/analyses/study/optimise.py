@@ -11,14 +11,16 @@ from numpy.typing import NDArray
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.sensitivities.parameters import SlopeSpace
 from klack.analyses.study.asked_points import AskedPoints, PointRow
-from klack.analyses.study.columns import (
+from klack.analyses.study.computing import sounds_of
+from klack.analyses.study.evaluation import (
+    Evaluation,
+    asked_of,
     measure_columns,
     point_fields,
+    point_log_form,
     require_some,
     row_warnings,
 )
-from klack.analyses.study.computing import sounds_of
-from klack.analyses.study.evaluation import Evaluation, asked_of, point_log_form
 from klack.analyses.study.goals import Goals, Side, goals_of, require_objectives
 from klack.analyses.study.gradients import Gradients, require_gradients
 from klack.analyses.study.live import Pace, Seen
@@ -36,11 +38,11 @@ from klack.errors import refuse_if
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
+from klack.studies.designs import Range
 from klack.studies.fronts import compromise, find_front, spread_over
 from klack.studies.polish import NoValue, polish
 from klack.studies.refinement import Refinement, RefinementSettings
 from klack.studies.search import Search, SearchSettings, require_pymoo
-from klack.studies.spread import Range
 
 __all__ = ["run_optimisation"]
 

@@ -21,10 +21,17 @@ from klack.case.study_source import StudySource
 from klack.errors import InputError, refuse_if
 from klack.expressions.expression import RESERVED, Expression, ordered
 from klack.input.problem import CaseProblem, Key, one_of
-from klack.studies.designs import balanced, latin_hypercube, sobol_sequence
+from klack.studies.designs import (
+    Listed,
+    Normal,
+    Range,
+    Spread,
+    balanced,
+    latin_hypercube,
+    sobol_sequence,
+)
 from klack.studies.screening import morris_design
 from klack.studies.sensitivity import saltelli_design
-from klack.studies.spread import Listed, Normal, Range, Spread
 from klack.units import KINDS, RATIO, TEMPERATURE, TEMPERATURE_RISE, Kind, format_si, parse_quantity
 
 __all__ = [

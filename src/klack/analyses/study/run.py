@@ -5,13 +5,15 @@ from time import perf_counter
 
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.study.asked_points import AskedPoints, PointRow
-from klack.analyses.study.columns import (
+from klack.analyses.study.evaluation import (
+    Evaluation,
+    asked_of,
     measure_columns,
     point_fields,
+    point_log_form,
     require_some,
     row_warnings,
 )
-from klack.analyses.study.evaluation import Evaluation, asked_of, point_log_form
 from klack.analyses.study.findings import (
     missed_bounds,
     require_surrogates,

@@ -4,9 +4,9 @@ from collections.abc import Iterable, Sequence
 
 from klack.analyses.point_table import NOT_COMPUTED, PointTable, RunsInterrupted, column_of
 from klack.analyses.study.asked_points import AskedPoints, PointRow
-from klack.analyses.study.columns import step_columns
+from klack.analyses.study.evaluation import step_columns
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.table import steps_of
+from klack.analyses.study.record import steps_of
 from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree

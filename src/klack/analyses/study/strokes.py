@@ -28,6 +28,7 @@ from klack.analyses.study.asked_points import (
     others_in,
     require_same_for_all,
 )
+from klack.analyses.study.computing import Stopped, never_stopped
 from klack.analyses.study.measures import (
     ChosenMeasure,
     PointNoise,
@@ -35,7 +36,6 @@ from klack.analyses.study.measures import (
     stroke_measures,
     told_until,
 )
-from klack.analyses.threads import Stopped, never_stopped
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
