@@ -11,7 +11,7 @@ from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
 from typing import NoReturn
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse_if
 from klack.expressions.dimension import (
     ANYTHING,
     HALF_TURN,
@@ -196,8 +196,15 @@ class Expression:
         """Raise where a word behind a number can be a unit and one of the known names."""
         for literal in nodes(self._root):
             for word in literal.words:
-                if word in known:
-                    raise _unit_or_name(self, literal, word)
+                refuse_if(
+                    word in known,
+                    self.where,
+                    got=f"'{literal.text}' at character {literal.place + 1} of '{self.text}', "
+                    f"where '{word}' is a unit and a parameter",
+                    expected="one meaning",
+                    hint=f"write blanks and the operator for the parameter ('2 * {word}', '2 / "
+                    f"{word}'), or rename it.",
+                )
 
 
 def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tuple[str, ...]:
@@ -266,17 +273,6 @@ def _unknown(expression: Expression, name: str, known: Collection[str]) -> Input
         hint=nearest(
             name, (*known, *sorted(RESERVED)), "write one of these names, or add the parameter."
         ),
-    )
-
-
-def _unit_or_name(expression: Expression, literal: Node, word: str) -> InputError:
-    return InputError(
-        expression.where,
-        got=f"'{literal.text}' at character {literal.place + 1} of '{expression.text}', where "
-        f"'{word}' is a unit and a parameter",
-        expected="one meaning",
-        hint=f"write blanks and the operator for the parameter ('2 * {word}', '2 / {word}'), or "
-        "rename it.",
     )
 
 

@@ -12,6 +12,7 @@
 import math
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 from klack.expressions.dimension import CELSIUS, Dimension, unit_literal, unit_words
@@ -285,7 +286,7 @@ class _Parser:
         if self.now.kind not in ("+", "-"):
             return self._power()
         start, symbol = self.now.start, "plus" if self._next().kind == "+" else "minus"
-        with _Level(self, start):
+        with self._level(start):
             return self._node(start, symbol, self._signed())
 
     def _power(self) -> Node:
@@ -297,7 +298,7 @@ class _Parser:
             hint = f"write ({base.text})^2 for the power of both, mm^2 for one of the unit."
             raise UnreadableError(got, start, hint)
         self._next()
-        with _Level(self, start):
+        with self._level(start):
             return self._node(start, "^", base, self._signed())
 
     def _value(self) -> Node:
@@ -315,7 +316,7 @@ class _Parser:
         if word.kind == "name":
             return self._named(word)
         if word.kind == "(":
-            with _Level(self, word.start):
+            with self._level(word.start):
                 inside = self._sum()
                 self._close(word)
             return inside
@@ -339,7 +340,7 @@ class _Parser:
             raise UnreadableError(f"'{name}(', no function", word.start, hint)
         bracket = self._next()
         arguments = []
-        with _Level(self, word.start):
+        with self._level(word.start):
             if self.now.kind != ")":
                 arguments.append(self._sum())
             while self.now.kind == ",":
@@ -352,6 +353,17 @@ class _Parser:
             got = f"'{self._since(word.start)}'"
             raise UnreadableError(got, word.start, f"give {count} to {name}.")
         return self._node(word.start, name, *arguments)
+
+    @contextmanager
+    def _level(self, start: int) -> Iterator[None]:
+        """One more level of parentheses, signs or powers, as long as it is read."""
+        self.level += 1
+        if self.level > _BRACKETS:
+            got = f"more than {_BRACKETS} levels of parentheses, signs and powers"
+            hint = "compute it in several steps, each a parameter."
+            raise UnreadableError(got, start, hint)
+        yield
+        self.level -= 1
 
     def _close(self, bracket: Token) -> None:
         if self.now.kind == "":
@@ -376,20 +388,3 @@ class _Parser:
         else:
             hint = "write a value before it."
         return UnreadableError(f"'{word.text}'", word.start, hint)
-
-
-class _Level:
-    """One more level of parentheses, signs or powers, as long as it is read."""
-
-    def __init__(self, parser: _Parser, start: int) -> None:
-        self.parser, self.start = parser, start
-
-    def __enter__(self) -> None:
-        self.parser.level += 1
-        if self.parser.level > _BRACKETS:
-            got = f"more than {_BRACKETS} levels of parentheses, signs and powers"
-            hint = "compute it in several steps, each a parameter."
-            raise UnreadableError(got, self.start, hint)
-
-    def __exit__(self, *exception: object) -> None:
-        self.parser.level -= 1

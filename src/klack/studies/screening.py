@@ -110,11 +110,31 @@ def morris_design(
     (60, 5)
     """
     require_size(trajectories * (parameters + 1), parameters)
-    _require_levels(levels)
-    if candidates is not None:
-        _require_candidates(parameters, trajectories, candidates)
-    ends = _for_each(parameters, bounded)
-    positions = np.stack([even_levels(levels, bounded=bool(end)) for end in ends])
+    refuse_if(
+        not 2 <= levels <= _MOST_LEVELS or levels % 2,
+        "levels",
+        got=f"{levels}",
+        expected=f"an even number from 2 to {_MOST_LEVELS}",
+        hint="4 is usual; the jump over half of an even number reaches all levels alike.",
+    )
+    most = int(np.sqrt(_MOST_WORK / (parameters * (parameters + 1) ** 2)))
+    refuse_if(
+        candidates is not None and not trajectories < candidates <= most,
+        "candidates",
+        got=f"{candidates} for {trajectories} trajectories of {parameters} parameters",
+        expected=f"more than {trajectories}, at most {most}",
+        hint="ten times the number of trajectories is usual; none takes them as drawn.",
+    )
+    ends = np.asarray(bounded, dtype=bool)
+    refuse_if(
+        ends.shape not in ((), (parameters,)),
+        "bounded",
+        got=f"an array of shape {ends.shape}",
+        expected=f"True, False, or one of them for each of {parameters} parameters",
+        hint="say for each parameter whether its range has ends.",
+    )
+    every = np.broadcast_to(ends, (parameters,))
+    positions = np.stack([even_levels(levels, bounded=bool(end)) for end in every])
     drawn = trajectories if candidates is None else candidates
     require_size(drawn * (parameters + 1), parameters)
     paths = np.stack([_trajectory(positions, seed, index) for index in range(drawn)])
@@ -154,12 +174,26 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
         If points and values do not match, or the points are no trajectories.
     """
     x, y = np.asarray(points, dtype=np.float64), np.asarray(values, dtype=np.float64)
-    _require_shapes(x, y)
+    fits = x.ndim == 2 and x.shape[1] and x.shape[0] and x.shape[0] % (x.shape[1] + 1) == 0
+    refuse_if(
+        not fits or y.shape != x.shape[:1],
+        "points",
+        got=f"points of shape {x.shape} and values of shape {y.shape}",
+        expected="trajectories of parameters + 1 points, and one value for each point",
+        hint="give points and values in the order of the design.",
+    )
     parameters = x.shape[1]
     paths = x.reshape(-1, parameters + 1, parameters)
     steps = np.diff(paths, axis=1)
-    _require_trajectories(steps)
-    moved = np.argmax(steps != 0, axis=2)
+    changed = steps != 0
+    refuse_if(
+        not (np.all(changed.sum(axis=2) == 1) and np.all(changed.sum(axis=1) == 1)),
+        "points",
+        got="points that are no trajectories",
+        expected="trajectories in which each parameter changes once, one at a time",
+        hint="give the points of the design unchanged and in its order.",
+    )
+    moved = np.argmax(changed, axis=2)
     jump = np.take_along_axis(steps, moved[..., None], axis=2)[..., 0]
     with np.errstate(invalid="ignore", over="ignore"):
         effect = np.diff(y.reshape(-1, parameters + 1), axis=1) / jump
@@ -248,59 +282,3 @@ def _scatter_error(effects: Floats) -> float:
         return np.nan
     without = np.array([np.std(np.delete(effects, i), ddof=1) for i in range(count)])
     return float(np.sqrt((count - 1) / count * np.sum((without - np.mean(without)) ** 2)))
-
-
-def _for_each(parameters: int, bounded: ArrayLike) -> NDArray[np.bool_]:
-    ends = np.asarray(bounded, dtype=bool)
-    refuse_if(
-        ends.shape not in ((), (parameters,)),
-        "bounded",
-        got=f"an array of shape {ends.shape}",
-        expected=f"True, False, or one of them for each of {parameters} parameters",
-        hint="say for each parameter whether its range has ends.",
-    )
-    return np.broadcast_to(ends, (parameters,))
-
-
-def _require_levels(levels: int) -> None:
-    refuse_if(
-        not 2 <= levels <= _MOST_LEVELS or levels % 2,
-        "levels",
-        got=f"{levels}",
-        expected=f"an even number from 2 to {_MOST_LEVELS}",
-        hint="4 is usual; the jump over half of an even number reaches all levels alike.",
-    )
-
-
-def _require_candidates(parameters: int, trajectories: int, candidates: int) -> None:
-    most = int(np.sqrt(_MOST_WORK / (parameters * (parameters + 1) ** 2)))
-    refuse_if(
-        not trajectories < candidates <= most,
-        "candidates",
-        got=f"{candidates} for {trajectories} trajectories of {parameters} parameters",
-        expected=f"more than {trajectories}, at most {most}",
-        hint="ten times the number of trajectories is usual; none takes them as drawn.",
-    )
-
-
-def _require_shapes(x: Floats, y: Floats) -> None:
-    fits = x.ndim == 2 and x.shape[1] and x.shape[0] and x.shape[0] % (x.shape[1] + 1) == 0
-    refuse_if(
-        not fits or y.shape != x.shape[:1],
-        "points",
-        got=f"points of shape {x.shape} and values of shape {y.shape}",
-        expected="trajectories of parameters + 1 points, and one value for each point",
-        hint="give points and values in the order of the design.",
-    )
-
-
-def _require_trajectories(steps: Floats) -> None:
-    """Raise unless each step changes one parameter, and each trajectory every one."""
-    changed = steps != 0
-    refuse_if(
-        not (np.all(changed.sum(axis=2) == 1) and np.all(changed.sum(axis=1) == 1)),
-        "points",
-        got="points that are no trajectories",
-        expected="trajectories in which each parameter changes once, one at a time",
-        hint="give the points of the design unchanged and in its order.",
-    )

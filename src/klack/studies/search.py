@@ -204,6 +204,8 @@ def require_pymoo() -> None:
 def _algorithm(settings: SearchSettings) -> Any:
     """Algorithm of pymoo, set up, with nothing shared with another one."""
     require_pymoo()
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.algorithms.soo.nonconvex.de import DE
     from pymoo.config import Config
     from pymoo.core.problem import Problem
     from pymoo.core.termination import NoTermination
@@ -216,23 +218,15 @@ def _algorithm(settings: SearchSettings) -> Any:
         xl=settings.edge,
         xu=highest(settings.edge),
     )
-    made = {"DE": _evolution, "NSGA-II": _nsga2, "NSGA-III": _nsga3}[settings.algorithm](settings)
+    made: Any
+    if settings.algorithm == "DE":
+        made = DE(pop_size=settings.population, variant="DE/best/1/bin", F=0.5, CR=0.9, output=None)
+    elif settings.algorithm == "NSGA-II":
+        made = NSGA2(pop_size=settings.population, output=None)
+    else:
+        made = _nsga3(settings)
     made.setup(problem, termination=NoTermination(), seed=int(settings.seed))
     return made
-
-
-def _evolution(settings: SearchSettings) -> Any:
-    """Differential evolution."""
-    from pymoo.algorithms.soo.nonconvex.de import DE
-
-    return DE(pop_size=settings.population, variant="DE/best/1/bin", F=0.5, CR=0.9, output=None)
-
-
-def _nsga2(settings: SearchSettings) -> Any:
-    """NSGA-II with the operators of pymoo."""
-    from pymoo.algorithms.moo.nsga2 import NSGA2
-
-    return NSGA2(pop_size=settings.population, output=None)
 
 
 def _nsga3(settings: SearchSettings) -> Any:

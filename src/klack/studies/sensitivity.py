@@ -159,7 +159,27 @@ def sobol_indices(
         range.
     """
     y = np.asarray(values, dtype=np.float64)
-    _require_arguments(y, parameters, confidence, resamples)
+    refuse_if(
+        parameters < 1 or y.ndim != 1 or y.size == 0 or y.size % (parameters + 2),
+        "values",
+        got=f"values of shape {y.shape} for {parameters} parameters",
+        expected=f"one value for each point: a multiple of {parameters + 2}",
+        hint="give the values in the order of the design, not a number where a point failed.",
+    )
+    refuse_if(
+        not 0.0 < confidence < 1.0,
+        "confidence",
+        got=f"{confidence:g}",
+        expected="a probability above 0 and below 1",
+        hint="the usual one is 0.95.",
+    )
+    refuse_if(
+        resamples < 100,
+        "resamples",
+        got=f"{resamples}",
+        expected="100 or more",
+        hint="the usual number is 1000.",
+    )
     rows = y.reshape(-1, parameters + 2)
     whole = rows[np.all(np.isfinite(rows), axis=1)]
     used, discarded = len(whole), len(rows) - len(whole)
@@ -231,27 +251,3 @@ def _means_again(terms: Floats, resamples: int, seed: int) -> Floats:
         times = np.stack([np.bincount(rows, minlength=count) for rows in drawn])
         means[start:stop] = times @ terms / count
     return means
-
-
-def _require_arguments(y: Floats, parameters: int, confidence: float, resamples: int) -> None:
-    refuse_if(
-        parameters < 1 or y.ndim != 1 or y.size == 0 or y.size % (parameters + 2),
-        "values",
-        got=f"values of shape {y.shape} for {parameters} parameters",
-        expected=f"one value for each point: a multiple of {parameters + 2}",
-        hint="give the values in the order of the design, not a number where a point failed.",
-    )
-    refuse_if(
-        not 0.0 < confidence < 1.0,
-        "confidence",
-        got=f"{confidence:g}",
-        expected="a probability above 0 and below 1",
-        hint="the usual one is 0.95.",
-    )
-    refuse_if(
-        resamples < 100,
-        "resamples",
-        got=f"{resamples}",
-        expected="100 or more",
-        hint="the usual number is 1000.",
-    )

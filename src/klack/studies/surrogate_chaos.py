@@ -115,7 +115,8 @@ class ChaosFit:
         least, found = _penalised(_matrix(own, none), values)[0], (0, none)
         enough = _ROUND_OFF**2 * np.sum((values - np.mean(values)) ** 2)
         best, tried = np.inf, 0
-        for degree, terms in _sets(self._axes, _most_terms(len(rows))):
+        most = int(np.clip(_MOST_NUMBERS / len(rows), 50, _MOST_TERMS))  # sorted in no time
+        for degree, terms in _sets(self._axes, most):
             if least <= enough or tried >= _PATIENCE:
                 break
             matrix = _matrix(own, terms)
@@ -143,11 +144,6 @@ class ChaosFit:
         return ChaosModel(
             self._axes, terms, scipy.linalg.solve_triangular(r, q.T @ y), int(terms.max())
         )
-
-
-def _most_terms(points: int) -> int:
-    """Candidates: as many as a fraction of a second sorts."""
-    return int(np.clip(_MOST_NUMBERS / points, 50, _MOST_TERMS))
 
 
 def _sorted_terms(matrix: Floats, y: Floats) -> NDArray[np.int64]:

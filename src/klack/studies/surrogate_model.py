@@ -61,7 +61,7 @@ class SurrogateAxis:
             density = np.exp(-0.5 * (CUT * gauss) ** 2) * half
             return cls(gauss, density / np.sum(density), (), spread)
         listed = spread.values
-        if _has_words(spread):
+        if any(isinstance(value, str) for value in listed):
             words = tuple(dict.fromkeys(map(str, listed)))
             each = np.array([words.index(str(value)) for value in listed])
             return cls(np.arange(len(words), dtype=float), _shares(each), words, spread)
@@ -155,10 +155,6 @@ class SurrogateAxis:
             own = (t[:, None] == np.arange(1, len(self.words))).astype(float)
             return np.hstack((np.ones((len(t), 1)), own if degree else own[:, :0]))
         return np.asarray(np.polynomial.legendre.legvander(t, degree), dtype=np.float64)
-
-
-def _has_words(spread: Listed) -> bool:
-    return any(isinstance(value, str) for value in spread.values)
 
 
 def _shares(places: NDArray[np.int64]) -> Floats:

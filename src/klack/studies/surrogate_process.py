@@ -80,7 +80,9 @@ class ProcessModel:
 
     def main_effect(self, parameter: int, t: Floats) -> Floats:
         """Mean over all other parameters where one has the coordinates t, shape of t."""
-        means = self._means()
+        means = np.array(
+            [axis.weights @ self._factor(k, axis.nodes) for k, axis in enumerate(self.axes)]
+        )
         means[parameter] = 1.0
         return self.mean + self._factor(parameter, t) @ (self.weights * np.prod(means, axis=0))
 
@@ -113,12 +115,6 @@ class ProcessModel:
 
     def _factor(self, k: int, t: Floats) -> Floats:
         return _factor(self.axes[k].columns(t), self.columns[k], self.lengths[k])
-
-    def _means(self) -> Floats:
-        """Means of the factors over their parameter, shape (parameters, points)."""
-        return np.array(
-            [axis.weights @ self._factor(k, axis.nodes) for k, axis in enumerate(self.axes)]
-        )
 
     def _moments(self, k: int) -> tuple[Any, Any]:
         """Means (points) and products (points, points) of the factors, in extended precision."""

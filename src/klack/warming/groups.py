@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pkgutil import iter_modules
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
 __all__ = ["GROUPS", "Group", "all_steps"]
 
@@ -26,23 +27,13 @@ class Group:
     compute: Callable[[], None]
 
 
-def _loop() -> None:
+def _loop(start: Literal["rest", "free"] = "free") -> None:
     from klack.simulation.network_run import simulate_network
     from klack.warming.small_valves import small_valve
 
     case = small_valve()
-    run = case.run
-    rows = case.network.network().rows()
-    simulate_network(rows, duration=run.duration, step=run.step, record=run.record, start="free")
-
-
-def _rest() -> None:
-    from klack.simulation.network_run import simulate_network
-    from klack.warming.small_valves import small_valve
-
-    case = small_valve()
-    rows = case.network.network().rows()
-    simulate_network(rows, duration=case.run.duration, step=case.run.step, record=case.run.record)
+    run, rows = case.run, case.network.network().rows()
+    simulate_network(rows, duration=run.duration, step=run.step, record=run.record, start=start)
 
 
 def _components() -> None:
@@ -99,16 +90,8 @@ def _spatial() -> None:
     run_stroke(spatial_valve("swept"))
 
 
-def _levels() -> None:
-    from klack.warming.small_impact import plain_impacts
-
-    plain_impacts()
-
-
-def _features() -> None:
-    from klack.warming.small_impact import featured_impacts
-
-    featured_impacts()
+def _small(impacts: str) -> None:
+    getattr(import_module("klack.warming.small_impact"), impacts)()
 
 
 def _impact() -> None:
@@ -126,9 +109,11 @@ GROUPS: Mapping[str, Group] = MappingProxyType(
         "valve": Group("meshes, bodies and contacts of a valve", _valve),
         "spatial": Group("strokes in three dimensions", _spatial),
         "components": Group("steps of all components", _components),
-        "rest": Group("static equilibrium", _rest),
-        "levels": Group("time loops of impacts", _levels),
-        "features": Group("the same with guide, friction, yield, rough faces", _features),
+        "rest": Group("static equilibrium", partial(_loop, "rest")),
+        "levels": Group("time loops of impacts", partial(_small, "plain_impacts")),
+        "features": Group(
+            "the same with guide, friction, yield, rough faces", partial(_small, "featured_impacts")
+        ),
         "impact": Group("meshes, bodies and contacts of impacts", _impact),
     }
 )

@@ -249,6 +249,18 @@ _STOPS = {"opening": "opening stop", "seat": "seat"}
 
 def calibration_content(study: CalibrationStudy) -> Content:
     """Put a calibration into words, tables and figures."""
+    by_name = {item.name: item for item in study.parameters}
+    keys = Table(
+        columns=("parameter", "key of the case"),
+        rows=tuple((name, ", ".join(item.keys)) for name, item in by_name.items()),
+    )
+    impacts = Table(
+        columns=("first impact on", *page_heads(FITTED_MEASURES)),
+        rows=tuple(
+            (_STOPS.get(impact.stop, impact.stop), *page_cells(FITTED_MEASURES, impact))
+            for impact in study.impacts
+        ),
+    )
     sections = [
         Section(title="The strokes", charts=tuple(stroke_chart(study, c) for c in study.channels)),
         Section(
@@ -258,11 +270,14 @@ def calibration_content(study: CalibrationStudy) -> Content:
                 for channel in study.channels[:1]
                 for window in study.windows
             ),
-            tables=(_impact_table(study),) if study.impacts else (),
+            tables=(impacts,) if study.impacts else (),
         ),
         _correlations(study),
-        _profiles(study),
-        Section(title="Input", tables=(_key_table(study), _fact_table(study))),
+        Section(
+            title="Profile likelihood",
+            charts=tuple(profile_chart(p, by_name[p.name]) for p in study.profiles),
+        ),
+        Section(title="Input", tables=(keys, _fact_table(study))),
     ]
     return page_of(
         study,
@@ -340,21 +355,6 @@ def _span(ends: Iterable[str]) -> str:
     return " to ".join(ends)
 
 
-def _key_table(study: CalibrationStudy) -> Table:
-    rows = tuple((item.name, ", ".join(item.keys)) for item in study.parameters)
-    return Table(columns=("parameter", "key of the case"), rows=rows)
-
-
-def _impact_table(study: CalibrationStudy) -> Table:
-    return Table(
-        columns=("first impact on", *page_heads(FITTED_MEASURES)),
-        rows=tuple(
-            (_STOPS.get(impact.stop, impact.stop), *page_cells(FITTED_MEASURES, impact))
-            for impact in study.impacts
-        ),
-    )
-
-
 def _fact_table(study: CalibrationStudy) -> Table:
     window = "; ".join(
         f"{w.what}: {quantity(w.first, 's')} to {quantity(w.last, 's')}" for w in study.windows
@@ -399,14 +399,6 @@ def _correlations(study: CalibrationStudy) -> Section:
         "windows, if all samples scattered independently.",
     )
     return Section(title=title, picture=figure)
-
-
-def _profiles(study: CalibrationStudy) -> Section:
-    by_name = {item.name: item for item in study.parameters}
-    return Section(
-        title="Profile likelihood",
-        charts=tuple(profile_chart(p, by_name[p.name]) for p in study.profiles),
-    )
 
 
 # --------------------------------------------------------------------------- words

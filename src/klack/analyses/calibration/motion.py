@@ -117,7 +117,11 @@ class MotionModel:
             When a step of the solver fails.
         """
         case = self.tree.case(self.changes(values))
-        network = filled_network(case, self._damped(case), self.laws)
+        damped = {  # with the damping of the case; everything else of bodies is as it was
+            name: replace(body, damping=damping_of(case.bodies[name].damping).ratios(body.omega))
+            for name, body in self.reduced.items()
+        }
+        network = filled_network(case, damped, self.laws)
         if self.variant == "dry":
             network = network.dry()
         run = case.run
@@ -143,13 +147,6 @@ class MotionModel:
                 if name
             },
         )
-
-    def _damped(self, case: ValveCase) -> dict[str, ReducedBody]:
-        """Bodies with the damping of the case; everything else of them is as it was."""
-        return {
-            name: replace(body, damping=damping_of(case.bodies[name].damping).ratios(body.omega))
-            for name, body in self.reduced.items()
-        }
 
 
 def channel_names(

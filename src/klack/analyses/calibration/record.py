@@ -277,10 +277,6 @@ PARAMETER_MEASURES = (VALUE, STANDARD_ERROR, *INTERVAL, SCATTER, START, *BOUNDS)
 """Of one parameter, in its unit."""
 
 
-def _resumed(study: CalibrationStudy) -> str:
-    return f", {count(study.resumed)} of them from an earlier run" if study.resumed else ""
-
-
 CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = described_in(
     _THEORY,
     Measure(
@@ -343,7 +339,9 @@ CALIBRATION_MEASURES: tuple[Measure[CalibrationStudy], ...] = described_in(
         name="computed strokes",
         definition="Strokes that were computed for the fit.",
         kind="whole",
-        remark=_resumed,
+        remark=lambda study: (
+            f", {count(study.resumed)} of them from an earlier run" if study.resumed else ""
+        ),
         page=True,
     ),
     Measure(

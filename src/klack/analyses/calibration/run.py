@@ -1,9 +1,10 @@
 """``klack calibrate``: fit chosen numbers of a valve to measured strokes."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,10 +163,9 @@ def run_calibration(
                 counted=np.ones(strokes.time.size, dtype=bool),
                 duration=case.run.duration,
             )
-            result = _calibrate(case, section, strokes, shown, clock)
+            found = _calibrate(case, section, strokes, shown, clock)
             evaluations = len(pool.used)
             resumed = sum(key in pool.used for key in list(log.done)[:resumed])
-    found = result.covariance
     return CalibrationStudy(
         **case_fields(case),
         **run_fields(begin, clock),
@@ -174,25 +174,12 @@ def run_calibration(
         strokes=tuple(stroke.name for stroke in strokes.strokes),
         rejected=tuple(f"{item.name}: {item.reason}" for item in strokes.rejected),
         variant=section.variant,
-        parameters=_parameters(parameters, result.fit, found),
-        correlation=found.correlation,
-        design_correlation=result.design_correlation,
-        singular_values=result.singular_values,
+        warnings=(*strokes.notes, *notes, *found.pop("doubts")),
         time=strokes.time,
-        channels=result.channels,
-        windows=result.windows,
-        impacts=result.impacts,
-        profiles=result.profiles,
-        residual_rms=result.residual_rms,
-        residual_rms_before=result.residual_rms_before,
-        misfit=result.misfit,
-        degrees=found.degrees,
-        iterations=result.fit.iterations,
         evaluations=evaluations,
         resumed=resumed,
         workers=workers,
-        converged=result.fit.converged,
-        warnings=(*strokes.notes, *notes, *result.warnings),
+        **found,
     )
 
 
@@ -256,30 +243,17 @@ def _motion_model(
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Result:
-    fit: Fit
-    covariance: ShotCovariance
-    design_correlation: NDArray[np.float64]
-    singular_values: Vector
-    channels: tuple[FittedChannel, ...]
-    windows: tuple[FitWindow, ...]
-    impacts: tuple[FittedImpact, ...]
-    profiles: tuple[ProfileCurve, ...]
-    residual_rms: float
-    residual_rms_before: float
-    misfit: float
-    warnings: tuple[str, ...]
-
-
 def _calibrate(
     case: ValveCase,
     section: CaseCalibration,
     strokes: StrokeSet,
     whole: StrokeModel,
     clock: StageClock,
-) -> _Result:
-    """Fit, judge and follow the parameters; ``whole`` computes all samples of a stroke."""
+) -> dict[str, Any]:
+    """Fit, judge and follow the parameters; ``whole`` computes all samples of a stroke.
+
+    What the record tells of it, and doubts.
+    """
     parameters = whole.parameters
     start = np.array([p.start for p in parameters])
     at_start = whole.motion(start, whole.duration)
@@ -326,9 +300,9 @@ def _calibrate(
         _impacts_of(time, after["lift"], whole.sensor_of(values)),
     )
     names = [p.name for p in parameters]
-    return _Result(
-        fit=fit,
-        covariance=covariance,
+    return dict(
+        parameters=_parameters(parameters, fit, covariance),
+        correlation=covariance.correlation,
         design_correlation=seen.correlation,
         singular_values=seen.singular_values,
         channels=tuple(
@@ -341,7 +315,10 @@ def _calibrate(
         residual_rms=_rms(lift - after["lift"], counted),
         residual_rms_before=_rms(lift - before["lift"], counted),
         misfit=misfit,
-        warnings=(
+        degrees=covariance.degrees,
+        iterations=fit.iterations,
+        converged=fit.converged,
+        doubts=(
             *restless,
             *_doubts(fit, misfit, strokes.count, len(names), impacts, windows),
             *identifiability_warnings(names, fit.z, seen, covariance),

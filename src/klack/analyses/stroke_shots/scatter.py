@@ -1,4 +1,4 @@
-"""Scatter of many strokes: its interval, its ratio between variants, what it goes with; in words."""
+"""Scatter of many strokes: interval, ratio between variants, what it goes with; and in words."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

@@ -7,13 +7,14 @@ depend neither on the number of threads nor on the other points.
 
 import threading
 import warnings
+from abc import abstractmethod
 from collections import OrderedDict, deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cache
 from queue import Empty, SimpleQueue
-from typing import Any, Protocol, TextIO, TypeVar
+from typing import Any, TextIO, TypeVar
 
 from threadpoolctl import ThreadpoolController
 
@@ -309,9 +310,9 @@ def compute_points(
     asked: AskedPoints,
     places: Iterable[int],
     keep: Callable[[int, PointRow], None],
-    threads: int | None = None,
-    progress: Progress = silent,
-    builds: Builds | None = None,
+    threads: int | None,
+    progress: Progress,
+    builds: Builds,
 ) -> int:
     """Compute some of the points, those with the same bodies one after another.
 
@@ -324,7 +325,7 @@ def compute_points(
         Called in this thread with each place and its row, in the order of their end.
     threads : int, optional
     progress : callable
-    builds : Builds, optional
+    builds : Builds
         Bodies and laws that were made before.
 
     Returns
@@ -341,11 +342,10 @@ def compute_points(
     """
     wanted, most = list(places), 0
     tally = Tally(len(asked.points), len(wanted), keep, progress)
-    holder = Builds() if builds is None else nullcontext(builds)
-    with holder as kept, tally, one_thread_of_blas():
+    with tally, one_thread_of_blas():
         for group in groups_of(asked, wanted):
             tally.tell()
-            most = max(most, _run_group(asked, group, tally, threads, progress, kept))
+            most = max(most, _run_group(asked, group, tally, threads, progress, builds))
     return most
 
 
@@ -472,22 +472,18 @@ def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None
     return tuple(found)
 
 
-class PointWorkers(Protocol):
-    """Threads, processes or a cluster that compute points.
+class PointWorkers(Closing):
+    """Threads, processes or a cluster that compute points, which end when it is closed.
 
     A row does not depend on who computes it: every point is computed alone, by one thread.
     """
 
-    @property
-    def count(self) -> int:
-        """Points that are computed at a time."""
-        ...
+    count: int
+    """Points that are computed at a time."""
+    words: str
+    """What they are: ``threads``, ``processes``."""
 
-    @property
-    def words(self) -> str:
-        """What they are: ``threads``, ``processes``."""
-        ...
-
+    @abstractmethod
     def compute(
         self,
         asked: AskedPoints,
@@ -513,14 +509,9 @@ class PointWorkers(Protocol):
         KeyboardInterrupt
             Ctrl-C, after the rows that were finished have been kept.
         """
-        ...
-
-    def close(self) -> None:
-        """End them."""
-        ...
 
 
-class ThreadWorkers(Closing):
+class ThreadWorkers(PointWorkers):
     """Threads of this process: strokes run outside of the interpreter.
 
     Parameters
@@ -532,13 +523,8 @@ class ThreadWorkers(Closing):
     words = "threads"
 
     def __init__(self, threads: int | None = None) -> None:
-        self._threads, self._builds = threads, Builds()
-        self._most = 0
-
-    @property
-    def count(self) -> int:
-        """Threads that computed points at a time, at most; those that may before the first."""
-        return self._most or self._threads or available_cores()
+        self._threads, self._builds, self._most = threads, Builds(), 0
+        self.count = threads or available_cores()
 
     def compute(
         self,
@@ -547,10 +533,10 @@ class ThreadWorkers(Closing):
         keep: Callable[[int, PointRow], None],
         progress: Progress,
     ) -> None:
-        """Compute some of the points, those with the same bodies one after another."""
-        threads, builds = self._threads, self._builds
-        most = compute_points(asked, places, keep, threads, progress, builds)
+        """Compute some of the points; ``count`` are the threads that this takes, at most."""
+        most = compute_points(asked, places, keep, self._threads, progress, self._builds)
         self._most = max(self._most, most)
+        self.count = self._most or self.count
 
     def close(self) -> None:
         """Forget the bodies."""

@@ -13,12 +13,11 @@ from uuid import uuid4
 
 import klack
 from klack.analyses.study.asked_points import AskedPoints, PointRow, groups_of
-from klack.analyses.study.computing import Agenda, Tally
+from klack.analyses.study.computing import Agenda, PointWorkers, Tally
 from klack.analyses.study.where import Answer, PointOrder, SentCase, answered, died_row
 from klack.analyses.workers import Failure, unwrapped
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
-from klack.closing import Closing
 from klack.errors import ConvergenceError, InputError, MissingExtraError
 from klack.progress import Progress, remark
 
@@ -209,7 +208,7 @@ def require_dask() -> None:
         raise MissingExtraError("distributed", "A study on a cluster", "dask") from None
 
 
-class DaskWorkers(Closing):
+class DaskWorkers(PointWorkers):
     """Workers of a cluster of dask compute, this process keeps the rows.
 
     Points that a lost worker had at that moment are computed by others.

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from time import perf_counter
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +33,8 @@ from klack.errors import InputError
 from klack.progress import Progress
 
 __all__ = [
-    "EffortFields",
     "Evaluation",
     "KeptPoint",
-    "PointFields",
     "asked_of",
     "measure_columns",
     "point_fields",
@@ -186,16 +184,6 @@ _KEYS = ("measures", "variant", "level")
 """Keys of a study that errors name without their file."""
 
 
-class EffortFields(TypedDict):
-    """Fields of a record that tell who computed its points, and how many were known."""
-
-    threads: int
-    workers: str
-    computed: int
-    kept: int
-    point_time: float
-
-
 def asked_of(
     case: AnyCase,
     tree: CaseTree,
@@ -248,7 +236,8 @@ class Evaluation:
             point_key(asked.tree, asked.variant, row, checks=asked.checks)
             for row in asked.points.written
         ]
-        self.so_far = rows = [self._known(key, measures) for key in keys]
+        kept = [self._log.done.get(key) for key in keys]
+        self.so_far = rows = [None if point is None else point.row(measures) for point in kept]
         first: dict[str, int] = {}
         for place, (key, row) in enumerate(zip(keys, rows, strict=True)):
             if row is None:
@@ -267,34 +256,19 @@ class Evaluation:
             order = sorted(first.values(), key=lambda place: bool(asked.points.written[place]))
             self._workers.compute(asked, tuple(order), keep, progress)
         self.seconds += perf_counter() - begin
-        return [
-            row or self._as(rows, first, key, measures) for key, row in zip(keys, rows, strict=True)
-        ]
+        none = PointRow((None,) * len(measures), "not computed", by_chance=True)
+        # the row of a point that equals an earlier one is there
+        return [row or rows[first[key]] or none for key, row in zip(keys, rows, strict=True)]
 
-    def effort(self, points: int) -> EffortFields:
+    def effort(self, points: int) -> dict[str, Any]:
         """What a record of so many points tells."""
-        return EffortFields(
+        return dict(
             threads=self._workers.count,
             workers=self._workers.words,
             computed=self.computed,
             kept=points - self.computed,
             point_time=self.seconds,
         )
-
-    def _known(self, key: str, measures: tuple[str, ...]) -> PointRow | None:
-        kept = self._log.done.get(key)
-        return None if kept is None else kept.row(measures)
-
-    def _as(
-        self,
-        rows: Sequence[PointRow | None],
-        first: dict[str, int],
-        key: str,
-        measures: tuple[str, ...],
-    ) -> PointRow:
-        """Row of a point that equals an earlier one."""
-        none = PointRow((None,) * len(measures), "not computed", by_chance=True)
-        return rows[first[key]] or none
 
 
 _NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[+-]?\d+)?")
@@ -320,30 +294,17 @@ def require_some(source: StudySource, rows: Sequence[PointRow]) -> None:
         )
 
 
-class PointFields(TypedDict):
-    """Fields of a record that its points give, beside their measures."""
-
-    variant: str
-    parameters: tuple[StudyColumn, ...]
-    linked: tuple[StudyColumn, ...]
-    failures: tuple[str, ...]
-    notes: tuple[str, ...]
-    model: str
-    halvings: NDArray[np.float64]
-    step_changes: NDArray[np.float64]
-
-
 def point_fields(
     asked: AskedPoints,
     space: Space,
     values: Sequence[Values],
     rows: Sequence[PointRow],
     today: PointRow,
-) -> PointFields:
+) -> dict[str, Any]:
     """Values of the parameters and of what follows from them, and how each point ended."""
     known = space.known()
     steps = step_columns(rows)
-    return PointFields(
+    return dict(
         variant=asked.variant,
         parameters=tuple(
             _column(values, item.name, item.unit, item.text(), known.get(item.name))

@@ -1,10 +1,9 @@
-"""Where the points of a study are computed: threads, processes, a cluster; how they travel there."""
+"""Where the points of a study are computed: threads, processes, a cluster; how they get there."""
 
 import os
 import pickle
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
 from hashlib import sha256
@@ -31,7 +30,6 @@ from klack.analyses.workers import Failure, WorkerDied, WorkerPool, answer, shar
 from klack.case.any_case import AnyCase
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, Points, PointValue
-from klack.closing import Closing
 from klack.cores import available_cores
 from klack.elasticity.factorization import chosen_backend
 from klack.errors import ConvergenceError, InputError, refuse_if
@@ -300,7 +298,7 @@ _ATTEMPTS = 3
 _Asked = tuple[tuple[int, ...], PointOrder]
 
 
-class ProcessWorkers(Closing):
+class ProcessWorkers(PointWorkers):
     """Processes of this machine, of one thread each.
 
     They start with the first points, end with this one, however it ends, and do not hear Ctrl-C.
@@ -449,22 +447,14 @@ class Where:
 
             require_dask()
 
-    @contextmanager
-    def open(self, case: AnyCase, tree: CaseTree) -> Iterator[PointWorkers]:
-        """Workers for the points of a case, which end with this block.
+    def open(self, case: AnyCase, tree: CaseTree) -> PointWorkers:
+        """Workers for the points of a case.
 
         Raises
         ------
         InputError
             If they do not fit into the memory; if the scheduler of a cluster does not answer.
         """
-        workers = self._of(case, tree)
-        try:
-            yield workers
-        finally:
-            workers.close()
-
-    def _of(self, case: AnyCase, tree: CaseTree) -> PointWorkers:
         if self.dask is not None:
             from klack.analyses.study.dask_workers import DaskWorkers
 
@@ -480,22 +470,15 @@ HERE = Where()
 """All cores of this process."""
 
 
-class _Fitting(Closing):
+class _Fitting(PointWorkers):
     """Threads, until there are many points that processes compute faster."""
 
     def __init__(self, case: AnyCase, tree: CaseTree) -> None:
         self._case, self._tree = case, tree
         self._chosen: PointWorkers = ThreadWorkers()
+        self.count, self.words = self._chosen.count, self._chosen.words
         self._points = 0
         self._bodies: set[tuple[object, ...]] = set()
-
-    @property
-    def count(self) -> int:
-        return self._chosen.count
-
-    @property
-    def words(self) -> str:
-        return self._chosen.words
 
     def compute(
         self,
@@ -507,7 +490,9 @@ class _Fitting(Closing):
         if isinstance(self._chosen, ThreadWorkers) and self._pays(asked, places):
             self._chosen.close()
             self._chosen = ProcessWorkers(self._case, self._tree, self._processes())
+            self.count, self.words = self._chosen.count, self._chosen.words
         self._chosen.compute(asked, places, keep, progress)
+        self.count = self._chosen.count
 
     def close(self) -> None:
         self._chosen.close()
@@ -516,15 +501,11 @@ class _Fitting(Closing):
         """Whether these points hold the interpreter for long."""
         self._points += len(places)
         self._bodies |= {tuple(group.made.items()) for group in groups_of(asked, places)}
-        if self._processes() < 2 or _has_python(self._case):
+        # components of the user's own and FMUs need not bear several calls at a time
+        if self._processes() < 2 or self._case.own_components or self._case.component_files:
             return False
         slow = asked.kind.holds_interpreter(asked) and self._points >= _HOLDING
         return slow or len(self._bodies) >= _GEOMETRIES
 
     def _processes(self) -> int:
         return min(available_cores(), int(0.8 * available_memory().size / PROCESS_SIZE))
-
-
-def _has_python(case: AnyCase) -> bool:
-    """Components of the user's own and FMUs, which need not bear several calls at a time."""
-    return bool(case.own_components) or bool(case.component_files)
