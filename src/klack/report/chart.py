@@ -5,12 +5,13 @@ matplotlib for paper.  Curves are told apart by line style as well as by colour,
 white copy stays readable; the colours are those of Okabe & Ito (2008), safe for colour-blind eyes.
 """
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import ceil, floor, log10
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
 from klack.report.ring_frames import RingFrames
@@ -31,6 +32,7 @@ __all__ = [
     "Panel",
     "ParallelAxis",
     "ParallelChart",
+    "dots",
     "stems",
 ]
 
@@ -260,6 +262,21 @@ class ParallelChart:
 
 
 AnyChart = Chart | BarChart | ParallelChart | RingFrames
+
+
+def dots(
+    x: ArrayLike, y: ArrayLike, label: str, colour: Colour, width: float, names: Iterable[str]
+) -> Curve:
+    """Points, also a single one, each with its name under the pointer."""
+    return Curve(
+        x=np.atleast_1d(np.asarray(x, dtype=float)),
+        y=np.atleast_1d(np.asarray(y, dtype=float)),
+        label=label,
+        colour=colour,
+        width=width,
+        drawn="points",
+        names=tuple(names),
+    )
 
 
 def stems(

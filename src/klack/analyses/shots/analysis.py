@@ -4,8 +4,7 @@
 """
 
 from collections.abc import Iterator
-from math import isfinite
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Field
 from typing_extensions import TypedDict
@@ -18,13 +17,11 @@ from klack.analyses.shots.record import (
     FIRST_IMPACT,
     RULE_MEASURES,
     SHOT_MEASURES,
-    RuleVerdict,
-    ShotColumns,
     ShotsStudy,
 )
+from klack.analyses.shots.wording import told_value
 from klack.analyses.store import RecordFormat
 from klack.terminal.tables import TextTable
-from klack.units import format_si
 
 __all__ = ["DISTRIBUTION_COLUMNS", "SHOTS", "distribution_rows", "shots_to_json"]
 
@@ -89,24 +86,26 @@ def shots_to_json(study: ShotsStudy) -> ShotsJson:
         standard deviation and quantiles; ``rule``: highest rebound minus centred shot.  Numbers
         that do not exist (nan) are None.
     """
-    return {
+    shots, rule = study.shots, study.rule
+    found: Any = {
         "schema": "klack-shots/1",
         "case": study.case,
         "klack": study.version,
         "seed": study.seed,
-        "centric": _row(study.centric, 0),
-        "shots": [_row(study.shots, i) for i in range(study.shots.count)],
+        "centric": json_of(SHOT_MEASURES, study.centric.row(0)),
+        "shots": [json_of(SHOT_MEASURES, shots.row(i)) for i in range(shots.count)],
         "highest": study.highest,
         "distribution": {
-            measure.json_key: moments(getattr(study.shots, measure.key)) for measure in FIRST_IMPACT
+            measure.json_key: moments(getattr(shots, measure.key)) for measure in FIRST_IMPACT
         },
-        "rule": _rule(study.rule),
+        "rule": {"holds": rule.holds, **json_of(RULE_MEASURES, rule), "sentence": rule.sentence},
         "wall_time_s": number_or_none(study.wall_time),
         "shot_time_s": number_or_none(study.shot_time),
         "workers": study.workers,
         "resumed": study.resumed,
         "warnings": list(study.warnings),
     }
+    return cast(ShotsJson, found)
 
 
 def shots_told(study: ShotsStudy) -> Iterator[TextTable | str]:
@@ -135,22 +134,8 @@ def distribution_rows(study: ShotsStudy) -> tuple[tuple[str, ...], ...]:
             float(values[study.highest]),
             *(float("nan") if number is None else number for number in found.values()),
         )
-        rows.append((measure.name, *(_text(number, measure.unit) for number in numbers)))
+        rows.append((measure.name, *(told_value(number, measure.unit) for number in numbers)))
     return tuple(rows)
-
-
-def _rule(rule: RuleVerdict) -> Any:
-    return {"holds": rule.holds, **json_of(RULE_MEASURES, rule), "sentence": rule.sentence}
-
-
-def _row(columns: ShotColumns, index: int) -> Any:
-    return json_of(SHOT_MEASURES, columns.row(index))
-
-
-def _text(value: float, unit: str) -> str:
-    if not isfinite(value):
-        return "–"
-    return format_si(value, unit) if unit != "1" else f"{value:.4f}"
 
 
 SHOTS = StoredAnalysis(

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.analyses.impact.pressure_figure import pressure_figure
 from klack.analyses.impact.pressure_view import PressureView, pressure_view
@@ -31,8 +30,10 @@ from klack.analyses.shots.record import (
     ShotsStudy,
 )
 from klack.analyses.shots.wording import (
+    degrees,
     largest_size,
     length_unit,
+    plain,
     shot_name,
     shots_answer,
 )
@@ -53,7 +54,12 @@ def shots_content(study: ShotsStudy) -> Content:
         Section(
             title="Is the highest rebound the centred one?",
             paragraphs=(_rule(study),),
-            charts=tuple(rebound_chart(study, shown) for shown in _explaining(study)),
+            charts=tuple(
+                rebound_chart(study, shown)
+                for shown in _drawn_numbers(study)
+                if shown.column in ("eccentricity", "tilt")
+                or abs(_related(study, shown)) > _RELATED
+            ),
         ),
         Section(title="Placement of the shots", picture=shots_map(study)),
         Section(title="Distribution of the rebounds", charts=(distribution_chart(study),)),
@@ -82,11 +88,9 @@ def _rule(study: ShotsStudy) -> str:
     """Position of the centred impact among the shots, and the correlation of the rebound."""
     rank, text = study.rule.rank, "No shot rebounds as high as the centred impact."
     if rank:
-        text = f"{_shots_of(rank)} at least as high as the centred impact."
-    related = {
-        shown.label: rank_correlation(shown.of(study.shots), study.shots.rebound_height)
-        for shown in _drawn_numbers(study)
-    }
+        those = "One shot rebounds" if rank == 1 else f"{rank} shots rebound"
+        text = f"{those} at least as high as the centred impact."
+    related = {shown.label: _related(study, shown) for shown in _drawn_numbers(study)}
     related = {label: value for label, value in related.items() if abs(value) > _RELATED}
     if related:
         strongest = max(related, key=lambda label: abs(related[label]))
@@ -98,8 +102,9 @@ def _rule(study: ShotsStudy) -> str:
     return text
 
 
-def _shots_of(number: int) -> str:
-    return "One shot rebounds" if number == 1 else f"{number} shots rebound"
+def _related(study: ShotsStudy, shown: Shown) -> float:
+    """Rank correlation of a drawn quantity with the rebound height."""
+    return rank_correlation(shown.of(study.shots), study.shots.rebound_height)
 
 
 def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
@@ -114,17 +119,6 @@ def _drawn_numbers(study: ShotsStudy) -> list[Shown]:
     )
     varying = [shown for shown in candidates if _varies(study.shots, shown.column)]
     return varying or list(candidates[:2])
-
-
-def _explaining(study: ShotsStudy) -> list[Shown]:
-    """Eccentricity, tilt, and other correlates of the rebound height."""
-    height = study.shots.rebound_height
-    return [
-        shown
-        for shown in _drawn_numbers(study)
-        if shown.column in ("eccentricity", "tilt")
-        or abs(rank_correlation(shown.of(study.shots), height)) > _RELATED
-    ]
 
 
 def _varies(shots: ShotColumns, column: str) -> bool:
@@ -211,35 +205,24 @@ def _columns(study: ShotsStudy) -> tuple[tuple[str, _ShotText, str, bool], ...]:
     """Head, text, column, and whether it stands there even if it never varies."""
     unit, factor = length_unit(study.shots.rebound_height)
     return (
-        ("eccentricity\n[µm]", _plain("eccentricity", 1e6, 2), "eccentricity", True),
-        ("towards\n[°]", _angle("direction"), "direction", False),
-        ("tilt\n[°]", _plain("tilt", np.degrees(1.0), 4), "tilt", True),
-        ("towards\n[°]", _angle("tilt_direction"), "tilt_direction", False),
-        ("force\n[N]", _plain("force", 1.0, 2), "force", False),
-        ("friction\nguide", _plain("friction", 1.0, 3), "friction", False),
-        ("friction\nfaces", _plain("contact_friction", 1.0, 3), "contact_friction", False),
-        ("waviness\n[nm]", _plain("waviness", 1e9, 0), "waviness", False),
-        ("restitution", _plain("restitution", 1.0, 4), "restitution", True),
-        (f"rebound\n[{unit}]", _plain("rebound_height", factor, 3), "rebound_height", True),
-        ("peak\n[N]", _plain("peak_force", 1.0, 1), "peak_force", True),
-        ("contact\n[µs]", _plain("contact_time", 1e6, 2), "contact_time", True),
-        ("lost\n[%]", _plain("friction_loss", 100.0, 1), "friction_loss", False),
+        ("eccentricity\n[µm]", _fixed("eccentricity", 1e6, 2), "eccentricity", True),
+        ("towards\n[°]", lambda row: degrees(row["direction"]), "direction", False),
+        ("tilt\n[°]", _fixed("tilt", np.degrees(1.0), 4), "tilt", True),
+        ("towards\n[°]", lambda row: degrees(row["tilt_direction"]), "tilt_direction", False),
+        ("force\n[N]", _fixed("force", 1.0, 2), "force", False),
+        ("friction\nguide", _fixed("friction", 1.0, 3), "friction", False),
+        ("friction\nfaces", _fixed("contact_friction", 1.0, 3), "contact_friction", False),
+        ("waviness\n[nm]", _fixed("waviness", 1e9, 0), "waviness", False),
+        ("restitution", _fixed("restitution", 1.0, 4), "restitution", True),
+        (f"rebound\n[{unit}]", _fixed("rebound_height", factor, 3), "rebound_height", True),
+        ("peak\n[N]", _fixed("peak_force", 1.0, 1), "peak_force", True),
+        ("contact\n[µs]", _fixed("contact_time", 1e6, 2), "contact_time", True),
+        ("lost\n[%]", _fixed("friction_loss", 100.0, 1), "friction_loss", False),
     )
 
 
-def _angle(column: str) -> _ShotText:
-    """Whole degrees from 0 to 359."""
-    return lambda row: f"{round(np.degrees(row[column])) % 360}"
-
-
-def _plain(column: str, factor: float, decimals: int) -> _ShotText:
-    def text(row: dict[str, float]) -> str:
-        value = factor * row[column]
-        if not np.isfinite(value):
-            return "–"
-        return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
-
-    return text
+def _fixed(column: str, factor: float, decimals: int) -> _ShotText:
+    return lambda row: plain(factor * row[column], decimals)
 
 
 # --------------------------------------------------------------------------- numbers
@@ -247,8 +230,7 @@ def _plain(column: str, factor: float, decimals: int) -> _ShotText:
 
 def _number_table(study: ShotsStudy) -> Table:
     """Centred, highest, and the spread of all shots."""
-    rows = [_number_row(study, measure) for measure in FIRST_IMPACT]
-    rows += [_share_row(study, measure) for measure in _shares(study)]
+    rows = [_number_row(study, measure) for measure in (*FIRST_IMPACT, *_shares(study))]
     worst = largest_size(study.shots.energy_residual)
     rows.append(("energy residual, largest", "", "", "", "", f"{worst:.1e}".replace("-", "−")))
     return Table(
@@ -267,21 +249,22 @@ def _number_table(study: ShotsStudy) -> Table:
 def _number_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
     values = np.asarray(getattr(study.shots, measure.key))
     centred = float(getattr(study.centric, measure.key)[0])
-    best = float(values[study.highest])
-    apart = best - centred
-    if measure.unit != "1":
-        bias = signed_share(apart / centred) if centred else "–"
-    else:
-        bias = signed(apart, 4)
     if not np.isfinite(values).any():
         return (measure.name, measure.printed(centred), *["–"] * 4)
+    best = float(values[study.highest])
+    apart, printed = best - centred, measure.printed
+    bias = ""
+    if measure in FIRST_IMPACT and measure.unit != "1":
+        bias = f"\n{signed_share(apart / centred) if centred else '–'}"
+    elif measure in FIRST_IMPACT:
+        bias = f"\n{signed(apart, 4)}"
     return (
         measure.name,
-        measure.printed(centred),
-        f"{measure.printed(best)}\n{bias}",
-        measure.printed(float(np.nanmean(values))),
-        measure.printed(float(np.nanstd(values))),
-        _range_of(values, measure.printed),
+        printed(centred),
+        f"{printed(best)}{bias}",
+        printed(float(np.nanmean(values))),
+        printed(float(np.nanstd(values))),
+        f"{printed(float(np.nanmin(values)))} to {printed(float(np.nanmax(values)))}",
     )
 
 
@@ -290,22 +273,6 @@ def _shares(study: ShotsStudy) -> tuple[Measure[Shot], ...]:
     rubbing = (FRICTION_LOSS,) if study.faces else ()
     yielding = (PLASTIC_LOSS,) if np.any(study.shots.plastic_loss) else ()
     return (ROCKING, *rubbing, *yielding)
-
-
-def _share_row(study: ShotsStudy, measure: Measure[Shot]) -> tuple[str, ...]:
-    values = np.asarray(getattr(study.shots, measure.key))
-    return (
-        measure.name,
-        measure.printed(float(getattr(study.centric, measure.key)[0])),
-        measure.printed(float(values[study.highest])),
-        measure.printed(float(np.nanmean(values))),
-        measure.printed(float(np.nanstd(values))),
-        _range_of(values, measure.printed),
-    )
-
-
-def _range_of(values: NDArray[np.float64], text: Callable[[float], str]) -> str:
-    return f"{text(float(np.nanmin(values)))} to {text(float(np.nanmax(values)))}"
 
 
 # --------------------------------------------------------------------------- words

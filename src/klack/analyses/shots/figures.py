@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.shots.record import ShotColumns, ShotsStudy, ShotTraces
 from klack.analyses.shots.wording import length_unit, shot_name
-from klack.report.chart import COLOURS, AxisSpec, Chart, Colour, Curve, Mark, Panel, Style
+from klack.report.chart import COLOURS, AxisSpec, Chart, Colour, Curve, Mark, Panel, Style, dots
 from klack.report.printed import STYLE, svg
 
 __all__ = [
@@ -111,24 +111,22 @@ class Shown:
         return self.factor * np.asarray(getattr(columns, self.column))
 
 
+_RESTITUTION = Shown("restitution", "restitution", "", 1.0)
+
+
 def rebound_chart(study: ShotsStudy, over: Shown) -> Chart:
     """Restitution and rebound height of every shot over one number that was drawn."""
-    drawn, middle = over.of(study.shots), float(over.of(study.centric)[0])
-    height_unit, height_factor = length_unit(study.shots.rebound_height)
+    height = Shown("rebound_height", "rebound height", *length_unit(study.shots.rebound_height))
     panels = [
-        _rebound_panel(study, drawn, middle, Shown("restitution", "restitution", "", 1.0)),
-        _rebound_panel(
-            study,
-            drawn,
-            middle,
-            Shown("rebound_height", "rebound height", height_unit, height_factor),
-        ),
+        _rebound_panel(study, over, shown)
+        for shown in (_RESTITUTION, height)
+        if np.isfinite(shown.of(study.shots)).any()
     ]
     return Chart(
         name=f"rebound-{over.column}",
         title=f"Rebound over {over.label}",
         x=AxisSpec(label=over.label, unit=over.unit),
-        panels=tuple(panel for panel in panels if panel is not None),
+        panels=tuple(panels),
         note=(
             "Every point is one shot. Dashed: the centred impact; dotted: the bias of "
             "the rule, the highest rebound of all shots minus it."
@@ -136,46 +134,33 @@ def rebound_chart(study: ShotsStudy, over: Shown) -> Chart:
     )
 
 
-def _rebound_panel(study: ShotsStudy, drawn: Floats, middle: float, shown: Shown) -> Panel | None:
-    """One measure over one drawn number; None if no shot has it."""
-    values, centred = shown.of(study.shots), float(shown.of(study.centric)[0])
-    if not np.isfinite(values).any():
-        return None
-    best = study.highest
-    curves = [
-        _points(drawn, values, _ALL, "sky", 1.4, study.shots.count),
-        _single(drawn[best], values[best], _HIGHEST, "red", 2.0, shot_name(best)),
-        Curve(
-            x=np.array([drawn[best], drawn[best]]),
-            y=np.array([values[best], centred]),
-            label="bias",
-            colour="red",
-            style="dotted",
-            width=2.2,
-        ),
-        _single(middle, centred, _CENTRED, "black", 2.5, _CENTRED),
-    ]
+def _rebound_panel(study: ShotsStudy, over: Shown, shown: Shown) -> Panel:
+    """One measure over one drawn number."""
+    every, best, centred = _dots(study, over, shown)
+    middle = centred.y[0]
+    bias = Curve(
+        x=np.append(best.x, best.x),
+        y=np.append(best.y, middle),
+        label="bias",
+        colour="red",
+        style="dotted",
+        width=2.2,
+    )
     return Panel(
         y=AxisSpec(label=shown.label, unit=shown.unit),
-        curves=tuple(curves),
-        marks=(Mark(value=centred, axis="y"),) if np.isfinite(centred) else (),
+        curves=(every, best, bias, centred),
+        marks=(Mark(value=float(middle), axis="y"),) if np.isfinite(middle) else (),
     )
 
 
-def _points(x: Floats, y: Floats, label: str, colour: Colour, width: float, count: int) -> Curve:
-    names = tuple(shot_name(i) for i in range(count))
-    return Curve(x=x, y=y, label=label, colour=colour, width=width, drawn="points", names=names)
-
-
-def _single(x: float, y: float, label: str, colour: Colour, width: float, name: str) -> Curve:
-    return Curve(
-        x=np.array([x]),
-        y=np.array([y]),
-        label=label,
-        colour=colour,
-        width=width,
-        drawn="points",
-        names=(name,),
+def _dots(study: ShotsStudy, over: Shown, shown: Shown) -> tuple[Curve, Curve, Curve]:
+    """One number over another: of all shots, of the highest, and of the centred one."""
+    x, y, best = over.of(study.shots), shown.of(study.shots), study.highest
+    alone = over.of(study.centric), shown.of(study.centric)
+    return (
+        dots(x, y, _ALL, "sky", 1.4, map(shot_name, range(study.shots.count))),
+        dots(x[best], y[best], _HIGHEST, "red", 2.0, [shot_name(best)]),
+        dots(*alone, _CENTRED, "black", 2.5, [_CENTRED]),
     )
 
 
@@ -186,7 +171,7 @@ def distribution_chart(study: ShotsStudy) -> Chart:
     """Histogram and share of shots below, of the rebound height; of the restitution without."""
     shown = Shown("rebound_height", "rebound height", *length_unit(study.shots.rebound_height))
     if not np.isfinite(study.shots.rebound_height).all():
-        shown = Shown("restitution", "restitution", "", 1.0)
+        shown = _RESTITUTION
     values = np.sort(shown.of(study.shots)[np.isfinite(shown.of(study.shots))])
     centred = float(shown.of(study.centric)[0])
     counts, edges = np.histogram(values, bins="sturges")
@@ -243,30 +228,14 @@ def distribution_chart(study: ShotsStudy) -> Chart:
 
 def peak_chart(study: ShotsStudy) -> Chart:
     """Contact time over peak force."""
-    force, time = study.shots.peak_force, 1e6 * study.shots.contact_time
-    best = study.highest
+    force = Shown("peak_force", "peak force", "N", 1.0)
+    time = Shown("contact_time", "contact time", "µs", 1e6)
     return Chart(
         name="peak",
         title="Contact time over peak force",
-        x=AxisSpec(label="peak force", unit="N"),
+        x=AxisSpec(label=force.label, unit=force.unit),
         panels=(
-            Panel(
-                y=AxisSpec(label="contact time", unit="µs"),
-                curves=(
-                    _points(force, time, _ALL, "sky", 1.4, study.shots.count),
-                    _single(
-                        float(force[best]), float(time[best]), _HIGHEST, "red", 2.0, shot_name(best)
-                    ),
-                    _single(
-                        float(study.centric.peak_force[0]),
-                        1e6 * float(study.centric.contact_time[0]),
-                        _CENTRED,
-                        "black",
-                        2.5,
-                        _CENTRED,
-                    ),
-                ),
-            ),
+            Panel(y=AxisSpec(label=time.label, unit=time.unit), curves=_dots(study, force, time)),
         ),
         note="Of the first impact of every shot. The contact time is that of its first contact.",
     )

@@ -22,7 +22,6 @@ from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import extended_compliance
-from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rigid_placement
 from klack.progress import Progress
 from klack.stages import collected_warnings
@@ -140,7 +139,15 @@ def _model(
     setup = ShotSetup(
         model=model,
         guide=guide,
-        gaps=_gaps(problem, space),
+        gaps=RigidGaps.of(
+            space,
+            pair.upper.mesh,
+            pair.upper_surface,
+            pair.lower.mesh,
+            pair.lower_surface,
+            centre=pair.upper.centre_of_mass,
+            form=pair.form,
+        ),
         about=np.array([0.0, 0.0, height]),
         inertia=pair.upper.inertia,
         opposite_gap=model.gap[first:],
@@ -158,18 +165,6 @@ def _model(
     elastic = model.omega > 0
     modes = tuple(int(np.sum(elastic & (model.owner == i))) for i in range(len(model.bodies)))
     return ShotModel(setup=setup, touch_height=drawn_height, modes=modes, notes=())
-
-
-def _gaps(problem: ContactProblem, space: ContactSpace) -> RigidGaps:
-    pair = problem.pair
-    return RigidGaps.of(
-        space, *_surfaces(problem), centre=pair.upper.centre_of_mass, form=pair.form
-    )
-
-
-def _surfaces(problem: ContactProblem) -> tuple[Mesh, Surface, Mesh, Surface]:
-    pair = problem.pair
-    return pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface
 
 
 def _candidates(

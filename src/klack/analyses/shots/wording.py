@@ -5,8 +5,17 @@ from numpy.typing import ArrayLike
 
 from klack.analyses.shots.record import FIRST_IMPACT, ShotsStudy
 from klack.report.wording import quantity, signed_share
+from klack.units import format_si
 
-__all__ = ["largest_size", "length_unit", "shot_name", "shots_answer"]
+__all__ = [
+    "degrees",
+    "largest_size",
+    "length_unit",
+    "plain",
+    "shot_name",
+    "shots_answer",
+    "told_value",
+]
 
 _SMALL = 1e-4
 """Lengths up to this are shown in micrometres [m]."""
@@ -57,3 +66,22 @@ def length_unit(values: ArrayLike) -> tuple[str, float]:
     (('µm', 1000000.0), ('mm', 1000.0))
     """
     return ("µm", 1e6) if largest_size(values) <= _SMALL else ("mm", 1e3)
+
+
+def told_value(value: float, unit: str, digits: int = 4) -> str:
+    """A value in a sentence or a table of a terminal; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"
+
+
+def plain(value: float, decimals: int) -> str:
+    """Number with fixed decimals in a table of a report; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
+
+
+def degrees(angle: float) -> str:
+    """Whole degrees from 0 to 359 of an angle [rad]; a dash where there is none."""
+    return f"{round(np.degrees(angle)) % 360}" if np.isfinite(angle) else "–"

@@ -15,6 +15,7 @@ from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
 from klack.analyses.sample import moments
+from klack.analyses.shots.wording import told_value
 from klack.analyses.store import RecordFormat
 from klack.analyses.stroke_shots.record import (
     FIRST_TOUCH_MEASURES,
@@ -34,7 +35,6 @@ from klack.analyses.stroke_shots.scatter import (
     scatter_ratio,
     scattered,
     stroke_answers,
-    told_value,
     wet_and_dry,
 )
 from klack.terminal.tables import TextTable

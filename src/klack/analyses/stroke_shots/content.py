@@ -10,10 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from klack.analyses.measures import Measure
 from klack.analyses.page import page_of
 from klack.analyses.schematic_section import schematic_section
-from klack.analyses.shots.wording import length_unit
+from klack.analyses.shots.wording import degrees, length_unit, plain
 from klack.analyses.stroke_shots.analysis import RATIO_COLUMNS, correlation_rows, ratio_rows
 from klack.analyses.stroke_shots.record import (
     AT_TOUCH,
@@ -31,7 +30,7 @@ from klack.analyses.stroke_shots.scatter import (
     scatter_answers,
     scattered,
 )
-from klack.report.chart import COLOURS, AxisSpec, Chart, Colour, Curve, Panel
+from klack.report.chart import COLOURS, AxisSpec, Chart, Colour, Curve, Panel, dots
 from klack.report.page import Content, Section, Table
 from klack.report.printed import STYLE, svg
 from klack.report.wording import count, power, printed_unit, quantity, sentence
@@ -82,40 +81,17 @@ def _panel(
         columns, alone = shots.stops[stop], shots.centric_stops[stop]
         x, y = factor * columns.eccentricity, scale * getattr(columns, column)
         colour = VARIANT_COLOURS.get(name, "black")
-        words = tuple(f"{name}, stroke {i}" for i in range(len(x)))
-        curves.append(
-            Curve(x=x, y=y, label=name, colour=colour, width=1.4, drawn="points", names=words)
-        )
+        words = (f"{name}, stroke {i}" for i in range(len(x)))
+        curves.append(dots(x, y, name, colour, 1.4, words))
         best = highest_rebound(shots, stop)
         if best is not None and np.isfinite(y[best.stroke]):
-            curves.append(
-                _single(
-                    x[best.stroke],
-                    y[best.stroke],
-                    f"{name}, highest, stroke {best.stroke}",
-                    "red",
-                    2.0,
-                )
-            )
+            top = f"{name}, highest, stroke {best.stroke}"
+            curves.append(dots(x[best.stroke], y[best.stroke], top, "red", 2.0, [top]))
         middle = scale * float(getattr(alone, column)[0])
         if np.isfinite(middle):
-            label_ = f"{name}, started centred"
-            curves.append(
-                _single(factor * float(alone.eccentricity[0]), middle, label_, colour, 3.0)
-            )
+            begun, start = f"{name}, started centred", factor * float(alone.eccentricity[0])
+            curves.append(dots(start, middle, begun, colour, 3.0, [begun]))
     return Panel(y=AxisSpec(label=label, unit=unit), curves=tuple(curves))
-
-
-def _single(x: float, y: float, label: str, colour: Colour, width: float) -> Curve:
-    return Curve(
-        x=np.array([x]),
-        y=np.array([y]),
-        label=label,
-        colour=colour,
-        width=width,
-        drawn="points",
-        names=(label,),
-    )
 
 
 def lift_chart(study: StrokeShotsStudy) -> Chart:
@@ -338,7 +314,9 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
         _drawn(study),
         Section(
             title="All strokes",
-            paragraphs=_listed_note(study),
+            paragraphs=()
+            if study.count <= _LISTED
+            else (f"The first {_LISTED} of {count(study.count)} strokes.",),
             tables=tuple(
                 _strokes(name, shots, stop)
                 for name, shots in study.variants.items()
@@ -354,7 +332,7 @@ def stroke_shots_content(study: StrokeShotsStudy) -> Content:
         answer=" ".join(answers),
         numbers=_numbers(study),
         sections=sections,
-        definitions=_definitions(),
+        definitions=_DEFINITIONS,
         limits=_limits(study),
     )
 
@@ -406,12 +384,6 @@ def _drawn(study: StrokeShotsStudy) -> Section:
     )
 
 
-def _listed_note(study: StrokeShotsStudy) -> tuple[str, ...]:
-    if study.count <= _LISTED:
-        return ()
-    return (f"The first {_LISTED} of {count(study.count)} strokes.",)
-
-
 _Cell = Callable[[Row, Row], str]
 
 
@@ -444,33 +416,23 @@ def _strokes(name: str, shots: VariantShots, stop: str) -> Table:
 
 def _cells(stroke: Row, first: Row) -> tuple[str, ...]:
     return (
-        _plain(1e6 * stroke["eccentricity"], 2),
-        _plain(1e6 * first["eccentricity"], 2),
-        _angle(first["direction"]),
-        _plain(float(np.degrees(first["tilt"])), 4),
-        _angle(first["tilt_direction"]),
-        _plain(first["approach_speed"], 4),
-        _plain(first["peak_force"], 1),
-        _plain(1e6 * first["contact_time"], 2),
-        _plain(first["restitution"], 4),
-        _plain(1e6 * first["rebound_height"], 2),
-        _plain(first["impacts"], 0),
+        plain(1e6 * stroke["eccentricity"], 2),
+        plain(1e6 * first["eccentricity"], 2),
+        degrees(first["direction"]),
+        plain(float(np.degrees(first["tilt"])), 4),
+        degrees(first["tilt_direction"]),
+        plain(first["approach_speed"], 4),
+        plain(first["peak_force"], 1),
+        plain(1e6 * first["contact_time"], 2),
+        plain(first["restitution"], 4),
+        plain(1e6 * first["rebound_height"], 2),
+        plain(first["impacts"], 0),
         power(stroke["energy_residual"]) if np.isfinite(stroke["energy_residual"]) else "–",
     )
 
 
 def _printed(value: float, unit: str, digits: int) -> str:
-    return quantity(value, unit, digits) if unit != "1" else _plain(value, 4)
-
-
-def _plain(value: float, decimals: int) -> str:
-    if not np.isfinite(value):
-        return "–"
-    return f"{value:.{decimals}f}".replace("-", "\N{MINUS SIGN}")
-
-
-def _angle(value: float) -> str:
-    return f"{round(np.degrees(value)) % 360}" if np.isfinite(value) else "–"
+    return quantity(value, unit, digits) if unit != "1" else plain(value, 4)
 
 
 # --------------------------------------------------------------------------- numbers
@@ -507,23 +469,27 @@ def _numbers(study: StrokeShotsStudy) -> Table:
     return Table(columns=("", *heads), rows=tuple(rows))
 
 
-def _definitions() -> tuple[tuple[str, str], ...]:
-    shown: tuple[Measure[Row], ...] = (*RESULTS, *AT_TOUCH, *COMPARED)
-    return (
-        *((item.name, item.definition) for item in shown),
-        (
-            "centred",
-            "The stroke that starts centred and upright, without Coulomb friction in the guide.",
-        ),
-        (
-            "95 % interval of a ratio of standard deviations",
-            "From 2000 samples drawn with repetition from the strokes.",
-        ),
-    )
+_DEFINITIONS = (
+    *((item.name, item.definition) for item in (*RESULTS, *AT_TOUCH, *COMPARED)),
+    (
+        "centred",
+        "The stroke that starts centred and upright, without Coulomb friction in the guide.",
+    ),
+    (
+        "95 % interval of a ratio of standard deviations",
+        "From 2000 samples drawn with repetition from the strokes.",
+    ),
+)
+
+
+_IN_A_ROW = (
+    "In a row",
+    "Strokes one after another are not independent: intervals are then too narrow.",
+)
 
 
 def _limits(study: StrokeShotsStudy) -> tuple[tuple[str, str], ...]:
-    found = [
+    return (
         (
             "Physics",
             "Linear elastic bodies with small deformations, faces that are smooth but for Coulomb "
@@ -535,12 +501,5 @@ def _limits(study: StrokeShotsStudy) -> tuple[tuple[str, str], ...]:
             "Off-axis strokes are chaotic: after three impacts on the seat, differences of "
             "round-off decide. Distributions do not depend on it, single late bounces do.",
         ),
-    ]
-    if study.carry:
-        found.append(
-            (
-                "In a row",
-                "Strokes one after another are not independent: intervals are then too narrow.",
-            )
-        )
-    return tuple(found)
+        *(() if not study.carry else (_IN_A_ROW,)),
+    )

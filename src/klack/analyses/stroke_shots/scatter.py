@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.measures import Measure
 from klack.analyses.sample import rank_correlation
+from klack.analyses.shots.wording import told_value
 from klack.analyses.stroke_shots.record import (
     COMPARED,
     RESULTS,
@@ -18,7 +19,6 @@ from klack.analyses.stroke_shots.record import (
     highest_rebound,
 )
 from klack.studies.samples import sample_quantile
-from klack.units import format_si
 
 __all__ = [
     "ScatterRatio",
@@ -32,7 +32,6 @@ __all__ = [
     "scatter_ratio",
     "scattered",
     "stroke_answers",
-    "told_value",
     "wet_and_dry",
 ]
 
@@ -170,13 +169,6 @@ Told = Callable[[float, str, int], str]
 
 _ANSWERED = ("peak_force", "rebound_height", "contact_time")
 _RATIOS = ("peak_force", "rebound_height", "injected_energy")
-
-
-def told_value(value: float, unit: str, digits: int = 4) -> str:
-    """A value in a sentence or a table of a terminal; a dash where there is none."""
-    if not np.isfinite(value):
-        return "–"
-    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"
 
 
 def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator[str]:

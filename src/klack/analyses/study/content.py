@@ -73,7 +73,14 @@ def study_content(record: StudyRecord) -> Content:
             charts=()
             if record.optimum is not None
             else tuple(
-                scatter_chart(record, measure, _strongest(varying, related[measure.name]), labels)
+                scatter_chart(
+                    record,
+                    measure,
+                    sorted(varying, key=lambda of: -abs(related[measure.name].get(of.name, 0.0)))[
+                        :2
+                    ],
+                    labels,
+                )
                 for measure in record.measures
                 if measure.varies and related.get(measure.name)
             ),
@@ -242,10 +249,6 @@ def _front_row(record: StudyRecord, place: int, labels: dict[str, str]) -> tuple
     varied = (item for item in record.parameters if item.varies)
     words = (f"{labels[i.name]} {on_page(i, float(i.values[place]), 3)}" for i in varied)
     return (str(place), *values, ", ".join(words))
-
-
-def _strongest(varying: list[StudyColumn], related: dict[str, float]) -> list[StudyColumn]:
-    return sorted(varying, key=lambda item: -abs(related.get(item.name, 0.0)))[:2]
 
 
 def _number_table(record: StudyRecord) -> Table:

@@ -27,6 +27,7 @@ from klack.report.chart import (
     Panel,
     ParallelAxis,
     ParallelChart,
+    dots,
 )
 from klack.report.wording import printed_unit
 
@@ -174,27 +175,11 @@ def _points(
     width: float,
 ) -> Curve:
     """Dots at some of the points of the study, each with its number."""
-    return Curve(
-        x=x[places],
-        y=y[places],
-        label=label,
-        colour=colour,
-        width=width,
-        drawn="points",
-        names=tuple(f"point {i}" for i in places),
-    )
+    return dots(x[places], y[places], label, colour, width, (f"point {i}" for i in places))
 
 
 def _today(x: float, y: float) -> Curve:
-    return Curve(
-        x=np.array([x]),
-        y=np.array([y]),
-        label="today",
-        colour="black",
-        width=3.0,
-        drawn="points",
-        names=("the case as it is",),
-    )
+    return dots(x, y, "today", "black", 3.0, ["the case as it is"])
 
 
 def effect_bars(measure: StudyColumn, item: Screening, labels: Mapping[str, str]) -> BarChart:

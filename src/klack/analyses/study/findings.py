@@ -1,6 +1,6 @@
 """What follows from all points of a study: sensitivities, missed bounds, surrogates."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +27,17 @@ from klack.studies.surrogate import Surrogate, SurrogateKind, fit_surrogate
 from klack.studies.surrogate_model import SurrogateAxis, require_scikit_learn
 
 __all__ = [
-    "missed_bounds",
+    "missed_bound",
     "require_surrogates",
-    "screenings_of",
-    "sensitivities_of",
+    "screening_of",
+    "sensitivity_of",
     "surrogate_warnings",
     "surrogates_of",
 ]
 
 
-def sensitivities_of(
-    measures: Sequence[StudyColumn], parameters: Sequence[str]
-) -> tuple[Sensitivity, ...]:
-    """Indices of each measure over the points of Saltelli's design, in the order of the design."""
-    return tuple(_sensitivity(item, tuple(parameters)) for item in measures)
-
-
-def _sensitivity(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivity:
+def sensitivity_of(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivity:
+    """Indices of a measure over the points of Saltelli's design, in the order of the design."""
     found = sobol_indices(item.values, len(parameters))
     return Sensitivity(
         measure=item.name,
@@ -61,16 +55,10 @@ def _sensitivity(item: StudyColumn, parameters: tuple[str, ...]) -> Sensitivity:
     )
 
 
-def screenings_of(
-    measures: Sequence[StudyColumn], parameters: Sequence[str], cube: NDArray[np.float64]
-) -> tuple[Screening, ...]:
-    """Elementary effects of each parameter on each measure, over the trajectories of Morris."""
-    return tuple(_screening(item, tuple(parameters), cube) for item in measures)
-
-
-def _screening(
+def screening_of(
     item: StudyColumn, parameters: tuple[str, ...], cube: NDArray[np.float64]
 ) -> Screening:
+    """Elementary effects of each parameter on a measure, over the trajectories of Morris."""
     found = elementary_effects(cube, item.values)
     return Screening(
         measure=item.name,
@@ -83,22 +71,16 @@ def _screening(
     )
 
 
-def missed_bounds(
-    bounds: Sequence[Bound], columns: Mapping[str, NDArray[np.float64]], units: Mapping[str, str]
-) -> tuple[MissedBound, ...]:
-    """Share of points that miss each bound, with its interval.
+def missed_bound(bound: Bound, column: StudyColumn) -> MissedBound:
+    """Share of points that miss a bound, with its interval.
 
     The interval takes the points for independent draws; Sobol points and a Latin hypercube scatter
     less, so that it tends to be wider than claimed.
     """
-    return tuple(_missed(bound, columns[bound.measure], units[bound.measure]) for bound in bounds)
-
-
-def _missed(bound: Bound, values: NDArray[np.float64], unit: str) -> MissedBound:
     sign = 1.0 if bound.is_most else -1.0
-    found = exceedance_of(sign * values, sign * bound.value)
+    found = exceedance_of(sign * column.values, sign * bound.value)
     return MissedBound(
-        bound=f"{bound.measure} {bound_text(bound, unit)}",
+        bound=f"{bound.measure} {bound_text(bound, column.unit)}",
         missed=found.exceeded,
         points=found.runs,
         failed=found.failed,

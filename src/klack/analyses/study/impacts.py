@@ -153,7 +153,7 @@ class _Impacts:
             if level not in ("", "full") and case.has_surfaces:
                 bodies = impact_bodies(case, levels=(level,), progress=progress, threads=1)
                 opened.enter_context(bodies).placed.keep_no_more()
-            if _has_shots(asked):
+            if asked.variant.rpartition(_WITH)[2] == SHOTS:
                 shots = shot_bodies(case, progress, threads=1)
                 opened.enter_context(shots).placed.keep_no_more()
             opened.pop_all()
@@ -218,10 +218,6 @@ _WITH = " + "
 def _level(asked: AskedPoints[Case]) -> str:
     """Level of the impact; empty where there is none."""
     return asked.variant.partition(_WITH)[0] if asked.variant != SHOTS else ""
-
-
-def _has_shots(asked: AskedPoints[Case]) -> bool:
-    return asked.variant.rpartition(_WITH)[2] == SHOTS
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -144,7 +144,12 @@ def run_optimisation(
                 measures=columns,
                 optimum=optimum,
                 sounds=sounds,
-                warnings=(*_doubts(optimum), *_lucky_draws(asked, source), *warnings, *of_rows),
+                warnings=(
+                    *(() if optimum.feasible else (_NOT_FEASIBLE,)),
+                    *_lucky_draws(asked, source),
+                    *warnings,
+                    *of_rows,
+                ),
             )
 
         if seen is not None:
@@ -165,6 +170,10 @@ def run_optimisation(
     return record(sounds, (*ended, *notes))
 
 
+_NOT_FEASIBLE = (
+    "No point keeps all bounds; the points shown miss them least. Try: wider ranges, or other "
+    "bounds."
+)
 _DRAWS = ("shots.seed", "shots.count")
 """Keys that decide which shots are drawn, and nothing about the valve."""
 
@@ -481,15 +490,6 @@ def _sounds(work: _Work, front: _Front, progress: Progress) -> tuple[PointSound,
     found = sounds_of(work.asked(written, work.names), progress)
     pairs = zip(points, found, strict=True)
     return tuple(PointSound(point=i, pressure=sound) for i, sound in pairs if sound is not None)
-
-
-def _doubts(optimum: Optimum) -> tuple[str, ...]:
-    if optimum.feasible:
-        return ()
-    return (
-        "No point keeps all bounds; the points shown miss them least. Try: wider ranges, or other "
-        "bounds.",
-    )
 
 
 def _lucky_draws(asked: AskedPoints, source: StudySource) -> tuple[str, ...]:

@@ -15,10 +15,10 @@ from klack.analyses.study.evaluation import (
     row_warnings,
 )
 from klack.analyses.study.findings import (
-    missed_bounds,
+    missed_bound,
     require_surrogates,
-    screenings_of,
-    sensitivities_of,
+    screening_of,
+    sensitivity_of,
     surrogate_warnings,
     surrogates_of,
 )
@@ -135,8 +135,8 @@ def run_study(
     known = {item.name: item.measure for item in asked.chosen}
     bounds = bounds_of(source, known, dict(zip(known, today.numbers, strict=True)))
     columns = measure_columns(asked, found, today)
-    varied = [item.name for item in points.space.varied]
-    wanted = source.study.surrogate
+    own, varied = {c.name: c for c in columns}, tuple(item.name for item in points.space.varied)
+    wanted, design = source.study.surrogate, source.study.design.kind
     surrogates = surrogates_of(wanted.kind, points, columns, clock) if wanted else ()
     return StudyRecord(
         **case_fields(case),
@@ -146,24 +146,16 @@ def run_study(
         study_text=source.text,
         design=points.design,
         measures=columns,
-        sensitivities=(
-            sensitivities_of(columns, varied) if source.study.design.kind == "saltelli" else ()
+        sensitivities=tuple(
+            sensitivity_of(item, varied) for item in columns if design == "saltelli"
         ),
-        screenings=(
-            screenings_of(columns, varied, points.cube)
-            if source.study.design.kind == "morris" and points.cube is not None
-            else ()
+        screenings=tuple(
+            screening_of(item, varied, points.cube)
+            for item in columns
+            if design == "morris" and points.cube is not None
         ),
         surrogates=surrogates,
-        missed=(
-            missed_bounds(
-                bounds,
-                {item.name: item.values for item in columns},
-                {item.name: item.unit for item in columns},
-            )
-            if source.study.design.kind in _DRAWN
-            else ()
-        ),
+        missed=tuple(missed_bound(b, own[b.measure]) for b in bounds if design in _DRAWN),
         warnings=(
             *points.notes,
             *_bounds_by_today(source),
