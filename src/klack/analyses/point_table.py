@@ -148,7 +148,7 @@ class PointTable:
         names, texts = zip(*self._texts, strict=True)
         writer.writerow([*(column.head for column in self.columns), *names])
         for i, said in enumerate(zip(*texts, strict=True)):
-            writer.writerow([*(_written(column.values[i]) for column in self.columns), *said])
+            writer.writerow([*(_text(column.values[i], "", "") for column in self.columns), *said])
         path = Path(file)
         with whole_file(path) as part:
             part.write_text(text.getvalue(), encoding="utf-8", newline="")
@@ -212,7 +212,7 @@ class PointTable:
         return ", ".join(parts)
 
     def _row(self, i: int) -> list[str]:
-        return [_short(column.values[i]) for column in self.columns]
+        return [_text(column.values[i], "-", ".6g") for column in self.columns]
 
     def _rest(self) -> list[str]:
         return [f"... and {len(self) - _SHOWN} more"] if len(self) > _SHOWN else []
@@ -252,16 +252,10 @@ def _plain(values: NDArray[Any]) -> list[Any]:
     return found
 
 
-def _written(value: Any) -> str:
+def _text(value: Any, none: str, form: str) -> str:
     if value is None or (isinstance(value, float) and np.isnan(value)):
-        return ""
-    return repr(float(value)) if isinstance(value, float) else str(value)
-
-
-def _short(value: Any) -> str:
-    if value is None or (isinstance(value, float) and np.isnan(value)):
-        return "-"
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+        return none
+    return format(float(value), form) if isinstance(value, float) else str(value)
 
 
 def _first_line(text: str) -> str:

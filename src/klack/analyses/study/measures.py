@@ -60,8 +60,7 @@ Found = TypeVar("Found")
 _NOISE = "noise"
 """Before the names of measures of noise."""
 
-_OF_CLICKS = {measure.key: measure for measure in CLICK_MEASURES}
-_OF_DESIGNS = {measure.key: measure for measure in DESIGN_MEASURES}
+_OF_DESIGNS = [measure.key for measure in DESIGN_MEASURES]
 NOISE_NAMES = tuple(f"{_NOISE}.{key}" for key in _OF_DESIGNS)
 NOISE_WORDS = f"of the noise {_NOISE}.KEY with a key of: {one_of(_OF_DESIGNS)}"
 
@@ -143,14 +142,17 @@ class ChosenMeasure:
         return None if value is None else float(value)
 
 
-def noise_measure(name: str) -> ChosenMeasure | None:
-    """Measure of the noise of a run, which has a :class:`PointNoise`; None for another name."""
-    stem, _, key = name.partition(".")
-    if stem == _NOISE and key in _OF_CLICKS:
-        return ChosenMeasure(name, _OF_CLICKS[key], "click", attrgetter("noise.click"))
-    if stem == _NOISE and key in _OF_DESIGNS:
-        return ChosenMeasure(name, _OF_DESIGNS[key], "design", attrgetter("noise.design"))
-    return None
+_NOISES: tuple[tuple[Literal["design", "click"], Sequence[Measure[Any]]], ...] = (
+    ("design", DESIGN_MEASURES),
+    ("click", CLICK_MEASURES),
+)
+_OF_NOISE = {
+    name: ChosenMeasure(name, measure, of, attrgetter(f"noise.{of}"))
+    for of, measures in _NOISES
+    for measure in measures
+    for name in [f"{_NOISE}.{measure.key}"]
+}
+"""Measures of the noise of a run, which has a :class:`PointNoise`, by their names."""
 
 
 def choose_measures(
@@ -394,7 +396,7 @@ def _impact_measure(case: Case, name: str) -> ChosenMeasure | None:
                 "'tilt'.",
             )
         return shot_measure(name)
-    noise = noise_measure(name)
+    noise = _OF_NOISE.get(name)
     own = name.rpartition(".")[2]
     if noise is None and own in _OF_LEVELS:
         raise InputError(
@@ -472,7 +474,7 @@ def _stroke_measure(name: str, stops: list[str]) -> ChosenMeasure | None:
             expected=_known_words(stops),
             hint="shots are drops of two bodies: study a case of an impact with a section 'shots'.",
         )
-    return noise_measure(name)
+    return _OF_NOISE.get(name)
 
 
 def _impact_on(stop: str, number: int) -> Callable[[StrokeOfPoint], ImpactEvent | None]:
