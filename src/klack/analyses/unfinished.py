@@ -91,7 +91,6 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
 
     Parameters
     ----------
-    form : LogForm
     folder : Path or None
         Made if it does not exist; None keeps the parts in memory only.
     mark : str

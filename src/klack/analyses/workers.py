@@ -110,7 +110,6 @@ class WorkerPool(Closing):
         ----------
         compute : callable
             Of a module, with one argument.
-        items : iterable
 
         Raises
         ------
@@ -375,7 +374,6 @@ class LoggedWork(Closing, Generic[Key, Part]):
         Sent to each process once.
     workers : int
         Processes; 1 computes in this one.
-    log : UnfinishedLog
     name : callable
         What an error calls the part of a key.
     fewest : int

@@ -69,7 +69,6 @@ class Expression:
 
     Parameters
     ----------
-    text : str
     names : tuple of str
         Parameters in it, each once, in the order of the text.
     where : str

@@ -46,7 +46,6 @@ class Token:
     ----------
     kind : str
         ``"number"``, ``"name"``, or the sign itself; empty at the end.
-    text : str
     start, end : int
         In the text of the expression.
     number : float [SI]
@@ -176,11 +175,8 @@ class Node:
 
     Parameters
     ----------
-    text : str
     place : int
         Of its first character in the expression.
-    symbol : str
-    arguments : tuple of Node
     number : float or None [SI]
     dimension : Dimension or None
         Of a number with a unit.

@@ -49,7 +49,6 @@ def even_levels(count: int, *, bounded: bool = True) -> Floats:
 
     Parameters
     ----------
-    count : int
     bounded : bool
         Whether the parameter has a value at 0 and at 1.
 
@@ -80,7 +79,6 @@ def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
 
     Parameters
     ----------
-    count, parameters : int
     seed : int
         The same seed gives the same points.
 

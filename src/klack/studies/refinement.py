@@ -208,7 +208,6 @@ class Refinement(Batches):
 
     Parameters
     ----------
-    settings : RefinementSettings
     points : array_like, shape (points, parameters)
         Start points in the unit cube.
     objectives, constraints : array_like, shape (points, ...)

@@ -84,8 +84,6 @@ def morris_design(
     ----------
     parameters : int
         d
-    trajectories : int
-    seed : int
     levels : int
         p, even.
     candidates : int, optional

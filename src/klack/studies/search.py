@@ -34,8 +34,6 @@ class SearchSettings:
         1 to 4.
     population : int
         Points per generation, which is one batch: 8 to 10 000, from 20 with 4 objectives.
-    generations : int
-    seed : int
     edge : float
         Distance that points keep from the faces of the cube, 0 to below 0.5; above zero for
         parameters whose distribution has no ends.
@@ -88,7 +86,6 @@ class Search(Batches):
 
     Parameters
     ----------
-    settings : SearchSettings
     start : array_like, shape (points, parameters), optional
         Points that enter the first batch, before drawn ones: the design of today.  At most a
         population; equal ones count once, and those nearer to a face than ``edge`` are moved.

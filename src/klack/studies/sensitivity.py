@@ -84,7 +84,6 @@ def saltelli_design(parameters: int, base: int, seed: int) -> Floats:
         d
     base : int
         Rows; :func:`~klack.studies.designs.balanced` says whether their number is a good one.
-    seed : int
 
     Returns
     -------
@@ -140,7 +139,6 @@ def sobol_indices(
     values : array (base * (parameters + 2))
         One measure at the points of :func:`saltelli_design`, in their order; not finite where the
         point failed.  A base row with such a value is discarded as a whole.
-    parameters : int
     confidence : float
         Above 0 and below 1.
     resamples : int

@@ -107,8 +107,6 @@ def fit_surrogate(
 
     Parameters
     ----------
-    kind : str
-    axes : sequence of SurrogateAxis
     points : array (points, parameters)
         Coordinates, see :meth:`SurrogateAxis.coordinate`.
     values : array (points)

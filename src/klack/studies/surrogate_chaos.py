@@ -42,7 +42,6 @@ class ChaosModel:
 
     Parameters
     ----------
-    axes : tuple of SurrogateAxis
     terms : int array (terms, parameters)
         Number of the function of each parameter, see :meth:`SurrogateAxis.functions`; the first
         term is the constant.
@@ -94,7 +93,6 @@ class ChaosFit:
 
     Parameters
     ----------
-    axes : sequence of SurrogateAxis
     t : array (points, parameters)
         Coordinates.
     """

@@ -38,7 +38,6 @@ class SurrogateAxis:
         Weights have the sum 1.
     words : tuple of str
         Of a list of words; empty for numbers.
-    spread : Range, Normal or Listed
     """
 
     nodes: Floats
@@ -48,12 +47,7 @@ class SurrogateAxis:
 
     @classmethod
     def of(cls, spread: Spread) -> "SurrogateAxis":
-        """Axis of the values of a parameter.
-
-        Parameters
-        ----------
-        spread : Range, Normal or Listed
-        """
+        """Axis of the values of a parameter."""
         gauss, half = np.polynomial.legendre.leggauss(_NODES)
         if isinstance(spread, Range):
             return cls(gauss, 0.5 * half, (), spread)

@@ -55,13 +55,10 @@ class ProcessModel:
 
     Parameters
     ----------
-    axes : tuple of SurrogateAxis
     columns : tuple of array (points, columns)
         Of the points that it was fitted to, for each parameter.
     lengths : tuple of array (columns)
         For each parameter.
-    mean : float
-    weights : array (points)
     noise : float
         Variance of noise, of that of the process.
     """
@@ -133,7 +130,6 @@ class ProcessFit:
 
     Parameters
     ----------
-    axes : sequence of SurrogateAxis
     t : array (points, parameters)
         Coordinates.
     """

@@ -23,7 +23,6 @@ class Compiled:
 
     Parameters
     ----------
-    functions : int
     seconds : float [s]
     """
 
@@ -65,7 +64,6 @@ class Warmed:
 
     Parameters
     ----------
-    name : str
     functions : int
         Functions of klack that had to be compiled for it; 0 if all were there.
     seconds : float [s]

@@ -60,7 +60,6 @@ def correlation_figure(
     names : sequence of str
         Of the parameters.
     matrices : sequence of (title, array of shape (p, p))
-    note : str
     """
     count = len(names)
     height = 0.9 + min(0.42 * count, 2.8)

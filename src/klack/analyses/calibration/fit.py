@@ -29,7 +29,6 @@ class StrokeModel:
         Computes motions from those parameters that are not of the sensor.
     sensor : LiftSensor
         Of the case.
-    trigger : Trigger or None
     zeroed : bool
         True if the lift before the trigger is set to zero.
     time : array, shape (k,) [s]

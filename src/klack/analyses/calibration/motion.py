@@ -76,15 +76,11 @@ class MotionModel:
 
     Parameters
     ----------
-    tree : CaseTree
     parameters : tuple of FreeParameter
         Those that the motion depends on.
     variant : "wet" or "dry"
-    roles : ValveRoles
     channels : mapping of str to str
         Recorded channel of each role.
-    reduced : mapping of str to ReducedBody
-    laws : mapping of str to StopFaces
     record : float [s]
         Spacing of the records.
     """
@@ -236,14 +232,7 @@ trial_log = TRIAL_LOG.open
 
 
 class TrialPool(LoggedWork[TrialKey, Motion]):
-    """Computes trials that the log does not hold yet, and keeps them there.
-
-    Parameters
-    ----------
-    model : MotionModel
-    workers : int
-    log : TrialLog
-    """
+    """Computes trials that the log does not hold yet, and keeps them there."""
 
     def __init__(self, model: MotionModel, workers: int, log: TrialLog) -> None:
         super().__init__(_run, model, workers, log, self._name_of)

@@ -42,7 +42,6 @@ class CalibratedParameter:
 
     Parameters
     ----------
-    name : str
     keys : tuple of str
         Paths in the case.
     unit : str
@@ -89,7 +88,6 @@ class FittedChannel:
 
     Parameters
     ----------
-    role, unit : str
     mean, low, high : array, shape (k,)
         Mean of the measured strokes, and the band of 90 % of them.
     before, after : array, shape (k,)
@@ -114,7 +112,6 @@ class FittedImpact:
 
     Parameters
     ----------
-    stop : str
     measured, scatter : float
         Median and standard deviation of the strokes.
     before, after : float
@@ -134,7 +131,6 @@ class ProfileCurve:
 
     Parameters
     ----------
-    name : str
     values : array, shape (k,)
     excess : array, shape (k,) [-]
         ``Lambda``: squared distance from the best value in standard errors, for a linear model.
@@ -166,18 +162,12 @@ class CalibrationStudy(CaseRecord):
         Names of the strokes that were fitted.
     rejected : tuple of str
         Strokes that were discarded, with the reason.
-    variant : str
-    parameters : tuple of CalibratedParameter
     correlation, design_correlation : array, shape (p, p)
         Of the estimates, from the scatter of the strokes; and from the sensitivities alone.
     singular_values : array, shape (p,)
         Of the weighted sensitivities by parameters scaled to their bounds.
     time : array, shape (k,) [s]
         From the trigger.
-    channels : tuple of FittedChannel
-    windows : tuple of FitWindow
-    impacts : tuple of FittedImpact
-    profiles : tuple of ProfileCurve
     residual_rms, residual_rms_before : float [m]
         Of the lift, mean stroke less computed, inside the windows.
     misfit : float [-]
@@ -187,7 +177,6 @@ class CalibrationStudy(CaseRecord):
         Degrees of freedom of Student's t.
     iterations, evaluations, resumed, workers : int
         Evaluations are computed strokes; those resumed come from an earlier, interrupted run.
-    converged : bool
     """
 
     profile_time: float

@@ -114,7 +114,6 @@ def run_calibration(
     ----------
     tree : CaseTree
         Case of the whole valve, as it was written.
-    strokes : StrokeSet
     folder : Path, optional
         Keeps computed trials there until it is finished; the same call resumes from them.
     workers : int, optional

@@ -110,7 +110,6 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
     ----------
     case : Case
         With a section ``shots``.
-    seed, index : int
     height : float [m]
         z of first touch in the drawing of the moving body.
 

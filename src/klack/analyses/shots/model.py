@@ -40,7 +40,6 @@ class ShotModel:
 
     Parameters
     ----------
-    setup : ShotSetup
     touch_height : float [m]
         z of first touch in the drawing of the moving body.
     modes : tuple of int
@@ -104,7 +103,6 @@ def shot_model(case: Case, bodies: ImpactBodies, progress: Progress) -> ShotMode
         With a section ``shots``.
     bodies : ImpactBodies
         From :func:`shot_bodies` of this case, or of one with the same bodies; they stay open.
-    progress : callable
     """
     with collected_warnings() as notes:
         problem = contact_problem(centred_case(case), bodies.placed, progress)

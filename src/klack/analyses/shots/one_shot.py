@@ -47,8 +47,6 @@ class ShotSetup:
     ----------
     model : InterfaceModel
         Centred, in first touch, with the mean friction between the faces.
-    guide : Guide or None
-    gaps : RigidGaps
     about : array, shape (3,) [m]
         Point of the axis at the height of first touch, about which the moving body is tilted.
     inertia : array, shape (3, 3) [kg m^2]
@@ -66,7 +64,6 @@ class ShotSetup:
         Above first touch.
     spring_stiffness : float [N/m]
     duration, step : float [s]
-    impacts : int
     force_span : float [s]
         Length of the record of the first impact.
     """
@@ -139,7 +136,6 @@ class ShotOutcome:
 
     Parameters
     ----------
-    index : int
     numbers : mapping of str to float
         One for each field of :class:`klack.analyses.shots.record.ShotColumns`.
     height, force : float32 array
@@ -173,8 +169,6 @@ def simulate_shot(
 
     Parameters
     ----------
-    setup : ShotSetup
-    draw : ShotDraw
     impacts : int, optional
         Stop earlier than the setup says.
     points : bool

@@ -329,8 +329,6 @@ class ShotsStudy(CaseRecord):
     ----------
     shot_time : float [s]
         Wall time of the shots alone, on ``workers`` processes.
-    seed : int
-    workers : int
     resumed : int
         Shots that an earlier, interrupted run had finished.
     speed : float [m/s]
@@ -355,14 +353,11 @@ class ShotsStudy(CaseRecord):
         Contact points.
     approach : float [m]
         Largest approach of any shot.
-    shots : ShotColumns
     centric : ShotColumns
         One row: no eccentricity, tilt, waviness or Coulomb friction in the guide, the mean force,
         and the mean coefficient of friction between the faces.
-    shot_traces, centric_traces : ShotTraces
     highest : int
         Row of the shot with the highest rebound.
-    rule : RuleVerdict
     pressures : mapping of str to PressureRecord
         Contact forces point by point of the first impact: ``"centric"`` and ``"highest"``, and
         ``"lowest"`` for the shot with the lowest restitution.

@@ -175,7 +175,6 @@ class DroppedShots:
 
     Parameters
     ----------
-    draws : tuple of ShotDraw
     outcomes : tuple of ShotOutcome
         Of the draws, in their order.
     alone : ShotOutcome

@@ -65,7 +65,6 @@ class StrokeStart:
 
     Parameters
     ----------
-    index : int
     aside : array, shape (2,) [m]
         Position of the axis of the needle at the height of its seat.
     lean : array, shape (2,) [rad]
@@ -95,7 +94,6 @@ class Starts:
     ----------
     case : ValveCase
         With a section ``shots`` and a guide.
-    seed : int
     height : float [m]
         Of the seat in the drawing of the needle.
     centre : array, shape (3,) [m]
@@ -150,7 +148,6 @@ class Starts:
 
         Parameters
         ----------
-        index : int
         end : array, shape (6,) [m], [rad]
             Translation of the centre of mass and rotation vector at the end of the one before.
         """
@@ -227,9 +224,6 @@ class StrokeSetup:
         Without meshes and contacts.
     spatial : SpatialValve
         Of the valve.
-    roles : ValveRoles
-    bodies : tuple of BodySummary
-    stops : tuple of StopSummary
     """
 
     valve: Valve
@@ -258,10 +252,8 @@ class StrokeOutcome:
 
     Parameters
     ----------
-    variant : str
     label : str
         Of the variant in words.
-    index : int
     stroke : mapping of str to float
         One for each field of :class:`klack.analyses.stroke_shots.record.StrokeColumns`.
     stops : mapping of str to mapping of str to float
@@ -468,8 +460,6 @@ def rebound_height(
     ----------
     events : sequence of ImpactEvent
         Of the whole stroke.
-    event : ImpactEvent
-    path : SpatialPath
     side : float
         1 for a stop below the needle, -1 for one above.
 

@@ -374,7 +374,6 @@ class VariantShots:
     ----------
     name, label : str
         ``"wet"`` or ``"dry"``; what a legend says.
-    strokes : StrokeColumns
     stops : mapping of str to StopColumns
         By end stop, the seat first.
     centric : StrokeColumns
@@ -407,7 +406,6 @@ class StrokeShotsStudy(CaseRecord):
 
     Parameters
     ----------
-    seed, workers : int
     carry : bool
         Whether every stroke starts from where the one before has left the needle.
     resumed : int
@@ -428,7 +426,6 @@ class StrokeShotsStudy(CaseRecord):
         Of the needle.
     points : mapping of str to int
         Contact points of each stop.
-    variants : mapping of str to VariantShots
     schematic : str
         Picture of the network (SVG); empty in older results.
     """

@@ -52,9 +52,7 @@ class Scattered:
     ----------
     stop : str
         Whose first impact it is of; empty for the whole stroke.
-    measure : Measure
     values : array, shape (n,)
-    centric : float
     """
 
     stop: str
@@ -107,7 +105,6 @@ class ScatterRatio:
 
     Parameters
     ----------
-    ratio : float
     low, high : float
         95 % interval; nan for fewer than five pairs.
     pairs : int
@@ -176,7 +173,6 @@ def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator
 
     Parameters
     ----------
-    study : StrokeShotsStudy
     told : callable
         Writes a value with its unit and so many digits.
     """

@@ -137,8 +137,6 @@ class PointKind(Protocol[CaseT, Built]):
 
         Parameters
         ----------
-        case : Case or ValveCase
-        name : str or None
         chosen : sequence of ChosenMeasure
             What the points are computed for.
 
@@ -188,13 +186,10 @@ class PointKind(Protocol[CaseT, Built]):
 
         Parameters
         ----------
-        asked : AskedPoints
-        group : PointGroup
         tree : CaseTree
             With the values of the group.
         case : Case or ValveCase
             Of the first point.
-        progress : callable
 
         Raises
         ------
@@ -231,9 +226,6 @@ class PointKind(Protocol[CaseT, Built]):
 
         Parameters
         ----------
-        asked : AskedPoints
-        built : object
-        place : int
         check : callable
             Called now and then; raises :class:`~klack.analyses.study.computing.Stopped` to give up.
         taken : callable
@@ -255,12 +247,8 @@ class AskedPoints(Generic[CaseT]):
 
     Parameters
     ----------
-    kind : PointKind
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
-    points : Points
-    chosen : tuple of ChosenMeasure
     variant : str
         Of the stroke; of an impact its level, ``"shots"``, or both.
     checks : bool
@@ -318,12 +306,10 @@ def require_same_for_all(keys: Iterable[PointKey], section: Key, what: str, hint
 
     Parameters
     ----------
-    keys : iterable of PointKey
     section : tuple
         ``("run", "variants")``.
     what : str
         ``"variant"``.
-    hint : str
 
     Raises
     ------

@@ -67,7 +67,6 @@ def on_threads(
     compute : callable
         Gets an item and a function to call now and then, which raises :class:`Stopped` once the
         work has been given up.  Must not raise anything else.
-    threads : int
     keep : callable
         Called in this thread with an item and its result, in the order of their end.
     tell : callable
@@ -246,7 +245,6 @@ class Tally(Closing):
         Of them, those that are not known yet.
     keep : callable
         Gets the place of a point and its row.
-    progress : callable
     """
 
     def __init__(
@@ -318,13 +316,10 @@ def compute_points(
 
     Parameters
     ----------
-    asked : AskedPoints
     places : iterable of int
         Of the points that are wanted.
     keep : callable
         Called in this thread with each place and its row, in the order of their end.
-    threads : int, optional
-    progress : callable
     builds : Builds
         Bodies and laws that were made before.
 
@@ -381,7 +376,6 @@ def compute_alone(asked: AskedPoints, builds: Builds) -> list[PointRow]:
 
     Parameters
     ----------
-    asked : AskedPoints
     builds : Builds
         Bodies and laws that were made before.
 
@@ -448,13 +442,7 @@ def _build(
 
 
 def sounds_of(asked: AskedPoints, progress: Progress) -> tuple[TimeSeries | None, ...]:
-    """Sound of a click of every point, computed once more; None where there is none.
-
-    Parameters
-    ----------
-    asked : AskedPoints
-    progress : callable
-    """
+    """Sound of a click of every point, computed once more; None where there is none."""
     found: list[TimeSeries | None] = [None] * len(asked.points)
     done = 0
     with warnings.catch_warnings(), one_thread_of_blas():
@@ -495,12 +483,10 @@ class PointWorkers(Closing):
 
         Parameters
         ----------
-        asked : AskedPoints
         places : sequence of int
             Of the points that are wanted.
         keep : callable
             Called in this thread with each place and its row, once, in the order of their end.
-        progress : callable
 
         Raises
         ------

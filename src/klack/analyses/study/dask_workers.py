@@ -42,9 +42,6 @@ class DaskTasks:
 
     Parameters
     ----------
-    client : Client
-    sent : SentCase
-    asked : AskedPoints
     tally : Tally
         Gets the rows.
     learn : callable
@@ -215,7 +212,6 @@ class DaskWorkers(PointWorkers):
 
     Parameters
     ----------
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     scheduler : str, Client or Cluster

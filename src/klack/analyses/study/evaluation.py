@@ -56,10 +56,6 @@ class KeptPoint:
 
     Parameters
     ----------
-    values : mapping of str to float or None
-    failure : str
-    notes : tuple of str
-    model : str
     steps : PointSteps or None
         See :class:`~klack.analyses.study.asked_points.PointRow`.
     """
@@ -209,13 +205,7 @@ def asked_of(
 
 
 class Evaluation:
-    """Computes what the log does not hold; counts points and seconds.
-
-    Parameters
-    ----------
-    log : PointLog
-    workers : PointWorkers
-    """
+    """Computes what the log does not hold; counts points and seconds."""
 
     def __init__(self, log: PointLog, workers: PointWorkers) -> None:
         self._log, self._workers = log, workers

@@ -37,7 +37,6 @@ class Bound:
 
     Parameters
     ----------
-    measure : str
     value : float [unit of the measure]
     is_most : bool
         True for the largest allowed value, False for the smallest.
@@ -63,7 +62,6 @@ class Goals:
         Measures.
     signs : tuple of float
         1 for one to minimise, -1 for one to maximise.
-    bounds : tuple of Bound
     """
 
     objectives: tuple[str, ...]
@@ -128,7 +126,6 @@ def goals_of(
 
     Parameters
     ----------
-    source : StudySource
     measures : mapping of str to Measure
         All that are computed, by their names in the study.
     today : mapping of str to float

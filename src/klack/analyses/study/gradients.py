@@ -72,9 +72,6 @@ class Gradients:
     ----------
     runner : SlopeRunner
         Of the case.
-    slopes : SlopeSpace
-    space : Space
-    goals : Goals
     chosen : tuple of ChosenMeasure
         Of the objectives and bounds.
     notes : list of str

@@ -226,7 +226,6 @@ class _Point:
 
     Parameters
     ----------
-    run : ImpactOfPoint
     notes : tuple of str
         Doubts; an empty one is none.
     models : tuple of str

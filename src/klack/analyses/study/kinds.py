@@ -36,11 +36,8 @@ def ask(
 
     Parameters
     ----------
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
-    points : sequence of mappings, or mapping of sequences
-    measures : iterable of str
     variant : str or None
         Of a stroke; of an impact its level.
 

@@ -21,7 +21,6 @@ class Pace:
 
     Parameters
     ----------
-    progress : Progress
     most : int
         Points that will have been asked for at the end.
     """
@@ -83,7 +82,6 @@ class LiveRecord:
 
     Parameters
     ----------
-    folder : Path
     progress : callable
         Is told of a fault.
     """
@@ -124,7 +122,6 @@ class ProgressPage:
 
     Parameters
     ----------
-    folder : Path
     progress : callable
         Is told where the page is.
     """

@@ -31,8 +31,6 @@ class _Scattered:
 
     Parameters
     ----------
-    name : str
-    kind : Kind
     deviation : float [SI]
         Standard deviation of made valves.
     today : float or None [SI]
@@ -53,7 +51,6 @@ class Scatter:
     ----------
     space : Space
         Of the study.
-    values : tuple of _Scattered
     cube : array, shape (valves, values)
         Shares of probability of each valve.
     """
@@ -239,8 +236,6 @@ class MadeValves:
 
     Parameters
     ----------
-    scatter : Scatter
-    value : RobustValue
     today : tuple of mapping
         Valves made after the case as it is; empty where words of the study have no value there.
     """

@@ -115,7 +115,6 @@ class ChosenMeasure:
     ----------
     name : str
         In the study.
-    measure : Measure
     of : str
         What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
         an impact, all of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
@@ -166,7 +165,6 @@ def choose_measures(
 
     Parameters
     ----------
-    names : iterable of str
     find : callable
         Of a name; None where there is no such measure.
     known : sequence of str
@@ -270,7 +268,6 @@ def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
     ----------
     names : iterable of str
         Of measures of the shots.
-    found : DroppedShots
     """
     parts = [name.split(".")[1:] for name in names]
     columns = dict.fromkeys(of for of, _ in parts if of in _RESULTS)
@@ -342,7 +339,6 @@ class ImpactOfPoint:
         Of the impact.
     noise : PointNoise, optional
         Of that impact.
-    shots : DroppedShots, optional
     """
 
     level: LevelResult | None = None
@@ -417,13 +413,7 @@ _OF_IMPACTS = {measure.key: measure for measure in EVENT_MEASURES}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StrokeOfPoint:
-    """Stroke of a point, and its noise.
-
-    Parameters
-    ----------
-    variant : StrokeVariant
-    noise : PointNoise
-    """
+    """Stroke of a point, and its noise."""
 
     variant: StrokeVariant
     noise: PointNoise

@@ -77,7 +77,6 @@ def run_optimisation(
 
     Parameters
     ----------
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     source : StudySource
@@ -86,7 +85,6 @@ def run_optimisation(
         Where computed points are kept.
     where : Where
         Points are computed.
-    progress : callable
     seen : callable, optional
         Takes what was found so far, now and then.
     live : callable, optional

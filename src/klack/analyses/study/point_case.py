@@ -20,7 +20,6 @@ def case_of_point(
 
     Parameters
     ----------
-    record : StudyRecord
     point : int or None
         The recommended one of an optimisation by default.
     folder : Path

@@ -305,7 +305,6 @@ class Linked:
         Path of the key.
     kind : Kind
         Of quantity.
-    expression : Expression
     words : mapping of str to str
         Parameter, or other key, that each word of the expression means.
     today : float [SI]
@@ -419,12 +418,10 @@ class StudyPoints:
 
     Parameters
     ----------
-    space : Space
     values : tuple of mapping of str to value
         Of each point by name [SI]: parameters, then what follows from them.
     design : str
         In words.
-    notes : tuple of str
     cube : array, shape (points, parameters that vary), optional
         Where they lie in the unit cube, if they were drawn there.
     """

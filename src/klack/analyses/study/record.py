@@ -77,8 +77,6 @@ class Sensitivity:
 
     Parameters
     ----------
-    measure : str
-    parameters : tuple of str
     first, first_low, first_high : array, shape (parameters,)
         Share that a parameter causes alone, with its interval of confidence.
     total, total_low, total_high : array, shape (parameters,)
@@ -111,8 +109,6 @@ class Screening:
 
     Parameters
     ----------
-    measure : str
-    parameters : tuple of str
     size, size_error : array, shape (parameters,) [unit of the measure]
         Mean of the sizes of the effects, mu*, and its standard error.
     mean : array, shape (parameters,)
@@ -139,7 +135,6 @@ class SurrogateEffect:
 
     Parameters
     ----------
-    parameter : str
     at : array [SI]
         Values of the parameter; of words, which of them.
     words : tuple of str
@@ -159,8 +154,6 @@ class StudySurrogate:
 
     Parameters
     ----------
-    measure : str
-    kind : str
     made_of : str
         In words.
     points, failed, repeated : int
@@ -174,7 +167,6 @@ class StudySurrogate:
         Value minus prediction from the other points; nan where there is none.
     reason : str
         Why nothing follows from it; empty if something does.
-    parameters : tuple of str
     first, first_low, first_high, total, total_low, total_high : array, shape (parameters,)
         Shares of the variance as of :class:`Sensitivity`, with the largest change that the error
         can make in them; nan with a reason.
@@ -213,7 +205,6 @@ class Optimum:
         In words.
     objectives : tuple of str
         Measures; ``ways`` says whether each is minimised or maximised.
-    ways : tuple of str
     bounds : tuple of str
         In words.
     kept : bool array, shape (points,)
@@ -300,7 +291,6 @@ class StudyRecord(CaseRecord):
         Points that were computed now, and that an earlier run had left.
     point_time : float [s]
         Wall-clock time of the points that were computed now.
-    parameters, linked, measures : tuple of StudyColumn
     failures : tuple of str
         Why a point has no measures; empty where it was computed.
     notes : tuple of str

@@ -78,16 +78,13 @@ def run_study(
 
     Parameters
     ----------
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
-    source : StudySource
     folder : Path, optional
         Where computed points are kept: an interrupted study resumes, and another study of the same
         case finds what both have.
     where : Where
         Points are computed.
-    progress : callable
     live : callable, optional
         Is offered a record of the points so far, often.
 

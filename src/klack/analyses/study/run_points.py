@@ -33,7 +33,6 @@ def run_points(
 
     Parameters
     ----------
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
     points : sequence of mappings, or mapping of sequences

@@ -81,8 +81,6 @@ class _Built:
         The same, checked where no point changes it.
     valve : Valve
         Of one point, without meshes.
-    bodies : tuple of BodySummary
-    stops : tuple of StopSummary
     notes : tuple of str
         Doubts about bodies and laws.
     transfers : Transfers

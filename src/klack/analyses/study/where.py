@@ -186,9 +186,6 @@ class PointOrder:
     ----------
     keys : tuple of PointKey
         All that the points of the study exchange.
-    measures : tuple of str
-    variant : str
-    checks : bool
     written : tuple of mapping of str to value
         What each point exchanges.
     """
@@ -217,7 +214,6 @@ class Answer:
 
     Parameters
     ----------
-    rows : tuple of PointRow
     seconds : float [s]
         That the worker took.
     """
@@ -306,10 +302,8 @@ class ProcessWorkers(PointWorkers):
 
     Parameters
     ----------
-    case : Case or ValveCase
     tree : CaseTree
         The same as it was written.
-    processes : int
 
     Raises
     ------
