@@ -25,7 +25,8 @@ from klack.case.any_case import AnyCase
 from klack.case.distribution import Distribution
 from klack.case.schema import Case
 from klack.case.shots import Shots, StrokeShots
-from klack.errors import InputError
+from klack.cores import available_cores
+from klack.errors import InputError, require_positive
 
 __all__ = [
     "ShotDraw",
@@ -38,6 +39,7 @@ __all__ = [
     "extreme_placements",
     "face_friction",
     "polar",
+    "runs_asked",
     "shots_of",
 ]
 
@@ -182,6 +184,16 @@ def extreme_placements(
             aside = _largest(shots.eccentricity) * towards
             extremes.append((aside, sign * _largest(shots.tilt) * towards))
     return tuple(extremes)
+
+
+def runs_asked(
+    stated: Shots | StrokeShots, count: int | None, seed: int | None, workers: int | None, runs: str
+) -> tuple[int, int, int]:
+    """How many shots or strokes, their seed, and processes: as asked for, else as stated."""
+    wanted = stated.count if count is None else count
+    require_positive("shots: count", wanted, runs)
+    own = stated.seed if seed is None else seed
+    return wanted, own, available_cores() if workers is None else workers
 
 
 def shots_of(case: Case) -> Shots:

@@ -18,6 +18,7 @@ from klack.analyses.shots.draw import (
     closing_force,
     draw_shot,
     face_friction,
+    runs_asked,
     shots_of,
 )
 from klack.analyses.shots.model import ShotModel, build_shots
@@ -37,8 +38,8 @@ from klack.cache.setting import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
-from klack.cores import available_cores
-from klack.errors import ConvergenceError, require_positive
+from klack.case.shots import Shots, StrokeShots
+from klack.errors import ConvergenceError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
@@ -46,9 +47,11 @@ from klack.units import format_si
 __all__ = [
     "DroppedShots",
     "drop_shots",
+    "friction_in_words",
     "guide_in_words",
     "highest_of",
     "judge_rule",
+    "position_in_words",
     "run_shots",
     "run_shots_on",
     "shot_doubts",
@@ -102,10 +105,7 @@ def run_shots(
     """
     begin = perf_counter()
     stated = shots_of(case)
-    count = stated.count if count is None else count
-    require_positive("shots: count", count, "shots")
-    seed = stated.seed if seed is None else seed
-    workers = available_cores() if workers is None else workers
+    count, seed, workers = runs_asked(stated, count, seed, workers, "shots")
     clock = StageClock(progress, result_cache())
     mark = shots_mark(case, seed, threads)
     with shot_log(folder, mark) as log, collected_warnings() as notes:
@@ -122,17 +122,12 @@ def run_shots(
             )
         lowest = int(np.nanargmin(shots.restitution))
         pictured = {
-            "centric": centric_draw(case),
-            "highest": dropped.draws[highest],
-            "lowest": dropped.draws[lowest],
-        }
-        faces = {
-            "centric": dropped.worn_before(count),
-            "highest": dropped.worn_before(highest),
-            "lowest": dropped.worn_before(lowest),
+            "centric": (centric_draw(case), dropped.worn_before(count)),
+            "highest": (dropped.draws[highest], dropped.worn_before(highest)),
+            "lowest": (dropped.draws[lowest], dropped.worn_before(lowest)),
         }
         with trial():  # once more what has told its doubts
-            pressures = _pressures(model.setup, pictured, faces)
+            pressures = _pressures(model.setup, pictured)
         clock("shots", 1.0)
     return ShotsStudy(
         **case_fields(case),
@@ -303,12 +298,12 @@ def highest_of(shots: ShotColumns) -> int | None:
 
 
 def _pressures(
-    setup: ShotSetup, pictured: Mapping[str, ShotDraw], faces: Mapping[str, Worn | None]
+    setup: ShotSetup, pictured: Mapping[str, tuple[ShotDraw, Worn | None]]
 ) -> dict[str, PressureRecord]:
     """Contact forces point by point of the first impact of some shots, on their faces."""
     records = {}
-    for name, draw in pictured.items():
-        result = simulate_shot(setup, draw, impacts=1, points=True, worn=faces[name])
+    for name, (draw, worn) in pictured.items():
+        result = simulate_shot(setup, draw, impacts=1, points=True, worn=worn)
         first = result.impacts[0]
         record = pressure_record(
             first.history, first.point_force, setup.model.points, setup.model.area
@@ -331,20 +326,11 @@ def _worn(shots: ShotColumns) -> Iterator[str]:
 
 def _distributions(case: Case) -> dict[str, str]:
     shots = shots_of(case)
-    words = {"closing force": closing_force(case).text("N")}
-    if shots.eccentricity is not None:
-        words["eccentricity"] = shots.eccentricity.text("m")
-    if shots.tilt is not None:
-        words["tilt"] = shots.tilt.text("rad")
-    if shots.eccentricity is None and shots.tilt is None and case.guide is not None:
-        words["eccentricity and tilt"] = (
-            f"axis uniformly within the clearance of {format_si(case.guide.clearance, 'm')} at "
-            "the lowest and the highest guiding height"
-        )
-    if shots.friction is not None:
-        words["friction in the guide"] = shots.friction.text("")
-    elif case.guide is not None:
-        words["friction in the guide"] = format_si(case.guide.friction, "")
+    words = {
+        "closing force": closing_force(case).text("N"),
+        **position_in_words(shots, case.guide),
+        **friction_in_words(shots, case.guide),
+    }
     if shots.contact_friction is not None:
         words["friction between the faces"] = shots.contact_friction.text("")
     if shots.waviness is not None:
@@ -370,6 +356,25 @@ def _faces_in_words(case: Case) -> str:
     if faces.speed > 0.0:
         text += f", fading over {format_si(faces.speed, 'm/s')}"
     return text
+
+
+def position_in_words(shots: Shots | StrokeShots, guide: CaseGuide | None) -> dict[str, str]:
+    """Distributions of the position at the start."""
+    given = (("eccentricity", shots.eccentricity, "m"), ("tilt", shots.tilt, "rad"))
+    words = {name: size.text(unit) for name, size, unit in given if size is not None}
+    if not words and guide is not None:
+        words["eccentricity and tilt"] = (
+            f"axis uniformly within the clearance of {format_si(guide.clearance, 'm')} at "
+            "the lowest and the highest guiding height"
+        )
+    return words
+
+
+def friction_in_words(shots: Shots | StrokeShots, guide: CaseGuide | None) -> dict[str, str]:
+    """Distribution of the friction in a guide."""
+    own = format_si(guide.friction, "") if guide is not None else ""
+    text = own if shots.friction is None else shots.friction.text("")
+    return {"friction in the guide": text} if text else {}
 
 
 def guide_in_words(guide: CaseGuide | None) -> str:

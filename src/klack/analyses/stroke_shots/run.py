@@ -8,7 +8,8 @@ from time import perf_counter
 import numpy as np
 
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.shots.run import guide_in_words
+from klack.analyses.shots.draw import runs_asked
+from klack.analyses.shots.run import friction_in_words, guide_in_words, position_in_words
 from klack.analyses.stroke.run import body_summaries, stop_summaries
 from klack.analyses.stroke_shots.one_stroke import (
     CENTRED,
@@ -37,8 +38,7 @@ from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.case.variants import Variant
-from klack.cores import available_cores
-from klack.errors import ConvergenceError, InputError, require_positive
+from klack.errors import ConvergenceError, InputError
 from klack.progress import Progress, silent
 from klack.schematic.picture import schematic_svg
 from klack.stages import StageClock, collected_warnings
@@ -92,10 +92,7 @@ def run_stroke_shots(
     begin = perf_counter()
     stated = shots_of_valve(case)
     wanted = case.require_variants(tuple(variants) or case.run.variants)
-    count = stated.count if count is None else count
-    require_positive("shots: count", count, "strokes")
-    seed = stated.seed if seed is None else seed
-    workers = available_cores() if workers is None else workers
+    count, seed, workers = runs_asked(stated, count, seed, workers, "strokes")
     roles = find_roles(case)
     clock = StageClock(progress, result_cache())
     with STROKE_LOG.open(folder, strokes_mark(case, seed, threads)) as log:
@@ -285,23 +282,13 @@ def _largest(case: ValveCase, spatial: SpatialValve, starts: Starts) -> dict[str
 
 
 def _distributions(case: ValveCase) -> dict[str, str]:
-    shots, words = shots_of_valve(case), {}
+    shots = shots_of_valve(case)
+    words = position_in_words(shots, case.guide)
     if case.placement is not None:
-        words["eccentricity and tilt"] = "the placement of the case, for the first stroke"
-    elif shots.draws_position and shots.eccentricity is not None and shots.tilt is not None:
-        words["eccentricity"] = shots.eccentricity.text("m")
-        words["tilt"] = shots.tilt.text("rad")
-    elif case.guide is not None:
-        words["eccentricity and tilt"] = (
-            f"axis uniformly within the clearance of {format_si(case.guide.clearance, 'm')} at "
-            "the lowest and the highest guiding height"
-        )
+        words = {"eccentricity and tilt": "the placement of the case, for the first stroke"}
     if shots.carry:
         words["later strokes"] = "start where the one before has left the needle across its axis"
-    if shots.friction is not None:
-        words["friction in the guide"] = shots.friction.text("")
-    elif case.guide is not None:
-        words["friction in the guide"] = format_si(case.guide.friction, "")
+    words |= friction_in_words(shots, case.guide)
     given = {name: stop.friction for name, stop in case.stops.items() if stop.friction > 0.0}
     if shots.contact_friction is not None:
         words["friction between the faces"] = shots.contact_friction.text("")
