@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from hashlib import sha256
 from io import FileIO
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from klack.closing import Closing
 from klack.errors import CacheWarning, InputError
 from klack.folder_lock import try_lock
 from klack.own_file import open_own_file
+
+if TYPE_CHECKING:
+    from klack.case.any_case import AnyCase
 
 __all__ = ["LogForm", "UnfinishedLog", "code_of_klack", "fingerprint"]
 
@@ -222,14 +225,7 @@ def _opened(path: Path) -> int:
     return handle
 
 
-class _Case(Protocol):
-    @property
-    def source(self) -> str: ...
-    @property
-    def bodies(self) -> Mapping[str, CaseBody]: ...
-
-
-def fingerprint(case: _Case, parts: Iterable[bytes]) -> str:
+def fingerprint(case: "AnyCase", parts: Iterable[bytes], source: str | None = None) -> str:
     """Digest of all that decides the numbers of a work: case, its files, klack, NumPy, and more.
 
     Parameters
@@ -238,9 +234,12 @@ def fingerprint(case: _Case, parts: Iterable[bytes]) -> str:
         Meshes and drawings of its bodies are read.
     parts : iterable of bytes
         Seeds, measured values, ...
+    source : str, optional
+        What counts of the text of the case; all of it by default.
     """
     digest = sha256()
-    heads = (word.encode() for word in (klack.__version__, np.__version__, case.source))
+    text = case.source if source is None else source
+    heads = (word.encode() for word in (klack.__version__, np.__version__, text))
     for part in (*heads, *parts):
         digest.update(part + b"\0")
     for body in case.bodies.values():

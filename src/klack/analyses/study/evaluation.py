@@ -25,7 +25,6 @@ from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.any_case import AnyCase
-from klack.case.bodies import CaseBody
 from klack.case.case_tree import CaseTree
 from klack.case.points import GivenPoints, PointValue
 from klack.case.study_source import StudySource
@@ -92,7 +91,9 @@ PointLog = UnfinishedLog[str, KeptPoint]
 
 def point_log_form(case: AnyCase, tree: CaseTree) -> tuple[LogForm[str, KeptPoint], str]:
     """How the points of a case are kept, and the mark of the case."""
-    mark = fingerprint(_Deciding.of(case, tree), _own_code(case))
+    data = {name: value for name, value in tree.data.items() if name not in _ASIDE}
+    source = json.dumps(data, sort_keys=True, default=str)
+    mark = fingerprint(case, _own_code(case), source)
     return (
         LogForm(
             file=f"points-{mark[:12]}.jsonl",
@@ -126,19 +127,6 @@ def _with_content(folder: Path, value: PointValue) -> PointValue | list[str]:
         except (OSError, ValueError):  # no name of a file
             return value
     return value
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Deciding:
-    """What of a case decides a point, as :func:`fingerprint` wants it."""
-
-    source: str
-    bodies: Mapping[str, CaseBody]
-
-    @classmethod
-    def of(cls, case: AnyCase, tree: CaseTree) -> "_Deciding":
-        data = {name: value for name, value in tree.data.items() if name not in _ASIDE}
-        return cls(source=json.dumps(data, sort_keys=True, default=str), bodies=case.bodies)
 
 
 def _own_code(case: AnyCase) -> Iterator[bytes]:
