@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from klack.errors import InputError
-from klack.studies.fronts import compromise, find_front, hypervolume, spread_over
+from klack.studies.fronts import compromise, find_front, spread_over
 
 
 def front_by_pairs(points):
@@ -116,43 +116,6 @@ def test_compromise_does_not_depend_on_units():
     assert compromise([[4.0, 4.0]]) == 0
 
 
-def test_hypervolume_of_boxes_by_hand():
-    assert hypervolume([[1.0]], [4.0]) == 3.0
-    assert hypervolume([[1.0, 2.0], [2.0, 1.0]], [3.0, 3.0]) == 3.0  # 2 + 2 - 1
-    boxes = [[0.0, 1.0, 1.0], [1.0, 0.0, 1.0], [1.0, 1.0, 0.0]]
-    assert hypervolume(boxes, [2.0, 2.0, 2.0]) == 4.0  # three boxes of 2 share one of 1
-    assert hypervolume([[0.0, 0.0, 0.0, 0.0]], [1.0, 2.0, 3.0, 4.0]) == 24.0
-
-
-def test_hypervolume_skips_what_adds_nothing():
-    points = [[1.0, 1.0], [1.0, 1.0], [1.5, 1.5], [np.nan, 0.0], [0.0, 3.0], [9.0, 0.0]]
-    assert hypervolume(points, [3.0, 3.0]) == 4.0
-    assert hypervolume(np.empty((0, 2)), [1.0, 1.0]) == 0.0
-    assert hypervolume([[2.0, 0.0]], [1.0, 1.0]) == 0.0
-
-
-@pytest.mark.parametrize("columns", [2, 3, 4])
-def test_hypervolume_is_that_of_pymoo(columns):
-    from pymoo.indicators.hv import HV
-
-    points = np.random.default_rng(columns).random((120, columns))
-    points[60:] = np.round(points[60:], 1)
-    reference = np.full(columns, 0.95)
-    expected = HV(ref_point=reference)(points)
-    assert hypervolume(points, reference) == pytest.approx(expected, rel=1e-12)
-
-
-def test_hypervolume_of_a_quarter_circle_converges():
-    errors = []
-    for count in (100, 200, 400):
-        angle = np.linspace(0.0, np.pi / 2, count)
-        points = 1.0 - np.column_stack((np.cos(angle), np.sin(angle)))
-        errors.append(np.pi / 4 - hypervolume(points, [1.0, 1.0]))
-    assert errors[0] > 0
-    assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.05)
-    assert np.log2(errors[1] / errors[2]) == pytest.approx(1.0, abs=0.05)
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -163,9 +126,6 @@ def test_hypervolume_of_a_quarter_circle_converges():
         (lambda: find_front([[1.0]], [[1.0], [2.0]]), "1 rows, as many"),
         (lambda: compromise(np.empty((0, 2))), "one point or more"),
         (lambda: compromise([[1.0, np.nan]]), "row 0, column 1"),
-        (lambda: hypervolume([[1.0, 2.0]], [3.0]), "2 numbers, one per objective"),
-        (lambda: hypervolume([[1.0, 2.0]], [3.0, np.inf]), "finite"),
-        (lambda: hypervolume([[1.0, -np.inf]], [3.0, 3.0]), "finite"),
     ],
 )
 def test_one_error_says_what_does_not_fit(call, words):

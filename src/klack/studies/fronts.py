@@ -1,4 +1,4 @@
-"""Best of many evaluated points: the non-dominated ones, a compromise, the volume they dominate.
+"""Best of many evaluated points: the non-dominated ones, and a compromise.
 
 Objectives are minimised; a constraint is kept where it is zero or less.  A point with a value that
 is not finite (nan: its run failed) never counts as feasible.
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError, refuse_if
 from klack.studies.batches import values_of_points
 
-__all__ = ["Front", "compromise", "find_front", "hypervolume", "spread_over"]
+__all__ = ["Front", "compromise", "find_front", "spread_over"]
 
 _PAIRS = 40_000
 """Largest number of pairs of points that are compared directly, without another division."""
@@ -100,10 +100,18 @@ def compromise(objectives: ArrayLike) -> int:
     -----
     Yu (1973), Management Science 19, 936-946; Zeleny (1973), compromise programming.
     """
-    values = _finite(objectives, "objectives of a front")
+    values, where = values_of_points(objectives, None).objectives, "objectives of a front"
+    if not np.isfinite(values).all():
+        row, column = np.argwhere(~np.isfinite(values))[0]
+        raise InputError(
+            where,
+            got=f"{values[row, column]} in row {row}, column {column}",
+            expected="finite numbers",
+            hint="leave failed points out.",
+        )
     refuse_if(
         not len(values),
-        "objectives of a front",
+        where,
         got="no point",
         expected="one point or more",
         hint="take the points of a front that is not empty.",
@@ -129,82 +137,6 @@ def spread_over(points: NDArray[np.integer], most: int) -> NDArray[np.integer]:
     if points.size <= most:
         return points
     return points[np.linspace(0, points.size - 1, most).round().astype(int)]
-
-
-def hypervolume(objectives: ArrayLike, reference: ArrayLike) -> float:
-    """Volume of the objective space that the points dominate, up to a reference point.
-
-    Exact, by slices along the last objective down to two objectives, where it is a sum of
-    rectangles.  Points that are not better than the reference in every objective add nothing.  The
-    time grows with ``n log n`` in two objectives, and by a factor ``n`` with each further one: made
-    for fronts of at most a thousand points in three.
-
-    Parameters
-    ----------
-    objectives : array_like, shape (points, objectives)
-        Numbers to minimise; rows with nan (failed points) are skipped.
-    reference : array_like, shape (objectives,)
-        Worst point that counts.
-
-    Returns
-    -------
-    float
-        In the product of the units of the objectives; compare only volumes of one reference.
-
-    Raises
-    ------
-    InputError
-        If the shapes do not fit, or the reference or an objective is infinite.
-
-    Notes
-    -----
-    Zitzler and Thiele (1998), PPSN V, 292-301.
-    """
-    values = values_of_points(objectives, None).objectives
-    corner = _finite(np.atleast_1d(np.asarray(reference, dtype=float))[None], "reference point")[0]
-    refuse_if(
-        corner.shape != (values.shape[1],),
-        "reference point",
-        got=f"{corner.size} numbers",
-        expected=f"{values.shape[1]} numbers, one per objective",
-        hint="give one worst value per objective.",
-    )
-    values = _finite(values[~np.isnan(values).any(axis=1)], "objectives")
-    inside = values[np.all(values < corner, axis=1)]
-    return _volume(inside, corner) if len(inside) else 0.0
-
-
-def _finite(numbers: ArrayLike, where: str) -> NDArray[np.float64]:
-    """Check for a table of finite numbers."""
-    values = values_of_points(numbers, None).objectives
-    bad = np.argwhere(~np.isfinite(values))
-    if bad.size:
-        row, column = bad[0]
-        raise InputError(
-            where,
-            got=f"{values[row, column]} in row {row}, column {column}",
-            expected="finite numbers",
-            hint="leave failed points out.",
-        )
-    return values
-
-
-def _volume(points: NDArray[np.float64], corner: NDArray[np.float64]) -> float:
-    """Dominated volume of points that are all better than the corner."""
-    if points.shape[1] == 1:
-        return float(corner[0] - points.min())
-    if points.shape[1] == 2:
-        points = points[np.argsort(points[:, 0], kind="stable")]
-        lowest = np.minimum.accumulate(np.concatenate((corner[1:], points[:, 1])))
-        return float(np.sum((corner[0] - points[:, 0]) * (lowest[:-1] - lowest[1:])))
-    points = points[_non_dominated(points)]
-    points = points[np.argsort(points[:, -1], kind="stable")]
-    depths = np.diff(points[:, -1], append=corner[-1])
-    total = 0.0
-    for count, depth in enumerate(depths, start=1):
-        if depth > 0.0:
-            total += depth * _volume(points[:count, :-1], corner[:-1])
-    return float(total)
 
 
 def _non_dominated(values: NDArray[np.float64]) -> NDArray[np.intp]:
