@@ -41,11 +41,7 @@ run: {duration: 20 us, step: 20 ns, coarse: 16, record: 1 us, variants: [wet]}
 
 def small_valve() -> ValveCase:
     """Read the case: rigid bodies, a fluid, a pipe, a stop with a film."""
-    path = Path("small-valve.yaml")
-    data, lines = parse(_SMALL, path)
-    case = CaseTree(path=path, text=_SMALL, data=data, lines=lines).case({})
-    assert isinstance(case, ValveCase)
-    return case
+    return _valve(_SMALL, Path("small-valve.yaml"))
 
 
 _SPATIAL = """
@@ -149,7 +145,10 @@ def spatial_valve(model: Literal["axisymmetric", "swept"]) -> ValveCase:
     solid = model == "swept"
     words = "model: swept\n      layers: 8" if solid else "model: axisymmetric"
     text = _SPATIAL.replace("MODEL", words).replace("FRICTION", ", friction: 0.1" if solid else "")
-    path = Path("spatial-valve.yaml")
+    return _valve(text, Path("spatial-valve.yaml"))
+
+
+def _valve(text: str, path: Path) -> ValveCase:
     data, lines = parse(text, path)
     case = CaseTree(path=path, text=text, data=data, lines=lines).case({})
     assert isinstance(case, ValveCase)

@@ -325,9 +325,8 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
             columns=MISSED_COLUMNS,
             rows=[missed_cells(item) for item in record.missed],
         )
-    own = {item.name: item for item in record.measures}
     for effects in record.screenings:
-        measure = own[effects.measure]
+        measure = record.measure(effects.measure)
         yield TextTable(
             title=f"Change of {effects.measure} over the whole range of each parameter",
             columns=EFFECT_COLUMNS,
@@ -347,7 +346,7 @@ def study_told(record: StudyRecord) -> Iterator[TextTable | str]:
             title=f"Each point predicted from the others by {record.surrogates[0].kind}",
             columns=SURROGATE_COLUMNS,
             rows=[
-                [item.measure, *surrogate_cells(own[item.measure], item, in_words)]
+                [item.measure, *surrogate_cells(record.measure(item.measure), item, in_words)]
                 for item in record.surrogates
             ],
         )

@@ -1,5 +1,6 @@
 """Content of a study's report before its layout."""
 
+from collections.abc import Sequence
 from math import isfinite, nan
 
 import numpy as np
@@ -16,7 +17,13 @@ from klack.analyses.study.figures import (
     sensitivity_bars,
     surrogate_bars,
 )
-from klack.analyses.study.record import Optimum, StudyColumn, StudyRecord, StudySurrogate
+from klack.analyses.study.record import (
+    Optimum,
+    Sensitivity,
+    StudyColumn,
+    StudyRecord,
+    StudySurrogate,
+)
 from klack.analyses.study.wording import (
     EFFECT_COLUMNS,
     MISSED_COLUMNS,
@@ -215,14 +222,13 @@ def _listen(record: StudyRecord, found: Optimum, labels: dict[str, str]) -> Sect
     if not record.sounds:
         return Section(title="Listen")
     scale = full_scale_of(*(item.pressure for item in record.sounds))
-    own = {item.name: item for item in record.measures}
     players = []
     for item in record.sounds:
         title = "today" if item.point < 0 else f"point {item.point}"
         title += ", recommended" if item.point == found.best else ""
         values = []
         for name in found.objectives:
-            of = own[name]
+            of = record.measure(name)
             value = of.today if item.point < 0 else float(of.values[item.point])
             values.append(f"{labels[name]} {on_page(of, value)}")
         players.append(
@@ -244,8 +250,8 @@ def _listen(record: StudyRecord, found: Optimum, labels: dict[str, str]) -> Sect
 
 def _front_row(record: StudyRecord, place: int, labels: dict[str, str]) -> tuple[str, ...]:
     objectives = record.optimum.objectives if record.optimum else ()
-    own = {item.name: item for item in record.measures}
-    values = (on_page(own[name], float(own[name].values[place])) for name in objectives)
+    chosen = (record.measure(name) for name in objectives)
+    values = (on_page(item, float(item.values[place])) for item in chosen)
     varied = (item for item in record.parameters if item.varies)
     words = (f"{labels[i.name]} {on_page(i, float(i.values[place]), 3)}" for i in varied)
     return (str(place), *values, ", ".join(words))
@@ -303,17 +309,16 @@ def _missed_section(record: StudyRecord) -> Section:
 
 def _screening_section(record: StudyRecord, labels: dict[str, str]) -> Section:
     """Effects of each parameter on each measure; empty without trajectories."""
-    own = {item.name: item for item in record.measures}
     rows = [
         (labels[item.measure], labels[item.parameters[k]], *cells)
         for item in record.screenings
         for k in largest_first(item)
-        for cells in [effect_cells(own[item.measure], item, k, on_page)]
+        for cells in [effect_cells(record.measure(item.measure), item, k, on_page)]
     ]
     return Section(
         title="How much each parameter changes",
         charts=tuple(
-            effect_bars(own[item.measure], item, labels)
+            effect_bars(record.measure(item.measure), item, labels)
             for item in record.screenings
             if np.isfinite(item.size).any()
         ),
@@ -324,12 +329,6 @@ def _screening_section(record: StudyRecord, labels: dict[str, str]) -> Section:
 def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section:
     """Bars and numbers of Sobol's indices; empty without them."""
     known = [item for item in record.sensitivities if np.isfinite(item.total).any()]
-    rows = [
-        (labels[item.measure], labels[name], *index_cells(item, k))
-        for item in known
-        for k, name in enumerate(item.parameters)
-    ]
-    heads = ("measure", "parameter", *SHARE_COLUMNS)
     told = [
         f"{labels[item.measure]}: {item.reason}." for item in record.sensitivities if item.reason
     ]
@@ -348,15 +347,27 @@ def _sensitivity_section(record: StudyRecord, labels: dict[str, str]) -> Section
         title="Which parameter causes the scatter",
         paragraphs=tuple(told),
         charts=tuple(sensitivity_bars(item, labels) for item in known),
-        tables=(Table(columns=heads, rows=tuple(rows)),) if rows else (),
+        tables=_share_tables(known, labels),
     )
+
+
+def _share_tables(
+    items: Sequence[Sensitivity | StudySurrogate], labels: dict[str, str]
+) -> tuple[Table, ...]:
+    """Shares of the variance of each measure; none without any."""
+    rows = tuple(
+        (labels[item.measure], labels[name], *index_cells(item, k))
+        for item in items
+        for k, name in enumerate(item.parameters)
+    )
+    heads = ("measure", "parameter", *SHARE_COLUMNS)
+    return (Table(columns=heads, rows=rows),) if rows else ()
 
 
 def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Section, ...]:
     """How well surrogates predict, and what follows from those that do; none without them."""
     if not record.surrogates:
         return ()
-    own = {item.name: item for item in record.measures}
     used = [item for item in record.surrogates if not item.reason]
     told = [
         "Each point is predicted from the others. Q2 is 1 for a perfect prediction and 0 for one "
@@ -378,7 +389,7 @@ def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Se
                     rows=tuple(
                         (
                             labels[item.measure],
-                            *surrogate_cells(own[item.measure], item, on_page),
+                            *surrogate_cells(record.measure(item.measure), item, on_page),
                         )
                         for item in record.surrogates
                     ),
@@ -387,17 +398,11 @@ def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Se
         )
     ]
     if used:
-        heads = ("measure", "parameter", *SHARE_COLUMNS)
-        rows = tuple(
-            (labels[item.measure], labels[name], *index_cells(item, k))
-            for item in used
-            for k, name in enumerate(item.parameters)
-        )
         found.append(
             Section(
                 title="Surrogates: which parameter causes the scatter",
                 charts=tuple(surrogate_bars(item, labels) for item in used),
-                tables=(Table(columns=heads, rows=rows),),
+                tables=_share_tables(used, labels),
             )
         )
         found.append(
@@ -406,18 +411,23 @@ def _surrogate_sections(record: StudyRecord, labels: dict[str, str]) -> tuple[Se
                 charts=tuple(
                     chart for item in used for chart in main_effect_charts(record, item, labels)
                 ),
-                tables=_word_effects(own, used, labels),
+                tables=_word_effects(record, used, labels),
             )
         )
     return tuple(found)
 
 
 def _word_effects(
-    own: dict[str, StudyColumn], used: list[StudySurrogate], labels: dict[str, str]
+    record: StudyRecord, used: list[StudySurrogate], labels: dict[str, str]
 ) -> tuple[Table, ...]:
     """Main effects of parameters that are words."""
     rows = tuple(
-        (labels[item.measure], labels[of.parameter], word, on_page(own[item.measure], float(mean)))
+        (
+            labels[item.measure],
+            labels[of.parameter],
+            word,
+            on_page(record.measure(item.measure), float(mean)),
+        )
         for item in used
         for of in item.effects
         for word, mean in zip(of.words, of.mean, strict=False)

@@ -116,8 +116,7 @@ def front_charts(
     record: StudyRecord, found: Optimum, labels: Mapping[str, str]
 ) -> tuple[Chart, ...]:
     """Each objective over the first one: all points, the front, the recommended one, today."""
-    own = {item.name: item for item in record.measures}
-    first, *others = (own[name] for name in found.objectives)
+    first, *others = map(record.measure, found.objectives)
     return tuple(_front_chart(first, item, found, labels) for item in others)
 
 

@@ -343,6 +343,10 @@ class StudyRecord(CaseRecord):
         """Number of points."""
         return len(self.failures)
 
+    def measure(self, name: str) -> StudyColumn:
+        """Measure of this name."""
+        return next(item for item in self.measures if item.name == name)
+
     @property
     def columns(self) -> tuple[StudyColumn, ...]:
         """Parameters, what follows from them, measures."""
