@@ -31,6 +31,7 @@ from klack.analyses.shots.record import (
 )
 from klack.analyses.shots.wording import (
     degrees,
+    drawn_section,
     largest_size,
     length_unit,
     plain,
@@ -153,8 +154,7 @@ def _pressure(study: ShotsStudy) -> Section:
 
 
 def _drawn(study: ShotsStudy) -> Section:
-    facts = [
-        ("seed", str(study.seed)),
+    facts = (
         ("guide", study.guide or "none"),
         ("friction between the faces", study.faces or "none"),
         ("surfaces", study.surfaces),
@@ -167,17 +167,8 @@ def _drawn(study: ShotsStudy) -> Section:
         ("kept elastic modes", " + ".join(count(number) for number in study.modes)),
         ("contact points", count(study.points)),
         ("time step", quantity(study.step, "s", 3)),
-        (
-            "computing time of the shots",
-            f"{quantity(study.shot_time, 's', 3)} on {study.workers} "
-            f"process{'es' if study.workers != 1 else ''}",
-        ),
-    ]
-    if study.resumed:
-        facts.append(("resumed from an interrupted run", f"{count(study.resumed)} shots"))
-    drawn = Table(columns=("what varies", "drawn from"), rows=tuple(study.distributions.items()))
-    fixed = Table(columns=("what all shots share", ""), rows=tuple(facts))
-    return Section(title="Distributions", tables=(drawn, fixed))
+    )
+    return drawn_section(study, facts, "shots", study.shot_time)
 
 
 def _shots(study: ShotsStudy) -> Section:

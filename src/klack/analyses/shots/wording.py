@@ -1,14 +1,22 @@
-"""Result of many shots, as text."""
+"""Words that reports of many shots and of many strokes share, and the answer of shots."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from klack.analyses.shots.record import FIRST_IMPACT, ShotsStudy
-from klack.report.wording import quantity, signed_share
+from klack.report.page import Section, Table
+from klack.report.wording import count, quantity, signed_share
 from klack.units import format_si
+
+if TYPE_CHECKING:
+    from klack.analyses.stroke_shots.record import StrokeShotsStudy
 
 __all__ = [
     "degrees",
+    "drawn_section",
     "largest_size",
     "length_unit",
     "plain",
@@ -85,3 +93,37 @@ def plain(value: float, decimals: int) -> str:
 def degrees(angle: float) -> str:
     """Whole degrees from 0 to 359 of an angle [rad]; a dash where there is none."""
     return f"{round(np.degrees(angle)) % 360}" if np.isfinite(angle) else "–"
+
+
+def drawn_section(
+    study: "ShotsStudy | StrokeShotsStudy",
+    facts: Iterable[tuple[str, str]],
+    runs: str,
+    spent: float,
+) -> Section:
+    """What varies from run to run, and what all of them share.
+
+    Parameters
+    ----------
+    facts : iterable of (str, str)
+        What they share.
+    runs : str
+        What they are called, ``"shots"``.
+    spent : float [s]
+        Wall time of the runs alone.
+    """
+    processes = f"{study.workers} process{'es' if study.workers != 1 else ''}"
+    shared = [
+        ("seed", str(study.seed)),
+        *facts,
+        (f"computing time of the {runs}", f"{quantity(spent, 's', 3)} on {processes}"),
+    ]
+    if study.resumed:
+        shared.append(("resumed from an interrupted run", f"{count(study.resumed)} {runs}"))
+    return Section(
+        title="Distributions",
+        tables=(
+            Table(columns=("what varies", "drawn from"), rows=tuple(study.distributions.items())),
+            Table(columns=(f"what all {runs} share", ""), rows=tuple(shared)),
+        ),
+    )

@@ -1,6 +1,5 @@
 """Content and figures of a report of many strokes before its layout, for screen and paper."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.page import page_of
 from klack.analyses.schematic_section import schematic_section
-from klack.analyses.shots.wording import degrees, length_unit, plain
+from klack.analyses.shots.wording import degrees, drawn_section, length_unit, plain
 from klack.analyses.stroke_shots.analysis import RATIO_COLUMNS, correlation_rows, ratio_rows
 from klack.analyses.stroke_shots.record import (
     AT_TOUCH,
@@ -356,35 +355,15 @@ def _correlations(name: str, shots: VariantShots) -> Table:
 
 
 def _drawn(study: StrokeShotsStudy) -> Section:
-    facts = [
-        ("seed", str(study.seed)),
-        (
-            "start",
-            "where the stroke before has left the needle" if study.carry else "drawn anew",
-        ),
+    facts = (
+        ("start", "where the stroke before has left the needle" if study.carry else "drawn anew"),
         ("guide", study.guide),
         ("mass of the needle", quantity(study.mass, "kg")),
         ("length of a stroke", quantity(study.duration, "s", 3)),
         *((f"contact points of '{stop}'", count(n)) for stop, n in study.points.items()),
         *((f"variant {name}", shots.label) for name, shots in study.variants.items()),
-        (
-            "computing time of the strokes",
-            f"{quantity(study.stroke_time, 's', 3)} on {study.workers} "
-            f"process{'es' if study.workers != 1 else ''}",
-        ),
-    ]
-    if study.resumed:
-        facts.append(("resumed from an interrupted run", f"{count(study.resumed)} strokes"))
-    return Section(
-        title="Distributions",
-        tables=(
-            Table(columns=("what varies", "drawn from"), rows=tuple(study.distributions.items())),
-            Table(columns=("what all strokes share", ""), rows=tuple(facts)),
-        ),
     )
-
-
-_Cell = Callable[[Row, Row], str]
+    return drawn_section(study, facts, "strokes", study.stroke_time)
 
 
 def _strokes(name: str, shots: VariantShots, stop: str) -> Table:
