@@ -3,6 +3,7 @@
 The highest shot is red and the centred impact black in all of them.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -247,8 +248,7 @@ def peak_chart(study: ShotsStudy) -> Chart:
 def height_traces_chart(study: ShotsStudy) -> Chart:
     """Height of the centre of mass over time, as long as the highlighted shots last."""
     unit, factor = length_unit(study.shot_traces.height)
-    bold = _bold(study)
-    ends = [_last(line.traces.time, line.traces.height[line.row]) for line in bold]
+    ends = [_last(traces.time, traces.height[row]) for traces, row, *_ in _bold(study)]
     limit = _LONGER * max(ends)
     return Chart(
         name="height",
@@ -257,10 +257,7 @@ def height_traces_chart(study: ShotsStudy) -> Chart:
         panels=(
             Panel(
                 y=AxisSpec(label="height", unit=unit),
-                curves=tuple(
-                    line.curve(1e3, factor, line.traces.time, line.traces.height, limit)
-                    for line in (*_thin(study), *bold)
-                ),
+                curves=_lines(study, lambda of: (of.time, of.height), (1e3, factor), limit),
                 marks=(Mark(value=0.0, axis="y"),),
             ),
         ),
@@ -273,7 +270,6 @@ def height_traces_chart(study: ShotsStudy) -> Chart:
 
 def force_traces_chart(study: ShotsStudy) -> Chart:
     """Contact force of the first impact over time."""
-    bold = _bold(study)
     limit = _LONGER * max(
         _last(traces.force_time, np.where(traces.force != 0, traces.force, np.nan).T)
         for traces in (study.shot_traces, study.centric_traces)
@@ -285,10 +281,7 @@ def force_traces_chart(study: ShotsStudy) -> Chart:
         panels=(
             Panel(
                 y=AxisSpec(label="contact force", unit="N"),
-                curves=tuple(
-                    line.curve(1e6, 1.0, line.traces.force_time, line.traces.force, limit)
-                    for line in (*_thin(study), *bold)
-                ),
+                curves=_lines(study, lambda of: (of.force_time, of.force), (1e6, 1.0), limit),
             ),
         ),
         note=f"Along the axis, on the moving body.{_thinned_note(study)}",
@@ -306,53 +299,46 @@ def _thinned_note(study: ShotsStudy) -> str:
     return f" The first {_MOST_TRACES} shots are drawn." if extra > 0 else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Line:
-    """One shot as a line: its row in the traces, and its look."""
+def _lines(
+    study: ShotsStudy,
+    of: Callable[[ShotTraces], tuple[Floats, NDArray[np.float32]]],
+    factors: tuple[float, float],
+    limit: float,
+) -> tuple[Curve, ...]:
+    """Many thin lines up to ``limit`` [s], the first with the name of all; on top the bold ones.
 
-    traces: ShotTraces
-    row: int
-    label: str
-    colour: Colour
-    style: Style
-    width: float
-    listed: bool = True
-
-    def curve(
-        self,
-        time_factor: float,
-        factor: float,
-        time: Floats,
-        values: NDArray[np.float32],
-        limit: float,
-    ) -> Curve:
-        """The line up to ``limit`` [s]."""
-        seen = time <= limit
-        return Curve(
-            x=time_factor * time[seen],
-            y=factor * np.asarray(values[self.row][seen], dtype=float),
-            label=self.label,
-            colour=self.colour,
-            style=self.style,
-            width=self.width,
-            listed=self.listed,
-        )
-
-
-def _thin(study: ShotsStudy) -> list[_Line]:
-    """Many thin lines, the first with the name of all."""
-    return [
-        _Line(study.shot_traces, i, "" if i else _ALL, "sky", "solid", 0.6, listed=not i)
-        for i in range(min(study.shots.count, _MOST_TRACES))
+    The bold ones are lowest, highest and centred, see :func:`_bold`.
+    """
+    shots = study.shot_traces
+    thin = range(min(study.shots.count, _MOST_TRACES))
+    looks: list[tuple[ShotTraces, int, str, Colour, Style, float]] = [
+        *((shots, i, "" if i else _ALL, "sky", "solid", 0.6) for i in thin),
+        *_bold(study),
     ]
+    curves = []
+    for k, (traces, row, label, colour, style, width) in enumerate(looks):
+        time, values = of(traces)
+        seen = time <= limit
+        curves.append(
+            Curve(
+                x=factors[0] * time[seen],
+                y=factors[1] * np.asarray(values[row][seen], dtype=float),
+                label=label,
+                colour=colour,
+                style=style,
+                width=width,
+                listed=k == 0 or k >= len(thin),
+            )
+        )
+    return tuple(curves)
 
 
-def _bold(study: ShotsStudy) -> list[_Line]:
-    """Lowest, highest and centred, on top of all others."""
+def _bold(study: ShotsStudy) -> tuple[tuple[ShotTraces, int, str, Colour, Style, float], ...]:
+    """Traces, row, label, colour, style and width of the lowest, the highest and the centred."""
     lowest, highest = int(np.nanargmin(study.shots.restitution)), study.highest
     shots, low, high = study.shot_traces, shot_name(lowest), shot_name(highest)
-    return [
-        _Line(shots, lowest, f"lowest restitution, {low}", "orange", "dashed", 2.2),
-        _Line(shots, highest, f"{_HIGHEST}, {high}", "red", "solid", 2.2),
-        _Line(study.centric_traces, 0, _CENTRED, "black", "dashdot", 2.2),
-    ]
+    return (
+        (shots, lowest, f"lowest restitution, {low}", "orange", "dashed", 2.2),
+        (shots, highest, f"{_HIGHEST}, {high}", "red", "solid", 2.2),
+        (study.centric_traces, 0, _CENTRED, "black", "dashdot", 2.2),
+    )

@@ -1,10 +1,11 @@
 """Points of a case, what is computed at each of them, and by which kind of calculation."""
 
 import warnings
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import nan
-from typing import Any, Generic, NamedTuple, Protocol
+from typing import Any, Generic, NamedTuple
 
 from typing_extensions import TypeVar
 
@@ -13,7 +14,7 @@ from klack.case.bodies import CaseFile
 from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, Points, PointValue
 from klack.case.study import CaseStudy
-from klack.errors import AccuracyWarning, InputError, KlackError
+from klack.errors import AccuracyWarning, KlackError, refuse_if
 from klack.input.problem import Key
 from klack.progress import Progress
 from klack.signals import TimeSeries
@@ -29,7 +30,6 @@ __all__ = [
     "doubts_in",
     "groups_of",
     "others_in",
-    "require_same_for_all",
 ]
 
 
@@ -112,7 +112,7 @@ Taken = Callable[[], Sequence[warnings.WarningMessage]]
 """Warnings of the thread that calls it, since it called last."""
 
 
-class PointKind(Protocol[CaseT, Built]):
+class PointKind(ABC, Generic[CaseT, Built]):
     """What a study computes at its points: strokes of a valve, impacts and shots of two bodies.
 
     Points are computed one by one, each by the functions of a single run, so that a row depends
@@ -122,7 +122,10 @@ class PointKind(Protocol[CaseT, Built]):
 
     builds: int
     """Groups of points whose bodies are kept for the next ones."""
+    same: tuple[Key, str, str]
+    """Section of the case that is the same for all points, what it has, and what to do instead."""
 
+    @abstractmethod
     def asked_variant(self, study: CaseStudy) -> str | None:
         """What the study says of the variant.
 
@@ -132,6 +135,7 @@ class PointKind(Protocol[CaseT, Built]):
             For a key of the study that this kind of case does not have; ``where`` is that key.
         """
 
+    @abstractmethod
     def variant(self, case: CaseT, name: str | None, chosen: Sequence[ChosenMeasure]) -> str:
         """Check that a case can run a variant, or level; its own one by default.
 
@@ -151,6 +155,7 @@ class PointKind(Protocol[CaseT, Built]):
         InputError
         """
 
+    @abstractmethod
     def measures(self, case: CaseT, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
         """Measures by their names, each once.
 
@@ -167,13 +172,25 @@ class PointKind(Protocol[CaseT, Built]):
         ------
         InputError
         """
+        section, what, hint = self.same
+        for key in keys:
+            refuse_if(
+                key.place[: len(section)] == section,
+                f"points: {key.name}",
+                got=f"a {what} as a part of a point",
+                expected=f"one {what} for all points",
+                hint=hint,
+            )
 
+    @abstractmethod
     def makes_bodies(self, case: CaseT, place: Key) -> bool:
         """Whether what is built for a group may follow from what stands there."""
 
     def holds_interpreter(self, asked: "AskedPoints[CaseT]") -> bool:
         """Whether threads compute these points hardly faster than one of them."""
+        return True
 
+    @abstractmethod
     def build(
         self,
         asked: "AskedPoints[CaseT]",
@@ -197,7 +214,7 @@ class PointKind(Protocol[CaseT, Built]):
         """
 
     def close(self, built: Built) -> None:
-        """Free what was built."""
+        """Free what was built: nothing, unless a kind says so."""
 
     def crew(
         self,
@@ -206,14 +223,16 @@ class PointKind(Protocol[CaseT, Built]):
         places: Sequence[int],
         threads: int | None,
     ) -> int:
-        """Threads for these points.
+        """Threads for these points: one, where they hold the interpreter.
 
         Raises
         ------
         InputError
             If so many points at a time do not fit into the memory.
         """
+        return 1
 
+    @abstractmethod
     def row(
         self,
         asked: "AskedPoints[CaseT]",
@@ -232,6 +251,7 @@ class PointKind(Protocol[CaseT, Built]):
             See :func:`klack.analyses.study.computing.warnings_of_threads`.
         """
 
+    @abstractmethod
     def pressure(self, asked: "AskedPoints[CaseT]", built: Built, place: int) -> TimeSeries | None:
         """Sound of a click of one point; None where there is none.
 
@@ -299,27 +319,3 @@ def groups_of(asked: AskedPoints, places: Iterable[int]) -> tuple[PointGroup, ..
 def _makes_bodies(asked: AskedPoints, place: Key) -> bool:
     """Whether bodies may follow from a key, or from what a parameter decides."""
     return any(asked.kind.makes_bodies(asked.case, key) for key in asked.case.behind(place))
-
-
-def require_same_for_all(keys: Iterable[PointKey], section: Key, what: str, hint: str) -> None:
-    """Refuse points that exchange what stands in a section of the case.
-
-    Parameters
-    ----------
-    section : tuple
-        ``("run", "variants")``.
-    what : str
-        ``"variant"``.
-
-    Raises
-    ------
-    InputError
-    """
-    for key in keys:
-        if key.place[: len(section)] == section:
-            raise InputError(
-                f"points: {key.name}",
-                got=f"a {what} as a part of a point",
-                expected=f"one {what} for all points",
-                hint=hint,
-            )

@@ -25,11 +25,11 @@ from klack.analyses.shots.run import drop_shots, shot_doubts
 from klack.analyses.study.asked_points import (
     AskedPoints,
     PointGroup,
+    PointKind,
     PointRow,
     Taken,
     doubts_in,
     others_in,
-    require_same_for_all,
 )
 from klack.analyses.study.computing import Stopped, never_stopped
 from klack.analyses.study.measures import (
@@ -41,7 +41,7 @@ from klack.analyses.study.measures import (
     shot_notes,
 )
 from klack.case.case_tree import CaseTree
-from klack.case.points import PointKey, case_at
+from klack.case.points import case_at
 from klack.case.schema import Case
 from klack.case.study import CaseStudy
 from klack.errors import refuse_if
@@ -87,10 +87,13 @@ class _Built:
     shots: ImpactBodies | None
 
 
-class _Impacts:
-    """See :class:`~klack.analyses.study.asked_points.PointKind`."""
-
+class _Impacts(PointKind[Case, _Built]):
     builds = 2  # each with its factorisations
+    same = (
+        ("run", "levels"),
+        "level",
+        "write level: interface in the study, and compute two of them.",
+    )
 
     def asked_variant(self, study: CaseStudy) -> str | None:
         """The level of the study."""
@@ -115,11 +118,6 @@ class _Impacts:
         """Of a level, of its noise, and of shots."""
         return impact_measures(case, names)
 
-    def require_keys(self, keys: Iterable[PointKey]) -> None:
-        """All but the levels."""
-        hint = "write level: interface in the study, and compute two of them."
-        require_same_for_all(keys, ("run", "levels"), "level", hint)
-
     def makes_bodies(self, case: Case, place: Key) -> bool:
         """Whether meshes, places or modes may follow from what stands there.
 
@@ -133,10 +131,6 @@ class _Impacts:
             return True
         is_damping = place[0] == "bodies" and place[2:3] == ("damping",)
         return not (is_damping or place[:2] in _OF_THE_IMPACT)
-
-    def holds_interpreter(self, asked: AskedPoints[Case]) -> bool:
-        """Nearly all of the time."""
-        return True
 
     def build(
         self,
@@ -164,16 +158,6 @@ class _Impacts:
         for bodies in (built.bodies, built.shots):
             if bodies is not None:
                 bodies.close()
-
-    def crew(
-        self,
-        asked: AskedPoints[Case],
-        built: _Built,
-        places: Sequence[int],
-        threads: int | None,
-    ) -> int:
-        """One: they share the bodies, and hold the interpreter."""
-        return 1
 
     def row(
         self,

@@ -21,12 +21,12 @@ from klack.analyses.study.asked_points import (
     UNCHECKED,
     AskedPoints,
     PointGroup,
+    PointKind,
     PointRow,
     PointSteps,
     Taken,
     doubts_in,
     others_in,
-    require_same_for_all,
 )
 from klack.analyses.study.computing import Stopped, never_stopped
 from klack.analyses.study.measures import (
@@ -40,7 +40,7 @@ from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.case_tree import CaseTree
 from klack.case.placed_errors import tells_place
-from klack.case.points import PointKey, PointValue, case_at, checked_parts
+from klack.case.points import PointValue, case_at, checked_parts
 from klack.case.study import CaseStudy
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
@@ -97,10 +97,13 @@ class _Built:
     transfers: Transfers = field(default_factory=Transfers)
 
 
-class _Strokes:
-    """See :class:`~klack.analyses.study.asked_points.PointKind`."""
-
+class _Strokes(PointKind[ValveCase, _Built]):
     builds = 8
+    same = (
+        ("run", "variants"),
+        "variant",
+        'write variant="dry", and compute two tables.',
+    )
 
     def asked_variant(self, study: CaseStudy) -> str | None:
         """The variant of the study."""
@@ -120,11 +123,6 @@ class _Strokes:
     def measures(self, case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasure, ...]:
         """Of a stroke, its impacts and its noise."""
         return stroke_measures(case, names)
-
-    def require_keys(self, keys: Iterable[PointKey]) -> None:
-        """All but the variants."""
-        hint = 'write variant="dry", and compute two tables.'
-        require_same_for_all(keys, ("run", "variants"), "variant", hint)
 
     def makes_bodies(self, case: ValveCase, place: Key) -> bool:
         """Whether meshes, modes or contact laws may follow from what stands there.
@@ -179,9 +177,6 @@ class _Strokes:
             stops=stop_summaries(valve),
             notes=tuple(notes),
         )
-
-    def close(self, built: _Built) -> None:
-        """Nothing has to be freed."""
 
     def crew(
         self,
