@@ -162,10 +162,6 @@ def elementary_effects(points: ArrayLike, values: ArrayLike) -> Screening:
         One measure at these points; not finite where the point failed.  The one or two effects
         next to such a point are discarded, all others are used.
 
-    Returns
-    -------
-    Screening
-
     Raises
     ------
     InputError

@@ -146,10 +146,6 @@ def sobol_indices(
     seed : int
         For the drawing of rows.
 
-    Returns
-    -------
-    SobolIndices
-
     Raises
     ------
     InputError

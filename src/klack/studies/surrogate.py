@@ -112,10 +112,6 @@ def fit_surrogate(
     values : array (points)
         One measure; not finite where the point failed.
 
-    Returns
-    -------
-    Surrogate
-
     Raises
     ------
     InputError

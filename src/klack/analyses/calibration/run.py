@@ -123,10 +123,6 @@ def run_calibration(
     threads : int, optional
         Of the factorisations.
 
-    Returns
-    -------
-    CalibrationStudy
-
     Raises
     ------
     InputError

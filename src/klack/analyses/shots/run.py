@@ -92,10 +92,6 @@ def run_shots(
     threads : int, optional
         Of the factorisations.
 
-    Returns
-    -------
-    ShotsStudy
-
     Raises
     ------
     InputError
