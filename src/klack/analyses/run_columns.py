@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.measures import Measure
+from klack.units import format_si
 
-__all__ = ["Columns", "with_columns"]
+__all__ = ["Columns", "told_value", "with_columns"]
 
 Column = NDArray[np.float64]
 Kind = TypeVar("Kind", bound="type[Columns]")
@@ -83,3 +84,10 @@ def with_columns(
         return cast(Kind, found)
 
     return extended
+
+
+def told_value(value: float, unit: str, digits: int = 4) -> str:
+    """A value in a sentence or a table of a terminal; a dash where there is none."""
+    if not np.isfinite(value):
+        return "–"
+    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"

@@ -12,6 +12,7 @@ from typing_extensions import TypedDict
 from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.run_columns import told_value
 from klack.analyses.sample import STATISTICS, moments
 from klack.analyses.shots.record import (
     FIRST_IMPACT,
@@ -19,7 +20,6 @@ from klack.analyses.shots.record import (
     SHOT_MEASURES,
     ShotsStudy,
 )
-from klack.analyses.shots.wording import told_value
 from klack.analyses.store import RecordFormat
 from klack.terminal.tables import TextTable
 

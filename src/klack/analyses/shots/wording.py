@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 from klack.analyses.shots.record import FIRST_IMPACT, ShotsStudy
 from klack.report.page import Section, Table
 from klack.report.wording import count, quantity, signed_share
-from klack.units import format_si
 
 if TYPE_CHECKING:
     from klack.analyses.stroke_shots.record import StrokeShotsStudy
@@ -22,7 +21,6 @@ __all__ = [
     "plain",
     "shot_name",
     "shots_answer",
-    "told_value",
 ]
 
 _SMALL = 1e-4
@@ -74,13 +72,6 @@ def length_unit(values: ArrayLike) -> tuple[str, float]:
     (('µm', 1000000.0), ('mm', 1000.0))
     """
     return ("µm", 1e6) if largest_size(values) <= _SMALL else ("mm", 1e3)
-
-
-def told_value(value: float, unit: str, digits: int = 4) -> str:
-    """A value in a sentence or a table of a terminal; a dash where there is none."""
-    if not np.isfinite(value):
-        return "–"
-    return format_si(value, unit, digits) if unit != "1" else f"{value:.4f}"
 
 
 def plain(value: float, decimals: int) -> str:

@@ -14,8 +14,8 @@ from typing_extensions import TypedDict
 from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.json_parts import Real, Version
 from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.run_columns import told_value
 from klack.analyses.sample import moments
-from klack.analyses.shots.wording import told_value
 from klack.analyses.store import RecordFormat
 from klack.analyses.stroke_shots.record import (
     FIRST_TOUCH_MEASURES,

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.measures import Measure
+from klack.analyses.run_columns import told_value
 from klack.analyses.sample import rank_correlation
-from klack.analyses.shots.wording import told_value
 from klack.analyses.stroke_shots.record import (
     COMPARED,
     RESULTS,
