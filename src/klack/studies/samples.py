@@ -71,8 +71,6 @@ class Margin:
     ----------
     mean, deviation : float
         Of the runs with a value, in the unit of the measure; the standard deviation with ``n - 1``.
-    multiple : float
-        ``k``.
     value : float
         ``mean + k deviation``.
     mean_error, deviation_error, value_error : float
@@ -83,7 +81,6 @@ class Margin:
 
     mean: float
     deviation: float
-    multiple: float
     value: float
     mean_error: float
     deviation_error: float
@@ -142,7 +139,7 @@ def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
     mean = math.fsum(found / count)
     size = float(np.abs(found - mean).max())
     if size == 0.0:
-        return Margin(mean, 0.0, multiple, mean, 0.0, 0.0, 0.0, count, failed)
+        return Margin(mean, 0.0, mean, 0.0, 0.0, 0.0, count, failed)
     scaled = (found - mean) / size  # so that fourth powers of small numbers keep their digits
     variance = math.fsum(scaled**2) / (count - 1)
     third, fourth = math.fsum(scaled**3) / count, math.fsum(scaled**4) / count
@@ -155,7 +152,6 @@ def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
     return Margin(
         mean=mean,
         deviation=size * spread,
-        multiple=multiple,
         value=mean + multiple * size * spread,
         mean_error=size * math.sqrt(of_mean),
         deviation_error=size * math.sqrt(of_spread),
@@ -498,10 +494,6 @@ class RobustValue:
         if self.kind == "margin":
             return mean_and_margin(found, self.number if high else -self.number).value
         return sample_quantile(found, self.number if high else 1.0 - self.number).estimate
-
-    def of_rows(self, table: NDArray[np.float64], *, high: bool) -> NDArray[np.float64]:
-        """The same for every row, shape (designs, valves) to (designs,)."""
-        return np.array([self.of(row, high=high) for row in table])
 
     def words(self, *, high: bool) -> str:
         """As it is written, with the sign of the side."""
