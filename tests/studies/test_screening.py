@@ -12,7 +12,7 @@ import pytest
 from draws import each
 
 from klack.errors import InputError
-from klack.studies.screening import elementary_effects, morris_design
+from klack.studies.sensitivity import elementary_effects, morris_design
 
 LINEAR, CURVED, SMALL = slice(7, 10), slice(0, 7), slice(10, 20)
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.calibration.fit import StrokeModel
 from klack.analyses.calibration.motion import (
     Motion,
     MotionModel,
+    StrokeModel,
     TrialPool,
     calibration_mark,
     channel_names,

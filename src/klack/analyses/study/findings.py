@@ -21,8 +21,7 @@ from klack.input.problem import one_of
 from klack.progress import Progress
 from klack.studies.designs import Listed, unevenness
 from klack.studies.samples import exceedance_of
-from klack.studies.screening import elementary_effects
-from klack.studies.sensitivity import sobol_indices
+from klack.studies.sensitivity import elementary_effects, sobol_indices
 from klack.studies.surrogate import Surrogate, SurrogateKind, fit_surrogate
 from klack.studies.surrogate_model import SurrogateAxis, require_scikit_learn
 

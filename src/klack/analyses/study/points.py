@@ -30,8 +30,7 @@ from klack.studies.designs import (
     latin_hypercube,
     sobol_sequence,
 )
-from klack.studies.screening import morris_design
-from klack.studies.sensitivity import saltelli_design
+from klack.studies.sensitivity import morris_design, saltelli_design
 from klack.units import KINDS, RATIO, TEMPERATURE, TEMPERATURE_RISE, Kind, format_si, parse_quantity
 
 __all__ = [
