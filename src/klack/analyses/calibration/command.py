@@ -62,7 +62,7 @@ def calibrate(
     ending = Ending.of(wanted, f"{checked.name}-calibration")
 
     from klack.analyses.calibration.analysis import CALIBRATION
-    from klack.analyses.calibration.log import TRIAL_LOG
+    from klack.analyses.calibration.motion import TRIAL_LOG
     from klack.analyses.calibration.run import CALIBRATED_NAME, calibrated_text
     from klack.measurement.loading import load_stroke_set
 
