@@ -191,15 +191,14 @@ def test_files_that_are_not_usable(step, tmp_path):
     with pytest.raises(InputError, match="got no such file, expected a STEP file"):
         mesh_step(tmp_path / "none.step", COARSE)
     other = tmp_path / "mesh.step"
-    other.write_text("solid ascii stl\n")
-    with pytest.raises(InputError, match=r"(?s)starts with 'solid ascii stl.*ISO-10303-21"):
-        mesh_step(other, COARSE)
-    other.write_text(step.read_text()[:4000])
-    with pytest.raises(InputError, match=r"damaged STEP file: entity #\d+ is missing"):
-        mesh_step(other, COARSE)
-    other.write_text("ISO-10303-21;\n")
-    with pytest.raises(InputError, match="that OpenCASCADE cannot read"):
-        mesh_step(other, COARSE)
+    for text, words in (
+        ("solid ascii stl\n", r"(?s)starts with 'solid ascii stl.*ISO-10303-21"),
+        (step.read_text()[:4000], r"damaged STEP file: entity #\d+ is missing"),
+        ("ISO-10303-21;\n", "that OpenCASCADE cannot read"),
+    ):
+        other.write_text(text)
+        with pytest.raises(InputError, match=words):
+            mesh_step(other, COARSE)
     with pytest.raises(InputError, match="one of: brim, joint, rim, shank, tip, top"):
         mesh_step(step, MeshSizing(size=MM, surfaces={"seat": MM}))
 
@@ -227,9 +226,10 @@ def test_solids_that_overlap_or_lie_apart_are_refused():
             (0, low), (Line((MM, low)), Line((MM, high)), Line((0, high)), Line((0, low)))
         )
 
-    with pytest.raises(InputError, match="3 regions of space from 2 solids"):
-        mesh_revolved({"a": disc(0), "b": disc(1 * MM)}, COARSE)
-    with pytest.raises(InputError, match="2 parts that share no node"):
-        mesh_revolved({"a": disc(0), "b": disc(3 * MM)}, COARSE)
-    with pytest.raises(InputError, match="got none, expected one profile per solid"):
-        mesh_revolved({}, COARSE)
+    for solids, words in (
+        ({"a": disc(0), "b": disc(1 * MM)}, "3 regions of space from 2 solids"),
+        ({"a": disc(0), "b": disc(3 * MM)}, "2 parts that share no node"),
+        ({}, "got none, expected one profile per solid"),
+    ):
+        with pytest.raises(InputError, match=words):
+            mesh_revolved(solids, COARSE)

@@ -182,14 +182,14 @@ def test_sectors_cover_their_share_of_the_circumference(meridian):
 
 
 def test_sectors_are_refused_where_they_make_no_sense(meridian, solid):
-    with pytest.raises(InputError, match=r"(?s)an axisymmetric mesh.*hold the whole surface"):
-        sector_nodes(meridian, "shank", 3, 0.5, 0.0)
-    with pytest.raises(InputError, match="do not overlap"):
-        sector_nodes(solid, "shank", 3, 2.2, 0.0)
-    with pytest.raises(InputError, match=r"nodes in \d+ of 40 sectors"):
-        sector_nodes(solid, "shank", 40, 0.01, 0.0)
-    with pytest.raises(InputError, match="one of: shank, tip, top"):
-        sector_nodes(solid, "shaft", 3, 0.5, 0.0)
+    for mesh, name, count, width, words in (
+        (meridian, "shank", 3, 0.5, r"(?s)an axisymmetric mesh.*hold the whole surface"),
+        (solid, "shank", 3, 2.2, "do not overlap"),
+        (solid, "shank", 40, 0.01, r"nodes in \d+ of 40 sectors"),
+        (solid, "shaft", 3, 0.5, "one of: shank, tip, top"),
+    ):
+        with pytest.raises(InputError, match=words):
+            sector_nodes(mesh, name, count, width, 0.0)
 
 
 def test_sweep_refuses_solids_and_too_few_layers(meridian, solid):

@@ -199,18 +199,14 @@ def test_a_silent_force_is_silence():
 
 def test_what_cannot_be_used_is_refused():
     force = half_sine(1e-3)
-    with pytest.raises(InputError, match=r"at most 20\.8 us"):
-        click_pressure(
-            TimeSeries(step=30e-6, values=np.ones(10), unit="N"),
-            FREQUENCY,
-            rising(FREQUENCY),
-            **AIR,
-        )
-    with pytest.raises(InputError, match="somewhere above zero"):
-        click_pressure(force, FREQUENCY, 0.0 * FREQUENCY, **AIR)
-    with pytest.raises(InputError, match="increasing"):
-        click_pressure(force, FREQUENCY[::-1], rising(FREQUENCY), **AIR)
-    with pytest.raises(InputError, match="same length"):
-        click_pressure(force, FREQUENCY, rising(FREQUENCY)[:-1], **AIR)
-    with pytest.raises(InputError, match="distance"):
-        click_pressure(force, FREQUENCY, rising(FREQUENCY), **{**AIR, "distance": 0.0})
+    coarse = TimeSeries(step=30e-6, values=np.ones(10), unit="N")
+    power = rising(FREQUENCY)
+    for given, air, words in (
+        ((coarse, FREQUENCY, power), AIR, r"at most 20\.8 us"),
+        ((force, FREQUENCY, 0.0 * FREQUENCY), AIR, "somewhere above zero"),
+        ((force, FREQUENCY[::-1], power), AIR, "increasing"),
+        ((force, FREQUENCY, power[:-1]), AIR, "same length"),
+        ((force, FREQUENCY, power), {**AIR, "distance": 0.0}, "distance"),
+    ):
+        with pytest.raises(InputError, match=words):
+            click_pressure(*given, **air)

@@ -205,15 +205,14 @@ def test_csv_of_a_spreadsheet(tmp_path, mark):
 
 def test_text_that_is_no_model_is_placed(tmp_path):
     path = tmp_path / "needle.csv"
-    path.write_text("A\n0,1\n-4,zero\n")
-    with pytest.raises(InputError, match=r"line 3: got '-4,zero'"):
-        read_state_space(path)
-    path.write_text("A,2,2\n0,1\n-4\n")
-    with pytest.raises(InputError, match="got 3 numbers of A, expected 2 x 2"):
-        read_state_space(path)
-    path.write_text("MODELDEF needle\n{\n}\n")
-    with pytest.raises(InputError, match="file format 0 or 1"):
-        read_state_space(path)
+    for text, words in (
+        ("A\n0,1\n-4,zero\n", r"line 3: got '-4,zero'"),
+        ("A,2,2\n0,1\n-4\n", "got 3 numbers of A, expected 2 x 2"),
+        ("MODELDEF needle\n{\n}\n", "file format 0 or 1"),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError, match=words):
+            read_state_space(path)
 
 
 def test_matrices_of_craig_and_bampton(tmp_path):

@@ -55,9 +55,10 @@ def test_sounds_share_a_full_scale():
 
 
 def test_clipping_and_other_rates_are_refused():
-    with pytest.raises(InputError, match="full_scale_of"):
-        wav_bytes(sound(0.1), full_scale=0.05)
-    with pytest.raises(InputError, match="48000 Hz"):
-        wav_bytes(sound(0.01, rate=44_100), full_scale=0.05)
-    with pytest.raises(InputError, match="full_scale"):
-        wav_bytes(sound(0.01), full_scale=0.0)
+    for given, scale, words in (
+        (sound(0.1), 0.05, "full_scale_of"),
+        (sound(0.01, rate=44_100), 0.05, "48000 Hz"),
+        (sound(0.01), 0.0, "full_scale"),
+    ):
+        with pytest.raises(InputError, match=words):
+            wav_bytes(given, full_scale=scale)
