@@ -25,8 +25,7 @@ def server(folder: Path) -> Iterator[Served]:
 @pytest.fixture(scope="module")
 def client(server: Served) -> Iterator[Any]:
     """A client without a browser that has the cookie."""
-    httpx = pytest.importorskip("httpx")
-    with httpx.Client(base_url=server.base, timeout=60.0) as found:
+    with pytest.importorskip("httpx").Client(base_url=server.base, timeout=60.0) as found:
         found.get(server.address)
         yield found
 

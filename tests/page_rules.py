@@ -39,10 +39,9 @@ def axe_findings(page: Any, rules: tuple[str, ...] = ()) -> list[str]:
     if not page.evaluate("() => 'axe' in window"):
         page.evaluate(AXE_SCRIPT)
     options = _AXE | ({"runOnly": {"type": "rule", "values": list(rules)}} if rules else {})
-    found = page.evaluate("options => axe.run(document, options)", options)
     return [
         f"{item['id']} ({item['impact']}): {node['html'][:140]} {node['target']}"
-        for item in found["violations"]
+        for item in page.evaluate("options => axe.run(document, options)", options)["violations"]
         if item["impact"] in _GRAVE
         for node in item["nodes"][:6]
     ]

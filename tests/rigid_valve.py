@@ -125,5 +125,4 @@ def write_bench(folder, seed, count):
     strokes = measured(seed, count=count)
     table = np.column_stack([strokes.time, *strokes.matrix("lift")])
     head = "time [s]," + ",".join(f"lift_{i} [m]" for i in range(count))
-    file = folder / "strokes.csv"
-    np.savetxt(file, table, delimiter=",", header=head, comments="", fmt="%.9e")
+    np.savetxt(folder / "strokes.csv", table, delimiter=",", header=head, comments="", fmt="%.9e")

@@ -224,8 +224,7 @@ def random_network(seed: int) -> Network:
     draw = random.Random(seed)
     parts: dict[str, Component] = {}
     nodes: dict[str, list[str]] = {"ground": ["ground"], "ambient": ["ambient"]}
-    bodies = [f"body_{i}" for i in range(draw.randint(1, 6))]
-    for name in bodies:
+    for name in [f"body_{i}" for i in range(draw.randint(1, 6))]:
         points = tuple(f"{draw.choice(_WORDS)}_{k}" for k in range(draw.randint(1, 6)))
         parts[name] = RigidMass(mass=draw.choice((1e-3, 2.0)), points=points, speed=draw.random())
         nodes |= {f"{name}.{point}": [f"{name}.{point}"] for point in points}

@@ -138,9 +138,8 @@ def test_the_interface_level_is_advised_and_run_again(path, tmp_path):
 
 def test_values_are_added_where_none_stand(path):
     """Exact: only the values asked for change, wherever the mapping ends."""
-    tree = read_case_tree(path)
     text = with_values(
-        tree,
+        read_case_tree(path),
         {
             ("bodies", "sphere", "mesh", "grading"): "0.2",
             ("bodies", "block", "mesh", "grading"): "0.15",
@@ -167,10 +166,8 @@ def test_a_whole_section_is_added(path):
             "reduction:\n  modes:\n    sphere: {count: 2}  # the block has the default\n", ""
         )
     )
-    tree = read_case_tree(path)
-
     text = with_values(
-        tree,
+        read_case_tree(path),
         {
             ("reduction", "modes", "block", "count"): "12",
             ("reduction", "modes", "sphere", "count"): "3",

@@ -421,8 +421,7 @@ def test_reader_of_a_pipe_may_leave_early():
         env={**os.environ, "PYTHONUNBUFFERED": "1"},
     )
 
-    assert done.stdout == "{\n"
-    assert done.stderr == "code 0\n"
+    assert (done.stdout, done.stderr) == ("{\n", "code 0\n")
 
 
 @pytest.mark.parametrize("name", ["valve.yaml", "table.CSV"])

@@ -133,8 +133,7 @@ def test_what_makes_no_sense_is_refused_at_once(tmp_path, capsys, arguments, wor
 
 def test_a_valve_on_the_ground_is_refused_and_told_why(tmp_path, capsys):
     valve = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
-    words = ["export", str(valve), "--to", "fmu", "--out", str(tmp_path / "x"), "-q"]
-    assert main(words) == 2
+    assert main(["export", str(valve), "--to", "fmu", "--out", str(tmp_path / "x"), "-q"]) == 2
     told = capsys.readouterr().err
     assert "network.components.seat: got an end stop on the ground, expected" in told
 

@@ -44,8 +44,7 @@ def test_a_warm_up_with_its_files(case, tmp_path, capsys):
     assert heat == pytest.approx(spent, rel=1e-9)
     record = klack.load_result(folder).record
     assert (record.case, record.end) == ("small", "duration")
-    page = HEAT.content(record)
-    assert [section.title for section in page.sections][:4] == [
+    assert [section.title for section in HEAT.content(record).sections][:4] == [
         "Over time",
         "Causes",
         "Points",

@@ -15,8 +15,7 @@ from klack.cli.main import main
 def test_the_example_can_be_typed(command, example, capsys):
     name = command.__name__
     assert main([name, "--help"]) == 0
-    shown = capsys.readouterr().out.split("Example:")[-1].split("╭")[0]
-    assert " ".join(shown.split()) == example
+    assert " ".join(capsys.readouterr().out.split("Example:")[-1].split("╭")[0].split()) == example
 
     first, *words = shlex.split(example)
     found, bound, _ = app.parse_args(words, print_error=False, exit_on_error=False)

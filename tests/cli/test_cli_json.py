@@ -57,11 +57,9 @@ def test_a_stroke_and_a_reduction(tmp_path, capsys):
 @pytest.mark.parametrize("kind", ["stroke", "stroke-steady", "shots", "stroke-shots", "noise"])
 def test_who_reads_a_result_by_program_sees_its_doubts(kind, capsys):
     assert main(["schema", "--kind", "result"]) == 0
-    parts = json.loads(capsys.readouterr().out)["$defs"].values()
-
     (whole,) = (
         part["properties"]
-        for part in parts
+        for part in json.loads(capsys.readouterr().out)["$defs"].values()
         if part["properties"].get("schema", {}).get("const") == f"klack-{kind}/1"
     )
     assert whole["warnings"]["items"] == {"type": "string"}

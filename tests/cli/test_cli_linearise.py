@@ -42,8 +42,7 @@ def test_all_files_hold_the_same_model(capsys):
     words = ("--current", "1 A", "--from", "coil.voltage", "--to", "coil.current")
     assert linearise("valve.yaml", *words, "--json", "n.json", "--no-report", "--out", "out") == 0
 
-    told = capsys.readouterr().out
-    assert "Stable: every small disturbance decays" in told
+    assert "Stable: every small disturbance decays" in capsys.readouterr().out
     stored = LINEARISATION.load(Path("out"))
     packed, mat = np.load("out/linear-model.npz"), loadmat("out/linear-model.mat")["klack"]
     numbers = json.loads(Path("n.json").read_text())
@@ -68,8 +67,7 @@ def test_a_relief_valve_on_a_pipe_is_told_unstable_and_where_it_becomes_so(capsy
     words = ("--band", "2 kHz", "--loop", "edge.mass_flow", "--no-report", "--out", "out")
     assert linearise("relief.yaml", *words, *SWEEP) == 0
 
-    told = capsys.readouterr().out
-    assert "Unstable: a small disturbance oscillates at 533.3 Hz" in told
+    assert "Unstable: a small disturbance oscillates at 533.3 Hz" in capsys.readouterr().out
     rows = list(csv.DictReader(Path("out/stability.csv").open()))
     assert [row["unstable eigenvalues"] != "0" for row in rows] == [False, True, True]
     assert {"loop-edge-mass-flow.svg", "stability-over-damper-diameter.svg"} <= {

@@ -113,8 +113,7 @@ def test_sounds_have_the_stated_level(heard, numbers):
     for name in ("click.wav", "pattern.wav"):
         with soundfile.SoundFile(heard / name) as file:
             assert (file.samplerate, file.channels, file.subtype) == (48_000, 1, "PCM_24")
-            scale = float(re.search(r"full scale = ([\d.e+-]+) Pa", file.comment)[1])
-            values = scale * file.read()
+            values = float(re.search(r"full scale = ([\d.e+-]+) Pa", file.comment)[1]) * file.read()
         peak = 20.0 * np.log10(np.abs(values).max() / 20e-6)
         # 24 bit, the scale written with six digits; the pattern has every peak between samples
         assert peak == pytest.approx(numbers["peak_level_dB"], abs=0.3)
@@ -153,9 +152,8 @@ def test_the_report_holds_players_and_says_what_it_is(heard):
     page = (heard / "report.html").read_text(encoding="utf-8")
 
     assert page.count("<audio controls") == 2
-    assert "media-src data:" in page
-    assert "upper bound" in page
-    assert "estimate" in page
+    for words in ("media-src data:", "upper bound", "estimate"):
+        assert words in page
     assert (heard / "report.pdf").read_bytes().startswith(b"%PDF")
 
 
@@ -213,8 +211,7 @@ def test_levels_of_one_result_are_compared(impact):
     words = ["--level", "reduced,lumped", "--json", "levels.json", "--no-report", "-q"]
     assert main(["noise", str(impact), *words]) == 0
 
-    found = json.loads(Path("levels.json").read_text())
-    reduced, lumped = found["designs"].values()
+    reduced, lumped = json.loads(Path("levels.json").read_text())["designs"].values()
     # rigid masses on a stiff spring: a shorter and higher blow, known up to no frequency
     assert lumped["third_octave"][-5]["level_dB"] > 10 + reduced["third_octave"][-5]["level_dB"]
     assert lumped["valid_up_to_Hz"] is None

@@ -175,6 +175,4 @@ def test_noise_of_a_stored_stroke_names_it_too(tmp_path, monkeypatch, capsys):
 
 
 def test_a_case_of_klack_alone_has_none():
-    case = load_any_case(HOW_TO / "small_valve.yaml")
-
-    assert case.own_components == {}
+    assert load_any_case(HOW_TO / "small_valve.yaml").own_components == {}

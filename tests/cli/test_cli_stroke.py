@@ -231,9 +231,7 @@ def test_a_run_goes_on_only_with_its_own_step_and_variants(run, capsys, tmp_path
 
 
 def test_an_impact_case_is_no_stroke(capsys):
-    drawn = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
-
-    assert main(["stroke", str(drawn)]) == 2
+    assert main(["stroke", str(Path(__file__).parents[1] / "data" / "case" / "drawn.yaml")]) == 2
 
     assert "run it with klack impact" in capsys.readouterr().err
 

@@ -109,8 +109,7 @@ def test_all_impulse_reaches_the_hold(damped: Structure) -> None:
 
 def test_blocked_force_over_time_and_over_frequency(damped: Structure) -> None:
     pulse = pulses(step=20e-9, count=200_000, times=(2e-5,), length=1e-5)
-    run = modal_response(damped, {"tip": pulse})
-    reaction = run.blocked_force
+    reaction = modal_response(damped, {"tip": pulse}).blocked_force
 
     n = len(reaction.values)
     f = np.fft.rfftfreq(n, pulse.step)[1:800]

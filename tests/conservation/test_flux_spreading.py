@@ -103,8 +103,7 @@ def test_a_solenoid_without_eddy_currents_is_switched_off(coil, decay, preload):
 
     run = simulate_network(Network(parts, nodes).rows(), duration=6e-3)
 
-    current = run.channels["coil current"].values
-    assert np.all(current[-100:] == 0.0)
+    assert np.all(run.channels["coil current"].values[-100:] == 0.0)
     assert abs(run.books.relative_residual) < 1e-12
     assert 0.0 <= run.books.losses["coil eddy"] < 1e-6 * run.books.losses["coil ohmic"]
 

@@ -133,8 +133,7 @@ def test_forces_obey_the_law():
 
 
 def restitution(law) -> float:
-    history = run(seat, law).history
-    return float(history.velocity_a[-1] / 0.3)
+    return float(run(seat, law).history.velocity_a[-1] / 0.3)
 
 
 def test_a_seat_of_rubbing_faces_returns_less_speed():

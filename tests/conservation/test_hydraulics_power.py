@@ -146,8 +146,7 @@ def test_loss_is_never_negative(name, fluid):
 def test_pumps_and_a_column_without_friction_lose_nothing():
     rng = np.random.default_rng(8)
     smooth = Inertance(length=5e-3, diameter=1e-3, friction="none")
-    pumps = [PARTS[name] for name in ("pump", "pump of pistons", "pulsation")]
-    for part in (*pumps, smooth):
+    for part in (*map(PARTS.get, ("pump", "pump of pistons", "pulsation")), smooth):
         lost, scale = balance(part, FLUIDS["with gas"], rng)
 
         # differences of stores: 1e-16 of the largest kinetic energy

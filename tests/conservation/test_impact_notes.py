@@ -46,8 +46,7 @@ def test_the_warm_up_of_the_interface_level_touches_nothing(judged, monkeypatch)
     run_impact(load_case(CASE), levels=["interface"], certify=False)
 
     warm_up, run = runs
-    assert warm_up.steps == 1
-    assert warm_up.steps_in_contact == 0
+    assert (warm_up.steps, warm_up.steps_in_contact) == (1, 0)
     assert run.steps_in_contact > 100
     assert [name for name, *_ in judged].count("simulate_interface") == 2
     # the motion of one step: round-off
@@ -58,8 +57,7 @@ def test_the_warm_up_of_the_interface_level_touches_nothing(judged, monkeypatch)
 def test_a_note_says_which_run_it_is_about(monkeypatch):
     """The interface level is asked three times: as a level, and twice for the estimate."""
     monkeypatch.setattr(interface_run, "_BALANCE", -1.0)  # nothing is good enough
-    case = load_case(CASE)
-    study = run_impact(case, levels=["reduced", "interface"])
+    study = run_impact(load_case(CASE), levels=["reduced", "interface"])
 
     notes = [note for note in study.warnings if "energy balance" in note]
     begins = sorted({note.split(": simulate_interface")[0] for note in notes})

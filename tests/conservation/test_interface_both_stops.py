@@ -68,8 +68,7 @@ def problem(case: Case) -> ContactProblem:
 
 @pytest.fixture(scope="module")
 def model(problem: ContactProblem) -> InterfaceModel:
-    pools = mode_pools(problem, at_least=1, progress=silent)
-    return build_interface(problem, pools)
+    return build_interface(problem, mode_pools(problem, at_least=1, progress=silent))
 
 
 def test_bounces_between_both_ends_keep_the_energy(model: InterfaceModel):

@@ -114,8 +114,7 @@ def test_two_stops_with_different_friction():
         flight=True,
         velocity=np.array([0.05, 0.0, 0.0, 0.0, 0.0, 0.0]),
     )
-    sides = [impact.side for impact in result.impacts]
-    assert {1.0, -1.0} <= set(sides)
+    assert {1.0, -1.0} <= {impact.side for impact in result.impacts}
     assert abs(result.energy.residual) < 1e-12
     for impact in result.impacts:
         lost = impact.history.ledger.friction

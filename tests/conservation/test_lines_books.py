@@ -89,8 +89,7 @@ def test_run_continues_to_the_same_bits():
 
 
 def test_step_that_is_given_up_leaves_no_trace():
-    rng = np.random.default_rng(6)
-    ends = 5e5 * rng.standard_normal((2, 300))
+    ends = 5e5 * np.random.default_rng(6).standard_normal((2, 300))
     answers, books = [], np.zeros((2, 1, 3))
     for k, repeats in enumerate((0, 1)):
         lines, state = compile_lines(

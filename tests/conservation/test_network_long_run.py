@@ -50,8 +50,7 @@ def switched_valve() -> Rows:
 
 def flexible_valve() -> Rows:
     """A wet valve with films on both stops and elastic bodies that part and touch again."""
-    valve = whole_valve(modes=(4, 6, 4), damping=0.0, driver=peak_and_hold(end=0.6e-3))
-    return valve.rows()
+    return whole_valve(modes=(4, 6, 4), damping=0.0, driver=peak_and_hold(end=0.6e-3)).rows()
 
 
 VALVES = {"rigid": (switched_valve, 50e-9, CYCLES * PERIOD), "wet": (flexible_valve, 20e-9, 1.4e-3)}

@@ -134,8 +134,7 @@ class Setup:
     def times(self, system: ReducedSystem) -> tuple[float, float]:
         """Step and duration: until well after the impact, or as far as the steps allow."""
         step = self.step * propose_step(system, speed=self.speed)
-        whole = (2.0 + self.gap) * self.contact_time
-        return step, min(whole, MOST_STEPS * step)
+        return step, min((2.0 + self.gap) * self.contact_time, MOST_STEPS * step)
 
 
 SETUPS = st.builds(
@@ -170,8 +169,7 @@ def run(setup: Setup, system: ReducedSystem, **more: int) -> ImpactHistory:
 @given(SETUPS)
 def test_energy_and_momentum_balance_and_the_contact_never_pulls(setup):
     """The ledger itself is asserted in every run, see ``energy_ledger``."""
-    system = setup.system()
-    history = run(setup, system)
+    history = run(setup, setup.system())
     ledger, m = history.ledger, setup.mass
 
     assert abs(ledger.residual) < 1e-9
@@ -192,8 +190,7 @@ def test_energy_and_momentum_balance_and_the_contact_never_pulls(setup):
     scale = m * setup.speed + np.abs(np.cumsum(push)).max() * history.step
     np.testing.assert_allclose(gained, given_to_a, rtol=0.0, atol=1e-9 * scale)
     if setup.support == "free":
-        mass_b = history.mass_b
-        gained = mass_b * history.velocity_b[1:]
+        gained = history.mass_b * history.velocity_b[1:]
         np.testing.assert_allclose(
             gained, -np.cumsum(history.force) * history.step, rtol=0.0, atol=1e-9 * scale
         )

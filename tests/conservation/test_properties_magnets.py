@@ -210,8 +210,7 @@ def test_a_map_is_one_energy(plant, share, place):
     slope = (plant.energy_at(psi + h, x) - plant.energy_at(psi - h, x)) / (2.0 * h)
     assert i == pytest.approx(slope, rel=1e-6, abs=10.0 * noise / h)
     pull = -(plant.energy_at(psi, x + d) - plant.energy_at(psi, x - d)) / (2.0 * d)
-    force = plant.force_at(psi, x)
-    assert force == pytest.approx(pull, rel=1e-4, abs=10.0 * noise / d)
+    assert plant.force_at(psi, x) == pytest.approx(pull, rel=1e-4, abs=10.0 * noise / d)
     assert plant.current_at(-psi, x) == -i
     assert plant.energy_at(-psi, x) == W
     if 0.0 <= place <= 1.0:

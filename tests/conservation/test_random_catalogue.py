@@ -46,8 +46,6 @@ def test_a_stopped_run_has_to_say_where_when_and_what_to_try(words, told):
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("seed", range(0, 36, 3))
 def test_a_random_valve_ends_in_an_answer_or_in_words(seed, tmp_path):
-    case = DRAWS["written"](DRAWS["draw"](seed), tmp_path)
-
-    end, words = DRAWS["ending"](case, more=True)
+    end, words = DRAWS["ending"](DRAWS["written"](DRAWS["draw"](seed), tmp_path), more=True)
 
     assert end in ("answer", "note", "error", "stopped"), words  # "stopped" as told above

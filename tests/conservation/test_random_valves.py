@@ -63,6 +63,4 @@ BALANCED = RELIEF_VALVE.replace("damping: 2 N", "damping: 60 N").replace(
 
 def test_forces_that_hold_each_other_settle():
     """Lifted by a slow pressure against its spring: nothing is left of 157 N but round-off."""
-    case = read_valve_case(BALANCED, Path("balanced.yaml"))
-
-    assert DRAWS["residuals"](case)["wet"] <= 1e-9
+    assert DRAWS["residuals"](read_valve_case(BALANCED, Path("balanced.yaml")))["wet"] <= 1e-9

@@ -115,8 +115,7 @@ def test_turned_port_is_refused():
     C = given.C.copy()
     C[1] *= -1.0
     assert "have the same direction" in refusal(replace(given, C=C)).expected
-    both = replace(given, C=C, B=given.B * [1.0, -1.0])
-    assert "move together along z" in refusal(both).got
+    assert "move together along z" in refusal(replace(given, C=C, B=given.B * [1.0, -1.0])).got
 
 
 def test_feedthrough_must_be_reciprocal_and_positive():

@@ -129,8 +129,7 @@ def test_force_here_seen_there_is_force_there_seen_here(block):
 
 def test_single_node_is_not_reciprocal_with_the_surface(block):
     """Why a node is an observer only: it moves differently from the mean that does the work."""
-    mesh = block[0].mesh
-    corner = node_observer(mesh, (0.0, 0.0, 0.0), "z", name="corner")
+    corner = node_observer(block[0].mesh, (0.0, 0.0, 0.0), "z", name="corner")
     body = reduced(block, "none", observers=[corner])
 
     elastic = slice(body.rigid_count, None)
@@ -146,10 +145,8 @@ def test_single_node_is_not_reciprocal_with_the_surface(block):
 )
 def test_damped_body_takes_in_power(block, correction, with_residual, loss_factor):
     """Passivity: the power w/2 F^H (-Im G) F of any pair of port forces is never negative."""
-    body = reduced(block, correction)
-
     receptance = reduced_receptance(
-        body, AXIS, with_residual=with_residual, loss_factor=loss_factor
+        reduced(block, correction), AXIS, with_residual=with_residual, loss_factor=loss_factor
     )
 
     lowest = np.linalg.eigvalsh(-receptance.values.imag)[:, 0]

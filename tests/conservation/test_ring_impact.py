@@ -36,8 +36,7 @@ def hit(model, speed=0.1):
 @pytest.mark.parametrize("count", [12, 13])
 def test_momentum_and_moment_about_the_centre_of_mass(pair, count):
     space, _ = pair.placed(count, ASIDE)
-    model = pair.model(space, axial=6, others=8)
-    result = hit(model)
+    result = hit(pair.model(space, axial=6, others=8))
 
     gained = momentum_of_needle(pair, result.motion.velocity[-1] - result.motion.velocity[0])
     pushed = impulse_on_needle(pair, space, result, STEP)

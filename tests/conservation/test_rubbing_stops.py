@@ -263,8 +263,7 @@ def test_the_bulk_behind_the_faces_takes_nothing_from_a_loop():
         return Loop(approach=back + modal * down, force=down, loss=loss)
 
     loops = [loop(share * depth[-1]) for share in (0.5, 0.75, 1.0)]
-    fit = rubbing_fit(local, loops)
-    D = bulk_compliance(local, fit.law)
+    D = bulk_compliance(local, rubbing_fit(local, loops).law)
     beside = rubbing_fit(without_bulk(local, D), loops)
 
     assert D > 0.0

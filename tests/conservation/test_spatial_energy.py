@@ -34,8 +34,7 @@ def stroke(
         "land": ForceOverTime(time=(0.0, 1e-6, 200e-6, 201e-6), force=(0.0, 45.0, 45.0, 0.0)),
     }
     placed = np.array([1e-7, -5e-8, 0.0, 2e-5, 3e-5, 0.0])
-    guide = needle.guide(friction=friction, clearance=0.2e-6)
-    valve = needle.valve(placement=placed, guide=guide)
+    valve = needle.valve(placement=placed, guide=needle.guide(friction=friction, clearance=0.2e-6))
     return move(needle.rows(joints), valve, duration, **more)
 
 

@@ -166,10 +166,9 @@ def test_seat_impact_is_that_of_the_impact_workflow(valve: Valve, friction: floa
     text = FILE.read_text(encoding="utf-8")
     if friction:
         valve = build_valve(rubbing(friction))
-    bodies = text[text.index("materials:") : text.index("  pole:")]
     impact = read_case(
         "klack: 1\ntitle: t\n"
-        + bodies
+        + text[text.index("materials:") : text.index("  pole:")]
         + "contact: {between: [needle.tip, housing.seat], gap: 0.5 um, "
         + f"friction: {friction}}}\n"
         + f"motion: {{speed: {SPEED} m/s}}\n"

@@ -19,8 +19,7 @@ def first_impacts(*, swept):
     for old, new in finer:
         assert old in text
         text = text.replace(old, new)
-    case = read_valve_case(text, FILE)
-    variant = run_stroke(case).variants["dry"]
+    variant = run_stroke(read_valve_case(text, FILE)).variants["dry"]
     assert abs(variant.result.books.relative_residual) < 1e-10
     return {stop: variant.impacts(stop)[0] for stop in ("opening", "seat")}
 

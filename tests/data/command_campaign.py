@@ -280,8 +280,7 @@ def campaign(folder: Path, count: int, seed: str) -> dict:
         command, name = PLAN[index % len(PLAN)]
         place = folder / "now"
         place.mkdir()
-        text = json.dumps(readable(cases[name], draw), indent=1)
-        (place / "case.yaml").write_text(text)
+        (place / "case.yaml").write_text(json.dumps(readable(cases[name], draw), indent=1))
         words = [command, "case.yaml", *words_of(command, name), "--json", "made.json"]
         began = time.monotonic()
         code = worker.run(words, place)

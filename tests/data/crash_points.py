@@ -156,8 +156,7 @@ def twice(folder: Path, first: int) -> list[str]:
         fresh(folder)
         forked(lambda: put(folder, "new"), first)
         code = forked(lambda: put(folder, "newer"), n)[0]
-        words = seen(folder)
-        found.add("+".join(words))
+        found.add("+".join(seen(folder)))
         put(folder, "last")
         if seen(folder) != ["last"] or litter(folder) != ["mine.txt", "page", "store"]:
             found.add(f"broken after {n}: {seen(folder)}, {litter(folder)}")
@@ -287,8 +286,7 @@ def warm() -> None:
     modules += [f"klack.analyses.{analysis}.analysis" for analysis in stored]
     for name in modules:
         importlib.import_module(name)
-    small = importlib.import_module("klack.warming.small_impact")
-    small.plain_impacts()
+    importlib.import_module("klack.warming.small_impact").plain_impacts()
     importlib.import_module("klack.warming.groups").GROUPS["rest"].compute()
 
 

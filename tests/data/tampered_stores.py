@@ -100,8 +100,7 @@ def in_a_child(act: Any) -> tuple[str, str]:
         code = 1
         try:
             os.close(reader)
-            text = act()
-            os.write(writer, text.encode()[:4000])
+            os.write(writer, act().encode()[:4000])
             code = 0
         except BaseException as error:
             os.write(writer, f"traceback {type(error).__name__}: {error}".encode()[:4000])

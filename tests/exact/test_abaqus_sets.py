@@ -110,8 +110,7 @@ def test_surface_elements_name_faces_in_every_way(tmp_path):
 
     assert set(mesh.surfaces) == {"end", "up", "down", "all", "faces"}
     assert all(mesh.surface(n).face_count == 1 for n in ("end", "up", "down", "faces"))
-    x = mesh.points[mesh.surface("all").nodes, 0]
-    assert sorted(set(x.tolist())) == [0.0, 4.0]
+    assert sorted(set(mesh.points[mesh.surface("all").nodes, 0].tolist())) == [0.0, 4.0]
     assert np.all(mesh.points[mesh.node_sets["inside"], 0] == 2.0)
     assert corner_volume(mesh) == pytest.approx(4.0, rel=1e-12)
 

@@ -153,8 +153,7 @@ def test_participation_of_a_rod() -> None:
 @pytest.mark.parametrize(("modes", "most"), [(6, 5e-3), (20, 1e-4)])
 def test_power_transfer_against_the_full_body(modes: int, most: float) -> None:
     """A thick ring with Poisson's ratio, loaded at its inner edge: direct harmonic solution."""
-    lines = [np.linspace(2e-3, 5e-3, 5), np.linspace(0, 8e-3, 9)]
-    mesh = lattice_mesh("quad8", lines)
+    mesh = lattice_mesh("quad8", [np.linspace(2e-3, 5e-3, 5), np.linspace(0, 8e-3, 9)])
     body = elastic_body("ring", mesh, {"solid": STEEL}, fixed_nodes=mesh.surface("bottom").nodes)
     port = surface_port(mesh, "inner", "z", name="port")
     with Flexibility(body) as flexibility:

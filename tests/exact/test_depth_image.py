@@ -106,9 +106,7 @@ def test_what_is_behind_is_hidden(place: float, share: float, order: int) -> Non
     """A small box behind a large one along the line of sight, or before it; in either order."""
     large, small = solid(2.0, 2.0, 2.0), solid(0.2, 0.2, 0.2)
     points = small[0] - 0.1 + 1.0 + place * OBLIQUE.axes[2]
-    bodies = [large, (points, small[1])][::order]
-
-    seen, pixel = look(bodies, size=8.0)
+    seen, pixel = look([large, (points, small[1])][::order], size=8.0)
 
     own = np.sum(seen.body == (1 if order > 0 else 0)) * pixel
     expected = share * area_seen(OBLIQUE, np.full(3, 0.2))
@@ -145,10 +143,9 @@ def test_a_cut_that_lies_on_the_surface_is_whole() -> None:
 
 def test_a_tube_is_cut_through_its_wall_and_stays_open() -> None:
     skin = tube()
-    camera = Camera(radians(-45.0), radians(20.0))
     seen, pixel = look(
         [(skin.points, skin.triangles)],
-        camera,
+        Camera(radians(-45.0), radians(20.0)),
         Quarter(np.zeros(3), QUARTER),
         size=10e-3,
     )

@@ -104,8 +104,7 @@ def test_fixed_body_has_no_rigid_modes_and_lists_its_fixed_dofs():
     assert held.is_fixed
     assert not body.is_fixed
     assert held.rigid_modes.shape == (body.dof_count, 0)
-    expected = np.sort((3 * nodes[:, None] + np.arange(3)).ravel())
-    np.testing.assert_array_equal(held.fixed, expected)
+    np.testing.assert_array_equal(held.fixed, np.sort((3 * nodes[:, None] + np.arange(3)).ravel()))
     np.testing.assert_array_equal(np.union1d(held.free, held.fixed), np.arange(held.dof_count))
 
 

@@ -34,8 +34,7 @@ def straightened(mesh: Mesh) -> Mesh:
 def distorted_box(family: str, scale: float) -> Mesh:
     """3 x 3 x 3 cells; inner corner nodes moved by up to a seventh of a cell."""
     d = 3 if family in SOLIDS else 2
-    lines = [np.linspace(0.0, 1.0, 4)] * d
-    mesh = lattice_mesh(family, lines, lambda x: scale * x)
+    mesh = lattice_mesh(family, [np.linspace(0.0, 1.0, 4)] * d, lambda x: scale * x)
     inner = np.all((mesh.points > 1e-9) & (mesh.points < scale * (1 - 1e-9)), axis=1)
     shift = np.random.default_rng(7).uniform(-1, 1, mesh.points.shape) * scale / 21
     return straightened(replace(mesh, points=mesh.points + shift * inner[:, None]))

@@ -27,8 +27,7 @@ LENGTH = 10e-3
 @pytest.fixture(scope="module")
 def rod():
     across, along = np.linspace(0.0, 0.5e-3, 3), np.linspace(0.0, LENGTH, 31)
-    mesh = lattice_mesh("hex20", [across, across, along])
-    return elastic_body("rod", mesh, {"solid": ROD})
+    return elastic_body("rod", lattice_mesh("hex20", [across, across, along]), {"solid": ROD})
 
 
 @pytest.fixture

@@ -120,8 +120,7 @@ def test_a_crown_presses_like_the_sphere_of_hertz(tmp_path):
     loads = np.array([15.0, 50.0])
     widths = [static.half_width_at(load) for load in loads]
 
-    expected = [point_radius(load, 0.4, modulus) for load in loads]
-    assert widths == pytest.approx(expected, rel=0.015)
+    assert widths == pytest.approx([point_radius(load, 0.4, modulus) for load in loads], rel=0.015)
 
 
 @pytest.mark.parametrize("key", ["", "gap"], ids=["placed", "as drawn"])

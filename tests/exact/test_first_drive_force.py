@@ -29,8 +29,7 @@ def drive(**keys):
     ]
     ambient = Ambient(pressure=1e5, temperature=293.15)
     fluid = library_fluid("n-heptane").at(293.15)
-    rows = Network(parts, nodes, ambient=ambient, fluid=fluid).rows()
-    return simulate_network(rows, **keys)
+    return simulate_network(Network(parts, nodes, ambient=ambient, fluid=fluid).rows(), **keys)
 
 
 def test_spring_force_and_pressure_at_rest():
@@ -45,9 +44,7 @@ def test_spring_force_and_pressure_at_rest():
 def test_a_run_that_continues_begins_with_the_force_of_its_end():
     whole = drive(duration=1e-4, record=1e-5)
     first = drive(duration=5e-5, record=1e-5)
-    second = drive(duration=5e-5, record=1e-5, state=first.state)
-
-    force = second.channels["lift drive force"].values
+    force = drive(duration=5e-5, record=1e-5, state=first.state).channels["lift drive force"].values
     np.testing.assert_allclose(force, whole.channels["lift drive force"].values[5:], rtol=1e-9)
     assert force[0] == first.channels["lift drive force"].values[-1]
 

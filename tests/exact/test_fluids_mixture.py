@@ -148,8 +148,7 @@ def test_density_rises_everywhere_and_stiffness_belongs_to_it(boiling, width, fr
 
     assert np.all(np.diff(rho) > 0.0)
     assert np.all(fluid.bulk_modulus(p) > 0.0)
-    kinks = np.array(fluid.kinks)
-    at = p[1:][np.all(np.abs(p[1:, None] / kinks - 1.0) > 1e-2, axis=1)]
+    at = p[1:][np.all(np.abs(p[1:, None] / np.array(fluid.kinks) - 1.0) > 1e-2, axis=1)]
     h = 1e-4 * np.minimum(at, width)
     slope = (fluid.density(at + h) - fluid.density(at - h)) / (2.0 * h)
     # a difference of densities keeps digits only where the fluid is soft against h

@@ -187,8 +187,7 @@ def test_a_struck_rod_carries_the_wave_of_st_venant():
     assert arrival == pytest.approx(30e-3 / C, rel=1e-2)  # a quarter of an element
     held = (strain.time > 8e-6) & (strain.time < 15e-6)
     for name, expected in (("strain", -0.5 / C), ("stress", -0.5 * 210e9 / C), ("speed", -0.5)):
-        mean = found[name].exact[held].mean()
-        assert mean == pytest.approx(expected, rel=3e-3), name
+        assert found[name].exact[held].mean() == pytest.approx(expected, rel=3e-3), name
     way = found["way"]
     assert way.exact[-1] == pytest.approx(-40e-3 / C, rel=3e-3)  # stops when the wave is there
 

@@ -108,8 +108,7 @@ CHECK = CheckValve(
     ("drop", "share"), [(-50.0, 0.0), (0.4, 0.0), (0.5, 0.0), (1.5, 0.5), (2.5, 1.0), (60.0, 1.0)]
 )
 def test_check_valve_opens_between_two_pressures(drop, share):
-    row = row_of(CHECK)
-    out = step(row, (60.0 + drop) * BAR, 60.0 * BAR)
+    out = step(row_of(CHECK), (60.0 + drop) * BAR, 60.0 * BAR)
 
     area = share * pi / 4 * 6e-3**2
     assert out[3] == pytest.approx(area, rel=1e-9, abs=1e-15)
@@ -191,12 +190,10 @@ def test_lag_of_a_relief_valve_is_exponential_at_any_step():
     state = step(row, 1e5 + 104 * BAR, 1e5)[3:6]
     start, steps = state[1], 7
     for _ in range(steps):
-        out = step(row, 1e5 + 108 * BAR, 1e5, h=0.5e-3, state=state)
-        state = out[3:6]
+        state = step(row, 1e5 + 108 * BAR, 1e5, h=0.5e-3, state=state)[3:6]
     end = valve.area_slope(RHO) * 8 * BAR / sqrt(108 * BAR)
 
-    exact = end + (start - end) * np.exp(-steps * 0.5e-3 / tau)
-    assert state[1] == pytest.approx(exact, rel=1e-13)
+    assert state[1] == pytest.approx(end + (start - end) * np.exp(-steps * 0.5e-3 / tau), rel=1e-13)
 
 
 def test_a_relief_valve_has_no_lag_before_time_zero():
@@ -241,8 +238,7 @@ def test_what_flows_into_an_accumulator_is_what_it_holds(inlet):
     part = Accumulator(volume=1e-4, precharge=60e5, inlet_diameter=inlet)
     row, table = row_of(part), fluid_table(OIL, AMBIENT.pressure)
     state, mass, lost, stored = None, 0.0, [], None
-    rng = np.random.default_rng(3)
-    for p in np.exp(rng.uniform(np.log(30e5), np.log(400e5), 300)):
+    for p in np.exp(np.random.default_rng(3).uniform(np.log(30e5), np.log(400e5), 300)):
         rho, _, g, _ = fluid_at(table, p, 0)
         out = step(row, p, 1e5, h=1e-4, state=state, rho=(rho, RHO))
         held, _, _ = gas_store(out[3], AMBIENT.pressure, 60e5, 1e-4, 1.4, 1e-5)

@@ -98,8 +98,7 @@ def test_slopes_of_a_column_are_derivatives(h, flow):
 
 
 def test_column_reads_its_store_at_the_start():
-    row = column()
-    out = step(row, [1e-3, 0.0, 0.0], 6 * BAR, BAR, h=0.0)
+    out = step(column(), [1e-3, 0.0, 0.0], 6 * BAR, BAR, h=0.0)
 
     inertia = 6e-3 / (RHO * pi / 4 * 1.2e-3**2)
     assert out[0] == 1e-3

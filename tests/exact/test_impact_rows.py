@@ -47,8 +47,7 @@ def ready(films=0):
 
 @pytest.mark.parametrize("count", [3, 400, 401, 799, 5000])
 def test_joined_intervals_keep_the_impulse_of_every_sector(count):
-    rng = np.random.default_rng(count)
-    force, rows = rng.uniform(1.0, 50.0, count), ready()
+    force, rows = np.random.default_rng(count).uniform(1.0, 50.0, count), ready()
     for begin in range(0, count, 64):
         assert feed(rows, force[begin : begin + 64], start=begin * H) == -1
 

@@ -60,8 +60,7 @@ def test_no_gap_closes_during_safe_flight(seed, points, rigid, elastic, pull):
 @given(seed=st.integers(0, 100_000))
 def test_rigid_flight_is_told_exactly(seed):
     """One falling point: the root of gap - v t - f t^2 / 2."""
-    rng = np.random.default_rng(seed)
-    gap, speed, pull = rng.uniform(0.01, 3.0, 3)
+    gap, speed, pull = np.random.default_rng(seed).uniform(0.01, 3.0, 3)
 
     safe = safe_flight(
         np.array([gap]),
@@ -240,19 +239,16 @@ def test_a_guided_body_meets_its_bore_in_flight(flight):
     model = rigid_body(
         mass=3e-3, inertia=(2e-7, 2e-7, 6e-9), points=np.zeros((1, 3)), stiffness=1e9, gap=1e-4
     )
-    guide = lateral_guide(model, clearance=4e-6, stiffness=1e7)
-
     run = simulate_interface(
         model,
         speed=0.1,
         duration=8e-4,
-        guide=guide,
+        guide=lateral_guide(model, clearance=4e-6, stiffness=1e7),
         velocity=np.array([0.1, 0, 0, 0, 0, 0]),
         flight=flight,
     )
 
-    x = run.motion.position[:, 0]
-    assert np.abs(x).max() < 4e-6 + 1.01 * 0.1 * sqrt(3e-3 / 1e7)
+    assert np.abs(run.motion.position[:, 0]).max() < 4e-6 + 1.01 * 0.1 * sqrt(3e-3 / 1e7)
     assert abs(run.motion.velocity[-1, 0]) <= 0.1 * (1 + 1e-6)
     assert run.energy.residual == pytest.approx(0.0, abs=1e-12)
     assert abs(run.energy.guide) < 1e-5 * run.energy.initial

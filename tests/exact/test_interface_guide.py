@@ -107,11 +107,9 @@ def test_two_heights_hold_the_tilt(needle):
 
 def test_a_round_bore_keeps_the_moment_of_momentum(needle):
     """Central force: a shaft that orbits in the bore keeps x v_y - y v_x for many turns."""
-    guide = lateral_guide(needle, clearance=CLEARANCE, stiffness=STIFFNESS)
-
     run = move(
         needle,
-        guide,
+        lateral_guide(needle, clearance=CLEARANCE, stiffness=STIFFNESS),
         [0.1, 0.05, 0, 0, 0, 0],
         5e-3,
         offset=np.array([0.0, 1e-6, 0.0, 0.0, 0.0, 0.0]),

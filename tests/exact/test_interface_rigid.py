@@ -56,9 +56,7 @@ def test_eccentric_rigid_bar(scale, arm):
 def test_direction_of_the_arm_turns_with_it(turn):
     arm = 2e-3 * np.array([np.cos(turn), np.sin(turn), 0.0])
 
-    run = simulate_interface(bar(arm), speed=0.5, duration=25e-6, step=5e-9)
-
-    end = run.motion.velocity[-1]
+    end = simulate_interface(bar(arm), speed=0.5, duration=25e-6, step=5e-9).motion.velocity[-1]
     assert end[2] / 0.5 == pytest.approx(2.0 / (1.0 + MASS * 4e-6 / INERTIA[0]) - 1.0, abs=1e-6)
     impulse = MASS * (end[2] + 0.5)
     assert end[3:] == pytest.approx(np.cross(arm, [0, 0, impulse]) / INERTIA, rel=1e-12)

@@ -92,8 +92,7 @@ def test_edges_beside_a_wall_are_those_of_the_field(ratio):
 @pytest.mark.parametrize("ratio", [0.1, 0.5, 1.0])  # gap over core radius
 def test_round_edges_are_those_of_the_round_field(ratio):
     inner, outer = 1.0, 2.7
-    wall = cylinder_wall(inner, outer)
-    flat = float(edges_beside_wall(ratio, wall)[0])
+    flat = float(edges_beside_wall(ratio, cylinder_wall(inner, outer))[0])
     c = flat + float(round_excess(ratio, inner, outer)[0])
 
     computed = half_gap(ratio, outer - inner, 1e-3, radius=inner)

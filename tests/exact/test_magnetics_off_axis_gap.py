@@ -48,8 +48,7 @@ def field_of_eccentric_cylinders(inner, outer, e, orders=40):
             np.hstack((np.ones((z.size, 1)), np.log(np.abs(z))[:, None], rise.real, fall.real))
         )
         wanted.append(np.full(z.size, value))
-    found = np.linalg.lstsq(np.vstack(rows), np.concatenate(wanted), rcond=None)[0]
-    return -2.0 * pi * found[1]
+    return -2.0 * pi * np.linalg.lstsq(np.vstack(rows), np.concatenate(wanted), rcond=None)[0][1]
 
 
 @pytest.mark.parametrize("e", [0.1, 0.3, 0.5])

@@ -77,8 +77,7 @@ def test_a_body_of_revolution_has_one_rigid_motion(ring):
     assert report.rigid == 1
     assert report.mass == pytest.approx(ring.mass, rel=1e-12)
     assert report.material.modulus == pytest.approx(MODULUS, rel=1e-9)
-    first = eigenmodes(ring, count=1).frequency[0]
-    assert report.first_frequency == pytest.approx(first, rel=1e-6)
+    assert report.first_frequency == pytest.approx(eigenmodes(ring, count=1).frequency[0], rel=1e-6)
 
 
 def test_supports_of_the_case_hold_a_given_body(body):
@@ -147,9 +146,7 @@ def test_another_order_of_rows_is_found(body):
     order = np.arange(3 * n).reshape(n, 3).T.ravel()  # all x, then all y, then all z
     K, M = body.K[order][:, order], body.M[order][:, order]
 
-    text = refused(body, K=csr_array(K), M=csr_array(M))
-
-    assert "'dofs'" in text
+    assert "'dofs'" in refused(body, K=csr_array(K), M=csr_array(M))
 
 
 def test_another_order_of_nodes_is_found(body):
@@ -167,11 +164,7 @@ def test_rotated_nodes_are_found(body):
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     T = np.eye(body.dof_count)
     T[30:33, 30:33] = turn
-    K = csr_array(T @ body.K.toarray() @ T.T)
-
-    text = refused(body, K=K)
-
-    assert "rigid shift" in text
+    assert "rigid shift" in refused(body, K=csr_array(T @ body.K.toarray() @ T.T))
 
 
 @pytest.mark.parametrize(
@@ -181,9 +174,7 @@ def test_rotated_nodes_are_found(body):
 def test_wrong_units_are_named_with_those_that_fit(body, taken, right):
     taken, right = unit_system(taken), unit_system(right)
     K = body.K * (taken.stiffness / right.stiffness)
-    M = body.M * (taken.mass / right.mass)
-
-    text = refused(body, K=K, M=M, units=taken)
+    text = refused(body, K=K, M=body.M * (taken.mass / right.mass), units=taken)
 
     assert "density" in text or "wave speed" in text
     assert f"in {taken.name}" in text
@@ -225,30 +216,22 @@ def test_two_pieces_are_refused(body):
     both = Mesh(points=np.vstack([body.mesh.points, far.points]), blocks=())
     K, M = (csr_array(block_diag([A, A], format="csr")) for A in (body.K, body.M))
 
-    text = refused(body, mesh=both, K=K, M=M)
-
-    assert "several pieces" in text
+    assert "several pieces" in refused(body, mesh=both, K=K, M=M)
 
 
 def test_supports_that_leave_a_motion_free_are_refused(body):
-    text = refused(body, fixed_nodes=[3])
-
-    assert "leave 3 of 6 rigid motions free" in text
+    assert "leave 3 of 6 rigid motions free" in refused(body, fixed_nodes=[3])
 
 
 def test_sizes_must_fit(body):
-    text = refused(body, K=body.K[:-3, :-3].tocsr())
-
-    assert f"for {body.mesh.node_count} nodes" in text
+    assert f"for {body.mesh.node_count} nodes" in refused(body, K=body.K[:-3, :-3].tocsr())
 
 
 def test_ports_of_node_sets_push_all_nodes_alike(body):
     mesh = without_elements(body.mesh)
     mesh = replace(mesh, node_sets={"top": np.array([3, 5, 9, 11])})
 
-    port = node_set_port(mesh, "top", "z", name="tip")
-
-    pattern = port.pattern.reshape(-1, 3)
+    pattern = node_set_port(mesh, "top", "z", name="tip").pattern.reshape(-1, 3)
     np.testing.assert_allclose(pattern.sum(axis=0), [0, 0, 1], atol=1e-15)
     np.testing.assert_allclose(pattern[[3, 5, 9, 11], 2], 0.25)
     with pytest.raises(InputError, match="one of: top"):

@@ -123,9 +123,7 @@ def test_a_spring_without_motion_pushes_as_one_without_mass():
         "other": Spring(stiffness=1e4, preload=-8.0),
     }
     rows = Network(parts, [["mass.body", "spring.end", "other.end"]]).rows()
-    run = simulate_network(rows, duration=5e-5)
-
-    place = run.channels["mass.body displacement"].values
+    place = simulate_network(rows, duration=5e-5).channels["mass.body displacement"].values
     assert place == pytest.approx(3.0 / 3e4, rel=1e-9)
 
 
@@ -224,9 +222,7 @@ def test_bristles_stay_bounded_in_any_step(share, way):
 
 
 def test_friction_about_rest_is_a_spring():
-    part = LuGreFriction(coulomb=0.5, bristle_stiffness=1e6, elastic_share=0.9)
-
-    out = step(part, 0.0, 0.4e-6)
+    out = step(LuGreFriction(coulomb=0.5, bristle_stiffness=1e6, elastic_share=0.9), 0.0, 0.4e-6)
 
     assert out[0] == pytest.approx(-1e6 * 0.2e-6, rel=1e-13)
     assert out[4] == pytest.approx(0.0, abs=1e-20)

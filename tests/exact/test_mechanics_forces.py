@@ -98,9 +98,7 @@ def test_weight_counts_the_inclination():
 
 
 def test_a_rigid_mass_moves_by_newton_and_starts_with_its_speed():
-    part = RigidMass(mass=3e-3, speed=-0.5, points=("tip", "top"))
-
-    rows = Network({"needle": part}, []).rows()
+    rows = Network({"needle": RigidMass(mass=3e-3, speed=-0.5, points=("tip", "top"))}, []).rows()
 
     body = rows.bodies[0].body
     assert body.port_shapes.T @ body.port_shapes == pytest.approx(1 / 3e-3, rel=1e-15)

@@ -125,8 +125,7 @@ def test_sets_surfaces_sections_and_materials():
     assert file_numbers["nested"] == [1, 2, 4, 5, 8]
     assert file_numbers["Foot"] == [1, 2, 3, 4, 9, 10]
     assert "in_a_step" not in file_numbers
-    x = mesh.points[mesh.surface("Ends").nodes, 0]
-    assert sorted(set(x.tolist())) == [0.0, 3 * MM]
+    assert sorted(set(mesh.points[mesh.surface("Ends").nodes, 0].tolist())) == [0.0, 3 * MM]
     assert mesh.surface("Bottom").face_count == mesh.surface("Foot").face_count == 2
     assert np.all(mesh.points[mesh.surface("Foot").nodes, 2] == 0)
     assert mesh.surface("Skin").face_count == 10  # without the face between the bricks

@@ -118,16 +118,13 @@ def write_cdb(path: Path, b: Body) -> None:
         lines.append("".join(f"{v:9d}" for v in whole[:19]))
         lines += ["".join(f"{v:9d}" for v in whole[19:])] if len(whole) > 19 else []
     lines.append(f"{-1:9d}")
-    slope = sorted(int(n) + 1 for n in b.slope[0])
-    top = sorted(int(n) + 1 for n in b.top[0])
-    ground = [int(n) + 1 for n in b.ground]
     for name, kind, members in (
         ("BODY", "ELEM", [11, -12]),
         ("CAP", "ELEM", [13]),
         ("LEFT", "ELEM", [14]),
-        ("SLOPE", "NODE", slope),
-        ("TOP", "NODE", top),
-        ("GROUND", "NODE", ground),
+        ("SLOPE", "NODE", sorted(int(n) + 1 for n in b.slope[0])),
+        ("TOP", "NODE", sorted(int(n) + 1 for n in b.top[0])),
+        ("GROUND", "NODE", [int(n) + 1 for n in b.ground]),
     ):
         lines += [f"CMBLOCK,{name:8s},{kind},{len(members):8d}  ! users component", "(8i10)"]
         for i in range(0, len(members), 8):
@@ -492,8 +489,7 @@ def test_materials_and_sections(form: str, tmp_path: Path) -> None:
     name, write, _ = WRITERS[form]
     write(tmp_path / name, body(True))
     model = read_mesh_file(tmp_path / name, MM)
-    solids = SOLIDS[form[:3]]
-    found = [model.materials[model.sections[solid]] for solid in solids]
+    found = [model.materials[model.sections[solid]] for solid in SOLIDS[form[:3]]]
     assert [m.young for m in found] == pytest.approx([2.1e5, 7e4], rel=1e-12)
     assert [m.poisson for m in found] == [0.3, 0.3]
     assert [m.density for m in found] == pytest.approx([7.85e-9] * 2, rel=1e-12)

@@ -72,9 +72,7 @@ def test_mid_node_at_the_quarter_point_makes_the_corner_singular():
 def test_summary_names_the_worst_element():
     points = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [3, 0.0]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [1, 4, 2]])
-    mesh = Mesh(points=points, blocks=(ElementBlock("tri3", triangles, "plate"),))
-
-    summary = mesh_summary(mesh)
+    summary = mesh_summary(Mesh(points=points, blocks=(ElementBlock("tri3", triangles, "plate"),)))
 
     assert (summary.nodes, summary.elements, summary.families) == (5, 3, {"tri3": 3})
     assert summary.largest_edge == pytest.approx(np.sqrt(5), rel=1e-12)

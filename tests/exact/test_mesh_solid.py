@@ -52,8 +52,7 @@ def volume(mesh: Mesh) -> float:
     _, dN = shape_functions("tet10", xi)
     total = 0.0
     for block in mesh.blocks:
-        x = mesh.points[block.connectivity]
-        jacobian = np.linalg.det(np.einsum("enc,qnd->eqcd", x, dN))
+        jacobian = np.linalg.det(np.einsum("enc,qnd->eqcd", mesh.points[block.connectivity], dN))
         assert jacobian.min() > 0
         total += float(np.einsum("q,eq->", w, jacobian))
     return total
@@ -110,14 +109,12 @@ def test_nodes_lie_on_the_exact_surfaces(body):
     for profile in (pin(), cap()):
         for curve in profile.curves:
             if curve.name in body.surfaces:
-                nodes = body.surface(curve.name).nodes
-                assert curve.distance(meridian[nodes]).max() < 1e-12
+                assert curve.distance(meridian[body.surface(curve.name).nodes]).max() < 1e-12
 
 
 def test_solids_are_joined_and_their_interface_is_a_node_set(body):
     assert body.solids == ("pin", "cap")
-    joint = body.points[body.node_sets["joint"]]
-    np.testing.assert_allclose(joint[:, 2], 6 * MM, rtol=1e-12)
+    np.testing.assert_allclose(body.points[body.node_sets["joint"]][:, 2], 6 * MM, rtol=1e-12)
     one, other = (np.unique(block.connectivity) for block in body.blocks)
     assert np.array_equal(np.intersect1d(one, other), body.node_sets["joint"])
 

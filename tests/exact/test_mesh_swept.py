@@ -64,8 +64,7 @@ def volume(mesh: Mesh) -> float:
     _, dN = shape_functions("tet10", xi)
     total = 0.0
     for block in mesh.blocks:
-        x = mesh.points[block.connectivity]
-        jacobian = np.linalg.det(np.einsum("enc,qnd->eqcd", x, dN))
+        jacobian = np.linalg.det(np.einsum("enc,qnd->eqcd", mesh.points[block.connectivity], dN))
         assert jacobian.min() > 0
         total += float(np.einsum("q,eq->", w, jacobian))
     return total
@@ -128,8 +127,7 @@ def test_every_surface_node_lies_on_the_surface_of_revolution(solid):
     meridian_points = np.column_stack([np.hypot(x, y), z])
     for curve in needle().curves:
         if curve.name != "axis":
-            nodes = solid.surface(curve.name).nodes
-            assert curve.distance(meridian_points[nodes]).max() < 2e-15
+            assert curve.distance(meridian_points[solid.surface(curve.name).nodes]).max() < 2e-15
 
 
 def test_areas_of_named_surfaces(solid):
@@ -145,8 +143,7 @@ def test_nodes_on_the_axis_are_merged_and_mid_nodes_are_in_the_middle(meridian, 
     assert (np.hypot(x, y) < 1e-12).sum() == on_axis.sum()
     # edges that end on the axis are straight and their mid node is the mid node of the meridian
     (block,) = solid.blocks
-    edges = np.array(FAMILIES["tet10"].edges)
-    pairs = block.connectivity[:, edges].reshape(-1, 2)
+    pairs = block.connectivity[:, np.array(FAMILIES["tet10"].edges)].reshape(-1, 2)
     middle = block.connectivity[:, 4:].ravel()
     r = np.hypot(x, y)
     radial = (r[pairs] < 1e-12).sum(axis=1) == 1

@@ -73,8 +73,7 @@ def forces(study, parameters, variant, duration):
     space = slope_space(case.checked, source, parameters)
     runner = SlopeRunner(case.checked, case.tree, space, variant, silent, None)
     (run,) = runner.tangents()
-    record = klack.run_stroke(case, variants=[variant]).record
-    found = moved_forces(record, case.checked, run, 0)
+    found = moved_forces(klack.run_stroke(case, variants=[variant]).record, case.checked, run, 0)
     return found, space.varied[0].value, run.touches[0]
 
 

@@ -240,8 +240,7 @@ def test_a_needle_that_rings_on_its_stop_has_landed():
     assert interrupted_impact([bounce, landed], ringing(20e-3)) is None
     assert interrupted_impact([bounce, landed], ringing(10.1e-3)) is landed
     # the bounces on the other stop tell nothing
-    other = replace(bounce, stop="opening")
-    assert interrupted_impact([other, landed], ringing(20e-3)) is landed
+    assert interrupted_impact([replace(bounce, stop="opening"), landed], ringing(20e-3)) is landed
 
 
 @pytest.mark.parametrize(("speed", "told"), [(0.29, False), (0.31, True)])

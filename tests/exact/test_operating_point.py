@@ -141,8 +141,7 @@ def test_a_held_direct_injector_passes_what_both_restrictions_pass():
     ],
 )
 def test_a_run_from_the_operating_point_of_a_valve_stays_there(name, current):
-    tree = read_case_tree(VALVES / f"{name}.yaml")
-    case = tree.case()
+    case = read_case_tree(VALVES / f"{name}.yaml").case()
     conditions = Conditions() if current is None else Conditions(current={"": current})
 
     found = find_point(build_valve(case), find_roles(case), case.run.variants[0], conditions)
@@ -353,9 +352,7 @@ def test_friction_that_may_hold_a_needle_elsewhere_is_told():
         "spring": Spring(stiffness=1e4, preload=-0.5),
         "guide": GuideFriction(coulomb=0.2, breakaway=0.3),
     }
-    rows = Network(parts, [["needle.tip", "spring.end", "guide.body"]]).rows()
-
-    point = operating_point(rows)
+    point = operating_point(Network(parts, [["needle.tip", "spring.end", "guide.body"]]).rows())
 
     assert point.start.displacement["needle.tip"] == pytest.approx(50e-6, rel=1e-12)
     assert point.friction["needle"] == pytest.approx(0.3 / 1e4, rel=1e-6)

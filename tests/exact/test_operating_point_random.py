@@ -290,8 +290,7 @@ def test_a_kicked_valve_moves_as_its_linear_model(seed):
     free = steady_rows(rows)
     sizes = step_sizes(free, "normal", step=10e-9, coarse=1)
     network = compile_network(free, sizes)
-    first = {"needle": point.start.displacement["needle.tip"]}
-    begin_steady(network, sizes.step, first=first)
+    begin_steady(network, sizes.step, first={"needle": point.start.displacement["needle.tip"]})
     clock = np.zeros(8, dtype=np.int64)
     clock[1] = -1
     state = saved_state(network, clock)

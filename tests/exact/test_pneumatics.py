@@ -140,10 +140,9 @@ def test_a_stroke_that_uses_up_a_chamber_is_refused():
         "air": GasChamber(volume=1e-9),
         "face": GasFace(direction="closing", outer_diameter=4e-3),
     }
-    joined = [*JOINED, "stop.lower", "face.body"]
     network = Network(
         {**BODY, **parts},
-        [joined, ["stop.upper", "ground"], ["air.gas", "face.gas"]],
+        [[*JOINED, "stop.lower", "face.body"], ["stop.upper", "ground"], ["air.gas", "face.gas"]],
         gas=AIR,
     )
     with pytest.raises(InputError, match="air"):

@@ -90,8 +90,7 @@ def test_a_piston_pushes_its_volume_through_an_orifice():
     rows = Network(parts, ends, ambient=ambient, fluid=fluid).rows()
     run = simulate_network(rows, duration=1.9e-3)
 
-    density = float(fluid.density(1e5))
-    drop = 0.5 * density * (speed * area / (0.7 * np.pi / 4 * 1e-6)) ** 2
+    drop = 0.5 * float(fluid.density(1e5)) * (speed * area / (0.7 * np.pi / 4 * 1e-6)) ** 2
     # the density in the orifice is that of the chamber: 1e-4 more
     assert run.channels["room pressure"].values[-1] - 1e5 == pytest.approx(drop, rel=1e-3)
     assert run.channels["piston drive force"].values[-1] == pytest.approx(-area * drop, rel=1e-3)

@@ -195,8 +195,7 @@ def test_points_take_what_the_loops_take():
 @pytest.mark.slow
 def test_running_in_at_the_interface_level():
     """Reference: the law with memory of the same loops; 4 % on ten elements over the contact."""
-    text = SPHERES.read_text("utf-8").replace("run: {", "run: {impacts: 3, ")
-    case = read_case(text, SPHERES)
+    case = read_case(SPHERES.read_text("utf-8").replace("run: {", "run: {impacts: 3, "), SPHERES)
     ran = [
         run_impact(case, levels=(level,), certify=False).running_in
         for level in ("reduced", "interface")

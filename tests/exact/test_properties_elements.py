@@ -42,8 +42,7 @@ FAMILIES = st.sampled_from(SOLIDS)
 
 
 def box(family: str, size: float, affine: np.ndarray) -> Mesh:
-    lines = [np.linspace(0.0, 1.0, 3)] * 3
-    return lattice_mesh(family, lines, lambda x: size * (x @ affine.T))
+    return lattice_mesh(family, [np.linspace(0.0, 1.0, 3)] * 3, lambda x: size * (x @ affine.T))
 
 
 @pytest.mark.slow

@@ -197,8 +197,7 @@ def test_an_exact_drop_is_read_as_it_was_written(
     level = {"seat": 0.0, "opening": float("nan")}
     if upwards:
         x, level = drop.height - x, {"seat": float("nan"), "opening": drop.height}
-    measures = measure_stroke(t, x, **level)
-    impacts = measures.impacts
+    impacts = measure_stroke(t, x, **level).impacts
 
     assert len(impacts) >= 3
     assert {impact.stop for impact in impacts} == {"opening" if upwards else "seat"}

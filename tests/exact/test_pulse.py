@@ -29,12 +29,9 @@ def test_a_trapezoid_is_read_exactly():
     pulse = measure_pulse(TIME, trapezoid(), "trapezoid")
 
     assert pulse.sign == -1.0
-    assert pulse.rest == pytest.approx(2e-5, rel=1e-9)
-    assert pulse.plateau == pytest.approx(1e-3, rel=1e-9)
+    assert (pulse.rest, pulse.plateau) == pytest.approx((2e-5, 1e-3), rel=1e-09)
     assert pulse.front == pytest.approx(0.0, abs=1e-12)
-    assert pulse.length == pytest.approx(80e-6, rel=1e-6)
-    assert pulse.rise == pytest.approx(8e-6, rel=1e-6)
-    assert pulse.fall == pytest.approx(16e-6, rel=1e-6)
+    assert (pulse.length, pulse.rise, pulse.fall) == pytest.approx((80e-6, 8e-6, 16e-6), rel=1e-06)
     assert pulse.peak == pytest.approx(1.0, rel=1e-9)
     assert pulse.ripple < 1e-9
 
@@ -53,8 +50,7 @@ def test_noise_on_front_and_end_leaves_the_length():
     noise = 5e-5 * np.random.default_rng(3).standard_normal(len(TIME))
     pulse = measure_pulse(TIME, trapezoid() + noise, "noise")
 
-    assert pulse.front == pytest.approx(0.0, abs=1e-6)
-    assert pulse.length == pytest.approx(80e-6, abs=1e-6)
+    assert (pulse.front, pulse.length) == pytest.approx((0.0, 80e-6), abs=1e-06)
     assert pulse.plateau == pytest.approx(1e-3, rel=0.01)
 
 

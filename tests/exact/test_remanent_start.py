@@ -67,8 +67,7 @@ def test_it_is_the_second_stroke():
 
     assert opens(once, 0.0) == pytest.approx(opens(twice, 8e-3), rel=2e-3)
     assert opens(new, 0.0) > 1.005 * opens(once, 0.0)  # the remanence helps
-    circuit = Solenoid(**MAGNET, iron=[IRON]).circuit()
-    known = remanent_state(circuit, current=0.0, gap=110e-6)[0][0]
+    known = remanent_state(Solenoid(**MAGNET, iron=[IRON]).circuit(), current=0.0, gap=110e-6)[0][0]
     flux = once.channels["coil flux"].values[0]
     assert flux == pytest.approx(float(known), rel=1e-3)  # the needle rests some nm deeper
     assert abs(once.books.relative_residual) < 1e-12

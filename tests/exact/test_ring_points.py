@@ -18,8 +18,7 @@ def points_of(count, rows=(0, 1, 2), sine=(False, False, True)):
 
 def spectrum_of(count, rows=3):
     """Symmetric positive compliances that fall with the order."""
-    rng = np.random.default_rng(count)
-    A = rng.normal(size=(count // 2 + 1, rows, rows))
+    A = np.random.default_rng(count).normal(size=(count // 2 + 1, rows, rows))
     spectrum = A @ A.transpose(0, 2, 1) / (1.0 + np.arange(count // 2 + 1))[:, None, None]
     # in order 0 what moves along the ring is torsion alone
     spectrum[0, :2, 2] = spectrum[0, 2, :2] = 0.0

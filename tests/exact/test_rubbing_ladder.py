@@ -134,8 +134,7 @@ def test_a_stiff_needle_loses_what_one_point_does(seat, friction):
 
 
 def test_all_depths_lose_the_same_share(seat):
-    found = [restitution(seat.rubbing, place) for place in range(3)]
-    assert np.ptp(found) < 0.002
+    assert np.ptp([restitution(seat.rubbing, place) for place in range(3)]) < 0.002
 
 
 def test_little_friction_is_the_frictionless_contact(seat):
@@ -173,8 +172,7 @@ def test_the_law_has_the_loops_of_the_bodies(seat, share):
     assert isinstance(fit.law, RubbingLaw)
     assert fit.error < 0.003
     for loop in contact.loops:
-        path = np.append(0.0, loop.approach - modal * loop.force)
-        apart = fit.law.along(path)[1:] - loop.force
+        apart = fit.law.along(np.append(0.0, loop.approach - modal * loop.force))[1:] - loop.force
         assert np.abs(apart).max() < (0.03 if share > 0.4 else 0.01) * loop.force[0]
 
 

@@ -136,9 +136,7 @@ def test_larger_bodies_hit_longer_and_harder(reference, scale):
     to 1753 at other sizes), and with them the force: 3e-4 of its peak.  The sphere rebounds nearly
     whole, its losses are a part in 10^4.
     """
-    study = study_of(scale=scale)
-
-    for name, level in study.levels.items():
+    for name, level in study_of(scale=scale).levels.items():
         same = reference.levels[name]
         force = same.history.force
         if name != "full":

@@ -177,8 +177,7 @@ def test_sound_is_long_enough_for_loudness():
 def test_transfer_is_carried_on_beyond_its_frequencies():
     """Below with f^4 of the power, above constant, up to the band limit."""
     f = np.linspace(0.0, 24e3, 48_001)
-    known = np.array([1e3, 5e3])
-    response = np.abs(pressure_transfer(f, known, np.array([4.0, 9.0]), rate=48e3))
+    response = np.abs(pressure_transfer(f, np.array([1e3, 5e3]), np.array([4.0, 9.0]), rate=48e3))
 
     at = {x: response[round(2 * x)] for x in (0, 250, 500, 1000, 5000, 15_000, 23_900)}
     assert at[0] == 0.0

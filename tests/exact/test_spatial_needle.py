@@ -101,8 +101,7 @@ def test_a_push_on_one_foot_gives_momentum_and_spin():
     assert run.channels["needle velocity"].values[-1] == pytest.approx(0.5 * after, rel=1e-5)
     impulse = MASS * 0.5 * (1.0 + after)
     assert hit.impulse == pytest.approx(impulse, rel=1e-5)
-    tilt = run.channels["needle tilt x"]
-    rate = np.diff(tilt.values[-3:-1])[0] / (run.time[1] - run.time[0])
+    rate = np.diff(run.channels["needle tilt x"].values[-3:-1])[0] / (run.time[1] - run.time[0])
     assert rate == pytest.approx(-a * impulse / INERTIA[1], rel=1e-5)
 
 

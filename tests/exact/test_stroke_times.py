@@ -114,8 +114,7 @@ def test_every_time_lies_in_the_run_and_closing_follows_opening(seed):
         for t, x in zip(at, lift, strict=True)
         if x in (0.0, 100.0)
     ]
-    times = times_of(np.column_stack([at, lift]), events)
-    (_, first), (_, second) = times.in_order
+    (_, first), (_, second) = times_of(np.column_stack([at, lift]), events).in_order
 
     known = [t for passage in (first, second) for t in moments(passage) if t is not None]
     assert all(0.0 <= t <= TIME[-1] for t in known)

@@ -47,8 +47,7 @@ def slopes(rows, given, name):
     way = Direction(name=name, plus=ends[0], minus=ends[1], distance=2 * shift)
     sizes = step_sizes(rows(**given), "normal")
     network = compile_network(rows(**given), sizes)
-    rest = begin_at_rest(network, sizes.step)[1]
-    return network, slopes_at_rest(network, rest, way, sizes)
+    return network, slopes_at_rest(network, begin_at_rest(network, sizes.step)[1], way, sizes)
 
 
 # --------------------------------------------------------------------------- closed forms
@@ -206,8 +205,7 @@ def test_starts_of_valves_are_those_found_from_nothing(name):
             rows, size = runner.rows({}), space.varied[0].size
             sizes = step_sizes(rows, "normal", step=case.run.step)
             network = compile_network(rows, sizes)
-            rest = begin_at_rest(network, sizes.step)[1]
-            found = slopes_at_rest(network, rest, way, sizes)
+            found = slopes_at_rest(network, begin_at_rest(network, sizes.step)[1], way, sizes)
         except (CaseProblem, KlackError):
             continue  # refused with its reason
         ends = [compile_network(end, sizes) for end in (way.plus, way.minus)]

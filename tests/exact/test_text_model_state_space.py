@@ -118,8 +118,7 @@ def test_pair_has_contact_forces_in_and_gaps_out(pair):
 
 def test_python_control_has_the_same_poles_and_response(body):
     pytest.importorskip("control")
-    model = body_model(body, provenance=ORIGIN, step=2e-8)
-    plant = to_control(model, residual_compliance=True)
+    plant = to_control(body_model(body, provenance=ORIGIN, step=2e-8), residual_compliance=True)
     poles = plant.poles()
     omega = np.sort(abs(poles[poles.imag > 1.0]))
     np.testing.assert_allclose(omega, body.omega[1:], rtol=1e-10)

@@ -22,8 +22,7 @@ SHIPPED = ("demo-stroke", "demo-valve-axisymmetric")
     ],
 )
 def test_what_the_case_does_not_have(name: str, section: str, message: str) -> None:
-    path = find_case(name)
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = find_case(name).read_text(encoding="utf-8").splitlines()
     own = [i for i, line in enumerate(lines) if line.startswith("noise:")]
     for first in own:  # up to the next section
         later = range(first + 1, len(lines))
@@ -39,9 +38,7 @@ def test_what_the_case_does_not_have(name: str, section: str, message: str) -> N
 def test_shipped_cases_are_read(name: str) -> None:
     path = find_case(name)
 
-    case = read_any_case(path.read_text(encoding="utf-8"), path)
-
-    assert case.name == name
+    assert read_any_case(path.read_text(encoding="utf-8"), path).name == name
 
 
 def test_a_forgotten_support_is_asked_for() -> None:

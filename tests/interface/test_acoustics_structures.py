@@ -121,14 +121,11 @@ def test_structures_are_stored_with_units_and_small(
     IMPACT.save(replace(lonely_study, structures=structures), tmp_path)
     folder = tmp_path / RESULT_NAME / "study" / "structures"
 
-    loaded = IMPACT.load(tmp_path).structures
-
-    for ours, theirs in zip(structures, loaded, strict=True):
+    for ours, theirs in zip(structures, IMPACT.load(tmp_path).structures, strict=True):
         assert ours.group_names == theirs.group_names
         np.testing.assert_array_equal(ours.port_shapes, theirs.port_shapes)
     assert zarr.open_array(folder / "0" / "omega", mode="r").attrs["unit"] == "rad/s"
-    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
-    assert size < 2e6
+    assert sum(file.stat().st_size for file in folder.rglob("*") if file.is_file()) < 2e6
 
 
 def test_only_the_surfaces_that_the_case_names(stroke_case: ValveCase) -> None:

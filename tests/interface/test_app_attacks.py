@@ -149,9 +149,8 @@ def test_no_address_leads_out_of_the_folder(client, path):
     for page in ("/case", "/sliders", "/compare"):
         answer = client.get(page, params={"path": path, "a": path, "b": path})
         assert answer.status_code in (200, 414)
-        assert "klack: secret" not in answer.text
-        assert "root:" not in answer.text
-        assert "Internal Server Error" not in answer.text
+        for words in ("klack: secret", "root:", "Internal Server Error"):
+            assert words not in answer.text
     for address in (f"/report?path={path}/report.html", f"/static/{path}", f"/sound/{path}"):
         answer = client.get(address.replace("\0", "%00").replace("\\", "%5C"))
         assert answer.status_code in (400, 404, 414)
@@ -187,8 +186,7 @@ def test_a_wrong_cookie_opens_nothing(server, client):
         {name: server.address.rpartition("=")[2]},  # the token is no cookie
     )
     for cookies in wrong:
-        answer = httpx.get(server.base, cookies=cookies)
-        assert answer.status_code == 403, cookies
+        assert httpx.get(server.base, cookies=cookies).status_code == 403, cookies
     twice = httpx.get(server.base, headers={"cookie": f"{name}=no; {name}={value}"})
     assert twice.status_code in (200, 403)
     assert httpx.get(f"{server.base}/?token={value}").status_code == 403

@@ -26,8 +26,7 @@ CASE = "valve/case.yaml"
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("app")
     (place / "valve").mkdir()
-    text = find_case("demo-valve-axisymmetric").read_text("utf-8")
-    (place / CASE).write_text(text, "utf-8")
+    (place / CASE).write_text(find_case("demo-valve-axisymmetric").read_text("utf-8"), "utf-8")
     return place
 
 

@@ -211,9 +211,7 @@ def test_a_page_that_was_left_makes_room_for_another(folder):
     state.mark_left(open_pages[0], is_left=True)
     state.mark_left(open_pages[1], is_left=True)
     state.mark_left(open_pages[0], is_left=False)  # it has come back
-    found = state.explorer()
-
-    assert found not in open_pages
+    assert state.explorer() not in open_pages
     with pytest.raises(InputError, match="reload the page"):
         asyncio.run(open_pages[1].call("move", {}))
     with pytest.raises(InputError, match="3 open slider pages"):

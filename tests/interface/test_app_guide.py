@@ -31,10 +31,8 @@ _NOISE = ("GPU stall", "WebGL", "413", "415", "Failed to load resource")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("guide")
     (place / "cad").mkdir()
-    case = load_any_case(find_case("demo-valve-axisymmetric"))
-    for name, body in case.bodies.items():
-        profiles = body.geometry.profile.profiles()
-        write_step_revolved(profiles, place / "cad" / f"{name}.step")
+    for name, body in load_any_case(find_case("demo-valve-axisymmetric")).bodies.items():
+        write_step_revolved(body.geometry.profile.profiles(), place / "cad" / f"{name}.step")
     shutil.copy(place / "cad" / "needle.step", place / "cad" / ATTACK)
     (place / "cad" / "empty.step").write_bytes(b"")
     (place / "cad" / "words.step").write_text("this is no STEP file")

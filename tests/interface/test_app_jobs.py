@@ -96,8 +96,7 @@ def test_a_run_that_was_killed_is_lost_and_its_number_may_be_given_out_again(fol
 
 def test_progress_is_read_from_the_folder(folder, sleeping):
     jobs = Jobs(folder)
-    job = jobs.start("impact", "bad.yaml", "out")
-    place = folder.path / ".klack-app" / "jobs" / job.name
+    place = folder.path / ".klack-app" / "jobs" / jobs.start("impact", "bad.yaml", "out").name
     (place / "progress.json").write_text('{"stage": "modes", "fraction": 0.25}')
 
     (found,) = jobs.all()

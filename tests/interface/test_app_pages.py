@@ -129,8 +129,7 @@ def test_motion_is_reduced_for_those_who_ask_for_it(page, server, folder):
 
 
 def test_charts_are_told_with_their_main_numbers(page, server, folder):
-    found = next(place for place in PAGES if place.name == "compare")
-    found.open(page, server.base, folder)
+    next(place for place in PAGES if place.name == "compare").open(page, server.base, folder)
     peak = page.locator("tbody tr").first.locator("td").nth(1).inner_text()
     shown = page.get_by_role("img", name="Contact force")
 
@@ -214,8 +213,7 @@ def test_results_of_two_kinds_are_not_offered_for_comparison(page, server):
 
 
 def test_a_slider_page_that_is_reloaded_again_and_again_answers(page, server, folder):
-    found = next(place for place in PAGES if place.name == "sliders")
-    found.open(page, server.base, folder)
+    next(place for place in PAGES if place.name == "sliders").open(page, server.base, folder)
 
     for _ in range(6):  # each left page may come back for some seconds, and holds its bodies
         page.goto(page.url, wait_until="domcontentloaded")

@@ -113,12 +113,10 @@ def test_a_study_is_made_started_stopped_and_resumed_without_its_server(
     page.get_by_role("button", name="Resume").click()
     page.wait_for_selector("text=study runs, ")
     page.wait_for_function("left => window.klackPoints.study.waiting < left", arg=before["waiting"])
-    done = told(page)["job"]["done"]
-    assert done > 8000 - before["waiting"]  # nothing computed was lost
+    assert told(page)["job"]["done"] > 8000 - before["waiting"]  # nothing computed was lost
     page.get_by_role("button", name="Stop").click()
     page.wait_for_selector("text=stopped; the points so far are kept")
-    again = told(page)["study"]["columns"]
-    for column, now in zip(before["columns"], again, strict=True):
+    for column, now in zip(before["columns"], told(page)["study"]["columns"], strict=True):
         for one, other_one in zip(column["values"], now["values"], strict=True):
             assert one is None or other_one == pytest.approx(one, rel=1e-6)
     require_within(page)
@@ -129,8 +127,7 @@ def test_a_brush_selects_in_all_views_and_thousands_are_paged(page, server):
     page.wait_for_selector("#kp-root[data-points='5000']")
     page.wait_for_selector(f"text=Made up{ATTACK}")
     page.wait_for_selector(".kp-table")
-    rows = page.locator(".kp-table tbody tr")
-    assert rows.count() == 20
+    assert page.locator(".kp-table tbody tr").count() == 20
     page.wait_for_selector("text=20 points without measures")
 
     told_of = "document.querySelector('#kp-told').textContent.includes('of 5000')"

@@ -98,8 +98,7 @@ def test_run_leaves_numbers_figures_and_a_page(run, tmp_path, capsys):
     assert entry["unit"] == "ns/step"
     assert entry["accuracy"] < 1e-9  # energy residual
     assert result["numbers"]["part modes: peak memory"]["value"] > 0.05
-    page = (out / "summary.md").read_text()
-    assert "| kernel, 10 modes, flight |" in page
+    assert "| kernel, 10 modes, flight |" in (out / "summary.md").read_text()
     assert "kernel, 10 modes, flight" in capsys.readouterr().out
 
 

@@ -125,8 +125,7 @@ def test_linear_elements_lock_and_are_told_of(tmp_path, family, least):
     """Two across the radius of a bar: too high by 9 % and 2 %, against exact elasticity."""
     path = tmp_path / "rods.yaml"
     path.write_text(LONG_30, encoding="utf-8")
-    lines = [np.linspace(0, 2e-3, 3), np.linspace(0, 30e-3, 31)]
-    mesh = lattice_mesh(family, lines, solid="long")
+    mesh = lattice_mesh(family, [np.linspace(0, 2e-3, 3), np.linspace(0, 30e-3, 31)], solid="long")
     with pytest.warns(AccuracyWarning, match=rf"'long' are too high: .* \({family}\)"):
         body = bending_body(load_case(path), "long", replace(mesh, surfaces={}))
     deviation = eigenmodes(body, count=1).frequency[0] / EXACT["bending"][0] - 1

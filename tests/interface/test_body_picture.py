@@ -71,8 +71,7 @@ def test_a_face_with_several_names_belongs_to_the_contact(problem, pictures):
 def test_its_surface_moves_as_the_recovered_nodes(problem, pictures):
     force = pictures[0].amplitude[:, -1]
     peak = int(np.argmax(force))
-    step = problem.case.run.reduced_step
-    number = round(pictures[0].instants[peak] / step)
+    number = round(pictures[0].instants[peak] / problem.case.run.reduced_step)
 
     (_, motion) = next(iter(recovered_motion(problem, [number], silent)))
 

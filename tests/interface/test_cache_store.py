@@ -143,8 +143,7 @@ def test_the_limit_holds_at_every_moment_though_not_every_entry_makes_it_look(
         for n in range(200):  # 8 kB each
             squares(cache, n, [])
             if limit < LARGE:
-                sizes = [path.stat().st_size for path in cache.folder.glob("*.entry")]
-                assert sum(sizes) <= limit
+                assert sum(path.stat().st_size for path in cache.folder.glob("*.entry")) <= limit
         assert len(looks) <= most
 
 

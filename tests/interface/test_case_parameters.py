@@ -203,8 +203,7 @@ def test_an_impact_case_has_parameters_as_well():
     plain = read_case(text, IMPACT)
     line = next(line for line in text.splitlines() if "speed:" in line)
     value = line.split("speed:")[1].split(",")[0].split("}")[0].split("#")[0].strip()
-    changed = text.replace(f"speed: {value}", "speed: = 2 * v", 1)
-    head, rest = changed.split("\n", 1)
+    head, rest = text.replace(f"speed: {value}", "speed: = 2 * v", 1).split("\n", 1)
     case = read_case(f"{head}\nparameters: {{v: {plain.motion.speed / 2!r} m/s}}\n{rest}", IMPACT)
 
     assert case.motion.speed == plain.motion.speed
@@ -221,8 +220,7 @@ def test_a_parameter_is_varied_like_a_key_and_written_alone():
 
 
 def test_a_parameter_that_is_an_expression_is_replaced_by_a_quantity():
-    text = with_parameters("a: 2 * 3 N, b: a", "preload: 12 N", "preload: = b")
-    tree = tree_of(text, SMALL)
+    tree = tree_of(with_parameters("a: 2 * 3 N, b: a", "preload: 12 N", "preload: = b"), SMALL)
     for name in ("a", "b"):
         place = quantity_at(tree.case(), ("parameters", name))
         assert place.value == 6.0

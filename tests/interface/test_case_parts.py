@@ -346,8 +346,7 @@ def test_a_stored_case_needs_no_file_and_does_not_change_with_it(tmp_path):
     assert stored.source == case.source
     assert stored.parts == {"mass.yaml": MASS}
     assert case.source.startswith(MAIN)
-    again = load_valve_case(path)
-    assert again.source != case.source
+    assert load_valve_case(path).source != case.source
 
 
 @pytest.mark.parametrize(
@@ -436,8 +435,7 @@ def test_nasty_values_in_case_and_part_are_a_case_or_one_clear_error(seed, tmp_p
         texts = {"main": MAIN, "mass": MASS} | {
             name: changed_value(trees[name], place, draw.choice(VALUES))
         }
-        path = written(tmp_path, texts["main"], mass=texts["mass"])
-        outcome(path)
+        outcome(written(tmp_path, texts["main"], mass=texts["mass"]))
 
 
 def test_texts_of_parts_without_an_include_are_refused(tmp_path):
@@ -477,9 +475,7 @@ def test_points_of_an_argument_are_those_of_cases_with_it(tmp_path):
     measure = "injector1_opening.peak_force"
     table = klack.run_many(path, {"parameters.lift": ["70 um", "80 um"]}, [measure])
     path.write_text(text.replace("lift: 80 um", "lift: 70 um"), encoding="utf-8")
-    one = klack.run_many(path, [{}], [measure])
-
-    assert table[measure][0] == one[measure][0]
+    assert table[measure][0] == klack.run_many(path, [{}], [measure])[measure][0]
     assert np.all(np.isfinite(table[measure]))
 
 
@@ -517,8 +513,7 @@ def test_bodies_materials_and_stops_of_a_part_have_names_of_their_own(tmp_path):
     assert {f"v_{plain.bodies[k].material}" for k in plain.bodies} == {
         body.material for body in case.bodies.values()
     }
-    stop = case.stops["v_seat"]
-    assert str(stop.upper) == "v_needle.tip"
+    assert str(case.stops["v_seat"].upper) == "v_needle.tip"
     assert case.network.components["v_needle"].body == "v_needle"
 
 

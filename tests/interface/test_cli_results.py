@@ -49,9 +49,7 @@ def names(folder: Path) -> list[str]:
 
 @pytest.mark.slow
 def test_impact_writes_result_report_and_numbers(asked, capsys):
-    code = main(["impact", str(DRAWN), "--level", "full", "reduced", "--json", "numbers.json"])
-
-    assert code == 0
+    assert main(["impact", str(DRAWN), "--level", "full", "reduced", "--json", "numbers.json"]) == 0
     folder = Path("klack-results/drawn")
     assert names(folder) == ["report.html", "report.pdf", "result.zarr"]
     assert (folder / "report.html").read_text().lstrip().startswith("<!")

@@ -22,9 +22,7 @@ CAMPAIGN = Path(__file__).parents[1] / "data" / "command_campaign.py"
 @pytest.mark.slow
 def test_commands_answer_or_say_why_not(tmp_path: Path):
     words = [sys.executable, str(CAMPAIGN), str(tmp_path / "campaign"), str(6 * LONGER), SEED]
-    done = subprocess.run(words, capture_output=True, text=True, check=True)
-
-    found = json.loads(done.stdout)
+    found = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)
     assert found.pop("wrong") == []
     assert sum(counts.get("answer", 0) for counts in found.values()) > 0
 

@@ -87,10 +87,9 @@ def write(folder: Path, scale: float = 3.0, text: str = "", added: float = 1.0) 
 def start(folder: Path, **env: str) -> "subprocess.Popen[str]":
     # Python knows a source by its second and its size: one written anew at once has old bytecode.
     own = {"NUMBA_CACHE_DIR": str(folder / "store"), "PYTHONDONTWRITEBYTECODE": "1"}
-    given = os.environ | own | env
     return subprocess.Popen(
         [sys.executable, str(folder / "run.py")],
-        env=given,
+        env=os.environ | own | env,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -153,8 +152,7 @@ def test_fields_that_change_places_are_other_code(program, kinds):
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the machine code of Linux")
 def test_only_entries_have_machine_code(compiled_program):
-    program = compiled_program
-    inner, entry = (file.read_bytes() for file in files(program))
+    inner, entry = (file.read_bytes() for file in files(compiled_program))
 
     assert b"\x7fELF" not in inner
     assert b"\x7fELF" in entry

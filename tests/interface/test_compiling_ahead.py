@@ -30,8 +30,7 @@ def started(monkeypatch, tmp_path):
     def start(command, **options):
         assert command[0] == sys.executable
         assert command[-4:] == ["-m", "klack.warming", "loop", "rest"]
-        sleep = [sys.executable, "-c", "import time; time.sleep(600)"]
-        processes.append(real(sleep, **options))
+        processes.append(real([sys.executable, "-c", "import time; time.sleep(600)"], **options))
         return processes[-1]
 
     real = subprocess.Popen

@@ -27,8 +27,7 @@ BACKENDS = available_backends()
 def block():
     across, along = np.linspace(0.0, 1e-3, 4), np.linspace(0.0, 3e-3, 7)
     mesh = lattice_mesh("tet10", [across, across, along])
-    nodes = mesh.surface("bottom").nodes
-    return elastic_body("block", mesh, {"solid": STEEL}, fixed_nodes=nodes)
+    return elastic_body("block", mesh, {"solid": STEEL}, fixed_nodes=mesh.surface("bottom").nodes)
 
 
 @pytest.fixture(scope="module")

@@ -64,10 +64,9 @@ def test_a_stored_stroke_of_earlier_versions_is_read_with_names_of_today(tmp_pat
     variant = study.variants["wet"]
     assert study.channels.flows == ("drain mass flow",)
     old = {name.replace("mass flow", "flow"): c for name, c in variant.result.channels.items()}
-    result = replace(variant.result, channels=old)
     earlier = replace(
         study,
-        variants={"wet": replace(variant, result=result)},
+        variants={"wet": replace(variant, result=replace(variant.result, channels=old))},
         channels=replace(study.channels, flows=("drain flow",)),
     )
     STROKE.save(earlier, tmp_path / "old")

@@ -98,8 +98,7 @@ def test_each_run_has_an_instance_of_its_own(spring_damper_fmu: Build):
 
 
 def test_sensors_may_have_other_names(spring_damper_fmu: Build):
-    sensors = {"lift": SENSORS["x"], "speed": SENSORS["v"]}
-    part = ControlledForce(sample_time=10e-6, sensors=sensors)
+    part = ControlledForce(sample_time=10e-6, sensors={"lift": SENSORS["x"], "speed": SENSORS["v"]})
     joined = {"lift": "x", "speed": "v"}
 
     found = run(controlled_by_fmu(part, spring_damper_fmu(), inputs=joined, parameters=NUMBERS))

@@ -83,22 +83,19 @@ def test_static_sources_have_the_prefix_of_the_standard(tmp_path):
 
 
 def test_every_number_survives_the_header():
-    text = data_header(MODELS["film"], "guid")
-    line = text.split("klack_omega[")[1].split("{")[1].split("}")[0]
+    line = data_header(MODELS["film"], "guid").split("klack_omega[")[1].split("{")[1].split("}")[0]
     assert [float(x) for x in line.split(",")] == list(MODELS["film"].omega)
 
 
 @pytest.mark.slow
 @needs_gcc
 def test_same_model_gives_the_same_file(tmp_path):
-    a = build_fmu(MODELS["dry"], tmp_path / "a.fmu", fmi=2)
-    with zipfile.ZipFile(a) as archive:
+    with zipfile.ZipFile(build_fmu(MODELS["dry"], tmp_path / "a.fmu", fmi=2)) as archive:
         names = set(archive.namelist())
         binary = archive.read("binaries/linux64/rods.so")
     assert {"modelDescription.xml", "sources/klack_model.c", "sources/klack_data.h"} <= names
     assert b"klack_do_step" not in exported(binary, tmp_path)
-    other = pair(TableLaw([1e-6], [100.0]))
-    assert build._guid(other, 2) != build._guid(MODELS["dry"], 2)
+    assert build._guid(pair(TableLaw([1e-6], [100.0])), 2) != build._guid(MODELS["dry"], 2)
     assert build._guid(pair(), 2) == build._guid(MODELS["dry"], 2)
 
 

@@ -134,8 +134,7 @@ def test_saved_state_goes_on_bit_by_bit(units, name, by_bytes):
 
     first = rest(fmu)
     fmu.setFMUState(state)
-    again = rest(fmu)
-    assert np.array_equal(first, again)
+    assert np.array_equal(first, rest(fmu))
     if by_bytes:
         other = unit.started()
         other.setFMUState(other.deserializeFMUState(held))
@@ -288,10 +287,8 @@ def test_body_takes_any_step_exactly(units):
     fmu = unit.started(force_top=3.0)
     fmu.doStep(0.0, 1e-3)
     P = modal_propagator(model.omega, model.damping, 1e-3)
-    shape = NEEDLE.port_shapes[:, NEEDLE.port_index("top")]
-    y = NEEDLE.port_shapes.T @ (P.B1 * 3.0 * shape)
-    found = unit.get(fmu, "displacement_bottom", "displacement_top")
-    assert found == pytest.approx(y, rel=1e-13)
+    y = NEEDLE.port_shapes.T @ (P.B1 * 3.0 * NEEDLE.port_shapes[:, NEEDLE.port_index("top")])
+    assert unit.get(fmu, "displacement_bottom", "displacement_top") == pytest.approx(y, rel=1e-13)
 
 
 @pytest.mark.parametrize("name", ["dry", "film", "body"])

@@ -209,8 +209,7 @@ def test_dependencies_are_those_of_the_equations(model, fmi, tmp_path):
     expected: dict[str, set[str]] = {name: set() for name in base}
     for name, column in zip(names, np.diag(moved), strict=True):
         shifted = at + column
-        changed = rates(model, shifted[:m], shifted[m : 2 * m], shifted[2 * m :])
-        for key, value in changed.items():
+        for key, value in rates(model, shifted[:m], shifted[m : 2 * m], shifted[2 * m :]).items():
             if abs(value - base[key]) > 1e-13 * abs(base[key]):
                 expected[key].add(name)
 
@@ -234,9 +233,7 @@ def test_parameters_set_the_states_of_a_pair(fmi, tmp_path):
 
 
 def test_event_indicator_depends_on_what_moves_the_gap(tmp_path):
-    found = read(MODELS["pair"], 3, tmp_path)
-
-    (item,) = found.eventIndicators
+    (item,) = read(MODELS["pair"], 3, tmp_path).eventIndicators
     assert item.variable.name == "gap"
     assert {v.name for v in item.dependencies} == {f"q_{n}" for n in MODELS["pair"].mode_names}
 
@@ -263,9 +260,7 @@ def test_units_say_their_exponents_and_modal_ones_none(fmi, tmp_path):
     [(20e-9, 5e-3, 1e-6), (20e-9, 55e-6, 1e-7), (50e-9, 1.0, 2e-6), (10e-9, 1.0, 5e-7)],
 )
 def test_communication_step_is_a_round_number(step, duration, expected):
-    model = replace(MODELS["pair"], step=step, duration=duration)
-
-    assert communication_step(model) == expected
+    assert communication_step(replace(MODELS["pair"], step=step, duration=duration)) == expected
 
 
 def test_build_description_follows_its_schema():

@@ -83,5 +83,4 @@ def test_bodies_without_a_mode_of_order_1_are_named():
 
 def test_a_report_reads_a_guide_with_a_film():
     text = HALF.replace("friction: 0.1}", "friction: 0.1, film: {length: 1.5 mm}}")
-    found = guide_of(SimpleNamespace(case_text=text))
-    assert found.film.length == pytest.approx(1.5e-3, rel=1e-12)
+    assert guide_of(SimpleNamespace(case_text=text)).film.length == pytest.approx(1.5e-3, rel=1e-12)

@@ -331,8 +331,7 @@ def test_copper_warmer_than_its_insulation_is_a_doubt(stated, kelvin, words):
 
 def test_each_coil_of_a_magnet_follows_its_own_copper():
     path = Path(__file__).parents[2] / "docs" / "how-to" / "two_coils.yaml"
-    case = read_valve_case(path.read_text(encoding="utf-8"), path)
-    valve = build_valve(case, silent, threads=1)
+    valve = build_valve(read_valve_case(path.read_text(encoding="utf-8"), path), silent, threads=1)
     cold = dict.fromkeys(("copper", "holding_copper", "body", "ambient"), 293.15)
 
     warm = warm_valve(valve, {"copper": cold | {"copper": 393.15, "holding_copper": 343.15}})
@@ -362,9 +361,7 @@ def test_a_winding_may_follow_a_fixed_temperature():
 
 
 def test_strokes_in_which_the_valve_does_not_open_are_a_doubt():
-    case = read(("voltage: 12 V", "voltage: 2.2 V"))
-
-    study = run_heat(case, soak=(243.15, 573.15))
+    study = run_heat(read(("voltage: 12 V", "voltage: 2.2 V")), soak=(243.15, 573.15))
 
     opening = next(x.values for x in study.numbers if x.name == "opening delay")
     assert np.isfinite(opening).tolist() == [True, False]

@@ -117,8 +117,7 @@ def test_a_full_accumulator_says_so_and_the_pressure_rises():
 
     (text,) = told
     assert re.match(r"'gas': at .* ms the gas volume.*It is full", text)
-    gas = result.channels["gas gas volume"].values
-    assert gas.min() == pytest.approx(0.3 * 2e-6, rel=1e-12)
+    assert result.channels["gas gas volume"].values.min() == pytest.approx(0.3 * 2e-6, rel=1e-12)
     # full from 60 bar / 0.3^1.4 on
     assert result.channels["rail pressure"].values[-1] > 1.2 * 60e5 * 0.3**-1.4
 

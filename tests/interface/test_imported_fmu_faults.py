@@ -217,8 +217,7 @@ if sys.argv[2] == "idle":
 def test_no_process_is_left_alone(state: str, spring_damper_fmu: Build):
     """Killed while the FMU hangs in a call, killed while it waits, and at a usual end."""
     fault = 'fclose(fopen("hanging", "w")); for (;;) sleep(1)'
-    path = spring_damper_fmu(fault=fault)
-    command = [sys.executable, "-c", PARENT, str(path), state]
+    command = [sys.executable, "-c", PARENT, str(spring_damper_fmu(fault=fault)), state]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
         assert parent.stdout is not None
         child = int(parent.stdout.readline())

@@ -34,9 +34,7 @@ def test_a_description_is_read(version: int, spring_damper_fmu: Build):
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_test_fmu_is_valid(version: int, spring_damper_fmu: Build):
     """Truth: the schema of the standard, as fmpy has it."""
-    fmpy = pytest.importorskip("fmpy")
-
-    fmpy.read_model_description(str(spring_damper_fmu(version)))
+    pytest.importorskip("fmpy").read_model_description(str(spring_damper_fmu(version)))
 
 
 @pytest.mark.parametrize("version", [2, 3])
@@ -90,8 +88,7 @@ def test_a_case_file_names_it_with_units(spring_damper_fmu: Build):
 
     assert isinstance(part, ImportedFmu)
     assert part.file == path
-    assert part.coupling_step == 1e-6
-    assert part.extrapolation == "linear"
+    assert (part.coupling_step, part.extrapolation) == (1e-6, "linear")
 
 
 @pytest.mark.parametrize(
@@ -123,8 +120,7 @@ def test_a_unit_of_another_kind_is_refused(spring_damper_fmu: Build):
 
 def test_an_fmu_that_gives_up_stops_the_run(spring_damper_fmu: Build):
     """It refuses a displacement that is no number."""
-    part = ImportedFmu(file=spring_damper_fmu(), **GIVEN)
-    row = rows_of(part).elements[0]
+    row = rows_of(ImportedFmu(file=spring_damper_fmu(), **GIVEN)).elements[0]
     _, out = evaluate(row.step, (), row.state, [0.0, 1e-6, 0.0, 0.0, 0.0, 0.0], 10)
 
     nowhere = float("nan")

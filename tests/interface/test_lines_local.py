@@ -125,9 +125,7 @@ def test_a_steady_flow_that_boils_in_the_line_is_refused():
 @pytest.mark.filterwarnings(TOLD)
 @pytest.mark.parametrize("friction", ["none", "steady", "kagawa", "turbulent"])
 def test_a_line_begins_in_its_steady_flow_and_stays_there(friction):
-    rows = network(LOCAL | {"friction": friction}, to=300e5)
-
-    p = run(rows).channels["room pressure"].values
+    p = run(network(LOCAL | {"friction": friction}, to=300e5)).channels["room pressure"].values
 
     assert np.max(np.abs(p / p[0] - 1.0)) < 1e-4  # the cells resolve the profile to this
 

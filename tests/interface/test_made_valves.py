@@ -54,8 +54,7 @@ class TestMade:
     @pytest.mark.slow
     def test_valves_scatter_about_the_case(self, tmp_path):
         """Truth: the distribution that was asked for; strokes of changed cases."""
-        file = write(tmp_path, STUDY + ROBUST)
-        record = klack.run_study(SMALL, file, made=256, threads=2).record
+        record = klack.run_study(SMALL, write(tmp_path, STUDY + ROBUST), made=256, threads=2).record
         own = columns(record)
 
         for name, mean, deviation in (
@@ -176,8 +175,7 @@ class TestRobustSearch:
     def test_a_design_with_a_valve_that_fails_has_no_value(self, tmp_path):
         wide = ROBUST.replace("lift: 2 um", "lift: 80 um")
         record = klack.optimise(SMALL, write(tmp_path, STUDY + wide)).record
-        values = columns(record)["opening_time (mean + 2 sd)"]
-        failed = ~np.isfinite(values)
+        failed = ~np.isfinite(columns(record)["opening_time (mean + 2 sd)"])
         assert failed.any()
         notes = [record.notes[i] for i in np.flatnonzero(failed)]
         assert all("made valves have no measures" in note for note in notes)
@@ -187,8 +185,7 @@ class TestRobustSearch:
 def test_the_variant_is_the_first_one_of_the_case(tmp_path):
     """The list of the case says [dry, wet]."""
     text = STUDY.replace("  variant: dry\n", "  design: {points: 2}\n")
-    record = klack.run_study(SMALL, write(tmp_path, text)).record
-    assert record.variant == "dry"
+    assert klack.run_study(SMALL, write(tmp_path, text)).record.variant == "dry"
     assert klack.run_many(SMALL, [{PRELOAD: "12 N"}], ["opening_time"]).variant == "dry"
 
 

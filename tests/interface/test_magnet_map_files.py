@@ -228,9 +228,7 @@ def test_random_maps_are_read(tmp_path):
                 ]
                 rows.append(separator.join(cells))
         rng.shuffle(rows)
-        text = [separator.join(heads[k] for k in order), *rows]
-
-        table = choice(tmp_path, text).table()
+        table = choice(tmp_path, [separator.join(heads[k] for k in order), *rows]).table()
 
         np.testing.assert_allclose(table.current, current, rtol=1e-7)
         np.testing.assert_allclose(table.gap, gap, rtol=1e-7)

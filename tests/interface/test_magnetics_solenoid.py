@@ -82,9 +82,7 @@ def test_fringing_adds_flux_and_takes_force_per_flux():
 
 
 def test_residual_flux_passes_the_closed_gap():
-    solenoid = Solenoid(**INJECTOR, residual_flux=2e-6)
-
-    state = static_state(solenoid.circuit(), current=0.0, gap=0.0)
+    state = static_state(Solenoid(**INJECTOR, residual_flux=2e-6).circuit(), current=0.0, gap=0.0)
 
     assert state.branch_fluxes[0] == pytest.approx(2e-6, rel=1e-9)
     assert state.force < 0.0

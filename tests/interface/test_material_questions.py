@@ -64,5 +64,4 @@ def test_such_a_material_is_refused_until_it_is_confirmed_and_then_noted_once(
     case.write_text(f"unusual: true\n{soft}")
     assert main(["impact", str(case), "--no-report", "--no-certify"]) == 0
 
-    said = " ".join("".join(capsys.readouterr()).split())
-    assert said.count("would carry waves at 164 m/s") == 1
+    assert " ".join("".join(capsys.readouterr()).split()).count("would carry waves at 164 m/s") == 1

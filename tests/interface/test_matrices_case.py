@@ -58,8 +58,7 @@ def write_deck(path: Path, mesh: Mesh, surfaces: dict[str, str], first: int) -> 
     for name, side in surfaces.items():
         lines.append(f"*SURFACE, NAME={name}, TYPE=ELEMENT")
         for faces in mesh.surface(side).blocks:
-            corners = faces.connectivity[:, : FAMILIES[faces.family].corners]
-            for row in table.find(corners).tolist():
+            for row in table.find(faces.connectivity[:, : FAMILIES[faces.family].corners]).tolist():
                 lines.append(f"{table.element[row] + 1}, S{table.side[row] + 1}")
     path.write_text("\n".join(lines) + "\n")
 

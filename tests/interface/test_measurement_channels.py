@@ -325,8 +325,7 @@ def test_channels_that_never_overlap_are_refused(tmp_path):
 
 
 def test_a_step_replaces_a_missing_time(tmp_path):
-    path = table(tmp_path / "a.csv", ["lift [um]"], [np.arange(10.0)])
-    series, _ = read(path, time_step=2e-5)
+    series, _ = read(table(tmp_path / "a.csv", ["lift [um]"], [np.arange(10.0)]), time_step=2e-5)
     assert series["lift"].step == 2e-5
     assert series["lift"].values[-1] == pytest.approx(9e-6)
 
@@ -339,8 +338,7 @@ def test_windows_cover_everything_and_share_the_overlap(tmp_path):
         parts = [w["lift"] for w in windows(recording, found, 3e-4, 1e-4)]
         with pytest.raises(InputError, match="windows: overlap"):
             next(windows(recording, found, 1e-4, 1e-4))
-    starts = [round(part.start / 1e-6) for part in parts]
-    assert starts == [0, 200, 400, 600, 800]
+    assert [round(part.start / 1e-6) for part in parts] == [0, 200, 400, 600, 800]
     assert [part.values.size for part in parts] == [300, 300, 300, 300, 201]
 
 

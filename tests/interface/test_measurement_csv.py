@@ -142,8 +142,7 @@ def test_the_header_tells_a_decimal_comma_from_two_columns(tmp_path, header, nam
 
 
 def test_no_header_at_all(tmp_path):
-    path = written(tmp_path / "a.csv", "")
-    with open_recording(path) as recording:
+    with open_recording(written(tmp_path / "a.csv", "")) as recording:
         assert [c.name for c in recording.channels] == ["column 2", "column 3"]
         assert any("column 1 rises evenly" in note for note in recording.notes)
         time, values = recording.read("column 2")

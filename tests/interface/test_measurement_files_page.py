@@ -35,6 +35,5 @@ def test_tables_are_the_same_measurement(tmp_path, text, encoding):
 
 @pytest.mark.parametrize("text", SECTIONS)
 def test_sections_are_valid(text):
-    content = YAML(typ="safe").load(text)["measurement"]
-    section = CaseMeasurement.model_validate(content, context={})
+    section = CaseMeasurement.model_validate(YAML(typ="safe").load(text)["measurement"], context={})
     assert "lift" in section.channels

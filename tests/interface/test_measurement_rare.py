@@ -187,8 +187,7 @@ def test_a_tdms_file_that_ends_early_is_told(tmp_path, capfd):
     about = {"unit_string": "um", "wf_increment": 1e-5}
     with nptdms.TdmsWriter(tmp_path / "a.tdms") as writer:
         writer.write_segment([nptdms.ChannelObject("bench", "lift", LIFT, about)])
-    content = (tmp_path / "a.tdms").read_bytes()
-    (tmp_path / "a.tdms").write_bytes(content[:-80])
+    (tmp_path / "a.tdms").write_bytes((tmp_path / "a.tdms").read_bytes()[:-80])
     read, notes = opened(tmp_path / "a.tdms")
     np.testing.assert_array_equal(read["lift"][2], LIFT[:40])
     assert "less data than expected" in notes

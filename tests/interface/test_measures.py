@@ -31,8 +31,7 @@ def test_keys_are_unique_in_their_catalogue():
 
 
 def test_the_schema_has_every_measure():
-    parts = result_schema()["$defs"].values()
-    described = [part["properties"] for part in parts]
+    described = [part["properties"] for part in result_schema()["$defs"].values()]
     for of, measures in MEASURES.items():
         words = {item.json_key: item.definition for item in measures}
         assert any(

@@ -202,8 +202,7 @@ def meshio_file(form: str, **options) -> Callable[[Path], None]:
 
 def vtk_appended(path: Path) -> None:
     pyvista = pytest.importorskip("pyvista")
-    grid = pyvista.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid()
-    grid.save(path)
+    pyvista.ImageData(dimensions=(2, 2, 2)).cast_to_unstructured_grid().save(path)
 
 
 SAMPLES: dict[str, tuple[str, str | Callable[[Path], bytes]]] = {

@@ -240,8 +240,7 @@ def test_the_key_of_the_case(tmp_path, capsys):
 
     case.write_text(CASE % "solids-only")
     assert main(["inspect", str(case)]) == 0
-    shown = capsys.readouterr()
-    assert "2 CBAR" in shown.err
+    assert "2 CBAR" in capsys.readouterr().err
 
     case.write_text(CASE % "all")
     assert main(["inspect", str(case)]) == 2
@@ -295,9 +294,7 @@ def test_spare_commas_behind_coordinates(spare, tmp_path):
     path = tmp_path / "a.inp"
     path.write_text(f"*NODE\n{nodes}\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n")
 
-    mesh = read_mesh_file(path, MM).mesh
-
-    assert corner_volume(mesh) == pytest.approx(1e-9 / 6, rel=1e-12)
+    assert corner_volume(read_mesh_file(path, MM).mesh) == pytest.approx(1e-9 / 6, rel=1e-12)
 
 
 POINTER = (
@@ -328,8 +325,7 @@ def test_a_case_that_names_a_pointer(tmp_path, capsys):
 
     assert main(["inspect", str(case)]) == 2
 
-    told = capsys.readouterr().err
-    assert "bodies.pin.geometry.mesh.file: got a git-LFS pointer" in told
+    assert "bodies.pin.geometry.mesh.file: got a git-LFS pointer" in capsys.readouterr().err
 
 
 def test_a_recording_that_is_a_pointer(tmp_path):

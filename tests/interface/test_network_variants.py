@@ -128,8 +128,7 @@ def test_dry_and_lumped_commute():
 def test_a_film_keeps_the_fluid_of_a_lumped_valve_without_chambers():
     wet = valve(FILM)
     kept = {key: wet.components[key] for key in ("needle", "housing", "spring", "opening")}
-    connections = [wet.connections[1], wet.connections[3]]
-    small = Network(kept, connections, fluid=wet.fluid)
+    small = Network(kept, [wet.connections[1], wet.connections[3]], fluid=wet.fluid)
 
     assert small.lumped(1e9).rows().interfaces[0].film is not None
 
@@ -179,6 +178,4 @@ def test_a_held_body_cannot_start_with_a_speed():
 
 
 def test_lumped_keeps_points_apart_in_the_results():
-    lumped = valve().lumped(1e9).components["needle"]
-
-    assert lumped == RigidMass(mass=3e-3, points=("top", "tip"))
+    assert valve().lumped(1e9).components["needle"] == RigidMass(mass=3e-3, points=("top", "tip"))

@@ -38,10 +38,9 @@ PLAN = ValvePlan(
 @pytest.fixture(scope="module")
 def drawn() -> dict[str, Profile]:
     """Half sections of the shipped demo valve."""
-    case = load_any_case(find_case("demo-valve-axisymmetric"))
     return {
         name: next(iter(body.geometry.profile.profiles().values()))
-        for name, body in case.bodies.items()
+        for name, body in load_any_case(find_case("demo-valve-axisymmetric")).bodies.items()
     }
 
 
@@ -118,9 +117,7 @@ def test_names_that_a_case_cannot_hold_are_made_plain(steps, tmp_path):
     named = text.replace("'tip'", "'the tip <script>'").replace("'taper'", "'the tip  script '")
     (tmp_path / "needle.step").write_text(named)
 
-    part = part_of_step("needle", tmp_path / "needle.step")
-
-    names = part.faces("half")
+    names = part_of_step("needle", tmp_path / "needle.step").faces("half")
     assert names[:2] == ("the_tip_script_", "the_tip_script__2")
     assert all(re.fullmatch(r"[A-Za-z_][A-Za-z0-9_-]*", name) for name in names)
 

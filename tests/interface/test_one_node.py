@@ -21,8 +21,7 @@ SHIFTS = "reduction:\n  shifts: {short: [-30 kHz, 90 kHz]}\n"
 
 
 def text_of(nodes: str, shifts: str = SHIFTS) -> str:
-    text = RODS.replace("reduction:\n", shifts)
-    return text.replace(
+    return RODS.replace("reduction:\n", shifts).replace(
         "  duration: 20 us\n",
         "  duration: 20 us\n  " + TRANSFER.replace("{NODES}", "{" + nodes + "}") + "\n",
     )

@@ -230,8 +230,7 @@ def test_a_run_stopped_in_its_report_keeps_its_result(
 
     assert main([*words, "-q", "--out", str(out)]) == 130
 
-    said = capsys.readouterr().err.splitlines()[-1]
-    assert said == (
+    assert capsys.readouterr().err.splitlines()[-1] == (
         f"klack {command}: stopped; the result is in {out}; klack report {out} writes its report."
     )
     assert load_result(out) is not None

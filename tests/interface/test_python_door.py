@@ -47,8 +47,7 @@ class TestValues:
     def test_a_default_is_written_where_it_was_not(self):
         case = klack.load_case("two-rods")
         assert "interface_step" not in case.text
-        other = case.with_value("run.interface_step", "3 ns")
-        assert other.value("run.interface_step") == 3e-9
+        assert case.with_value("run.interface_step", "3 ns").value("run.interface_step") == 3e-9
 
     def test_an_entry_of_a_list_is_exchanged(self):
         case = klack.load_case(Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml")

@@ -179,8 +179,7 @@ def chain(control):
 
 
 def test_bodies_that_push_each_other_end_at_the_stop_of_the_last_one():
-    rows = chain(control=10e-9).rows()
-    travel = Travel.of(rows)
+    travel = Travel.of(chain(control=10e-9).rows())
 
     far, stops = travel.highest({"needle": 1.0})
     assert far == pytest.approx(270e-6, rel=1e-12)
@@ -423,8 +422,7 @@ def test_laws_of_liquids_state_their_range():
 
 
 def test_every_row_of_a_network_that_can_leave_a_range_is_watched():
-    limits = limits_of(chain(control=10e-9).rows())
-    text = {(limit.component, limit.quantity) for limit in limits}
+    text = {(limit.component, limit.quantity) for limit in limits_of(chain(control=10e-9).rows())}
 
     assert text == {("room", "volume"), ("room", "pressure"), ("ambient", "pressure")}
     watched = limits_of(rows_of(MAP))

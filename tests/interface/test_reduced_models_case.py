@@ -114,8 +114,7 @@ def test_study_is_stored_reported_and_exported(tmp_path):
     numbers = study_to_json(study)
     assert numbers["levels"]["reduced"]["peak_force_N"] > 50
     assert numbers["estimated_error"] == {}
-    content = report_content(study)
-    facts = str(content)
+    facts = str(report_content(study))
     assert "reduced body in needle.npz" in facts
     assert "without contact points" in facts
     assert "are nan" not in facts

@@ -187,8 +187,7 @@ def test_matrix_market_blocks(tmp_path):
         text += f"% Matrix {name}\n" + stream.getvalue().decode()
     path = tmp_path / "needle.spm"
     path.write_text(text)
-    found = read_state_space(path)
-    assert_read(found, WITHOUT_RESIDUAL, rel=1e-15)
+    assert_read(read_state_space(path), WITHOUT_RESIDUAL, rel=1e-15)
 
 
 @pytest.mark.parametrize("mark", [",", ";", "\t"])

@@ -224,8 +224,7 @@ def test_the_distribution_counts_every_shot(study: ShotsStudy) -> None:
 def test_a_shot_without_a_rebound_height_keeps_its_restitution(study: ShotsStudy) -> None:
     heights = study.shots.rebound_height.copy()
     heights[3] = np.nan
-    shots = replace(study.shots, rebound_height=heights)
-    lost = replace(study, shots=shots, pressures={})
+    lost = replace(study, shots=replace(study.shots, rebound_height=heights), pressures={})
 
     chart = distribution_chart(lost)
 

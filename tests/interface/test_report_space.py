@@ -114,9 +114,7 @@ def test_the_ring_of_first_touch_sets_the_enlarged_window(solid_study: ImpactStu
     turn = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     ring = np.column_stack([1e-4 * np.cos(turn), 1e-4 * np.sin(turn), 0 * turn])
     upper, lower = solid_study.pictures
-    study = replace(solid_study, pictures=(upper, replace(lower, touch=ring)))
-
-    figure = solid_figure(study)
+    figure = solid_figure(replace(solid_study, pictures=(upper, replace(lower, touch=ring))))
 
     assert b"<!-- 0.1 mm -->" in figure.image  # of 0.44 mm across
     assert b"<!-- first touch -->" in figure.image

@@ -285,7 +285,6 @@ def test_the_page_shows_the_numbers_of_the_study(study: StrokeStudy, page: str):
 
 
 def test_user_text_stays_text_on_the_page(study: StrokeStudy):
-    wet = replace(study.variants["wet"], label=HOSTILE)
     hostile = replace(
         study,
         case=HOSTILE,
@@ -294,7 +293,7 @@ def test_user_text_stays_text_on_the_page(study: StrokeStudy):
         case_text=HOSTILE,
         needle=HOSTILE,
         warnings=(HOSTILE,),
-        variants={**study.variants, "wet": wet},
+        variants={**study.variants, "wet": replace(study.variants["wet"], label=HOSTILE)},
         stops=tuple(replace(stop, surfaces=HOSTILE, name=HOSTILE) for stop in study.stops),
         lines=(replace(study.lines[0], name=HOSTILE),),
     )
@@ -311,8 +310,7 @@ def test_every_chart_is_one_that_plotly_accepts(study: StrokeStudy, page: str):
 
     assert len(found) == len(stroke_charts(study)) >= 12
     for text in found:
-        figure = go.Figure(json.loads(text))
-        assert len(figure.data) > 0
+        assert len(go.Figure(json.loads(text)).data) > 0
 
 
 @pytest.mark.slow
@@ -472,9 +470,7 @@ def test_a_doubtful_contact_is_said_with_its_stop(study: StrokeStudy, tmp_path: 
 
 
 def test_numbers_of_a_study_are_pure_json(study: StrokeStudy):
-    numbers = stroke_to_json(lonely(study))
-
-    text = json.dumps(numbers, allow_nan=False)
+    text = json.dumps(stroke_to_json(lonely(study)), allow_nan=False)
     assert json.loads(text)["opening_time_s"] is None
     whole = stroke_to_json(study)
     assert whole["variant"] == "wet"
@@ -603,8 +599,7 @@ def test_impacts_that_are_not_shown_are_counted(study: StrokeStudy):
 
 
 def test_a_result_of_an_earlier_version_says_so(study: StrokeStudy, tmp_path: Path):
-    old = in_space(study, None)
-    STROKE.save(old, tmp_path)
+    STROKE.save(in_space(study, None), tmp_path)
     content = stroke_content(STROKE.load(tmp_path))
     section = next(s for s in content.sections if s.title.startswith("Line load"))
     assert "a version of klack that did not record" in section.paragraphs[0]

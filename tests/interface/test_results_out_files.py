@@ -220,9 +220,7 @@ def test_names_stay_apart_and_inside_their_folder():
 
 def test_netcdf_is_read_by_the_library_of_unidata(table: ResultTable, tmp_path: Path):
     netcdf = pytest.importorskip("netCDF4")
-    path = write_netcdf(table, tmp_path / "result.nc")
-
-    with netcdf.Dataset(path) as file:
+    with netcdf.Dataset(write_netcdf(table, tmp_path / "result.nc")) as file:
         assert file.Conventions.startswith("CF-")
         assert file.title == table.about["title"]
         assert str(file["case_text"][...]) == table.case_text
@@ -289,8 +287,7 @@ def test_csv_gives_the_same_doubles(table: ResultTable, tmp_path: Path):
         (run.name, s.name, s.unit, repr(s.value)) for run in table.runs for s in run.scalars
     ]
     assert [(r["run"], r["name"], r["unit"], r["value"]) for r in rows] == expected
-    about = json.loads((tmp_path / "about.json").read_text(encoding="utf-8"))
-    assert about["title"] == TITLE
+    assert json.loads((tmp_path / "about.json").read_text(encoding="utf-8"))["title"] == TITLE
 
 
 def test_no_text_says_nan(tables: dict[str, ResultTable], tmp_path: Path):
@@ -380,9 +377,7 @@ def test_scipy_reads_numbers_and_names(tables: dict[str, ResultTable], tmp_path:
     from scipy.io import loadmat
 
     table = tables["stroke"]
-    path = write_mat(table, tmp_path / "result.mat")
-
-    read = loadmat(path, simplify_cells=True)
+    read = loadmat(write_mat(table, tmp_path / "result.mat"), simplify_cells=True)
 
     assert read["about"]["runs"].tolist() == ["wet", "dry_lumped"]
     assert read["wet"]["names"]["needle_tip_displacement"] == "needle.tip displacement"
@@ -410,10 +405,7 @@ def test_a_run_too_large_for_matlab_5_is_refused(tmp_path: Path):
 
 
 def test_asammdf_reads_every_time_channel(table: ResultTable, tmp_path: Path):
-    asammdf = pytest.importorskip("asammdf")
-    path = write_mdf(table, tmp_path / "result.mf4")
-
-    with asammdf.MDF(path) as file:
+    with pytest.importorskip("asammdf").MDF(write_mdf(table, tmp_path / "result.mf4")) as file:
         count = 0
         for run, axis, channels in curves(table):
             if axis.quantity != "time":

@@ -18,8 +18,7 @@ PLANES = ("tri3", "tri6", "quad4", "quad8")
 def box(family: str) -> Mesh:
     """1 x 2 x 3 (or 1 x 2) with uneven cells."""
     d = 3 if family in SOLIDS else 2
-    lines = [np.array([0.0, 0.4, 1.0]) * (i + 1) for i in range(d)]
-    return lattice_mesh(family, lines)
+    return lattice_mesh(family, [np.array([0.0, 0.4, 1.0]) * (i + 1) for i in range(d)])
 
 
 # meshio reads no quadratic wedge
@@ -131,8 +130,7 @@ def test_paraview_finds_times_and_parts(tmp_path: Path):
 
     assert reader.time_values == [0.0, 1e-7, 2e-7]
     reader.set_active_time_value(2e-7)
-    both = reader.read()
-    assert [block["x"][0] for block in both] == [2.0, 3.0]
+    assert [block["x"][0] for block in reader.read()] == [2.0, 3.0]
 
 
 def break_off(folder: Path) -> None:

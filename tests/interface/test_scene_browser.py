@@ -172,8 +172,7 @@ def test_the_cursor_runs_through_the_impact_and_the_body_follows(browser, file):
 
 def test_a_click_on_a_peak_shows_its_mode(browser, file):
     with Opened(browser, file, reduced_motion="reduce") as opened:
-        mark = opened.page.locator(".ks-mark").nth(1)
-        mark.click()
+        opened.page.locator(".ks-mark").nth(1).click()
         assert opened.state()["mode"] == 1
         assert "2.5 kHz" in opened.page.locator(".ks-panel select[aria-label=Mode]").evaluate(
             "box => box.selectedOptions[0].textContent"

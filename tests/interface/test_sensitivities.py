@@ -182,9 +182,7 @@ class TestNumbers:
 class TestCommand:
     def test_writes_tables_and_numbers(self, tmp_path, capsys):
         file = tmp_path / "numbers.json"
-        code = main(["sensitivities", str(SMALL), "--study", str(STUDY), "--json", str(file)])
-
-        assert code == 0
+        assert main(["sensitivities", str(SMALL), "--study", str(STUDY), "--json", str(file)]) == 0
         told = capsys.readouterr().out
         assert "elasticity" in told
         assert "Impacts, and how strongly their times answer" in told

@@ -164,5 +164,4 @@ def test_a_placement_puts_the_axis_where_it_was_drawn():
     for z in (TOUCH, 3e-3, 7e-3):
         at = pose.of(np.array([0.0, 0.0, z]))
         # angles of a milliradian: the cosine is 1 to 1e-6
-        expected = d.aside + d.lean * (z - TOUCH)
-        assert at[:2] == pytest.approx(expected, rel=1e-5, abs=1e-12)
+        assert at[:2] == pytest.approx(d.aside + d.lean * (z - TOUCH), rel=1e-5, abs=1e-12)

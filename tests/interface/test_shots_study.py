@@ -325,8 +325,7 @@ def test_what_cannot_be_is_one_error(needle, tmp_path, capsys, command, old, new
         text += "  objectives: {shots.restitution.mean: minimise}\n"
     file = write(tmp_path, text)
     out = tmp_path / "out"
-    case = str(needle.tree.path)
-    assert main([command, case, "--study", str(file), "--out", str(out)]) == 2
+    assert main([command, str(needle.tree.path), "--study", str(file), "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert words in said
     assert str(file) in said
@@ -370,8 +369,7 @@ def test_names_are_those_of_the_catalogue():
 @pytest.mark.slow
 def test_processes_resume_report_and_export(needle, tmp_path, capsys):
     """The same rows on two processes, from the log, in JSON and as CSV."""
-    file = write(tmp_path, STUDY)
-    command = ["study", str(needle.tree.path), "--study", str(file), "--quiet"]
+    command = ["study", str(needle.tree.path), "--study", str(write(tmp_path, STUDY)), "--quiet"]
     logs = []
     for words in (["--workers", "2"], ["--threads", "1"]):
         out = tmp_path / words[0].strip("-")
@@ -379,8 +377,7 @@ def test_processes_resume_report_and_export(needle, tmp_path, capsys):
         (log,) = out.glob("points-*.jsonl")
         logs.append(sorted(log.read_text().splitlines()))
     assert logs[0] == logs[1]
-    report = (out / "report.html").read_text()
-    assert "shots restitution mean" in report
+    assert "shots restitution mean" in (out / "report.html").read_text()
     kept = log.read_text().splitlines(keepends=True)
     log.write_text("".join(kept[:-1]) + kept[-1][:30])  # as a killed run leaves it
     assert main([*command, "--threads", "1", "--out", str(out), "--no-report"]) == 0

@@ -31,9 +31,7 @@ def test_what_is_written_is_read_back(tmp_path):
 def test_the_file_says_how_loud_it_is(tmp_path):
     write_wav(tmp_path / "tone.wav", sound(0.02), full_scale=0.05)
     with soundfile.SoundFile(tmp_path / "tone.wav") as file:
-        assert file.subtype == "PCM_24"
-        assert file.channels == 1
-        assert file.title == "tone"
+        assert (file.subtype, file.channels, file.title) == ("PCM_24", 1, "tone")
         assert file.comment == level_statement(0.05)
     # 20 lg(0.05 / 20e-6) = 67.96, a sine 3.01 less
     assert "0.05 Pa peak (68.0 dB peak re 20 uPa" in level_statement(0.05)

@@ -127,8 +127,7 @@ def stored_by_zarr(folder: Path) -> RecordFormat:
 def test_pieces_along_all_axes_are_read_without_zarr(tmp_path: Path, monkeypatch):
     form = stored_by_zarr(tmp_path)
     monkeypatch.setitem(sys.modules, "zarr", None)  # its import fails
-    found = load_record(tmp_path, form).numbers["x"]
-    assert np.array_equal(found, np.arange(35.0).reshape(7, 5))
+    assert np.array_equal(load_record(tmp_path, form).numbers["x"], np.arange(35.0).reshape(7, 5))
 
 
 @pytest.mark.parametrize(

@@ -212,8 +212,7 @@ def test_a_row_starts_where_it_has_ended(setup, starts):
         aside = end[:2] + (starts.height - starts.centre[2]) * lean
         assert row["eccentricity"] == pytest.approx(np.hypot(*aside), rel=1e-9)
         assert row["tilt"] == pytest.approx(np.hypot(*lean), rel=1e-9)
-        drawn = starts.drawn(index)
-        assert row["eccentricity"] != pytest.approx(np.hypot(*drawn.aside), rel=1e-3)
+        assert row["eccentricity"] != pytest.approx(np.hypot(*starts.drawn(index).aside), rel=1e-3)
     # the first one is the drawn one, and none of them has come to rest in so short a time
     first = log.done["dry", 0]
     assert first.stroke["eccentricity"] == np.hypot(*starts.drawn(0).aside)

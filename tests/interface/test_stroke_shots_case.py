@@ -63,8 +63,7 @@ def test_the_next_stroke_of_a_row_starts_where_the_last_one_ended():
     assert start.placement[:2] == pytest.approx(end[:2], abs=1e-13)
     assert start.placement[3:] == pytest.approx(end[3:], rel=1e-12)
     assert abs(start.placement[2]) < 1e-11  # along the axis it starts as the case says
-    assert start.friction == 0.1
-    assert start.index == 3
+    assert (start.friction, start.index) == (0.1, 3)
 
 
 @pytest.mark.slow
@@ -98,9 +97,7 @@ def test_friction_and_position_can_be_drawn():
 
 def test_the_first_stroke_of_a_row_may_start_from_a_placement():
     text = "placement: {eccentricity: 1 um}\nshots: {carry: true}"
-    start = starts(text).drawn(0)
-
-    assert start.aside == pytest.approx([1e-6, 0.0])
+    assert starts(text).drawn(0).aside == pytest.approx([1e-6, 0.0])
     assert starts(text).centred().friction == 0.0
 
 

@@ -137,8 +137,7 @@ def test_the_ratio_of_two_scatters_is_that_of_their_draws():
     found = scatter_ratio(0.4 * values + 7.0, values)
 
     assert (found.ratio, found.pairs) == (pytest.approx(0.4), 60)
-    assert found.low == pytest.approx(0.4)
-    assert found.high == pytest.approx(0.4)
+    assert (found.low, found.high) == pytest.approx((0.4, 0.4))
     # strokes that have a value in one variant alone are left out
     holed = values.copy()
     holed[:10] = NAN

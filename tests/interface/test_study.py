@@ -221,8 +221,7 @@ class TestKept:
     def test_another_case_finds_nothing_and_destroys_nothing(self, study, tmp_path):
         klack.run_study(SMALL, study, folder=tmp_path / "out")
         heavier = klack.load_case(SMALL).with_value("network.components.needle.mass", "4 g")
-        changed = klack.run_study(heavier, study, folder=tmp_path / "out").record
-        assert changed.computed == 9
+        assert klack.run_study(heavier, study, folder=tmp_path / "out").record.computed == 9
         assert klack.run_study(SMALL, study, folder=tmp_path / "out").record.computed == 0
 
     def test_a_changed_file_is_another_point(self, tmp_path):
@@ -358,8 +357,7 @@ def test_the_section_of_the_case_serves_as_well(tmp_path):
     case = tmp_path / "case.yaml"
     case.write_text(SMALL.read_text() + "study:" + STUDY)
     record = klack.run_study(case).record
-    assert record.count == 8
-    assert record.study_text == ""
+    assert (record.count, record.study_text) == (8, "")
 
 
 def test_a_measure_without_values_is_told(tmp_path):
@@ -373,13 +371,11 @@ def test_command_writes_result_report_and_numbers(study, tmp_path, capsys):
     out, numbers = tmp_path / "out", tmp_path / "numbers.json"
     command = ["study", str(SMALL), "--study", str(study), "--out", str(out)]
     assert main([*command, "--json", str(numbers)]) == 0
-    told = capsys.readouterr().out
-    assert "8 points, Sobol points, seed 1" in told
+    assert "8 points, Sobol points, seed 1" in capsys.readouterr().out
     found = json.loads(numbers.read_text())
     assert found["schema"] == "klack-study/1"
     assert len(found["measures"]["opening_time"]["values"]) == 8
-    page = (out / "report.html").read_text()
-    assert "drawParallel" in page
+    assert "drawParallel" in (out / "report.html").read_text()
     assert (out / "report.pdf").stat().st_size > 10_000
     stored = klack.load_result(out)
     data = stored.to_xarray()
@@ -498,8 +494,7 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
   measures: [noise.sound_exposure_level_weighted, noise.radiated_energy, noise.loudness_max]
   design: {{kind: grid}}
 """
-        record = klack.run_study(case, write(tmp_path, text)).record
-        found = columns(record)
+        found = columns(klack.run_study(case, write(tmp_path, text)).record)
         changed = klack.load_case(case).with_value(PRELOAD, "6 N").with_value(mount, "20 N/um")
         noise = klack.noise_of(klack.run_stroke(changed, ["dry"]))
         (truth,) = (
@@ -534,8 +529,7 @@ run: {duration: 1 ms, step: 50 ns, variants: [dry]}
   objectives: {{noise.sound_exposure_level_weighted: minimise, closing_time: minimise}}
   search: {{population: 20, generations: 1, refinements: 0}}
 """
-        file = write(tmp_path, text)
-        result = klack.optimise(case, file)
+        result = klack.optimise(case, write(tmp_path, text))
         record = result.record
         today, best, *others = record.sounds
         assert (today.point, best.point) == (-1, record.optimum.best)
@@ -724,24 +718,20 @@ class TestOptimum:
         )
         text = text.replace("opening.peak_force: {most: today - 1 %}, ", "")
         out = tmp_path / "out"
-        file = write(tmp_path, text)
-        command = ["optimise", str(SMALL), "--study", str(file), "--out", str(out)]
+        command = ["optimise", str(SMALL), "--study", str(write(tmp_path, text)), "--out", str(out)]
         monkeypatch.setattr("klack.analyses.study.live._FIRST", 0.0)
         assert main([*command, "--json", str(tmp_path / "o.json")]) == 0
-        told = capsys.readouterr()
-        assert "best so far" in told.err
+        assert "best so far" in capsys.readouterr().err
         found = json.loads((tmp_path / "o.json").read_text())
         best = found["optimum"]["best"]
         assert found["parameters"][PRELOAD]["values"][best] == pytest.approx(14.0, rel=1e-3)
         assert found["parameters"]["lift"]["values"][best] == pytest.approx(110e-6, rel=1e-3)
-        page = (out / "report.html").read_text()
-        assert "The recommended point and that of today" in page
+        assert "The recommended point and that of today" in (out / "report.html").read_text()
 
         assert main(["export", str(out), "--to", "case", "--out", str(tmp_path / "case")]) == 0
         (case,) = (tmp_path / "case").glob("*.yaml")
         stroke = klack.run_stroke(case, ["dry"]).measures["dry"]
-        value = found["measures"]["opening_time"]["values"][best]
-        assert stroke["opening_time"].value == value
+        assert stroke["opening_time"].value == found["measures"]["opening_time"]["values"][best]
         assert main(["export", str(out), "--to", "case", "--point", "9999"]) == 2
         assert "--point" in capsys.readouterr().err
 

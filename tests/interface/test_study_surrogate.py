@@ -79,8 +79,7 @@ def test_leave_one_out_errors_are_those_of_fresh_strokes(record, tmp_path):
 def test_shares_are_those_of_saltelli_with_fewer_points(record, tmp_path):
     text = STUDY.replace("kind: sobol, points: 40", "kind: saltelli, points: 32")
     text = text.replace("  surrogate: {kind: polynomial-chaos}\n", "")
-    other = klack.run_study(SMALL, write(tmp_path, text)).record
-    for item in other.sensitivities:
+    for item in klack.run_study(SMALL, write(tmp_path, text)).record.sensitivities:
         found = surrogates(record)[item.measure]
         assert np.all(
             (item.total_low - 0.02 < found.total) & (found.total < item.total_high + 0.02)
@@ -96,8 +95,7 @@ def test_points_stay_as_they_were_computed(record, tmp_path):
     assert without.surrogates == ()
     for with_it, alone in zip(record.measures, without.measures, strict=True):
         np.testing.assert_array_equal(with_it.values, alone.values)
-    residuals = surrogates(record)["opening_time"].residuals
-    assert residuals.shape == (40,)
+    assert surrogates(record)["opening_time"].residuals.shape == (40,)
 
 
 @pytest.mark.slow
@@ -171,8 +169,7 @@ def test_without_the_library_nothing_is_computed(tmp_path, capsys, monkeypatch):
         monkeypatch.setitem(sys.modules, name, None)
     monkeypatch.setitem(sys.modules, "sklearn", None)
     out = tmp_path / "out"
-    asked = ["study", str(SMALL), "--study", str(write(tmp_path)), "--out", str(out)]
-    assert main(asked) == 2
+    assert main(["study", str(SMALL), "--study", str(write(tmp_path)), "--out", str(out)]) == 2
     assert "klack[surrogate]" in capsys.readouterr().err
     assert not (out / "result.zarr").exists()
 
@@ -189,8 +186,7 @@ def points_file(folder, rows):
 def drawn(count):
     u = np.random.default_rng(2).random((count, 3))
     z = np.clip(np.random.default_rng(3).standard_normal(count), -2.5, 2.5)
-    rows = np.column_stack((10 + 4 * u[:, 0], 3 + 0.1 * z, 90 + 20 * u[:, 2]))
-    return rows.round(4)
+    return np.column_stack((10 + 4 * u[:, 0], 3 + 0.1 * z, 90 + 20 * u[:, 2])).round(4)
 
 
 def levels(rows):

@@ -110,8 +110,7 @@ Point = Mapping[str, str | float]
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[str]:
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
+    with pytest.importorskip("distributed").LocalCluster(
         n_workers=2, threads_per_worker=1, dashboard_address=":0"
     ) as found:
         yield found.scheduler_address
@@ -285,8 +284,7 @@ class TestWorkersThatDie:
         plain = [{PRELOAD: point[PRELOAD]} for point in points]
         truth = klack.run_many(deadly, plain, ["energy_throughput"], variant="dry")
         left = [k for k in range(8) if k != 3]
-        values = table.measures[0].values
-        assert values[left].tolist() == truth.measures[0].values[left].tolist()
+        assert table.measures[0].values[left].tolist() == truth.measures[0].values[left].tolist()
 
     def test_a_point_that_ended_them_is_tried_by_the_next_study(
         self, deadly: klack.CaseOnHand, tmp_path: Path

@@ -79,9 +79,7 @@ network:
     - [needle.top, spring.end]
 run: {duration: 1 ms}
 """
-    case = read_valve_case(text, Path("rigid.yaml"))
-
-    roles = find_roles(case)
+    roles = find_roles(read_valve_case(text, Path("rigid.yaml")))
 
     assert (roles.needle, roles.point, roles.opening_stop) == ("needle", "bottom", "")
 
@@ -258,8 +256,7 @@ def test_either_kind_is_told_by_its_sections():
 def test_schema_is_plain_json_and_holds_the_components():
     schema = valve_case_schema()
 
-    text = json.dumps(schema, allow_nan=False)
-    assert '"flexible-body"' in text
+    assert '"flexible-body"' in json.dumps(schema, allow_nan=False)
     assert set(schema["required"]) == {"klack", "title", "network", "run"}
 
 

@@ -18,8 +18,7 @@ KINDS = {"f4": "<f4", "i2": "<i2", "i1": "<i1", "u1": "<u1", "u2": "<u2", "u4": 
 
 
 def unpacked(packed: dict) -> np.ndarray:
-    values = np.frombuffer(b64decode(packed["data"]), KINDS[packed["type"]])
-    return values.reshape(packed["shape"])
+    return np.frombuffer(b64decode(packed["data"]), KINDS[packed["type"]]).reshape(packed["shape"])
 
 
 class Elements(HTMLParser):
@@ -73,9 +72,7 @@ EVIL = "</script><script>alert(1)</script><!--"
 def test_words_of_a_case_stay_words():
     view = brick_view(face=EVIL)
     view = replace(view, title=EVIL, source=f"case {EVIL}", notes=(EVIL,))
-    page = page_of(view)
-
-    elements = Elements(page)
+    elements = Elements(page_of(view))
     assert [tag for tag, _ in elements.tags].count("script") == 2
     assert "alert(1)" not in elements.scripts[1]
     assert EVIL in elements.text

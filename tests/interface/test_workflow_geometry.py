@@ -124,8 +124,7 @@ def test_welded_armature_has_the_mass_of_both_materials():
 
 
 def test_bodies_as_drawn_keep_their_distance():
-    case = read_case(WELDED.replace(", gap: 0 um", ""), Path("drawn.yaml"))
-    pair = build_bodies(case, silent)
+    pair = build_bodies(read_case(WELDED.replace(", gap: 0 um", ""), Path("drawn.yaml")), silent)
     assert pair.shift == 0.0
     assert pair.upper.mesh.points[:, 1].min() == pytest.approx(1e-3, rel=1e-9)
 
@@ -139,7 +138,6 @@ def test_bodies_that_overlap_as_drawn_are_refused():
 
 
 def test_run_that_ends_before_the_touch_is_refused():
-    text = WELDED.replace("gap: 0 um", "gap: 40 um")
-    case = read_case(text, Path("late.yaml"))
+    case = read_case(WELDED.replace("gap: 0 um", "gap: 40 um"), Path("late.yaml"))
     with pytest.raises(InputError, match="first touch at 100 us"):
         run_impact(case, levels=("reduced",))

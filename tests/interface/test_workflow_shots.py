@@ -292,8 +292,7 @@ def test_shots_as_a_dataset(study):
     assert float(data.restitution.sel(shot=0)) == study.centric.restitution[0]
     np.testing.assert_array_equal(data.contact_force.sel(shot=0), study.centric_traces.force[0])
     # mechanics: the impulse is the integral of the force, sampled 400 times
-    force = data.contact_force.sel(shot=0)
-    assert float(force.integrate("force_time")) == pytest.approx(
+    assert float(data.contact_force.sel(shot=0).integrate("force_time")) == pytest.approx(
         float(data.impulse.sel(shot=0)), rel=1e-3
     )
     assert data.peak_force.attrs["units"] == "N"
@@ -336,8 +335,7 @@ def test_no_shot_begins_inside_the_wall(model):
 def test_a_placement_inside_the_wall_is_refused(tilt, fits):
     """The upper height is 7.4 mm above first touch, the clearance 3 um."""
     motion = CASE.motion.model_copy(update={"placement": Placement(eccentricity=0.0, tilt=tilt)})
-    case = CASE.model_copy(update={"motion": motion})
-    problem = build_problem(case, silent, threads=1)
+    problem = build_problem(CASE.model_copy(update={"motion": motion}), silent, threads=1)
     pools = mode_pools(problem, at_least=1, progress=silent)
     guided = partial(build_guide, problem, build_interface(problem, pools), pools)
     if fits:

@@ -23,9 +23,7 @@ MODULES = [
 def test_examples_print_what_they_say(module, as_for_a_user):
     said: list[str] = []
     runner = doctest.DocTestRunner(verbose=False, optionflags=doctest.ELLIPSIS)
-    found = doctest.DocTestFinder(exclude_empty=True).find(importlib.import_module(module))
-
-    for example in found:
+    for example in doctest.DocTestFinder(exclude_empty=True).find(importlib.import_module(module)):
         runner.run(example, out=said.append)
 
     assert not said, "".join(said)

@@ -25,8 +25,7 @@ def current(y):
 def rates(voltage):
     def right(t, y):
         i = current(y)
-        mmf = float(GAP_LAW.mmf(y[0], GAP - lift(t)) + IRON.mmf(y[0], 0.0))
-        main = (TURNS * i - mmf) / EDDY
+        main = (TURNS * i - float(GAP_LAW.mmf(y[0], GAP - lift(t)) + IRON.mmf(y[0], 0.0))) / EDDY
         return [main, (voltage - R * i) / TURNS - main]
 
     return right

@@ -62,12 +62,11 @@ def on_seat(upper, law, *, gap=0.1e-6, series=0.0, **more):
 
 
 def model_of(system, *, speed=0.0, films=(), step=STEP):
-    names = [f"stop_{i}" for i in range(len(system.contacts))]
     return pair_model(
         "rods",
         system,
         moving="needle",
-        contact_names=names,
+        contact_names=[f"stop_{i}" for i in range(len(system.contacts))],
         films=films,
         speed=speed,
         step=step,
@@ -155,9 +154,7 @@ def test_co_simulation_repeats_the_impact_kernel(name, tmp_path):
         duration=steps * per_step * STEP,
         steps_per_record=per_step,
     )
-    unit = Unit(model_of(system, speed=-0.4), tmp_path)
-
-    own = unit.run(
+    own = Unit(model_of(system, speed=-0.4), tmp_path).run(
         steps, per_step * STEP, "mean_contact_force", "peak_contact_force", "velocity", "gap"
     )
 

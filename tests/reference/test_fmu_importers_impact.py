@@ -220,9 +220,8 @@ def by_host(impact, folder, compiler, platform, ending, run):
     reference = references(impact.fmu[2])
     numbers = [repr(STEP), str(COUNT)]
     numbers += [str(reference[name]) for name in ("peak_contact_force", "velocity")]
-    guid = fmpy.read_model_description(impact.fmu[2]).guid
     done = subprocess.run(
-        [*run, str(host), str(library), guid, *numbers],
+        [*run, str(host), str(library), fmpy.read_model_description(impact.fmu[2]).guid, *numbers],
         capture_output=True,
         text=True,
         timeout=120,

@@ -75,8 +75,7 @@ def test_damping_lowers_the_restitution_as_the_page_says(tmp_path):
     page = "restitution-too-high.md"
     found = measures_of(changed_demo(tmp_path, block(page)))
 
-    text = row(page, "losses in material")[2]
-    written = float(re.search(r" 1 %: ([\d.]+)", text)[1])
+    written = float(re.search(r" 1 %: ([\d.]+)", row(page, "losses in material")[2])[1])
     assert found.restitution == pytest.approx(written, abs=2e-4)  # versions of the mesher
 
 

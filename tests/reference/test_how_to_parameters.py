@@ -69,8 +69,7 @@ def test_the_files_are_those_of_the_page():
 
 
 def test_the_table_is_that_of_the_run():
-    case = load_valve_case(FOUR)
-    result = run_stroke(case, variants=("wet",)).variants["wet"].result
+    result = run_stroke(load_valve_case(FOUR), variants=("wet",)).variants["wet"].result
     rows = re.findall(r"^\| (\d) \| ([\d.]+) ms \| ([\d.]+) m/s \| (\d+) N \|$", PAGE, re.M)
 
     assert len(rows) == 4

@@ -49,8 +49,7 @@ def in_file_order(body: ElasticBody):
 
 
 def frequencies_of(files: MatrixFiles, body: ElasticBody, numbers: np.ndarray) -> np.ndarray:
-    system = read_system(files.stiffness, files.mass, dofs=files.dofs)
-    placed = on_nodes(system, numbers, 3)
+    placed = on_nodes(read_system(files.stiffness, files.mass, dofs=files.dofs), numbers, 3)
     K, M = placed.K * UNITS.stiffness, placed.M * UNITS.mass
     given, report = checked_body("block", body.mesh, K, M, numbers=numbers, units=UNITS)
     assert report.rigid == 6
@@ -66,9 +65,7 @@ def test_a_form_gives_the_same_frequencies(form, body, frequencies, tmp_path):
     """Every form is a check of ``klack verify``, group exchange."""
     K, M, numbers, node, direction = in_file_order(body)
 
-    files = write_matrices(form, tmp_path, K, M, node, direction)
-
-    found = frequencies_of(files, body, numbers)
+    found = frequencies_of(write_matrices(form, tmp_path, K, M, node, direction), body, numbers)
     np.testing.assert_allclose(found, frequencies, rtol=ROUNDED.get(form, 1e-8))
 
 

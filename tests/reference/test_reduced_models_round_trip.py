@@ -47,11 +47,9 @@ def needle() -> ReducedBody:
     edges = [Line((1e-3 * r, 1e-3 * z), n) for (r, z), n in zip(corners, names, strict=True)]
     profile = Profile((0.0, 0.0), (*edges, Line((0.0, 0.0), "axis")))
     mesh = mesh_meridian({"needle": profile}, MeshSizing(size=5e-4, refinements=(), grading=0.3))
-    body = elastic_body("needle", mesh, {"needle": STEEL})
-    ports = [surface_port(mesh, name, "z", name=name) for name in ("tip", "top")]
     return reduce_body(
-        body,
-        ports,
+        elastic_body("needle", mesh, {"needle": STEEL}),
+        [surface_port(mesh, name, "z", name=name) for name in ("tip", "top")],
         modes=ByCount(15),
         correction="consistent",
         damping=ModalDamping(ratio=0.0005),
@@ -137,8 +135,7 @@ def test_state_space_and_back(tmp_path, needle, form):
     assert back.damping == pytest.approx(needle.damping, rel=1e-8, abs=1e-12)
     largest = np.abs(needle.port_shapes).max()
     for mine, given in zip(back.port_shapes, needle.port_shapes, strict=True):
-        sign = np.sign(mine @ given)
-        assert sign * mine == pytest.approx(given, abs=1e-8 * largest)
+        assert np.sign(mine @ given) * mine == pytest.approx(given, abs=1e-8 * largest)
     assert back.static_compliance == pytest.approx(needle.static_compliance, rel=1e-8)
     assert back.mass == pytest.approx(needle.mass, rel=1e-9)
     force = own_impact(needle, float(needle.residual_compliance[0, 0]))
@@ -220,9 +217,8 @@ def receptance(body: ReducedBody, frequency: np.ndarray, a: int, b: int) -> np.n
 
 def write_response(file: object, nodes: tuple[int, int], x: np.ndarray, H: np.ndarray, kind: int):
     """Dataset 58 of a displacement (8) or an acceleration (12) over a force."""
-    pyuff = pytest.importorskip("pyuff")
     file.write_sets(
-        pyuff.prepare_58(
+        pytest.importorskip("pyuff").prepare_58(
             binary=0,
             func_type=4,
             rsp_node=nodes[0],

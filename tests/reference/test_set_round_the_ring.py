@@ -77,8 +77,7 @@ def _opened(folder, body, rows, material, forces):
     for load in loads:
         load[body.fixed] = 0.0
     folder.mkdir()
-    printed = body.mesh.surface("face").nodes
-    (folder / "body.inp").write_text(_deck(body, material, loads, printed))
+    (folder / "body.inp").write_text(_deck(body, material, loads, body.mesh.surface("face").nodes))
     done = subprocess.run(
         [find_calculix(), "body"], cwd=folder, capture_output=True, text=True, check=False
     )
@@ -118,8 +117,7 @@ def test_set_off_axis_against_plastic_flow_in_three_dimensions(tmp_path):
     plane = ring_pair(**MESH, layers=0, reach=3.5e-6, hard_seat=True)
     loops = ring_loops(plane, 150.0)
     pair = ring_pair(**MESH, layers=SECTORS, reach=2.5e-6, hard_seat=True)
-    limit = loops.pressure_limit
-    states = press(pair, limit, eccentricity=0.5e-6, approaches=(0.5e-6, 1.5e-6))
+    states = press(pair, loops.pressure_limit, eccentricity=0.5e-6, approaches=(0.5e-6, 1.5e-6))
     forces = [state.forces for state in states]
     soft = pair.materials[0]
     solid = _opened(tmp_path / "solid", pair.bodies[0], pair.space.G_a, soft, forces)[-1]

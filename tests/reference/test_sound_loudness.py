@@ -125,8 +125,7 @@ def test_a_click_decays_at_once_and_a_long_sound_slowly():
     core = np.zeros((2, 2000))
     core[0, 990:1000] = 1.0
     core[1, :1000] = 1.0
-    after = nonlinear_decay(core)[:, 1000:]
-    fall = 0.5e-3 * (after > 0.1).sum(axis=1)
+    fall = 0.5e-3 * (nonlinear_decay(core)[:, 1000:] > 0.1).sum(axis=1)
 
     # short: 1 / (1 / 5 ms + 26.7 / s) at the fastest; long: 15 ms once both voltages are equal
     assert 4.41e-3 * np.log(10.0) < fall[0] < 5.0e-3 * np.log(10.0)

@@ -227,5 +227,4 @@ def test_a_state_of_an_earlier_version_goes_on():
 
     after = run_stroke(case("0.16 ms", "[dry]"), after=before)
 
-    impacts = recorded_impacts(after.reference)
-    assert len(impacts) == len(after.reference.result.events) == 1
+    assert len(recorded_impacts(after.reference)) == len(after.reference.result.events) == 1

@@ -167,8 +167,7 @@ def test_the_command_writes_it_from_a_stored_result(study, folder, tmp_path, cap
 
     assert main([*command, "--impact", "1", "--variant", "dry", *out]) == 0
 
-    told = json.loads((tmp_path / "told.json").read_text())
-    assert told["to"] == "vtk"
+    assert json.loads((tmp_path / "told.json").read_text())["to"] == "vtk"
     ours = (tmp_path / "out" / stem(study) / "needle_0003.vtu").read_bytes()
     assert ours == (folder / stem(study) / "needle_0003.vtu").read_bytes()
     for wrong, expected in (

@@ -122,8 +122,7 @@ def test_a_stored_stroke_is_the_same_and_goes_on(tmp_path):
     assert told["motion"] == "three-dimensional"
     for event in told["events"]:
         assert abs(event["axis"]["tilt_x_rad"]) < 8e-6 / 9e-3 * 1.3  # bore, and what it gives
-    path = axis_path_chart(whole)
-    assert [panel.y.label for panel in path.panels] == ["y at 13 mm", "y at 4 mm"]
+    assert [panel.y.label for panel in axis_path_chart(whole).panels] == ["y at 13 mm", "y at 4 mm"]
     assert len(axis_over_time_chart(whole).panels) == 3
 
 

@@ -21,10 +21,9 @@ _CODE = re.compile(
 @cache
 def avoided() -> dict[str, str]:
     """Discarded phrase -> term to use."""
-    rows = [row for row in _ROW.finditer(STYLE.read_text(encoding="utf-8")) if row["avoid"]]
     return {
         phrase: row["term"]
-        for row in rows
+        for row in [row for row in _ROW.finditer(STYLE.read_text(encoding="utf-8")) if row["avoid"]]
         if row["term"] not in ("term", "---")
         for phrase in row["avoid"].split(", ")
     }

@@ -21,8 +21,7 @@ def test_sphere_on_the_end_of_a_long_rod(radius):
     half-space by the ratio of contact radius to sphere radius (1/27).
     """
     table = np.loadtxt(ZENER, delimiter=",", comments="#", skiprows=4)
-    parameter = zener_parameter(STEEL, 2e-3, radius, SPEED)
-    expected = np.interp(parameter, table[:, 0], table[:, 1])
+    expected = np.interp(zener_parameter(STEEL, 2e-3, radius, SPEED), table[:, 0], table[:, 1])
 
     run = drop_sphere(radius=radius, height=60e-3, bulk=1.2e-3, speed=SPEED, step=100e-9)
 

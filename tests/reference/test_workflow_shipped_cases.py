@@ -57,8 +57,7 @@ def test_all_shipped_cases_are_tested():
 
 def test_the_struck_bar_carries_the_wave_of_one_dimension():
     """Truth: St Venant, strain v / (2 c) for 2 L / c, later by the distance over c."""
-    study = study_of("struck-bar", "full")
-    (gauge,) = study.levels["full"].gauges
+    (gauge,) = study_of("struck-bar", "full").levels["full"].gauges
     c, length, speed = sqrt(204.6e9 / 7800.0), 0.2, 14.4
     pulse = measure_pulse(gauge.time, gauge.values, "struck-bar")
 
@@ -125,8 +124,7 @@ def test_two_rods_follow_wave_theory():
 
 def test_reduced_models_of_other_programs_follow_wave_theory_and_the_exact_rods():
     """St Venant as above; the files hold the exact rods, the universal file in five decimals."""
-    study = study_of("from-other-tools", "reduced")
-    result = study.levels["reduced"]
+    result = study_of("from-other-tools", "reduced").levels["reduced"]
     steel = {"young": 210e9, "density": 7850.0, "area": pi * 0.002**2}
     needle = rod_body("needle", length=0.040, elastic_modes=40, **steel)
     seat = rod_body("seat", length=0.080, elastic_modes=80, **steel)

@@ -34,8 +34,7 @@ def test_ends_leave_exact_binomial_tails(exceeded, runs):
 def test_an_interval_of_a_table():
     """Clopper and Pearson: 2 of 10 at 95 %, as in tables, 2.52 % to 55.61 %."""
     found = count_exceedance(2, 10)
-    assert found.low == pytest.approx(0.02521, abs=5e-6)
-    assert found.high == pytest.approx(0.55610, abs=5e-6)
+    assert (found.low, found.high) == pytest.approx((0.02521, 0.55610), abs=5e-06)
 
 
 def test_no_exceedance_gives_the_rule_of_three():

@@ -266,8 +266,7 @@ def test_a_search_told_stored_values_asks_for_the_same_points(objectives):
 
 def test_the_design_of_today_is_in_the_first_batch():
     start = [[0.2, 0.9], [1.0, 0.0], [0.2, 0.9]]
-    search = Search(SearchSettings(2, 2, population=10), start)
-    first = search.ask()
+    first = Search(SearchSettings(2, 2, population=10), start).ask()
     assert first[:2].tolist() == [[0.2, 0.9], [np.nextafter(1.0, 0.0), 0.0]]
     assert np.array_equal(first[2:], Search(SearchSettings(2, 2, population=10)).ask()[2:])
 

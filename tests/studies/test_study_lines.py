@@ -14,8 +14,7 @@ def row(*notes):
 
 def test_notes_that_differ_in_numbers_only_are_told_once():
     rows = [row("only 18 % left", "slow"), row("only 19.5 % left"), row("only 18 % left"), row()]
-    told = row_warnings(rows, row(), ())
-    assert told == (
+    assert row_warnings(rows, row(), ()) == (
         "3 of 4 points, with other numbers: only 18 % left",
         "1 of 4 points: slow",
     )

@@ -270,8 +270,7 @@ def test_reasons_against_a_surrogate():
     assert reason(np.where(t[:, 0] > 0.7, np.nan, t[:, 0])).startswith("9 of 64 points have no")
     assert reason(np.full(64, np.nan)).startswith("64 of 64 points have no value")
     assert fewest_points([UNIT] * 15) == 32
-    words = SurrogateAxis.of(SPREADS["words"])
-    assert fewest_points([words] * 10) == 42
+    assert fewest_points([SurrogateAxis.of(SPREADS["words"])] * 10) == 42
 
 
 def test_a_word_that_one_point_has_is_no_knowledge():
@@ -279,8 +278,7 @@ def test_a_word_that_one_point_has_is_no_knowledge():
     axes = [UNIT, SurrogateAxis.of(Listed(("oil", "water")))]
     u = sobol_sequence(40, 1, 1)[:, 0]
     t = np.column_stack((2 * u - 1, np.arange(40) == 11))
-    found = fit_surrogate("polynomial-chaos", axes, t, u + 100.0 * t[:, 1])
-    assert not found.predictivity > 0.9
+    assert not fit_surrogate("polynomial-chaos", axes, t, u + 100.0 * t[:, 1]).predictivity > 0.9
 
 
 @pytest.mark.parametrize("kind", KINDS)
