@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from klack.assembling.placement import first_touch_of_meshes
 from klack.contact.pairing import axial_distance, face_thickness
 from klack.elasticity.body import ElasticBody
-from klack.errors import InputError, require_positive
+from klack.errors import InputError, refuse, require_positive
 from klack.materials import Material
 from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
@@ -131,20 +131,26 @@ class CalculixSettings:
         require_positive("CalculiX: step", self.step, "s")
         require_positive("CalculiX: penalty", self.penalty, "Pa/m")
         require_positive("CalculiX: stick", self.stick, "")
-        if not self.duration >= self.step:
-            raise InputError(
-                "CalculiX: duration",
-                got=f"{self.duration:g} s",
-                expected=f"the time of one step ({self.step:g} s) or more",
-                hint="check the units; an impact of steel parts lasts 5 to 50 us.",
-            )
-        if not -1.0 / 3.0 <= self.alpha <= 0.0:
-            raise InputError(
-                "CalculiX: alpha",
-                got=f"{self.alpha:g}",
-                expected="a value from -1/3 to 0",
-                hint="0 for no numerical damping, -0.05 is the default of CalculiX.",
-            )
+        refuse(
+            (
+                not self.duration >= self.step,
+                InputError(
+                    "CalculiX: duration",
+                    got=f"{self.duration:g} s",
+                    expected=f"the time of one step ({self.step:g} s) or more",
+                    hint="check the units; an impact of steel parts lasts 5 to 50 us.",
+                ),
+            ),
+            (
+                not -1.0 / 3.0 <= self.alpha <= 0.0,
+                InputError(
+                    "CalculiX: alpha",
+                    got=f"{self.alpha:g}",
+                    expected="a value from -1/3 to 0",
+                    hint="0 for no numerical damping, -0.05 is the default of CalculiX.",
+                ),
+            ),
+        )
 
 
 def default_penalty(impact: CalculixImpact) -> float:
@@ -281,12 +287,14 @@ def _require_solids(impact: CalculixImpact) -> None:
 
 def _heading(impact: CalculixImpact, settings: CalculixSettings, shift: float) -> Iterator[str]:
     title = impact.title.encode("ascii", "replace").decode().replace("\n", " ")
-    yield "*HEADING"
-    yield title[:72]
-    yield "** written by klack; units: mm, t, s, N, MPa, mJ; axis of motion: z"
-    yield f"** {UPPER} = {_plain(impact.upper.name)}, moved by {shift / _MM:.9g} mm along z from"
-    yield f"** where the case puts it; {LOWER} = {_plain(impact.lower.name)}"
-    yield f"** step {settings.step:g} s, penalty {settings.penalty * _MM / _MPA:g} MPa/mm"
+    yield from (
+        "*HEADING",
+        title[:72],
+        "** written by klack; units: mm, t, s, N, MPa, mJ; axis of motion: z",
+        f"** {UPPER} = {_plain(impact.upper.name)}, moved by {shift / _MM:.9g} mm along z from",
+        f"** where the case puts it; {LOWER} = {_plain(impact.lower.name)}",
+        f"** step {settings.step:g} s, penalty {settings.penalty * _MM / _MPA:g} MPa/mm",
+    )
 
 
 def _body_lines(
@@ -299,8 +307,10 @@ def _body_lines(
 ) -> Iterator[str]:
     """Nodes, elements, contact faces and held nodes of one body."""
     yield f"*NODE, NSET={role}_NODES"
-    for i, (x, y, z) in enumerate((mesh.points / _MM).tolist(), start=first_node + 1):
-        yield f"{i}, {x:.12e}, {y:.12e}, {z:.12e}"
+    yield from (
+        f"{i}, {x:.12e}, {y:.12e}, {z:.12e}"
+        for i, (x, y, z) in enumerate((mesh.points / _MM).tolist(), start=first_node + 1)
+    )
     number = first_element
     for block in mesh.blocks:
         yield f"*ELEMENT, TYPE={_TYPES[block.family]}, ELSET={_solid_set(role, mesh, block.solid)}"
@@ -308,11 +318,11 @@ def _body_lines(
             number += 1
             yield from _wrapped([number, *nodes])
     yield f"*ELSET, ELSET={role}"
-    for solid in mesh.solids:
-        yield f"{_solid_set(role, mesh, solid)},"
+    yield from (f"{_solid_set(role, mesh, solid)}," for solid in mesh.solids)
     yield f"*SURFACE, NAME={role}_CONTACT, TYPE=ELEMENT"
-    for element, side in _faces(mesh, surface):
-        yield f"{first_element + element + 1}, S{side + 1}"
+    yield from (
+        f"{first_element + element + 1}, S{side + 1}" for element, side in _faces(mesh, surface)
+    )
     held = np.unique(fixed // 3)
     if len(held):
         yield f"*NSET, NSET={role}_FIXED"
@@ -340,10 +350,15 @@ def _section_lines(role: str, mesh: Mesh, materials: Mapping[str, Material]) -> 
     """One material and one section per solid."""
     for solid in mesh.solids:
         material, name = materials[solid], _solid_set(role, mesh, solid)
-        yield from (f"** {_plain(material.name)}", f"*MATERIAL, NAME={name}")
-        yield from ("*ELASTIC", f"{material.young / _MPA:.12g}, {material.poisson:.12g}")
-        yield from ("*DENSITY", f"{material.density / _TONNE_PER_MM3:.12g},")
-        yield f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"
+        yield from (
+            f"** {_plain(material.name)}",
+            f"*MATERIAL, NAME={name}",
+            "*ELASTIC",
+            f"{material.young / _MPA:.12g}, {material.poisson:.12g}",
+            "*DENSITY",
+            f"{material.density / _TONNE_PER_MM3:.12g},",
+            f"*SOLID SECTION, ELSET={name}, MATERIAL={name}",
+        )
 
 
 def _ballast_lines(impact: CalculixImpact, node: int, element: int) -> Iterator[str]:
@@ -352,46 +367,67 @@ def _ballast_lines(impact: CalculixImpact, node: int, element: int) -> Iterator[
     size = max(float(np.ptp(mesh.points, axis=0).max()) for mesh in bodies) / _MM
     first = max(float(mesh.points[:, 0].max()) for mesh in bodies) / _MM + size
     density = _BALLAST_FACTOR * impact.upper.mass / (size * _MM) ** 3 / _TONNE_PER_MM3
-    yield "** ballast, without contact: beside its energy ccx does not take the loss of friction"
-    yield "** for an error of the time steps"
-    yield f"*NODE, NSET={_BALLAST}_NODES"
+    yield from (
+        "** ballast, without contact: beside its energy ccx does not take the loss of friction",
+        "** for an error of the time steps",
+        f"*NODE, NSET={_BALLAST}_NODES",
+    )
     base = ((0, 0), (1, 0), (1, 1), (0, 1))
     corners = [(x, y, z) for z in (0, 1) for x, y in base]
-    for i, (x, y, z) in enumerate(corners, start=node + 1):
-        yield f"{i}, {first + x * size:.12e}, {y * size:.12e}, {z * size:.12e}"
-    yield f"*ELEMENT, TYPE=C3D8, ELSET={_BALLAST}"
-    yield ", ".join(map(str, (element + 1, *range(node + 1, node + 9))))
-    yield from (f"*MATERIAL, NAME={_BALLAST}", "*ELASTIC", "210000, 0.3")
-    yield from ("*DENSITY", f"{density:.12g},")
-    yield f"*SOLID SECTION, ELSET={_BALLAST}, MATERIAL={_BALLAST}"
+    yield from (
+        f"{i}, {first + x * size:.12e}, {y * size:.12e}, {z * size:.12e}"
+        for i, (x, y, z) in enumerate(corners, start=node + 1)
+    )
+    yield from (
+        f"*ELEMENT, TYPE=C3D8, ELSET={_BALLAST}",
+        ", ".join(map(str, (element + 1, *range(node + 1, node + 9)))),
+        f"*MATERIAL, NAME={_BALLAST}",
+        "*ELASTIC",
+        "210000, 0.3",
+        "*DENSITY",
+        f"{density:.12g},",
+        f"*SOLID SECTION, ELSET={_BALLAST}, MATERIAL={_BALLAST}",
+    )
 
 
 def _contact_lines(settings: CalculixSettings, friction: float) -> Iterator[str]:
-    yield "*SURFACE INTERACTION, NAME=CONTACT"
-    yield "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
-    yield f"{settings.penalty * _MM / _MPA:.12g},"
+    yield from (
+        "*SURFACE INTERACTION, NAME=CONTACT",
+        "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+        f"{settings.penalty * _MM / _MPA:.12g},",
+    )
     if friction > 0.0:
         slope = settings.stick * settings.penalty
-        yield f"** stick slope: penalty times {settings.stick:.3g}. Faces that stick give way"
-        yield f"** across by up to {friction / settings.stick:.3g} times their overclosure."
-        yield "** A larger slope is closer to Coulomb, but where the slip turns the iterations may"
-        yield "** cycle between stick and slip."
-        yield "*FRICTION"
-        yield f"{friction:.12g}, {slope * _MM / _MPA:.12g}"
-    yield "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE"
-    yield f"{UPPER}_CONTACT, {LOWER}_CONTACT"
+        yield from (
+            f"** stick slope: penalty times {settings.stick:.3g}. Faces that stick give way",
+            f"** across by up to {friction / settings.stick:.3g} times their overclosure.",
+            "** A larger slope is closer to Coulomb, but where the slip turns the iterations may",
+            "** cycle between stick and slip.",
+            "*FRICTION",
+            f"{friction:.12g}, {slope * _MM / _MPA:.12g}",
+        )
+    yield from (
+        "*CONTACT PAIR, INTERACTION=CONTACT, TYPE=SURFACE TO SURFACE",
+        f"{UPPER}_CONTACT, {LOWER}_CONTACT",
+    )
 
 
 def _step_lines(impact: CalculixImpact, settings: CalculixSettings) -> Iterator[str]:
     increments = int(np.ceil(settings.duration / settings.step * (1.0 - 1e-9)))
-    yield f"*STEP, INC={10 * increments + 100}"
-    yield f"*DYNAMIC, DIRECT, ALPHA={settings.alpha:g}, SOLVER={_solver(impact, settings)}"
-    yield f"{settings.step:.9g}, {increments * settings.step:.9g}"
+    yield from (
+        f"*STEP, INC={10 * increments + 100}",
+        f"*DYNAMIC, DIRECT, ALPHA={settings.alpha:g}, SOLVER={_solver(impact, settings)}",
+        f"{settings.step:.9g}, {increments * settings.step:.9g}",
+    )
     if impact.closing_force != 0.0:
         acceleration = impact.closing_force / impact.upper.mass / _MM
         yield from ("*DLOAD", f"{UPPER}, GRAV, {acceleration:.12g}, 0., 0., -1.")
-    yield from (f"*CONTACT PRINT, SLAVE={UPPER}_CONTACT, MASTER={LOWER}_CONTACT", "CF")
-    yield from ("*CONTACT PRINT, TOTALS=ONLY", "CELS")
+    yield from (
+        f"*CONTACT PRINT, SLAVE={UPPER}_CONTACT, MASTER={LOWER}_CONTACT",
+        "CF",
+        "*CONTACT PRINT, TOTALS=ONLY",
+        "CELS",
+    )
     for role in (UPPER, LOWER):
         yield from (f"*EL PRINT, ELSET={role}, TOTALS=ONLY", "ELSE, ELKE")
     yield "*END STEP"

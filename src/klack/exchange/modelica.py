@@ -84,13 +84,11 @@ def _interface(model: ModalModel) -> Iterable[str]:
         unit = "m" if output.quantity == "displacement" else "m/s"
         yield f'  output Real {output.name}(unit="{unit}") {text(output.description)};'
     if model.kind == "pair":
-        yield (
+        yield from (
             f'  parameter Real start_velocity(unit="m/s") = {number(start_speed(model))} '
-            '"Velocity of the moving body at the start, + opening";'
-        )
-        yield (
+            '"Velocity of the moving body at the start, + opening";',
             '  parameter Real start_rise(unit="m") = 0 '
-            '"Displacement of the moving body along +z before the start";'
+            '"Displacement of the moving body along +z before the start";',
         )
     if any(contact.film and contact.series_compliance for contact in model.contacts):
         yield (
@@ -101,10 +99,12 @@ def _interface(model: ModalModel) -> Iterable[str]:
 
 def _modes(model: ModalModel) -> Iterable[str]:
     m = model.mode_count
-    yield array(
-        f'parameter Real omega[{m}](each unit="rad/s")', model.omega, "Angular eigenfrequencies"
+    yield from (
+        array(
+            f'parameter Real omega[{m}](each unit="rad/s")', model.omega, "Angular eigenfrequencies"
+        ),
+        array(f'parameter Real damping[{m}](each unit="1")', model.damping, "Damping ratios"),
     )
-    yield array(f'parameter Real damping[{m}](each unit="1")', model.damping, "Damping ratios")
     if np.any(model.constant):
         words = "Modal forces that always act [N/sqrt(kg)]"
         yield array(f"parameter Real constant_force[{m}]", model.constant, words)
@@ -118,16 +118,22 @@ def _modes(model: ModalModel) -> Iterable[str]:
         start = {"q": "each start=0", "v": "each start=0"}
     else:
         still = model.start_velocity - model.rise * start_speed(model)
-        yield array(
-            f"parameter Real rise[{m}]", model.rise, "Modal displacements of 1 m of rise [sqrt(kg)]"
+        yield from (
+            array(
+                f"parameter Real rise[{m}]",
+                model.rise,
+                "Modal displacements of 1 m of rise [sqrt(kg)]",
+            ),
+            array(f"parameter Real rest[{m}]", model.start, "q at the start [m.sqrt(kg)]"),
         )
-        yield array(f"parameter Real rest[{m}]", model.start, "q at the start [m.sqrt(kg)]")
         start = {"q": "start=rest + start_rise*rise", "v": "start=start_velocity*rise"}
         if np.any(np.abs(still) > 1e-14 * np.linalg.norm(model.start_velocity)):
             yield array(f"parameter Real drift[{m}]", still, "Further v at the start")
             start["v"] += " + drift"
-    yield f'  Real q[{m}]({start["q"]}, each fixed=true) "Modal displacements [m.sqrt(kg)]";'
-    yield f'  Real v[{m}]({start["v"]}, each fixed=true) "Modal velocities [m/s.sqrt(kg)]";'
+    yield from (
+        f'  Real q[{m}]({start["q"]}, each fixed=true) "Modal displacements [m.sqrt(kg)]";',
+        f'  Real v[{m}]({start["v"]}, each fixed=true) "Modal velocities [m/s.sqrt(kg)]";',
+    )
 
 
 def _shapes(model: ModalModel) -> dict[str, str]:
@@ -160,8 +166,8 @@ def _annotation(model: ModalModel) -> Iterable[str]:
         )
     rows = "".join(f"<li>{html.escape(fact, quote=False)}</li>" for fact in facts)
     info = text(f"<html><p>Modes of elastic bodies in SI units.</p><ul>{rows}</ul></html>")
-    yield f"  annotation(Documentation(info={info}),"
-    yield (
+    yield from (
+        f"  annotation(Documentation(info={info}),",
         f"    experiment(StartTime=0, StopTime={number(model.duration)}, Tolerance=1e-7, "
-        f"Interval={number(model.step)}));"
+        f"Interval={number(model.step)}));",
     )

@@ -167,14 +167,18 @@ def law_functions(contacts: Sequence[ModelContact]) -> Iterable[str]:
 
 def _law_function(name: str, kind: ContactKind, rows: int, soft: bool) -> Iterable[str]:
     size = {"linear": "1", "power": "2"}.get(kind, f"{rows}, 5")
-    yield f'  function {name} "Contact force over the overlap of the bodies"'
-    yield '    input Real closing(unit="m") "Overlap: indentation + series*force";'
-    yield '    input Real series(unit="m/N");'
-    yield f"    input Real law[{size}];"
-    yield '    output Real force(unit="N");'
+    yield from (
+        f'  function {name} "Contact force over the overlap of the bodies"',
+        '    input Real closing(unit="m") "Overlap: indentation + series*force";',
+        '    input Real series(unit="m/N");',
+        f"    input Real law[{size}];",
+        '    output Real force(unit="N");',
+    )
     if kind == "linear":
-        yield "  algorithm"
-        yield "    force := max(closing, 0.0)*law[1]/(1 + series*law[1]);"
+        yield from (
+            "  algorithm",
+            "    force := max(closing, 0.0)*law[1]/(1 + series*law[1]);",
+        )
     elif kind == "power":
         yield _POWER.strip("\n").replace("SEARCH", "    Real f;\n" if soft else "")
         if soft:
@@ -182,13 +186,13 @@ def _law_function(name: str, kind: ContactKind, rows: int, soft: bool) -> Iterab
         yield "    force := law[1]*d^law[2];"
     else:
         search = "    Real low;\n    Real high;\n    Real excess;\n" if soft else ""
-        yield _TABLE.strip("\n").replace("ROWS", str(rows)).replace("SEARCH", search)
-        yield (
+        yield from (
+            _TABLE.strip("\n").replace("ROWS", str(rows)).replace("SEARCH", search),
             _SOFT_TABLE.strip("\n").replace("TURNS", str(MODELICA_TABLE_TURNS))
             if soft
-            else "    s := rest;"
+            else "    s := rest;",
+            "    force := law[row, 2] + s*(law[row, 3] + s*(law[row, 4] + s*law[row, 5]));",
         )
-        yield "    force := law[row, 2] + s*(law[row, 3] + s*(law[row, 4] + s*law[row, 5]));"
     yield f"  end {name};"
 
 

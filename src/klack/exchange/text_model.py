@@ -115,30 +115,37 @@ def _law_points(contact: ModelContact) -> NDArray[np.float64]:
 def _info(model: ModalModel, form: FirstOrder) -> Iterable[str]:
     origin = model.provenance
     what = "linear body" if model.kind == "body" else "bodies and their contacts"
-    yield f"{model.name}: {what}"
-    yield f"case: {origin.case} ({origin.title})"
-    yield f"made by klack {origin.version}, {origin.created}"
-    for name, words in origin.meshes.items():
-        yield f"mesh of {name}: {words}"
-    yield ""
-    yield "x' = A x + B u + xc, y = C x + D u + y0; SI units; + is along +z (opening)"
-    yield f"{len(form.start)} states: modal displacements [m.kg^(1/2)], then modal velocities"
-    yield f"{model.name}_modes.csv: frequency, damping ratio, mass-normalised shapes [1/sqrt(kg)]"
-    yield f"modes up to {model.frequencies.max():.6g} Hz; step of klack {model.step:.6g} s"
-    yield ""
+    yield from (
+        f"{model.name}: {what}",
+        f"case: {origin.case} ({origin.title})",
+        f"made by klack {origin.version}, {origin.created}",
+    )
+    yield from (f"mesh of {name}: {words}" for name, words in origin.meshes.items())
+    yield from (
+        "",
+        "x' = A x + B u + xc, y = C x + D u + y0; SI units; + is along +z (opening)",
+        f"{len(form.start)} states: modal displacements [m.kg^(1/2)], then modal velocities",
+        f"{model.name}_modes.csv: frequency, damping ratio, mass-normalised shapes [1/sqrt(kg)]",
+        f"modes up to {model.frequencies.max():.6g} Hz; step of klack {model.step:.6g} s",
+        "",
+    )
     yield from _listed("input", form.input_names, form.input_units)
     yield from _listed("output", form.output_names, form.output_units, form.output_offset, "y0")
     yield from _listed("state", form.state_names, form.state_units, form.start, "start")
     rates = [(k + 1, float(x)) for k, x in enumerate(form.constant_rate) if x]
-    yield ""
-    yield "xc (constant forces): " + (
-        ", ".join(f"state {k}: {x!r}" for k, x in rates) if rates else "zero"
+    yield from (
+        "",
+        "xc (constant forces): "
+        + (", ".join(f"state {k}: {x!r}" for k, x in rates) if rates else "zero"),
     )
     if model.kind == "body":
-        yield ""
-        yield "residual compliance between the inputs [m/N]; not in D:"
-        for row in model.residual_compliance:
-            yield "  " + " ".join(_DIGITS % value for value in row)
+        yield from (
+            "",
+            "residual compliance between the inputs [m/N]; not in D:",
+        )
+        yield from (
+            "  " + " ".join(_DIGITS % value for value in row) for row in model.residual_compliance
+        )
     for contact in model.contacts:
         yield ""
         yield from _contact(contact)
@@ -169,6 +176,8 @@ def _contact(contact: ModelContact) -> Iterable[str]:
     yield f"  series compliance: {contact.series_compliance!r} m/N"
     if contact.film is not None:
         film = contact.film
-        yield "  film: F = (cubic/h^3 + linear/h) V, h = max(gap, 0) + cut_off, F >= -suction"
-        yield f"  cubic = {film.cubic!r} N.s.m^2, linear = {film.linear!r} N.s"
-        yield f"  cut_off = {film.cut_off!r} m, suction = {film.suction!r} N"
+        yield from (
+            "  film: F = (cubic/h^3 + linear/h) V, h = max(gap, 0) + cut_off, F >= -suction",
+            f"  cubic = {film.cubic!r} N.s.m^2, linear = {film.linear!r} N.s",
+            f"  cut_off = {film.cut_off!r} m, suction = {film.suction!r} N",
+        )

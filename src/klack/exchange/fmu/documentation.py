@@ -1,6 +1,5 @@
 """Pages and pictures inside an FMU: what the model is, how to connect it, where it ends."""
 
-from dataclasses import dataclass
 from importlib.resources import files
 from typing import Literal
 
@@ -17,21 +16,6 @@ from klack.exchange.modal_model import ModalModel, ModelContact
 from klack.network.protocols import InterfaceLaw
 
 __all__ = ["documentation_files"]
-
-
-@dataclass(frozen=True, slots=True)
-class _ContactWords:
-    name: str
-    law: str
-    gap: str
-    series: str
-    film: str
-
-
-@dataclass(frozen=True, slots=True)
-class _Residual:
-    name: str
-    value: str
 
 
 def documentation_files(model: ModalModel, *, fmi: Literal[2, 3] = 2) -> dict[str, bytes]:
@@ -52,7 +36,9 @@ def documentation_files(model: ModalModel, *, fmi: Literal[2, 3] = 2) -> dict[st
         "documentation/index.html": _page(model).encode(),
         "documentation/diagram.svg": port_picture(model, outputs),
         "documentation/answer.svg": answer_picture(model),
-        "documentation/licenses/license.txt": _license(),
+        "documentation/licenses/license.txt": files("klack.exchange.fmu")
+        .joinpath("license.txt")
+        .read_bytes(),
         place: icon(),
     }
 
@@ -77,7 +63,7 @@ def _page(model: ModalModel) -> str:
         parameters=[v for v in variables if v.causality == "parameter"],
         contacts=[_contact_words(contact) for contact in model.contacts],
         residuals=[
-            _Residual(item.name.removeprefix("force_"), f"{1e9 * d:.4g} nm/N")
+            {"name": item.name.removeprefix("force_"), "value": f"{1e9 * d:.4g} nm/N"}
             for item, d in zip(model.inputs, model.residual_compliance.diagonal(), strict=True)
         ],
         step=f"{1e6 * communication_step(model):g} µs",
@@ -102,15 +88,17 @@ def _range(ratios: NDArray[np.float64]) -> str:
     return f"{high:.3g} %" if low == high else f"{low:.3g} to {high:.3g} %"
 
 
-def _contact_words(contact: ModelContact) -> _ContactWords:
+def _contact_words(contact: ModelContact) -> dict[str, str]:
     film = contact.film
-    return _ContactWords(
-        name=contact.name,
-        law=_law_words(contact.law),
-        gap=f"{1e6 * contact.gap:.4g} µm",
-        series=f"{1e9 * contact.series_compliance:.4g} nm/N",
-        film="none" if film is None else f"squeeze film, pulls with at most {film.suction:.3g} N",
-    )
+    return {
+        "name": contact.name,
+        "law": _law_words(contact.law),
+        "gap": f"{1e6 * contact.gap:.4g} µm",
+        "series": f"{1e9 * contact.series_compliance:.4g} nm/N",
+        "film": "none"
+        if film is None
+        else f"squeeze film, pulls with at most {film.suction:.3g} N",
+    }
 
 
 def _law_words(law: InterfaceLaw | None) -> str:
@@ -130,8 +118,3 @@ def _law_words(law: InterfaceLaw | None) -> str:
             return f"{_law_words(law.law)}, with dissipation {law.dissipation:.3g}"
         case _:
             return type(law).__name__
-
-
-def _license() -> bytes:
-    """Licence of what klack wrote."""
-    return files("klack.exchange.fmu").joinpath("license.txt").read_bytes()

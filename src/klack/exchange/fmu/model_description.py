@@ -6,7 +6,7 @@ Version 2 leaves the time out, as some importers of that version stumble over it
 it.  The event indicator of a contact is its gap.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 from xml.etree import ElementTree as ET
 
@@ -17,7 +17,6 @@ from klack.exchange.modal_model import ModalModel
 
 __all__ = ["SOURCE_FILES", "communication_step", "model_description"]
 
-_Known = Mapping[int, tuple[int, ...]]
 
 SOURCE_FILES = {2: ("klack_model.c", "klack_fmi2.c"), 3: ("klack_model.c", "klack_fmi3.c")}
 """C sources of both versions of the standard."""
@@ -58,14 +57,10 @@ def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> st
         stepSize=_number(communication_step(model)),
     )
     found = dependencies_of(model)
-    if fmi == 2:
-        if exchange:
-            root.set("numberOfEventIndicators", str(len(model.contacts)))
-        _variables_2(root, model, variables, exchange)
-        _structure_2(root, variables, found, exchange)
-    else:
-        _variables_3(root, model, variables, exchange)
-        _structure_3(root, variables, found, exchange)
+    if fmi == 2 and exchange:
+        root.set("numberOfEventIndicators", str(len(model.contacts)))
+    _variables(root, model, variables, fmi, exchange)
+    _structure(root, variables, found, fmi, exchange)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, "unicode") + "\n"
 
@@ -149,13 +144,10 @@ def _initial(model: ModalModel, variable: FmuVariable) -> str | None:
     """How the value at the start comes about; None where the standard allows no word."""
     if variable.causality == "input":
         return None
-    known = variable.start is not None and (variable.causality == "parameter" or _free(model))
+    known = variable.start is not None and (
+        variable.causality == "parameter" or model.kind == "body"
+    )
     return "exact" if known else "calculated"
-
-
-def _free(model: ModalModel) -> bool:
-    """Whether the states may be set before the start; those of a pair follow its parameters."""
-    return model.kind == "body"
 
 
 def _attributes(model: ModalModel, variable: FmuVariable) -> dict[str, str]:
@@ -185,100 +177,62 @@ def _words(model: ModalModel, variable: FmuVariable, reference: int) -> dict[str
     return found if initial is None else found | {"initial": initial}
 
 
-def _variables_2(
-    root: ET.Element, model: ModalModel, variables: Sequence[FmuVariable], exchange: bool
+def _variables(
+    root: ET.Element, model: ModalModel, variables: Sequence[FmuVariable], fmi: int, exchange: bool
 ) -> None:
+    """Variables, those of version 2 with an element for their number; derivatives count from 1."""
     listed = ET.SubElement(root, "ModelVariables")
     for reference, variable in enumerate(variables):
-        scalar = ET.SubElement(listed, "ScalarVariable", _words(model, variable, reference))
-        real = ET.SubElement(scalar, "Real", _attributes(model, variable))
+        words, number = _words(model, variable, reference), _attributes(model, variable)
         if variable.derivative_of is not None and exchange:
-            real.set("derivative", str(variable.derivative_of + 1))
-
-
-def _variables_3(
-    root: ET.Element, model: ModalModel, variables: Sequence[FmuVariable], exchange: bool
-) -> None:
-    listed = ET.SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(variables):
-        words = _words(model, variable, reference) | _attributes(model, variable)
-        if variable.derivative_of is not None and exchange:
-            words["derivative"] = str(variable.derivative_of)
-        ET.SubElement(listed, "Float64", words)
-    ET.SubElement(
-        listed,
-        "Float64",
-        name="time",
-        valueReference=str(len(variables)),
-        description="Time",
-        causality="independent",
-        variability="continuous",
-        unit="s",
-    )
+            number["derivative"] = str(variable.derivative_of + (fmi == 2))
+        if fmi == 2:
+            ET.SubElement(ET.SubElement(listed, "ScalarVariable", words), "Real", number)
+        else:
+            ET.SubElement(listed, "Float64", words | number)
+    if fmi == 3:
+        ET.SubElement(
+            listed,
+            "Float64",
+            name="time",
+            valueReference=str(len(variables)),
+            description="Time",
+            causality="independent",
+            variability="continuous",
+            unit="s",
+        )
 
 
 # --------------------------------------------------------------------------- structure
 
 
-def _initial_unknowns(
-    variables: Sequence[FmuVariable], found: Dependencies, exchange: bool
-) -> list[int]:
-    """References of the outputs, states and derivatives that the initialization computes."""
-    return [r for r in sorted(found.at_start) if variables[r].causality == "output" or exchange]
-
-
-def _structure_2(
-    root: ET.Element, variables: Sequence[FmuVariable], found: Dependencies, exchange: bool
-) -> None:
-    structure = ET.SubElement(root, "ModelStructure")
-
-    def unknowns(
-        title: str, references: Iterable[int], known: Mapping[int, tuple[int, ...]]
-    ) -> None:
-        rows = list(references)
-        if not rows:
-            return
-        group = ET.SubElement(structure, title)
-        for r in rows:
-            ET.SubElement(
-                group,
-                "Unknown",
-                index=str(r + 1),
-                dependencies=" ".join(str(k + 1) for k in known[r]),
-            )
-
-    unknowns("Outputs", found.outputs, found.running)
-    if exchange:
-        unknowns("Derivatives", found.derivatives, found.running)
-    unknowns("InitialUnknowns", _initial_unknowns(variables, found, exchange), found.at_start)
-
-
-def _structure_3(
+def _structure(
     root: ET.Element,
     variables: Sequence[FmuVariable],
     found: Dependencies,
+    fmi: int,
     exchange: bool,
 ) -> None:
+    """What depends on what: in groups that count from 1 in version 2, by references in version 3.
+
+    The initialization computes outputs, and in model exchange states and derivatives.
+    """
     structure = ET.SubElement(root, "ModelStructure")
-
-    def unknown(title: str, reference: int, known: Sequence[int]) -> None:
-        ET.SubElement(
-            structure,
-            title,
-            valueReference=str(reference),
-            dependencies=" ".join(str(k) for k in known),
-        )
-
-    for r in found.outputs:
-        unknown("Output", r, found.running[r])
-    if exchange:
-        for r in found.derivatives:
-            unknown("ContinuousStateDerivative", r, found.running[r])
-    for r in _initial_unknowns(variables, found, exchange):
-        unknown("InitialUnknown", r, found.at_start[r])
-    if exchange:
-        for r in found.indicators:
-            unknown("EventIndicator", r, found.running[r])
+    initial = [r for r in sorted(found.at_start) if variables[r].causality == "output" or exchange]
+    for title, word, references, known, wanted in (
+        ("Outputs", "Output", found.outputs, found.running, True),
+        ("Derivatives", "ContinuousStateDerivative", found.derivatives, found.running, exchange),
+        ("InitialUnknowns", "InitialUnknown", initial, found.at_start, True),
+        ("", "EventIndicator", found.indicators, found.running, exchange and fmi == 3),
+    ):
+        rows = references if wanted else ()
+        group = ET.SubElement(structure, title) if fmi == 2 and rows else structure
+        for r in rows:
+            depends = " ".join(str(k + (fmi == 2)) for k in known[r])
+            if fmi == 2:
+                ET.SubElement(group, "Unknown", index=str(r + 1), dependencies=depends)
+            else:
+                ET.SubElement(structure, word, valueReference=str(r), dependencies=depends)
 
 
 # --------------------------------------------------------------------------- text
