@@ -10,7 +10,6 @@ table with one mode per row::
 
 import csv
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +17,9 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.model_files.named_arrays import NamedArrays, read_named_arrays
-from klack.model_files.uff_modes import UffModes, read_uff_modes
-from klack.model_files.uff_responses import Receptance
+from klack.model_files.uff_modes import FileModalData, read_uff_modes
 
-__all__ = ["FileModalData", "read_modal_data"]
+__all__ = ["read_modal_data"]
 
 Floats = NDArray[np.float64]
 
@@ -33,44 +31,6 @@ _MASS = ("modal_mass", "modal_masses", "mass", "mr")
 _SHAPES = ("shapes", "phi", "mode_shapes", "modes", "Psi")
 _RESIDUAL = ("residual", "residual_compliance", "feedthrough", "D")
 _LABELS = ("ports", "port_names", "labels", "names", "dofs")
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FileModalData:
-    """Modes of a file; frequencies in Hz, all else in the units of the file.
-
-    Parameters
-    ----------
-    path : Path
-    frequency : array, shape (m,) [Hz]
-    damping : array, shape (m,) [-], or None
-        None where the file gives none.
-    modal_mass : array, shape (m,)
-        1 for mass-normalised shapes.
-    shapes : array, shape (m, n)
-    labels : tuple of str
-        Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction.
-    residual : array, shape (n, n), or None
-        Residual compliance between the columns.
-    by_node : bool
-        True where columns are nodes and directions.
-    length, force : float or None [m], [N]
-        Units that the file itself claims.
-    responses : tuple of Receptance
-        Between nodes; they tell what the modes miss.
-    """
-
-    path: Path
-    frequency: Floats
-    damping: Floats | None
-    modal_mass: Floats
-    shapes: Floats
-    labels: tuple[str, ...]
-    residual: Floats | None = None
-    by_node: bool = False
-    length: float | None = None
-    force: float | None = None
-    responses: tuple[Receptance, ...] = ()
 
 
 def read_modal_data(path: Path) -> FileModalData:
@@ -87,7 +47,7 @@ def read_modal_data(path: Path) -> FileModalData:
         )
     suffix = path.suffix.lower()
     if suffix in _UFF:
-        data = _of_uff(path, read_uff_modes(path))
+        data = read_uff_modes(path)
     elif suffix in (".mat", ".npz"):
         data = _of_arrays(read_named_arrays(path))
     else:
@@ -107,21 +67,6 @@ def read_modal_data(path: Path) -> FileModalData:
             hint="export mass-normalised shapes; without modal mass their size has no meaning.",
         )
     return data
-
-
-def _of_uff(path: Path, modes: UffModes) -> FileModalData:
-    return FileModalData(
-        path=path,
-        frequency=modes.frequency,
-        damping=modes.damping,
-        modal_mass=modes.modal_mass,
-        shapes=modes.shapes,
-        labels=modes.labels,
-        by_node=True,
-        length=modes.length,
-        force=modes.force,
-        responses=modes.responses,
-    )
 
 
 def _of_arrays(held: NamedArrays) -> FileModalData:

@@ -15,7 +15,7 @@ from klack.errors import InputError
 from klack.model_files.uff_lines import uff_datasets, uff_numbers, uff_refusal, uff_whole
 from klack.model_files.uff_responses import DIRECTIONS, Receptance, read_response
 
-__all__ = ["UffModes", "read_uff_modes"]
+__all__ = ["FileModalData", "read_uff_modes"]
 
 Floats = NDArray[np.float64]
 
@@ -25,29 +25,40 @@ _DISPLACEMENT = 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class UffModes:
-    """Real modes of a universal file, in its units.
+class FileModalData:
+    """Modes of a file; frequencies in Hz, all else in the units of the file.
 
     Parameters
     ----------
-    frequency, damping, modal_mass : array, shape (m,) [Hz], [-], (mass)
+    frequency : array, shape (m,) [Hz]
+    damping : array, shape (m,) [-], or None
+        None where the file gives none.
+    modal_mass : array, shape (m,)
+        1 for mass-normalised shapes.
     shapes : array, shape (m, n)
-    labels : tuple of str
-        ``"17 z"``: node and direction of each column.
+    labels
+        Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction.
+    residual : array, shape (n, n), or None
+        Residual compliance between the columns.
+    by_node
+        True where columns are nodes and directions.
     length, force : float or None [m], [N]
-        Units of dataset 164.
-    responses : tuple of Receptance
-        Of datasets 58.
+        Units that the file itself claims.
+    responses
+        Between nodes; they tell what the modes miss.
     """
 
+    path: Path
     frequency: Floats
-    damping: Floats
+    damping: Floats | None
     modal_mass: Floats
     shapes: Floats
     labels: tuple[str, ...]
-    length: float | None
-    force: float | None
-    responses: tuple[Receptance, ...]
+    residual: Floats | None = None
+    by_node: bool = False
+    length: float | None = None
+    force: float | None = None
+    responses: tuple[Receptance, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -60,7 +71,7 @@ class _Mode:
     shapes: Floats
 
 
-def read_uff_modes(path: Path) -> UffModes:
+def read_uff_modes(path: Path) -> FileModalData:
     """Read all normal modes.
 
     Parameters
@@ -105,7 +116,9 @@ def read_uff_modes(path: Path) -> UffModes:
             path, odd.line, "a mode with other nodes than the first", "the same nodes"
         )
     width = modes[0].shapes.shape[1]
-    return UffModes(
+    return FileModalData(
+        path=path,
+        by_node=True,
         frequency=np.array([mode.frequency for mode in modes]),
         damping=np.array([mode.damping for mode in modes]),
         modal_mass=np.array([mode.mass for mode in modes]),
