@@ -1,5 +1,10 @@
 """Errors and warnings for users, each with advice."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Any
+
 __all__ = [
     "AccuracyWarning",
     "CacheWarning",
@@ -8,6 +13,9 @@ __all__ = [
     "KlackError",
     "LeftAloneWarning",
     "MissingExtraError",
+    "foreign_reading",
+    "optional_package",
+    "refuse",
     "refuse_if",
     "require_nonnegative",
     "require_positive",
@@ -15,6 +23,7 @@ __all__ = [
 
 
 _LONGEST = 1200  # characters of each part; the names that a study may measure are a thousand
+_LONGEST_FOREIGN = 80  # of what a foreign reader says
 
 
 class KlackError(Exception):
@@ -80,6 +89,35 @@ def refuse_if(wrong: object, where: str, *, got: str, expected: str, hint: str) 
     """Raise :class:`InputError` where a value from the user cannot be used."""
     if wrong:
         raise InputError(where, got=got, expected=expected, hint=hint)
+
+
+def optional_package(package: str, purpose: str, extra: str | None, *, module: str = "") -> Any:
+    """Import a package that need not be installed; ``module`` where it is imported as another."""
+    try:
+        return import_module(module or package)
+    except ImportError as error:
+        raise MissingExtraError(package, purpose, extra) from error
+
+
+@contextmanager
+def foreign_reading(where: str, what: str, hint: str) -> Iterator[None]:
+    """Turn any error of a foreign reader into :class:`InputError`; ``what`` is "an MDF file"."""
+    try:
+        yield
+    except KlackError:
+        raise
+    except Exception as error:  # readers meet damage with any kind of error, bare ones as well
+        said = " ".join(str(error).split())[:_LONGEST_FOREIGN] or type(error).__name__
+        raise InputError(
+            where, got=f"{what} that cannot be read ({said})", expected="a whole file", hint=hint
+        ) from error
+
+
+def refuse(*rules: tuple[object, KlackError]) -> None:
+    """Raise the error of the first rule that is broken: pairs of whether it is, and its error."""
+    for broken, error in rules:
+        if broken:
+            raise error
 
 
 def require_positive(where: str, value: float, unit: str) -> None:

@@ -9,7 +9,6 @@ from klack.assembling.modes import elastic_count
 from klack.case.bodies import CaseFile
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.plausible_material import estimate_material
-from klack.materials import Material
 from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["BodySummary", "summarise_body"]
@@ -84,16 +83,15 @@ def _material(case: CaseFile, body: ElasticBody) -> str:
     given = case.bodies[body.name].matrices
     if given is None:
         materials = case.materials_of(body.name, body.mesh.solids)
-        return "; ".join(dict.fromkeys(_in_words(m) for m in materials.values()))
+        return "; ".join(
+            dict.fromkeys(
+                f"{m.name} (E {m.young / 1e9:.4g} GPa, nu {m.poisson:.3g}, rho {m.density:.5g} "
+                "kg/m3)"
+                for m in materials.values()
+            )
+        )
     found = estimate_material(body.K, body.mesh, body.mass)
     return (
         f"matrices {given.stiffness.name} and {given.mass.name} ({found.density_in_words}, wave "
         f"speed {found.wave_speed:.4g} m/s)"
-    )
-
-
-def _in_words(material: Material) -> str:
-    return (
-        f"{material.name} (E {material.young / 1e9:.4g} GPa, nu {material.poisson:.3g}, "
-        f"rho {material.density:.5g} kg/m3)"
     )

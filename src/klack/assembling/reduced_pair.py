@@ -162,7 +162,14 @@ def own_pair(
                 loops=loops,
             )
         except OverfullModesError:
-            fewer = {name: _fewer(choice) for name, choice in selection.items()}
+            fewer = {
+                name: (
+                    ByCount(max(1, 2 * choice.count // 3))
+                    if isinstance(choice, ByCount)
+                    else choice
+                )
+                for name, choice in selection.items()
+            }
             if fewer == selection:
                 raise
             selection = fewer
@@ -178,11 +185,6 @@ def own_pair(
             stacklevel=2,
         )
     return pair
-
-
-def _fewer(choice: ModeSelection) -> ModeSelection:
-    """About two thirds of the lowest modes; other selections unchanged."""
-    return ByCount(max(1, 2 * choice.count // 3)) if isinstance(choice, ByCount) else choice
 
 
 def reduce_pair(

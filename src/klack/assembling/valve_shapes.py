@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from klack.assembling.spatial import modes_in_network
-from klack.assembling.stops import StopContact
 from klack.assembling.valve import build_valve_bodies, valve_parts
 from klack.case.valve import ValveCase
 from klack.elasticity.body import ElasticBody
@@ -67,20 +66,17 @@ def valve_shapes(
     for name, body in parts.bodies.items():
         kept = modes_in_network(case, name, parts.pools, parts.ports)
         rigid = body.rigid_modes
-        touching = [c for c in parts.contacts.values() if name in _sides(c)]
+        touching = [
+            c for c in parts.contacts.values() if name in (c.pair.upper.name, c.pair.lower.name)
+        ]
         found[name] = BodyShapes(
             body=body,
             shapes=np.hstack([rigid, kept.shapes]),
             omega=np.append(np.zeros(rigid.shape[1]), kept.omega),
-            above={c.name: c.pair.shift + _gap(case, c.name) for c in touching},
+            above={
+                c.name: c.pair.shift + float(getattr(case.network.components[c.name], "gap", 0.0))
+                for c in touching
+            },
             is_upper={c.name: c.pair.upper.name == name for c in touching},
         )
     return found
-
-
-def _sides(contact: StopContact) -> tuple[str, str]:
-    return contact.pair.upper.name, contact.pair.lower.name
-
-
-def _gap(case: ValveCase, stop: str) -> float:
-    return float(getattr(case.network.components[stop], "gap", 0.0))

@@ -9,6 +9,7 @@ from klack.case.given_consistency import check_given, check_port
 from klack.case.impact_sections import ImpactSections
 from klack.case.outputs import check_outputs
 from klack.contact.friction import MOST_FRICTION
+from klack.errors import refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
 
@@ -108,21 +109,27 @@ def check_surface(case: CaseFile, key: Key, surface: SurfaceName) -> None:
 
 def _check_roles(case: ImpactSections) -> None:
     moving, stop = case.contact.between
-    if moving.body == stop.body:
-        raise CaseProblem(
-            ("contact", "between"),
-            got=f"{moving} and {stop}, two surfaces of one body",
-            expected="surfaces of two bodies",
-            hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
-        )
-    if case.moving_body.fixed:
-        raise CaseProblem(
-            ("bodies", moving.body, "fixed"),
-            got=f"supports of '{moving.body}', the body that moves",
-            expected="no supports there",
-            hint="remove 'fixed', or swap the two surfaces in contact.between.",
-            on_key=True,
-        )
+    refuse(
+        (
+            moving.body == stop.body,
+            CaseProblem(
+                ("contact", "between"),
+                got=f"{moving} and {stop}, two surfaces of one body",
+                expected="surfaces of two bodies",
+                hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
+            ),
+        ),
+        (
+            case.moving_body.fixed,
+            CaseProblem(
+                ("bodies", moving.body, "fixed"),
+                got=f"supports of '{moving.body}', the body that moves",
+                expected="no supports there",
+                hint="remove 'fixed', or swap the two surfaces in contact.between.",
+                on_key=True,
+            ),
+        ),
+    )
     models = [case.bodies[s.body].geometry.dimension for s in case.contact.between]
     if models[0] != models[1] and case.has_surfaces:
         flat, solid = (moving, stop) if models[0] == 2 else (stop, moving)
@@ -181,21 +188,27 @@ def _check_local_law(case: ImpactSections) -> None:
     correction, law = case.reduction.correction, case.contact.local_law.kind
     if not case.has_surfaces:
         return  # in given_consistency
-    if correction == "consistent" and law != "consistent":
-        raise CaseProblem(
-            ("contact", "local_law", "kind"),
-            got=f"a {law} law with the correction 'consistent'",
-            expected="the law 'consistent', which carries the residual compliance",
-            hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
-        )
-    if correction != "consistent" and law == "consistent":
-        raise CaseProblem(
-            ("reduction", "correction"),
-            got=f"the correction '{correction}' with a consistent local law",
-            expected="a local law of the kind linear, hertz or submodel",
-            hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
-            "correction 'consistent'.",
-        )
+    refuse(
+        (
+            correction == "consistent" and law != "consistent",
+            CaseProblem(
+                ("contact", "local_law", "kind"),
+                got=f"a {law} law with the correction 'consistent'",
+                expected="the law 'consistent', which carries the residual compliance",
+                hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
+            ),
+        ),
+        (
+            correction != "consistent" and law == "consistent",
+            CaseProblem(
+                ("reduction", "correction"),
+                got=f"the correction '{correction}' with a consistent local law",
+                expected="a local law of the kind linear, hertz or submodel",
+                hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
+                "correction 'consistent'.",
+            ),
+        ),
+    )
 
 
 def _check_opposite(case: ImpactSections) -> None:
@@ -205,20 +218,26 @@ def _check_opposite(case: ImpactSections) -> None:
         check_surface(case, ("opposite", "between", i), surface)
     stop, moving = case.opposite.between
     between = [surface.body for surface in case.contact.between]
-    if moving.body != between[0] or stop.body in between:
-        raise CaseProblem(
-            ("opposite", "between"),
-            got=f"{stop} and {moving}",
-            expected=f"a surface of the third body, then one of '{between[0]}', which moves",
-            hint="the upper stop is a separate body.",
-        )
-    if case.bodies[stop.body].geometry.dimension != case.dimension:
-        raise CaseProblem(
-            ("bodies", stop.body, "geometry", "model"),
-            got=f"'{stop.body}' of another dimension than the moving body",
-            expected="all bodies axisymmetric or all three-dimensional",
-            hint="take 'model: swept' with 'layers: 18'.",
-        )
+    refuse(
+        (
+            moving.body != between[0] or stop.body in between,
+            CaseProblem(
+                ("opposite", "between"),
+                got=f"{stop} and {moving}",
+                expected=f"a surface of the third body, then one of '{between[0]}', which moves",
+                hint="the upper stop is a separate body.",
+            ),
+        ),
+        (
+            case.bodies[stop.body].geometry.dimension != case.dimension,
+            CaseProblem(
+                ("bodies", stop.body, "geometry", "model"),
+                got=f"'{stop.body}' of another dimension than the moving body",
+                expected="all bodies axisymmetric or all three-dimensional",
+                hint="take 'model: swept' with 'layers: 18'.",
+            ),
+        ),
+    )
 
 
 def _check_roughness(case: ImpactSections) -> None:
@@ -302,22 +321,29 @@ def _check_ends(case: ImpactSections) -> None:
             continue
         key: Key = ("bodies", name, "non_reflecting")
         stop = case.contact.stop
-        if case.shots is not None or case.opposite is not None:
-            raise CaseProblem(
-                key,
-                got="a non-reflecting end together with 'shots' or 'opposite'",
-                expected="neither of them: both are for the interface level",
-                hint="remove non_reflecting.",
-                on_key=True,
-            )
-        if name != stop.body or not body.has_surfaces or not isinstance(body.material, str):
-            raise CaseProblem(
-                key,
-                got=f"a non-reflecting end of '{name}'",
-                expected=f"one of '{stop.body}', the body that is hit, meshed and of one material",
-                hint="the body that moves would be braked by it from the start.",
-                on_key=True,
-            )
+        refuse(
+            (
+                case.shots is not None or case.opposite is not None,
+                CaseProblem(
+                    key,
+                    got="a non-reflecting end together with 'shots' or 'opposite'",
+                    expected="neither of them: both are for the interface level",
+                    hint="remove non_reflecting.",
+                    on_key=True,
+                ),
+            ),
+            (
+                name != stop.body or not body.has_surfaces or not isinstance(body.material, str),
+                CaseProblem(
+                    key,
+                    got=f"a non-reflecting end of '{name}'",
+                    expected=f"one of '{stop.body}', the body that is hit, meshed and of one "
+                    "material",
+                    hint="the body that moves would be braked by it from the start.",
+                    on_key=True,
+                ),
+            ),
+        )
         check_surface(case, key, SurfaceName(body=name, surface=body.non_reflecting))
         held = [support.surface for support in body.fixed or ()]
         if body.non_reflecting in (stop.surface, *held):

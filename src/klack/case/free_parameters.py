@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from klack.case.calibration import CalibrationParameter
 from klack.case.key_path import Quantity, quantity_at, split_path
 from klack.case.valve_sections import ValveSections
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import Kind, format_si
 
@@ -96,7 +96,9 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
                 _require_cheap(behind, text, direct=behind == key)
             places.append(quantity_at(case, key))
         except CaseProblem as problem:
-            raise _moved(problem, at) from None
+            raise CaseProblem(
+                at, got=problem.got, expected=problem.expected, hint=problem.hint
+            ) from None
     first = places[0]
     for i, place in enumerate(places[1:], 1):
         if place.kind != first.kind or place.value != first.value:
@@ -109,20 +111,26 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
     bounds = {side: _bound(places, where, side, getattr(item, side)) for side in ("lower", "upper")}
     lower, upper = bounds["lower"], bounds["upper"]
     unit = first.kind.unit
-    if not lower < upper:
-        raise CaseProblem(
-            (*where, "upper"),
-            got=format_si(upper, unit),
-            expected=f"more than the lower bound, {format_si(lower, unit)}",
-            hint="swap them, or check the units.",
-        )
-    if not lower <= first.value <= upper:
-        raise CaseProblem(
-            where,
-            got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
-            expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
-            hint="the search begins at the value of the case: change it, or the bounds.",
-        )
+    refuse(
+        (
+            not lower < upper,
+            CaseProblem(
+                (*where, "upper"),
+                got=format_si(upper, unit),
+                expected=f"more than the lower bound, {format_si(lower, unit)}",
+                hint="swap them, or check the units.",
+            ),
+        ),
+        (
+            not lower <= first.value <= upper,
+            CaseProblem(
+                where,
+                got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
+                expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
+                hint="the search begins at the value of the case: change it, or the bounds.",
+            ),
+        ),
+    )
     return FreeParameter(name, tuple(places), lower, upper, first.value)
 
 
@@ -156,7 +164,3 @@ def _bound(places: list[Quantity], where: Key, side: str, text: str | float) -> 
         raise CaseProblem(
             (*where, side), got=problem.got, expected=problem.expected, hint=problem.hint
         ) from None
-
-
-def _moved(problem: CaseProblem, key: Key) -> CaseProblem:
-    return CaseProblem(key, got=problem.got, expected=problem.expected, hint=problem.hint)

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import Count, Name, Number, Section
@@ -233,26 +233,32 @@ class Geometry(Section):
     @model_validator(mode="after")
     def _consistent(self) -> Self:
         kind = self._exactly_one(("profile", "step", "mesh", "nodes"), "where the shape comes from")
-        if kind == "profile" and self.model is None:
-            raise CaseProblem(
-                (),
-                got="a profile without model",
-                expected="model: axisymmetric, swept or solid",
-                hint="start with axisymmetric; swept for bodies held in sectors.",
-            )
         allowed = {
             "profile": ("axisymmetric", "swept", "solid"),
             "step": ("solid",),
             "mesh": ("solid", "axisymmetric"),
             "nodes": ("solid", "axisymmetric"),
         }[kind]
-        if self.model is not None and self.model not in allowed:
-            raise CaseProblem(
-                ("model",),
-                got=f"model {self.model} for a {kind}",
-                expected=f"one of: {', '.join(allowed)}",
-                hint="a profile can be turned into any of the three models.",
-            )
+        refuse(
+            (
+                kind == "profile" and self.model is None,
+                CaseProblem(
+                    (),
+                    got="a profile without model",
+                    expected="model: axisymmetric, swept or solid",
+                    hint="start with axisymmetric; swept for bodies held in sectors.",
+                ),
+            ),
+            (
+                self.model is not None and self.model not in allowed,
+                CaseProblem(
+                    ("model",),
+                    got=f"model {self.model} for a {kind}",
+                    expected=f"one of: {', '.join(allowed)}",
+                    hint="a profile can be turned into any of the three models.",
+                ),
+            ),
+        )
         if self.model == "swept" and self.layers is None:
             hint = "use 18: contact of turned parts needs few layers."
             raise CaseProblem((), got="a swept body without layers", expected="layers", hint=hint)

@@ -6,6 +6,7 @@ sound) is refused here, before anything is read.
 
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.impact_sections import ImpactSections
+from klack.errors import refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 
 __all__ = ["GIVEN_LEVELS", "check_given", "check_port", "require_surfaces"]
@@ -61,48 +62,62 @@ def check_given(case: ImpactSections) -> None:
                 hint=f"remove '{section}', or give '{name}' a mesh.",
                 on_key=True,
             )
-    if not case.motion.placement.is_centred:
-        raise CaseProblem(
-            ("motion", "placement"),
-            got=f"an off-axis placement with '{name}', {what}",
-            expected="a centred body: a port moves along the axis alone",
-            hint="remove 'placement'.",
-            on_key=True,
-        )
-    if case.run.transfer is not None:
-        raise CaseProblem(
-            ("run", "transfer"),
-            got=f"transfer functions of the full order with '{name}', {what}",
-            expected="bodies that klack reduces itself",
-            hint="remove 'transfer'.",
-            on_key=True,
-        )
-    if case.reduction.shifts:
-        raise CaseProblem(
-            ("reduction", "shifts"),
-            got=f"shifts of attachment modes with '{name}', {what}",
-            expected="two meshed bodies: there are no attachment modes without",
-            hint="remove 'shifts'.",
-            on_key=True,
-        )
+    refuse(
+        (
+            not case.motion.placement.is_centred,
+            CaseProblem(
+                ("motion", "placement"),
+                got=f"an off-axis placement with '{name}', {what}",
+                expected="a centred body: a port moves along the axis alone",
+                hint="remove 'placement'.",
+                on_key=True,
+            ),
+        ),
+        (
+            case.run.transfer is not None,
+            CaseProblem(
+                ("run", "transfer"),
+                got=f"transfer functions of the full order with '{name}', {what}",
+                expected="bodies that klack reduces itself",
+                hint="remove 'transfer'.",
+                on_key=True,
+            ),
+        ),
+        (
+            case.reduction.shifts,
+            CaseProblem(
+                ("reduction", "shifts"),
+                got=f"shifts of attachment modes with '{name}', {what}",
+                expected="two meshed bodies: there are no attachment modes without",
+                hint="remove 'shifts'.",
+                on_key=True,
+            ),
+        ),
+    )
     _check_law(case, name, what)
-    if not case.contact.faces.is_none:
-        raise CaseProblem(
-            ("contact", "friction" if case.contact.friction else "static_friction"),
-            got=f"friction with '{name}', {what}",
-            expected="no friction: without a surface nothing is known of its slip",
-            hint="leave it out, or give the body a mesh.",
-        )
     forms = ("crown", "waviness", "tilt", "roughness")
     form = next((key for key in forms if getattr(case.contact, key)), None)
-    if form is not None:
-        raise CaseProblem(
-            ("contact", form),
-            got=f"the key '{form}' of faces with '{name}', {what}",
-            expected="bodies with surfaces",
-            hint=f"remove '{form}', or give '{name}' a mesh.",
-            on_key=True,
-        )
+    refuse(
+        (
+            not case.contact.faces.is_none,
+            CaseProblem(
+                ("contact", "friction" if case.contact.friction else "static_friction"),
+                got=f"friction with '{name}', {what}",
+                expected="no friction: without a surface nothing is known of its slip",
+                hint="leave it out, or give the body a mesh.",
+            ),
+        ),
+        (
+            form is not None,
+            CaseProblem(
+                ("contact", form),
+                got=f"the key '{form}' of faces with '{name}', {what}",
+                expected="bodies with surfaces",
+                hint=f"remove '{form}', or give '{name}' a mesh.",
+                on_key=True,
+            ),
+        ),
+    )
     for i, level in enumerate(case.run.levels):
         if level not in GIVEN_LEVELS:
             raise CaseProblem(

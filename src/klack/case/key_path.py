@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from klack.case.distribution import Distribution
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
 from klack.units import RATIO, Kind, parse_quantity
@@ -108,7 +108,11 @@ def node_at(case: Section, key: Key) -> tuple[Any, FieldInfo | None]:
                 hint=nearest(str(part), map(str, known), "write the path from the top."),
             )
         if isinstance(node, Section):
-            field = _fields(node)[str(part)]
+            field = next(
+                info
+                for name, info in type(node).model_fields.items()
+                if (info.alias or name) == part
+            )
         node = found[part]
         if isinstance(node, Distribution):
             node = node.written
@@ -154,20 +158,27 @@ def _require_of_case(case: Section, key: Key) -> None:
         return
     place = ".".join(map(str, key))
     copy = found.origin(key).copy
-    if copy:
-        raise CaseProblem(
-            (),
-            got=f"'{place}', which stands in the part '{copy}'",
-            expected="a key of the case itself",
-            hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
-        )
-    if not found.behind(key):
-        raise CaseProblem(
-            (),
-            got=f"'{place}', which no value of the case follows from",
-            expected="a parameter that the case uses",
-            hint="use it in an expression: '= ...'.",
-        )
+    refuse(
+        (
+            copy,
+            CaseProblem(
+                (),
+                got=f"'{place}', which stands in the part '{copy}'",
+                expected="a key of the case itself",
+                hint="make it a parameter of the part, and name include.N.with.PARAMETER (N "
+                "from 0).",
+            ),
+        ),
+        (
+            not found.behind(key),
+            CaseProblem(
+                (),
+                got=f"'{place}', which no value of the case follows from",
+                expected="a parameter that the case uses",
+                hint="use it in an expression: '= ...'.",
+            ),
+        ),
+    )
 
 
 def _advice(key: Key, node: Any) -> str:
@@ -206,10 +217,6 @@ def _below(node: Any) -> tuple[list[str | int], dict[str | int, Any]]:
     elif isinstance(node, Sequence) and not isinstance(node, str):
         found = dict(enumerate(node))
     return list(found), found
-
-
-def _fields(node: Section) -> dict[str, FieldInfo]:
-    return {info.alias or name: info for name, info in type(node).model_fields.items()}
 
 
 def kind_in(annotation: Any, metadata: Sequence[Any]) -> Kind | None:

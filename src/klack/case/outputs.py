@@ -5,6 +5,7 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from klack.errors import refuse
 from klack.gauges.gauge import GaugeKind
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Number, Section
@@ -116,33 +117,41 @@ def check_outputs(
                 hint="names are those of channels in the results.",
             )
         names.add(output.name)
-        if other:
-            raise CaseProblem(
-                ("outputs",),
-                got=f"outputs together with '{other}'",
-                expected="bodies that the contact alone acts on, with their meshes",
-                hint=f"remove outputs, or '{other}'.",
-                on_key=True,
-            )
         dimension = dimensions[output.body]
         axes = _AXES[dimension]
-        if len(output.at) != dimension:
-            raise CaseProblem(
-                ("outputs", i, "at"),
-                got=f"{len(output.at)} coordinates",
-                expected=f"[{', '.join(axes)}] of '{output.body}'",
-                hint="coordinates are those of the drawing.",
-            )
         known = (*axes, "around") if dimension == 2 else axes
         fits = (
             output.direction in known
             if isinstance(output.direction, str)
             else len(output.direction) == dimension
         )
-        if not fits:
-            raise CaseProblem(
-                ("outputs", i, "direction"),
-                got=f"{output.direction}",
-                expected=f"one of: {', '.join(known)}, or {dimension} numbers",
-                hint=f"'{output.body}' has the coordinates {', '.join(axes)}.",
-            )
+        refuse(
+            (
+                other,
+                CaseProblem(
+                    ("outputs",),
+                    got=f"outputs together with '{other}'",
+                    expected="bodies that the contact alone acts on, with their meshes",
+                    hint=f"remove outputs, or '{other}'.",
+                    on_key=True,
+                ),
+            ),
+            (
+                len(output.at) != dimension,
+                CaseProblem(
+                    ("outputs", i, "at"),
+                    got=f"{len(output.at)} coordinates",
+                    expected=f"[{', '.join(axes)}] of '{output.body}'",
+                    hint="coordinates are those of the drawing.",
+                ),
+            ),
+            (
+                not fits,
+                CaseProblem(
+                    ("outputs", i, "direction"),
+                    got=f"{output.direction}",
+                    expected=f"one of: {', '.join(known)}, or {dimension} numbers",
+                    hint=f"'{output.body}' has the coordinates {', '.join(axes)}.",
+                ),
+            ),
+        )

@@ -51,7 +51,11 @@ def self_contained(text: str, path: Path, data: Any, lines: Lines) -> tuple[str,
         or that is nested too deeply.
     """
     kept = data.get("parts")
-    kept = dict(kept) if _is_texts(kept) else {}
+    kept = (
+        dict(kept)
+        if isinstance(kept, Mapping) and all(isinstance(text, str) for text in kept.values())
+        else {}
+    )
     found = _Found(path.parent, dict(kept), len(text.encode()))
     _collect(found, data, (str(path),), "", lambda key: _where(path, lines, key))
     new = {name: part for name, part in found.texts.items() if name not in kept}
@@ -162,10 +166,6 @@ def _scalar(text: str) -> str:
 
 def _is_plain(line: str) -> bool:
     return line.isprintable() and (not line or line.strip() != "")
-
-
-def _is_texts(value: Any) -> bool:
-    return isinstance(value, Mapping) and all(isinstance(text, str) for text in value.values())
 
 
 def _where(path: Path, lines: Lines, key: Key) -> str:

@@ -6,6 +6,7 @@ from klack.case.shots_of_valve import check_shots_of_valve
 from klack.case.spatial_consistency import check_motion
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
+from klack.errors import refuse
 from klack.input.problem import CaseProblem, Key, one_of
 from klack.network.component import Component
 
@@ -163,20 +164,26 @@ def _check_laws(case: ValveSections) -> None:
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):
             continue
-        if name not in case.stops:
-            raise CaseProblem(
-                ("network", "components", name, "law"),
-                got="a consistent law, but no surfaces to compute it from",
-                expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
-                hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
-            )
-        if case.reduction.correction != "consistent":
-            raise CaseProblem(
-                ("reduction", "correction"),
-                got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
-                expected="the correction 'consistent'",
-                hint="or give the end stop a linear law.",
-            )
+        refuse(
+            (
+                name not in case.stops,
+                CaseProblem(
+                    ("network", "components", name, "law"),
+                    got="a consistent law, but no surfaces to compute it from",
+                    expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
+                    hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
+                ),
+            ),
+            (
+                case.reduction.correction != "consistent",
+                CaseProblem(
+                    ("reduction", "correction"),
+                    got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
+                    expected="the correction 'consistent'",
+                    hint="or give the end stop a linear law.",
+                ),
+            ),
+        )
 
 
 def _check_friction(case: ValveSections) -> None:

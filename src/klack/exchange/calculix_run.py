@@ -119,7 +119,7 @@ def run_calculix(
                 process.kill()
                 process.wait()
     data = deck.with_suffix(".dat")
-    if code != 0 or not _finished(log):
+    if code != 0 or "Job finished" not in _tail(log):
         raise _failure(deck, log, code)
     return CalculixRun(data=data, wall_time=monotonic() - begin)
 
@@ -158,10 +158,6 @@ def _reached(status: Path) -> float:
         return float(lines[-1].split()[4])
     except (OSError, IndexError, ValueError):  # not yet there, or a line half written
         return 0.0
-
-
-def _finished(log: Path) -> bool:
-    return "Job finished" in _tail(log)
 
 
 def _failure(deck: Path, log: Path, code: int) -> InputError | ConvergenceError:

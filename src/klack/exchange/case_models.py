@@ -202,7 +202,11 @@ def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseM
             expected="at least one component of type end-stop",
             hint="export the bodies alone: --part body.",
         )
-    used = [body for body in valve.reduced.values() if _is_used(body.name, contacts)]
+    used = [
+        body
+        for body in valve.reduced.values()
+        if any(body.name in (contact.body_a, contact.body_b) for contact in contacts)
+    ]
     pair = pair_model(
         f"{case.name}_pair",
         ReducedSystem(bodies=tuple(used), contacts=tuple(contacts)),
@@ -236,10 +240,6 @@ def _body_of(part: object) -> str:
             hint="describe it as a body of the case and a flexible-body of the network.",
         )
     return part.body
-
-
-def _is_used(name: str, contacts: list[ContactPair]) -> bool:
-    return any(name in (contact.body_a, contact.body_b) for contact in contacts)
 
 
 def _provenance(case: Case | ValveCase, meshes: Mapping[str, Mesh]) -> Provenance:

@@ -20,7 +20,7 @@ from scipy.sparse import csc_array, diags_array
 
 from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.contact.step_constants import RELAXATION
-from klack.errors import InputError, MissingExtraError
+from klack.errors import InputError, optional_package
 from klack.exchange.modal_model import ModalModel, ModelContact
 
 if TYPE_CHECKING:
@@ -180,10 +180,7 @@ def to_control(model: ModalModel, *, residual_compliance: bool = False) -> "cont
     MissingExtraError
         Without the package ``control``.
     """
-    try:
-        import control
-    except ImportError as error:
-        raise MissingExtraError("control", "A model for python-control", None) from error
+    control = optional_package("control", "A model for python-control", None)
     form = state_space(model)
     return control.StateSpace(
         form.A,

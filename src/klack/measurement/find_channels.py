@@ -205,7 +205,7 @@ def _guess(
     if len(found) > 1:
         whole = [info for info in found if _last_part(info.name).lower() == role]
         found = whole if len(whole) == 1 else found
-    if len(found) > 1 and not _is_series(found):
+    if len(found) > 1 and len({re.sub(r"\d+", "#", info.name) for info in found}) > 1:
         if must:
             raise _ambiguous(recording, role, found)
         return ()
@@ -222,11 +222,6 @@ def _named_like(role: Role, info: ChannelInfo) -> bool:
         return False
     word = rf"(\w*_)?({_WORDS[role]})(_?\d+)?(_\w*)?"
     return re.fullmatch(word, name) is not None
-
-
-def _is_series(infos: Sequence[ChannelInfo]) -> bool:
-    """True if the names differ in their numbers only."""
-    return len({re.sub(r"\d+", "#", info.name) for info in infos}) == 1
 
 
 def _pair(

@@ -152,7 +152,11 @@ def unit_factor(text: str, quantity: Role | Kind, where: str) -> UnitFactor:
     """
     kind = quantity if isinstance(quantity, Kind) else ROLES[quantity]
     unit = plain_unit(text)
-    table = _TIMES if kind is TIME else _table(kind)
+    table = (
+        _TIMES
+        if kind is TIME
+        else next((units for role, units in _TABLE.items() if ROLES[role] is kind))
+    )
     if unit in table:
         return UnitFactor(table[unit], _ATMOSPHERE if unit in _GAUGE else 0.0)
     if no_unit(text):
@@ -193,7 +197,3 @@ def roles_of_unit(text: str) -> tuple[Role, ...]:
 def is_unit(text: str) -> bool:
     """True for a usual unit of time or of any role."""
     return plain_unit(text) in _TIMES or bool(roles_of_unit(text))
-
-
-def _table(kind: Kind) -> Mapping[str, float]:
-    return next(units for role, units in _TABLE.items() if ROLES[role] is kind)

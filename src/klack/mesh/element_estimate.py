@@ -102,7 +102,10 @@ def require_meshable(
     total = sum(counts.values())
     needed = element_memory(dimension, total)
     worst = max(counts, key=lambda name: counts[name])
-    size = {"size": sizing.size, "contact.size": _finest(sizing)}.get(worst)
+    size = {
+        "size": sizing.size,
+        "contact.size": min((item.size for item in sizing.refinements), default=sizing.size),
+    }.get(worst)
     if size is None:
         size = sizing.surfaces[worst.removeprefix("surfaces.")]
     power = dimension - (1 if worst.startswith("surfaces.") else 0)
@@ -113,10 +116,6 @@ def require_meshable(
         what=f"{format_si(size, 'm', 3)}, which gives some {total:.1g} elements, a mesh",
         hint=f"a 'mesh: {worst}' of {format_si(fitting, 'm', 2)} or more; check its unit.",
     )
-
-
-def _finest(sizing: MeshSizing) -> float:
-    return min((item.size for item in sizing.refinements), default=sizing.size)
 
 
 def _region(refinement: Refinement, dimension: int) -> float:

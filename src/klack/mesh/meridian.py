@@ -82,7 +82,9 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
     segment_edge = _find_edges(edges, tri.segments)
     for k, curve in enumerate(tri.curves):
         on = tri.segment_curves == k
-        midpoints[segment_edge[on]] = _middle_on_curve(curve, points[tri.segments[on]])
+        midpoints[segment_edge[on]] = curve.at(
+            curve.fraction(points[tri.segments[on]]).mean(axis=1)
+        )
     connectivity = np.hstack([tri.triangles, len(points) + local_edges])
     blocks = tuple(
         ElementBlock("tri6", connectivity[tri.domains == i], solid)
@@ -193,11 +195,6 @@ def _corners_on_curves(tri: _Triangulation) -> NDArray[np.float64]:
     same = gap.min(axis=1) < 1e-9 * np.ptp(ends, axis=0).max()
     points[boundary[same]] = ends[nearest[same]]
     return points
-
-
-def _middle_on_curve(curve: Curve, ends: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Points of the edge halfway between pairs of its points, (n, 2, 2) -> (n, 2) [m]."""
-    return curve.at(curve.fraction(ends).mean(axis=1))
 
 
 def _unique_edges(triangles: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.model_files.system_matrix import (
     Role,
     RowPlaces,
@@ -151,15 +151,21 @@ def _places(
     marks, _ = file.integers(at)
     equations, directions = int(head[_EQUATIONS]), int(head[_DOFS])
     uniform = len(counts) == len(nodes) and bool(np.all(counts == len(labels)))
-    if not uniform or directions != len(labels) or equations != len(nodes) * len(labels):
-        raise InputError(
-            str(file.path),
-            got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
-            expected="nodes that all have the same degrees of freedom",
-            hint="export a model of solid elements alone; no mass, contact or beam elements.",
-        )
-    if len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)):
-        raise _damaged(file.path, "inconsistent nodes, directions or marks")
+    refuse(
+        (
+            not uniform or directions != len(labels) or equations != len(nodes) * len(labels),
+            InputError(
+                str(file.path),
+                got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
+                expected="nodes that all have the same degrees of freedom",
+                hint="export a model of solid elements alone; no mass, contact or beam elements.",
+            ),
+        ),
+        (
+            len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)),
+            _damaged(file.path, "inconsistent nodes, directions or marks"),
+        ),
+    )
     rows = RowPlaces(
         np.repeat(nodes, len(labels)).astype(np.int64),
         np.tile(labels, len(nodes)).astype(np.int64),

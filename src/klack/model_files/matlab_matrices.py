@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.errors import InputError, KlackError, MissingExtraError
+from klack.errors import InputError, foreign_reading, optional_package
 from klack.model_files.mat5 import read_mat5
 from klack.model_files.stored_sparse import compressed_matrix, dense_matrix
 from klack.model_files.system_matrix import Role, SystemMatrix, choose_matrix
@@ -35,18 +35,8 @@ def read_matlab_matrix(path: Path, name: str | None, role: Role | None) -> Syste
     with path.open("rb") as stream:
         start = stream.read(520)
     reader = _hdf5 if start[:4] == _HDF5 or start[512:516] == _HDF5 else _classic
-    try:
+    with foreign_reading(str(path), "a MATLAB file", _HINT):
         return reader(path, name, role)
-    except KlackError:
-        raise
-    except Exception as error:  # h5py meets damage with any kind of error
-        said = " ".join(str(error).split())[:80] or type(error).__name__
-        raise InputError(
-            str(path),
-            got=f"a MATLAB file that cannot be read ({said})",
-            expected="a whole file",
-            hint=_HINT,
-        ) from error
 
 
 def _classic(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
@@ -106,10 +96,7 @@ def _matrix(path: Path, name: str, value: Any) -> SystemMatrix:
 
 
 def _hdf5(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
-    try:
-        import h5py
-    except ImportError as error:
-        raise MissingExtraError("h5py", f"reading {path.name} (MATLAB 7.3)", "exchange") from error
+    h5py = optional_package("h5py", f"reading {path.name} (MATLAB 7.3)", "exchange")
     with h5py.File(path, "r") as file:
         found = dict(_variables(file, ""))
         last = {key.rpartition(".")[2]: key for key in found}

@@ -4,7 +4,7 @@ Nothing in such a file is executed, and sizes are checked before memory is taken
 """
 
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array
 
-from klack.errors import InputError, KlackError
+from klack.errors import InputError, foreign_reading
 from klack.model_files.mat5 import MatValue, read_mat5
 from klack.model_files.matrix_listing import read_listing
 
@@ -119,13 +119,6 @@ def read_named_arrays(path: Path) -> NamedArrays:
 Read = tuple[dict[str, NDArray[np.float64]], dict[str, tuple[str, ...]]]
 
 
-def _damaged(path: Path, what: str, error: Exception, hint: str) -> InputError:
-    said = " ".join(str(error).split())[:80] or type(error).__name__
-    return InputError(
-        str(path), got=f"{what} that cannot be read ({said})", expected="a whole file", hint=hint
-    )
-
-
 def _too_large(path: Path, size: int) -> InputError:
     return InputError(
         str(path),
@@ -185,29 +178,43 @@ def _collect(
 def _numpy(path: Path) -> Read:
     arrays: dict[str, NDArray[np.float64]] = {}
     texts: dict[str, tuple[str, ...]] = {}
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(item.file_size for item in archive.infolist())
-            if size > _LARGEST:
-                raise _too_large(path, size)
-            for item in archive.infolist():
-                if item.filename.endswith(".npy"):
-                    value = _entry(path, archive, item)
-                    key = item.filename.removesuffix(".npy")
-                    if value.dtype.kind == "U":
-                        texts[key] = tuple(str(text).strip() for text in value.ravel())
-                    elif value.dtype.kind in _NUMBERS and value.ndim <= 2:
-                        arrays[key] = np.atleast_2d(np.array(value, dtype=np.float64))
-    except KlackError:
-        raise
-    except Exception as error:  # zipfile and numpy meet damage with many kinds of error
-        hint = "write it again with numpy.savez, arrays of numbers and texts alone."
-        raise _damaged(path, "a NumPy file", error, hint) from error
+    hint = "write it again with numpy.savez, arrays of numbers and texts alone."
+    with foreign_reading(str(path), "a NumPy file", hint), zipfile.ZipFile(path) as archive:
+        size = sum(item.file_size for item in archive.infolist())
+        if size > _LARGEST:
+            raise _too_large(path, size)
+        for item in archive.infolist():
+            if item.filename.endswith(".npy"):
+                value = _entry(path, archive, item)
+                key = item.filename.removesuffix(".npy")
+                if value.dtype.kind == "U":
+                    texts[key] = tuple(str(text).strip() for text in value.ravel())
+                elif value.dtype.kind in _NUMBERS and value.ndim <= 2:
+                    arrays[key] = np.atleast_2d(np.array(value, dtype=np.float64))
     return arrays, texts
 
 
 def _entry(path: Path, archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> NDArray[Any]:
-    """One array, its size checked against that of its entry first; never a pickled object."""
+    return npy_array(
+        archive,
+        item,
+        item.file_size,
+        lambda shape, dtype: InputError(
+            str(path),
+            got=f"'{item.filename}' of shape {shape} and type {dtype}",
+            expected="numbers or texts, as many as the file holds",
+            hint="store plain arrays; objects are refused.",
+        ),
+    )
+
+
+def npy_array(
+    archive: zipfile.ZipFile,
+    item: zipfile.ZipInfo,
+    room: int,
+    refusal: Callable[[tuple[int, ...], np.dtype[Any]], InputError],
+) -> NDArray[Any]:
+    """One array, its size checked against ``room`` [bytes] first; never a pickled object."""
     with archive.open(item) as stream:
         version = np.lib.format.read_magic(stream)
         head = (
@@ -217,12 +224,7 @@ def _entry(path: Path, archive: zipfile.ZipFile, item: zipfile.ZipInfo) -> NDArr
         )
         shape, fortran, dtype = head(stream)
         count = int(np.prod([float(n) for n in shape]))
-        if dtype.hasobject or any(n < 0 for n in shape) or count * dtype.itemsize > item.file_size:
-            raise InputError(
-                str(path),
-                got=f"'{item.filename}' of shape {shape} and type {dtype}",
-                expected="numbers or texts, as many as the file holds",
-                hint="store plain arrays; objects are refused.",
-            )
+        if dtype.hasobject or any(n < 0 for n in shape) or count * dtype.itemsize > room:
+            raise refusal(shape, dtype)
         values = np.frombuffer(stream.read(count * dtype.itemsize), dtype=dtype, count=count)
     return values.reshape(shape, order="F" if fortran else "C")

@@ -68,11 +68,10 @@ def number_rows(
 def _rows(
     block: bytes, columns: int, where: str, line: int, comments: bytes
 ) -> NDArray[np.float64]:
-    text = block
-    if any(block.find(bytes([sign])) >= 0 for sign in comments):
+    text, signs = block, tuple(bytes([sign]) for sign in comments)
+    if any(sign in block for sign in signs):
         text = b"\n".join(
-            b"" if row.lstrip()[:1] in _signs(comments) and row.strip() else row
-            for row in block.split(b"\n")
+            b"" if row.lstrip()[:1] in signs and row.strip() else row for row in block.split(b"\n")
         )
     values = numbers_in(text)
     if values is None or not _even(text, columns, len(values)):
@@ -82,10 +81,6 @@ def _rows(
                 raise _not_numbers(where, number, row, columns)
         raise _not_numbers(where, line, text, columns)
     return values.reshape(-1, columns)
-
-
-def _signs(comments: bytes) -> tuple[bytes, ...]:
-    return tuple(bytes([sign]) for sign in comments)
 
 
 def _even(text: bytes, columns: int, count: int) -> bool:

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from klack.errors import InputError, KlackError
+from klack.errors import InputError, foreign_reading
+from klack.model_files.named_arrays import npy_array
 from klack.model_files.stored_sparse import (
     Checked,
     compressed_matrix,
@@ -48,24 +49,17 @@ class _Arrays:
 
     def __getitem__(self, name: str) -> Any:
         item = self._entry[name]
-        with self._archive.open(item) as stream:
-            version = np.lib.format.read_magic(stream)
-            head = np.lib.format.read_array_header_1_0
-            if version != (1, 0):
-                head = np.lib.format.read_array_header_2_0
-            shape, fortran, dtype = head(stream)
-            count = int(np.prod([float(n) for n in shape]))
-            size = count * dtype.itemsize
-            whole = all(n >= 0 for n in shape) and size <= min(item.file_size, self._room)
-            if dtype.hasobject or not whole:
-                raise InputError(
-                    f"{self.path}: {name}",
-                    got=f"an array of shape {shape} and type {dtype}",
-                    expected="numbers, as many as the file holds",
-                    hint=_HINT,
-                )
-            values = np.frombuffer(stream.read(size), dtype=dtype, count=count)
-        return values.reshape(shape, order="F" if fortran else "C")
+        return npy_array(
+            self._archive,
+            item,
+            min(item.file_size, self._room),
+            lambda shape, dtype: InputError(
+                f"{self.path}: {name}",
+                got=f"an array of shape {shape} and type {dtype}",
+                expected="numbers, as many as the file holds",
+                hint=_HINT,
+            ),
+        )
 
 
 def read_numpy_matrix(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
@@ -76,23 +70,10 @@ def read_numpy_matrix(path: Path, name: str | None, role: Role | None) -> System
     InputError
         For complex matrices, objects, names that are not there, and damaged files.
     """
-    try:
-        with zipfile.ZipFile(path) as archive:
-            arrays = _Arrays(path, archive)
-            chosen, (matrix, notes) = _matrix(arrays, name, role)
-            return SystemMatrix(
-                path=path, name=chosen, matrix=matrix, rows=_rows(arrays), notes=notes
-            )
-    except KlackError:
-        raise
-    except Exception as error:  # zipfile and numpy meet damage with many kinds of error
-        said = " ".join(str(error).split())[:80] or type(error).__name__
-        raise InputError(
-            str(path),
-            got=f"a NumPy file that cannot be read ({said})",
-            expected="a whole file",
-            hint=_HINT,
-        ) from error
+    with foreign_reading(str(path), "a NumPy file", _HINT), zipfile.ZipFile(path) as archive:
+        arrays = _Arrays(path, archive)
+        chosen, (matrix, notes) = _matrix(arrays, name, role)
+        return SystemMatrix(path=path, name=chosen, matrix=matrix, rows=_rows(arrays), notes=notes)
 
 
 def _matrix(arrays: _Arrays, name: str | None, role: Role | None) -> tuple[str, Checked]:

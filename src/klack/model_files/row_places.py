@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.model_files.system_matrix import RowPlaces
 
 __all__ = ["read_row_places"]
@@ -61,10 +61,13 @@ def read_row_places(path: Path) -> RowPlaces:
         node.append(place[0])
         direction.append(place[1])
     places = RowPlaces(np.array(node, dtype=np.int64), np.array(direction, dtype=np.int64))
-    if not node:
-        raise _wrong(str(path), "no rows")
-    if len(np.unique(8 * places.node + places.direction)) < len(node):
-        raise _wrong(str(path), "the same node and direction twice")
+    refuse(
+        (not node, _wrong(str(path), "no rows")),
+        (
+            len(np.unique(8 * places.node + places.direction)) < len(node),
+            _wrong(str(path), "the same node and direction twice"),
+        ),
+    )
     return places
 
 

@@ -162,7 +162,9 @@ def symmetric_matrix(
         return A, ("it is diagonal",)
     if below and above:
         turned = A.T.tocsr()
-        if _same_pattern(A, turned):
+        if bool(
+            np.array_equal(A.indptr, turned.indptr) and np.array_equal(A.indices, turned.indices)
+        ):
             difference = A.data - turned.data
             del turned
             notes = _asymmetry_notes(where, A, difference)
@@ -182,10 +184,6 @@ def _has_both(A: csr_array) -> bool:
     """True if any pair (i, j) is stored together with (j, i)."""
     stored = csr_array((np.ones(A.nnz, dtype=np.int8), A.indices, A.indptr), shape=A.shape)
     return int(stored.multiply(stored.T.tocsr()).nnz) > int(np.count_nonzero(stored.diagonal()))
-
-
-def _same_pattern(A: csr_array, B: csr_array) -> bool:
-    return bool(np.array_equal(A.indptr, B.indptr) and np.array_equal(A.indices, B.indices))
 
 
 def _asymmetry_notes(where: str, A: csr_array, difference: NDArray[np.float64]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from klack.analyses.shots.record import ShotsStudy
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke_shots.record import StrokeShotsStudy
 from klack.analyses.study.record import StudyRecord
-from klack.errors import InputError, MissingExtraError
+from klack.errors import InputError, optional_package
 from klack.exchange.results.about import about_study
 from klack.exchange.results.naming import identifiers
 from klack.exchange.results.noise_dataset import noise_variables
@@ -49,10 +49,7 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
     InputError
         For another record, or a run that it does not have.
     """
-    try:
-        import xarray
-    except ImportError as error:
-        raise MissingExtraError("xarray", "datasets of results", "exchange") from error
+    xarray = optional_package("xarray", "datasets of results", "exchange")
     about: dict[str, str]
     if isinstance(record, ImpactStudy | StrokeStudy):
         table = result_table(record)
@@ -81,7 +78,11 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
             if of is design:
                 values = json_of(measures, of)
                 variables |= {
-                    item.key: Variable((), _number(values[item.json_key]), about_measure(item))
+                    item.key: Variable(
+                        (),
+                        (float("nan") if values[item.json_key] is None else values[item.json_key]),
+                        about_measure(item),
+                    )
                     for item in measures
                 }
         about = about_study(record, {"run": design.name, "label": design.label})
@@ -106,10 +107,6 @@ def _named(run: str | None, usual: str, known: Iterable[str]) -> str:
             hint="name a level, a variant, a design, or a transfer function of this result.",
         )
     return name
-
-
-def _number(value: float | int | bool | None) -> float | int | bool:
-    return float("nan") if value is None else value
 
 
 def _table_variables(run: ResultRun) -> tuple[Variables, Variables]:

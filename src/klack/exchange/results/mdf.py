@@ -7,7 +7,7 @@ left out: a master of MDF is a time, an angle, a distance or an index.
 from datetime import UTC, datetime
 from pathlib import Path
 
-from klack.errors import MissingExtraError
+from klack.errors import optional_package
 from klack.exchange.results.table import ResultRun, ResultTable
 from klack.whole_file import whole_file
 
@@ -35,11 +35,8 @@ def write_mdf(table: ResultTable, path: Path) -> Path:
     InputError
         If the place cannot be written to.
     """
-    try:
-        from asammdf import MDF, Signal
-    except ImportError as error:
-        raise MissingExtraError("asammdf", "writing MDF", "exchange") from error
-    with MDF(version="4.10") as file:
+    asammdf = optional_package("asammdf", "writing MDF", "exchange")
+    with asammdf.MDF(version="4.10") as file:
         file.header.start_time = _start(table.about.get("created", ""))
         file.header.comment = _lines({"kind": table.kind, **table.about})
         for run in table.runs:
@@ -47,7 +44,7 @@ def write_mdf(table: ResultTable, path: Path) -> Path:
                 if axis.quantity != "time" or not channels or axis.values.size == 0:
                     continue
                 signals = [
-                    Signal(
+                    asammdf.Signal(
                         samples=channel.values,
                         timestamps=axis.values,
                         unit=channel.unit,

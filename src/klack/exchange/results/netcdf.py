@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.errors import MissingExtraError
+from klack.errors import optional_package
 from klack.exchange.results.naming import identifiers
 from klack.exchange.results.table import ResultRun, ResultTable
 from klack.whole_file import whole_file
@@ -48,10 +48,7 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
     InputError
         If the place cannot be written to.
     """
-    try:
-        import h5netcdf
-    except ImportError as error:
-        raise MissingExtraError("h5netcdf", "writing netCDF", "exchange") from error
+    h5netcdf = optional_package("h5netcdf", "writing netCDF", "exchange")
     # HDF5 writes to memory: it ends the process where the disk is full when it closes a file
     memory = BytesIO()
     with h5netcdf.File(memory, "w", invalid_netcdf=False) as file:

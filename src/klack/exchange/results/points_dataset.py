@@ -24,17 +24,17 @@ def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str,
     """
     names = identifiers([item.name for item in study.columns], ("point", *_SAID))
     variables = {
-        name: Variable(("point",), _values(item), _about(item))
+        name: Variable(
+            ("point",),
+            (np.array([item.words[int(i)] for i in item.values]) if item.words else item.values),
+            _about(item),
+        )
         for name, item in zip(names, study.columns, strict=True)
     }
     for (name, long_name), texts in zip(_SAID.items(), (study.failures, study.notes), strict=True):
         variables[name] = Variable(("point",), np.array(texts, dtype=str), {"long_name": long_name})
     number = np.arange(study.count)
     return variables, {"point": Variable(("point",), number, {"long_name": "number of the point"})}
-
-
-def _values(item: StudyColumn) -> np.ndarray:
-    return np.array([item.words[int(i)] for i in item.values]) if item.words else item.values
 
 
 def _about(item: StudyColumn) -> dict[str, str]:

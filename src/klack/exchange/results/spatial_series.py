@@ -18,7 +18,7 @@ from klack.assembling.mode_marks import shape_marks
 from klack.assembling.valve_shapes import BodyShapes, valve_shapes
 from klack.case.valve import ValveCase
 from klack.elasticity.stress import StressField, von_mises
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.exchange.results.naming import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.exchange.results.vtu_ring import write_ring
@@ -225,13 +225,19 @@ def _parts(
 
 def _require_same(name: str, found: BodyShapes, q: Floats, marks: Floats) -> None:
     """Refuse coordinates of other shapes: mesh, sign or pairing of modes may differ."""
-    if found.shapes.shape[1] != q.shape[1]:
-        raise _other_bodies(
-            f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
-        )
     here = shape_marks(found.shapes)
-    if len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()):
-        raise _other_bodies(f"modes of '{name}' with other shapes than those of the result")
+    refuse(
+        (
+            found.shapes.shape[1] != q.shape[1],
+            _other_bodies(
+                f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
+            ),
+        ),
+        (
+            len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()),
+            _other_bodies(f"modes of '{name}' with other shapes than those of the result"),
+        ),
+    )
 
 
 def _other_bodies(got: str) -> InputError:

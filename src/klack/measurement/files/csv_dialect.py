@@ -234,7 +234,11 @@ def _header_cells(line: str, dialect: Dialect) -> list[str] | None:
         text = text.lstrip(dialect.comments + "/ \t")
     others = [s for s in _SEPARATORS if s not in (dialect.separator, "")]
     for separator in (dialect.separator, *others):
-        cells = _cells(text, separator) if separator else _words(text)
+        cells = (
+            _cells(text, separator)
+            if separator
+            else [word.strip('"') for word in _WORDS.findall(text)]
+        )
         while len(cells) > dialect.width and cells[-1].lower() in _NO_COLUMN:
             cells.pop()
         if len(cells) == dialect.width - 1 and dialect.width > 2 and separator:
@@ -247,20 +251,12 @@ def _header_cells(line: str, dialect: Dialect) -> list[str] | None:
     return None
 
 
-def _words(text: str) -> list[str]:
-    """Blank-separated names, a unit in brackets staying with its name."""
-    return [word.strip('"') for word in _WORDS.findall(text)]
-
-
 def _is_unit_row(cells: Sequence[str]) -> bool:
     written = [cell for cell in cells if not no_unit(cell)]
     return bool(written) and all(
-        is_unit(cell) or _in_brackets(cell) or cell.lower() == SEQUENCE for cell in written
+        is_unit(cell) or re.fullmatch(r"[\[(].*[\])]", cell) or cell.lower() == SEQUENCE
+        for cell in written
     )
-
-
-def _in_brackets(cell: str) -> bool:
-    return re.fullmatch(r"[\[(].*[\])]", cell) is not None
 
 
 def split_label(label: str) -> tuple[str, str]:

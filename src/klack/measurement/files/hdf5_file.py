@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from klack.errors import InputError, MissingExtraError
-from klack.measurement.files.foreign import foreign_reading
+from klack.errors import InputError, foreign_reading, optional_package
 from klack.measurement.files.stored_arrays import (
     ArrayRecording,
     StoredArray,
@@ -89,10 +88,7 @@ class NetCdf3File(ArrayRecording):
 
 
 def _opened(path: Path) -> Any:
-    try:
-        import h5py
-    except ImportError as error:
-        raise MissingExtraError("h5py", f"reading {path.name} (HDF5)", "measurement") from error
+    h5py = optional_package("h5py", f"reading {path.name} (HDF5)", "measurement")
     with _damage(str(path)):
         return h5py.File(path, "r")
 

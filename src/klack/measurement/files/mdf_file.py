@@ -5,6 +5,7 @@ computed: such channels are left out, with a note.  Values that stand for a text
 among numbers are missing.
 """
 
+import logging
 from contextlib import AbstractContextManager, redirect_stdout
 from dataclasses import dataclass
 from io import StringIO
@@ -15,9 +16,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, MissingExtraError
+from klack.errors import InputError, foreign_reading, optional_package
 from klack.measurement.files.clock import no_clock, unique_names
-from klack.measurement.files.foreign import foreign_reading, keep_quiet
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
@@ -97,7 +97,7 @@ class MdfFile(Recording):
         channel = group.channels[c]
         if group.channel_group.cycles_nr < 2:
             return "fewer than two samples"
-        if not _is_number(channel, old):
+        if channel.data_type not in (_NUMBERS_3 if old else _NUMBERS_4):
             return "no numbers"
         if group.channel_dependencies[c]:
             return "a structure or an array"
@@ -239,15 +239,12 @@ def _partial(conversion: Any) -> _Partial | None:
 
 
 def _opened(path: Path, file: Any) -> Any:
-    try:
-        from asammdf import MDF
-    except ImportError as error:
-        raise MissingExtraError("asammdf", f"reading {path.name} (MDF)", "measurement") from error
-    keep_quiet("asammdf")
+    asammdf = optional_package("asammdf", f"reading {path.name} (MDF)", "measurement")
+    logging.getLogger("asammdf").setLevel(logging.CRITICAL)  # else it writes parts of damaged files
     with _damage(str(path)):
         try:
             # of an open file asammdf reads only the records that are asked for
-            return MDF(file, raise_on_multiple_occurrences=False)
+            return asammdf.MDF(file, raise_on_multiple_occurrences=False)
         except Exception as error:  # of any kind, and on its way again below
             _forget_half_open(error)
             raise
@@ -263,10 +260,6 @@ def _forget_half_open(error: Exception) -> None:
         half: Any = frame.f_locals.get("self")
         if hasattr(half, "_closed"):
             half._closed = True
-
-
-def _is_number(channel: Any, old: bool) -> bool:
-    return channel.data_type in (_NUMBERS_3 if old else _NUMBERS_4)
 
 
 def _in_record(group: Any, channel: Any, old: bool) -> bool:

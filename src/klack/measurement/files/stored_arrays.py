@@ -192,10 +192,6 @@ def _long_axis(shape: tuple[int, ...]) -> int:
     return int(np.argmax(shape))
 
 
-def _is_vector(shape: tuple[int, ...]) -> bool:
-    return max(shape) > 1 and int(np.prod(shape)) == max(shape)
-
-
 def _split(name: str) -> tuple[str, str]:
     return split_label(name.rsplit("/", 1)[-1])
 
@@ -313,7 +309,7 @@ def _from_first(array: StoredArray) -> StoredArray:
 
 
 def _is_time(array: StoredArray, group: StoredGroup) -> bool:
-    if not _is_vector(array.shape):
+    if max(array.shape) <= 1 or int(np.prod(array.shape)) != max(array.shape):
         return False
     name, unit = _split(array.name)[0], _unit_of(array, group)
     has_values = any(_split(other.name)[0].lower() in _VALUES for other in group.arrays)

@@ -6,17 +6,17 @@ are ``group/channel``, without the group if there is only one.
 """
 
 import logging
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import MissingExtraError
+from klack.errors import foreign_reading, optional_package
 from klack.measurement.files.clock import clock_factor, is_clock, no_clock
 from klack.measurement.files.csv_dialect import split_label
-from klack.measurement.files.foreign import foreign_reading, heard
 from klack.measurement.files.scales import unknown_scales
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
@@ -149,7 +149,7 @@ class TdmsFile(Recording):
 
     def _read(self, channel: Any, first: int, last: int) -> Vector:
         with _damage(f"{self.path.name}: channel '{channel.name}'"):
-            with heard([logger for name, logger in _loggers() if name.startswith("nptdms")]):
+            with _heard():
                 values = channel.read_data(offset=first, length=last - first)
             if not _is_stamped(channel):
                 return np.asarray(values, dtype=np.float64)
@@ -165,20 +165,33 @@ class TdmsFile(Recording):
 
 
 def _opened(path: Path, notes: list[str]) -> Any:
-    try:
-        import nptdms
-    except ImportError as error:
-        raise MissingExtraError("npTDMS", f"reading {path.name} (TDMS)", "measurement") from error
-    loggers = [logger for name, logger in _loggers() if name.startswith("nptdms")]
-    with _damage(str(path)), heard(loggers) as said:
+    nptdms = optional_package(
+        "npTDMS", f"reading {path.name} (TDMS)", "measurement", module="nptdms"
+    )
+    with _damage(str(path)), _heard() as said:
         tdms = nptdms.TdmsFile.open(path, raw_timestamps=True)  # others are cut to 1 us
     notes += [f"{path.name}: {' '.join(text.split())[:_LONGEST]}." for text in dict.fromkeys(said)]
     return tdms
 
 
-def _loggers() -> list[tuple[str, logging.Logger]]:
-    known = logging.Logger.manager.loggerDict.items()
-    return [(name, logger) for name, logger in known if isinstance(logger, logging.Logger)]
+@contextmanager
+def _heard() -> Iterator[list[str]]:
+    """Collect what npTDMS logs of a file instead of writing it to the terminal."""
+    said: list[str] = []
+    kept = [
+        (logger, list(logger.handlers), logger.propagate)
+        for name, logger in logging.Logger.manager.loggerDict.items()
+        if name.startswith("nptdms") and isinstance(logger, logging.Logger)
+    ]
+    handler = logging.Handler()
+    handler.emit = lambda record: said.append(record.getMessage())  # type: ignore[method-assign]
+    for logger, _, _ in kept:
+        logger.handlers, logger.propagate = [handler], False
+    try:
+        yield said
+    finally:
+        for logger, handlers, propagate in kept:
+            logger.handlers, logger.propagate = handlers, propagate
 
 
 def _damage(where: str) -> AbstractContextManager[None]:

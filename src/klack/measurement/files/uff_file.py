@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, MissingExtraError
+from klack.errors import InputError, foreign_reading, optional_package
 from klack.measurement.files.clock import unique_names
 from klack.measurement.files.csv_dialect import split_label
-from klack.measurement.files.foreign import foreign_reading
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.units import TIME
@@ -130,10 +129,7 @@ class UffFile(Recording):
 
 
 def _opened(path: Path) -> Any:
-    try:
-        import pyuff
-    except ImportError as error:
-        raise MissingExtraError("pyuff", f"reading {path.name} (UFF)", "measurement") from error
+    pyuff = optional_package("pyuff", f"reading {path.name} (UFF)", "measurement")
     size = path.stat().st_size
     if size > _LARGEST:
         raise InputError(

@@ -103,7 +103,7 @@ def mesh_model(
         ElementBlock(part.family, nodes.index(part), part.name) for part in _merged(solids)
     )
     marks = tuple(
-        MarkedFaces(part.name, part.numbers, nodes.index(part)[:, : _corners(part)])
+        MarkedFaces(part.name, part.numbers, nodes.index(part)[:, : FAMILIES[part.family].corners])
         for part in raw.faces
         if len(part.numbers)
     )
@@ -145,10 +145,6 @@ def mesh_model(
         left_out=left_out,
         foreign_materials=raw.foreign_materials,
     )
-
-
-def _corners(part: FileElements) -> int:
-    return FAMILIES[part.family].corners
 
 
 def _dimension(path: Path, solids: tuple[FileElements, ...]) -> int:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.keywords import Keyword
 from klack.mesh.files.abaqus.numbers import number
@@ -84,20 +84,26 @@ def read_placement(keyword: Keyword) -> Placement:
 
 def add_instance(root: Scope, name: str, part: Scope, placement: Placement, place: str) -> None:
     """Put an instance into the assembly; its sets and surfaces are called ``name.set``."""
-    if name.upper() in root.instances:
-        raise InputError(
-            f"{place}: *INSTANCE",
-            got=f"a second instance '{name[:80]}'",
-            expected="every name once",
-            hint="give every instance its own name.",
-        )
-    if root.nodes.count + part.nodes.count > LARGEST_NODES:
-        raise InputError(
-            f"{place}: *INSTANCE",
-            got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
-            expected=f"at most {LARGEST_NODES}",
-            hint="leave out unneeded instances.",
-        )
+    refuse(
+        (
+            name.upper() in root.instances,
+            InputError(
+                f"{place}: *INSTANCE",
+                got=f"a second instance '{name[:80]}'",
+                expected="every name once",
+                hint="give every instance its own name.",
+            ),
+        ),
+        (
+            root.nodes.count + part.nodes.count > LARGEST_NODES,
+            InputError(
+                f"{place}: *INSTANCE",
+                got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
+                expected=f"at most {LARGEST_NODES}",
+                hint="leave out unneeded instances.",
+            ),
+        ),
+    )
     _require_revolution(part, placement, place)
     node, element = root.nodes.count, root.elements.count
     root.instances[name.upper()] = Instance(name, part, node, element)

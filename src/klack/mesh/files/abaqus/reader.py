@@ -84,7 +84,12 @@ def _build(path: Path, deck: Deck, unit_length: float, wanted: Sequence[str] | N
     new[used] = np.arange(len(used))
     mesh = Mesh(
         points=_points(scope)[used, :dimension] * unit_length,
-        blocks=tuple(_renumbered_block(block.elements, new) for block in blocks),
+        blocks=tuple(
+            ElementBlock(
+                block.elements.family, new[block.elements.connectivity], block.elements.solid
+            )
+            for block in blocks
+        ),
         surfaces={name: _renumbered(surface, new) for name, surface in surfaces.items()},
         node_sets={
             name: kept for name, nodes in node_sets.items() if len(kept := _present(new, nodes))
@@ -241,10 +246,6 @@ def _points(scope: Scope) -> NDArray[np.float64]:
     points = scope.points[0] if len(scope.points) == 1 else np.concatenate(scope.points)
     scope.points.clear()
     return points
-
-
-def _renumbered_block(block: ElementBlock, new: NDArray[np.int64]) -> ElementBlock:
-    return ElementBlock(block.family, new[block.connectivity], block.solid)
 
 
 def _present(new: NDArray[np.int64], nodes: NDArray[np.int64]) -> NDArray[np.int64]:

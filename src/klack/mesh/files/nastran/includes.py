@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from klack.errors import InputError
+from klack.errors import InputError, refuse
 from klack.mesh.files.file_bytes import LARGEST_BYTES, read_bytes
 
 __all__ = ["text_with_includes"]
@@ -66,36 +66,48 @@ def text_with_includes(path: Path) -> tuple[bytes, tuple[tuple[int, str, int], .
 
 
 def _require_text(file: Path, data: bytes, size: int) -> None:
-    if b"\0" in data[:4096]:
-        raise InputError(
-            str(file),
-            got="a binary file",
-            expected=_KIND,
-            hint="export the mesh as bulk data (.bdf) from the preprocessor.",
-        )
-    if size > LARGEST_BYTES:
-        raise InputError(
-            str(file),
-            got=f"{size / 1e9:.3g} GB with all includes",
-            expected=f"at most {LARGEST_BYTES / 1e9:.3g} GB",
-            hint="write the mesh only, without results or steps.",
-        )
+    refuse(
+        (
+            b"\0" in data[:4096],
+            InputError(
+                str(file),
+                got="a binary file",
+                expected=_KIND,
+                hint="export the mesh as bulk data (.bdf) from the preprocessor.",
+            ),
+        ),
+        (
+            size > LARGEST_BYTES,
+            InputError(
+                str(file),
+                got=f"{size / 1e9:.3g} GB with all includes",
+                expected=f"at most {LARGEST_BYTES / 1e9:.3g} GB",
+                hint="write the mesh only, without results or steps.",
+            ),
+        ),
+    )
 
 
 def _below(place: str, folder: Path, name: str, depth: int, seen: set[Path]) -> Path:
     path = (folder / name).resolve()
-    if not path.is_relative_to(folder):
-        raise InputError(
-            f"{place}: INCLUDE",
-            got=f"the file '{name}'",
-            expected="a file in the folder of the main file or below it",
-            hint="copy it next to the main file.",
-        )
-    if depth > _DEEPEST or path in seen:
-        raise InputError(
-            f"{place}: INCLUDE",
-            got=f"'{name}' for the second time, or {depth} levels deep",
-            expected=f"every file included once, and up to {_DEEPEST} levels deep",
-            hint="write the model into one file.",
-        )
+    refuse(
+        (
+            not path.is_relative_to(folder),
+            InputError(
+                f"{place}: INCLUDE",
+                got=f"the file '{name}'",
+                expected="a file in the folder of the main file or below it",
+                hint="copy it next to the main file.",
+            ),
+        ),
+        (
+            depth > _DEEPEST or path in seen,
+            InputError(
+                f"{place}: INCLUDE",
+                got=f"'{name}' for the second time, or {depth} levels deep",
+                expected=f"every file included once, and up to {_DEEPEST} levels deep",
+                hint="write the model into one file.",
+            ),
+        ),
+    )
     return path
