@@ -24,7 +24,7 @@ from typing import Any
 
 import psutil
 
-from klack.case.shipped import find_case
+from klack.case.reader import find_case
 
 _MOVES_AT_ONCE = 500
 _PAGES_AT_ONCE = 10

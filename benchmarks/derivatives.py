@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from klack.analyses.sensitivities.parameters import VariedKey, slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner
-from klack.case.case_tree import CaseTree, read_case_tree
+from klack.case.any_case import CaseTree, read_case_tree
 from klack.case.key_path import quantity_at
-from klack.case.shipped import find_case, shipped_cases
+from klack.case.reader import find_case, shipped_cases
 from klack.case.valve import ValveCase
 from klack.errors import KlackError
 from klack.input.problem import CaseProblem, Key

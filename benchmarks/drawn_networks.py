@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import KlackError
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network

@@ -23,7 +23,7 @@ from klack.analyses.impact.interface_level import (
 from klack.assembling.modes import kept_modes, mode_pools
 from klack.assembling.problem import build_problem
 from klack.case import load_case, shipped_cases
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.progress import silent

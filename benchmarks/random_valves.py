@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
+from klack.case.any_case import read_valve_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import read_valve_case
 from klack.simulation.network_run import simulate_network
 
 __all__ = ["draw", "main", "residuals"]

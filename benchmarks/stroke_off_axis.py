@@ -15,7 +15,7 @@ from number import Number, Size
 
 from klack.analyses.stroke.run import variant_network
 from klack.assembling.valve import Valve, build_valve
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 

@@ -14,7 +14,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from klack.case import case_schema
-from klack.case.valve_reader import valve_case_schema
+from klack.case.any_case import valve_case_schema
 from klack.units import KINDS, Kind, format_si
 
 __all__ = ["PAGES", "anchor", "page"]

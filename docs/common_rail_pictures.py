@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.report.chart import COLOURS
 from klack.report.printed import STYLE, svg
 from klack.simulation.network_result import NetworkResult

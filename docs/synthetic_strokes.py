@@ -29,11 +29,10 @@ from klack.analyses.shots.model import build_shots
 from klack.analyses.shots.one_shot import ShotSetup, run_shot
 from klack.analyses.stroke.run import run_variant, variant_network
 from klack.assembling.valve import Valve, build_valve
-from klack.case.reader import parse, text_of, validated
+from klack.case.levels import Variant
+from klack.case.reader import parse, shipped_cases, text_of, validated
 from klack.case.schema import Case
-from klack.case.shipped import shipped_cases
 from klack.case.valve import ValveCase
-from klack.case.variants import Variant
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
 

@@ -133,7 +133,7 @@ PAGES = (
 
 def made_folder(folder: Path) -> Path:
     """Cases, and a result of every kind with its report, computed in this process."""
-    from klack.case.shipped import find_case
+    from klack.case.reader import find_case
     from klack.cli.main import main
 
     for name, shipped in (("valve", "demo-valve-axisymmetric"), ("stroke", "demo-stroke")):

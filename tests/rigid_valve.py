@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.reader import parse
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor

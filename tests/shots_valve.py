@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+from klack.case.any_case import read_valve_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import read_valve_case
 
 FILE = Path(__file__).parent / "data" / "case" / "stroke.yaml"
 GUIDE = "guide: {surface: shaft, heights: [4 mm, 13 mm], clearance: 4 um, friction: 0.1}"

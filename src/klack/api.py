@@ -18,14 +18,13 @@ from klack.analyses.catalogue import analysis_in
 from klack.analyses.measures import Measure, json_of
 from klack.analyses.point_table import PointTable, RunsInterrupted
 from klack.analyses.sensitivities.record import SensitivityRecord
-from klack.case.case_tree import CaseTree, read_case_tree, tree_of
-from klack.case.inserting import with_values
+from klack.case.any_case import CaseTree, read_any_case, read_case_tree, tree_of
 from klack.case.key_path import kind_at, node_at, quantity_at, split_path
 from klack.case.points import GivenPoints
+from klack.case.reader import find_case
+from klack.case.rewriting import with_values
 from klack.case.schema import Case
-from klack.case.shipped import find_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import read_any_case
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.network.component import Component

@@ -7,9 +7,9 @@ import pytest
 from energy_ledger import allowed
 from ruamel.yaml import YAML
 
-from klack.case.case_tree import read_case_tree
-from klack.case.inserting import with_values
+from klack.case.any_case import read_case_tree
 from klack.case.reader import load_case, read_case
+from klack.case.rewriting import with_values
 from klack.cli.main import main
 from klack.errors import InputError
 

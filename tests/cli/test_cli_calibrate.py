@@ -9,7 +9,7 @@ from rigid_valve import write_bench
 
 from klack.analyses.calibration.analysis import CALIBRATION
 from klack.analyses.calibration.motion import TRIAL_LOG, MotionModel
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.cli.main import main
 
 pytestmark = pytest.mark.slow
@@ -153,6 +153,6 @@ def test_a_lift_that_counts_backwards_is_refused(bench, tmp_path, capsys):
 def test_a_missing_file_is_named(bench, tmp_path, capsys, monkeypatch):
     args = command(bench, tmp_path / "out", "--quiet")
     args[3] = str(tmp_path / "nothing.csv")
-    monkeypatch.setitem(sys.modules, "klack.case.case_tree", None)  # nothing long has begun
+    monkeypatch.setitem(sys.modules, "klack.case.any_case", None)  # nothing long has begun
     assert main(args) == 2
     assert "nothing.csv" in capsys.readouterr().err

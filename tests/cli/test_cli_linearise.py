@@ -16,7 +16,7 @@ from scipy.io import loadmat
 
 from klack.analyses.linearisation.analysis import LINEARISATION
 from klack.analyses.linearisation.controllers import plain_name
-from klack.case.case_tree import read_case_tree
+from klack.case.any_case import read_case_tree
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
 

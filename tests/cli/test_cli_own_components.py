@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from klack.case.case_tree import read_case_tree
-from klack.case.valve_reader import load_any_case, load_valve_case
+from klack.case.any_case import load_any_case, load_valve_case, read_case_tree
 from klack.cli.main import main
 from klack.errors import InputError
 

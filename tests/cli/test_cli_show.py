@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from json_schema_check import require_documented
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.cli.main import main
 from klack.network.catalogue import type_words
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.cli.main import main
 from klack.errors import KlackError
 from klack.network.step_function import is_step_function

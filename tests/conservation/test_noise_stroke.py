@@ -15,9 +15,9 @@ from klack.analyses.noise.run import run_noise
 from klack.analyses.noise.source import NoiseSource, stroke_sources
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
-from klack.case.shipped import find_case
+from klack.case.any_case import load_valve_case
+from klack.case.reader import find_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_valve_case
 from klack.signals import TimeSeries
 
 pytestmark = pytest.mark.slow

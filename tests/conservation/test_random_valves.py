@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from rigid_valve import RELIEF_VALVE
 
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import AccuracyWarning
 from klack.simulation.network_result import IncompleteRunError
 

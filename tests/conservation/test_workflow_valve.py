@@ -19,8 +19,8 @@ from klack.analyses.stroke.summary import stroke_to_json
 from klack.assembling import rubbing as rubbing_module
 from klack.assembling.valve import Valve, build_valve
 from klack.case import read_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.contact.laws import TableLaw
 from klack.contact.rubbing_law import RubbingLaw
 from klack.errors import AccuracyWarning

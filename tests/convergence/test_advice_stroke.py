@@ -16,9 +16,9 @@ from klack.analyses.advice.stroke import (
     stroke_measures,
 )
 from klack.assembling.valve import build_valve
-from klack.case.shipped import find_case
+from klack.case.any_case import load_valve_case, read_valve_case
+from klack.case.reader import find_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_valve_case, read_valve_case
 
 pytestmark = pytest.mark.slow
 

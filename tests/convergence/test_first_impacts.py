@@ -13,7 +13,7 @@ import pytest
 from doubts import doubts
 from numpy.typing import NDArray
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.friction import GuideFriction

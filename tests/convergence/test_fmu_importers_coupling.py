@@ -9,7 +9,7 @@ import pytest
 from c_compiler import needs_compiler
 
 from klack.case import find_case
-from klack.case.valve_reader import load_any_case
+from klack.case.any_case import load_any_case
 from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu
 

@@ -20,7 +20,7 @@ from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact_changes, told
 from klack.analyses.stroke.summary import stroke_to_json
-from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.network.accuracy import PROMISED
 from klack.simulation.network_result import ImpactEvent

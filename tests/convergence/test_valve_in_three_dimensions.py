@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"
 

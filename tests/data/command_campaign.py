@@ -106,7 +106,7 @@ def number(value: object) -> re.Match | None:
 
 def readable(tree: dict, draw: random.Random) -> dict:
     """Change a case, mostly so that the reader takes it."""
-    from klack.case.valve_reader import read_any_case
+    from klack.case.any_case import read_any_case
     from klack.errors import InputError
 
     for _ in range(100):

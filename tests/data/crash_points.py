@@ -278,7 +278,7 @@ def warm() -> None:
         "scipy.sparse.linalg",
         "zarr",
         "klack.analyses.result_folder",
-        "klack.case.valve_reader",
+        "klack.case.any_case",
     ]
     stored = ("impact", "stroke", "shots", "noise")
     for analysis in (*stored, "reduction", "calibration"):

@@ -22,9 +22,8 @@ from klack.app.explorer import Explorer
 from klack.app.form import checked_text, exchanged_text
 from klack.app.reader import Reader
 from klack.app.sliders import sliders_of
-from klack.case.case_tree import read_case_tree, tree_of
-from klack.case.reader import read_case
-from klack.case.shipped import find_case
+from klack.case.any_case import read_case_tree, tree_of
+from klack.case.reader import find_case, read_case
 from klack.errors import InputError
 from klack.stages import collected_warnings
 

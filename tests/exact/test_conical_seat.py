@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.errors import InputError
 from klack.hydraulics.conical_seat import ConicalSeat
 from klack.hydraulics.fluid_library import library_fluid

@@ -6,8 +6,7 @@ from scipy.sparse import csr_array
 
 from klack.assembling.candidates import Candidates, grade_of, reach_of
 from klack.assembling.problem import place_bodies
-from klack.case.reader import load_case
-from klack.case.shipped import find_case
+from klack.case.reader import find_case, load_case
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.statics import contact_compliance
 from klack.elasticity.condensation import condensed_inverse

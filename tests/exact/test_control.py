@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.control.hysteresis import HysteresisController
 from klack.control.pid import PidController, Setpoint
 from klack.control.sensor import Sensor

@@ -12,7 +12,7 @@ import yaml
 from draws import each
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.control.pid import PidController, Setpoint
 from klack.control.sensor import Sensor
 from klack.errors import InputError

@@ -12,7 +12,7 @@ from draws import each
 from scipy.linalg import expm
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.control.pid import PidController
 from klack.control.sensor import Sensor
 from klack.errors import AccuracyWarning, InputError

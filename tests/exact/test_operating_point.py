@@ -16,7 +16,7 @@ from klack.analyses.operating_point.record import OperatingPoints
 from klack.analyses.operating_point.run import find_point, run_operating_points
 from klack.analyses.operating_point.table import write_csv
 from klack.assembling.valve import build_valve
-from klack.case.case_tree import CaseTree, read_case_tree, tree_of
+from klack.case.any_case import CaseTree, read_case_tree, tree_of
 from klack.case.valve_roles import find_roles
 from klack.errors import ConvergenceError, InputError
 from klack.hydraulics.chamber import Chamber

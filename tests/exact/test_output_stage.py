@@ -8,7 +8,7 @@ import pytest
 from draws import each
 from ruamel.yaml import YAML
 
-from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.magnetics.driver import When

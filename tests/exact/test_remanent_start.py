@@ -7,7 +7,7 @@ import pytest
 
 from klack.analyses.stroke.loop_figure import loop_chart
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.magnetics.constant_drive import driven, hysteretic_coils
 from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.remanent_start import remanent_state

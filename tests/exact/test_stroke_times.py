@@ -11,7 +11,7 @@ import pytest
 from draws import each
 
 from klack.analyses.stroke.times import all_lift_times, lift_times
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.network_run import simulate_network

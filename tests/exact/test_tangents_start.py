@@ -11,7 +11,7 @@ import pytest
 
 from klack.analyses.sensitivities.parameters import slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner
-from klack.case.case_tree import read_case_tree
+from klack.case.any_case import read_case_tree
 from klack.case.key_path import _below, quantity_at
 from klack.errors import KlackError
 from klack.hydraulics.chamber import Chamber

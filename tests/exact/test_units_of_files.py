@@ -15,7 +15,7 @@ from property_profiles import examples
 from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.run import run_stroke
 from klack.case import read_case
-from klack.case.valve_reader import read_any_case
+from klack.case.any_case import read_any_case
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.materials import Material

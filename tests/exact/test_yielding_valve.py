@@ -12,8 +12,8 @@ from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import stroke_to_json, yield_told
 from klack.assembling import yielding
+from klack.case.any_case import read_valve_case
 from klack.case.reader import read_case
-from klack.case.valve_reader import read_valve_case
 from klack.errors import AccuracyWarning, InputError
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from klack.case.shipped import find_case
-from klack.case.valve_reader import read_any_case
+from klack.case.any_case import read_any_case
+from klack.case.reader import find_case
 from klack.errors import InputError
 
 SHIPPED = ("demo-stroke", "demo-valve-axisymmetric")

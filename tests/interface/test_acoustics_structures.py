@@ -20,11 +20,11 @@ from klack.analyses.impact.run import run_impact
 from klack.analyses.store import RESULT_NAME
 from klack.assembling.structures import radiating_surfaces
 from klack.assembling.valve import build_valve
+from klack.case.any_case import read_any_case
 from klack.case.bodies import SurfaceName
 from klack.case.noise import CaseNoise
-from klack.case.shipped import find_case
+from klack.case.reader import find_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import read_any_case
 from klack.errors import InputError
 from klack.reduction.damping import ModalDamping
 from klack.reduction.structure import Structure

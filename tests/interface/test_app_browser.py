@@ -9,7 +9,7 @@ import pytest
 from klack.analyses.catalogue import analysis_in
 from klack.app.folder import OpenFolder
 from klack.app.jobs import Jobs
-from klack.case.shipped import find_case
+from klack.case.reader import find_case
 
 pytest.importorskip("nicegui")
 from app_browser import LONG, page, require_within, server

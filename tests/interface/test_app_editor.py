@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from klack.case.shipped import find_case
+from klack.case.reader import find_case
 
 pytest.importorskip("nicegui")
 from app_browser import page, server, slow

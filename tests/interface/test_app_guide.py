@@ -7,9 +7,8 @@ from typing import Any
 
 import pytest
 
-from klack.case.reader import read_case
-from klack.case.shipped import find_case
-from klack.case.valve_reader import load_any_case
+from klack.case.any_case import load_any_case
+from klack.case.reader import find_case, read_case
 from klack.mesh.solid import write_step_revolved
 
 pytest.importorskip("nicegui")

@@ -18,8 +18,8 @@ from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.run import run_study
 from klack.app.folder import OpenFolder
 from klack.app.jobs import Jobs
-from klack.case.case_tree import read_case_tree
-from klack.case.shipped import find_case
+from klack.case.any_case import read_case_tree
+from klack.case.reader import find_case
 from klack.case.study_source import study_of
 
 __all__ = ["page", "server"]  # fixtures

@@ -24,7 +24,7 @@ from klack.app.state import State
 from klack.app.study_files import beside_case, case_of_study, free_name, result_of_study
 from klack.app.study_points import StudyPoints, points_json
 from klack.app.study_texts import study_offer, study_problem, study_text
-from klack.case.case_tree import read_case_tree
+from klack.case.any_case import read_case_tree
 from klack.case.study_source import study_of
 from klack.errors import InputError, KlackError
 from klack.progress import PointCount, silent

@@ -4,11 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree, read_valve_case
 from klack.case.free_parameters import free_parameters
 from klack.case.reader import parse
 from klack.case.rewriting import moved_files, rewritten, written_quantity
-from klack.case.valve_reader import read_valve_case
 from klack.errors import InputError
 
 CASE = """\

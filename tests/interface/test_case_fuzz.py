@@ -22,7 +22,7 @@ from mutated_cases import NASTY, changed, leaves, mutated
 from ruamel.yaml import YAML
 
 from klack.case import shipped_cases
-from klack.case.valve_reader import load_any_case, read_any_case
+from klack.case.any_case import load_any_case, read_any_case
 from klack.errors import InputError
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
@@ -154,7 +154,7 @@ def test_hostile_files_in_a_confined_process(tmp_path: Path):
     (tmp_path / "too large.yaml").write_bytes(b"klack: 1\n" * 1_200_000)
     program = (
         "import sys, time, pathlib\n"
-        "from klack.case.valve_reader import load_any_case\n"
+        "from klack.case.any_case import load_any_case\n"
         "from klack.errors import InputError\n"
         "for path in sorted(pathlib.Path('.').glob('*.yaml')):\n"
         "    begin = time.process_time()\n"

@@ -14,13 +14,12 @@ from klack.analyses.record import CaseRecord, case_fields, run_fields
 from klack.analyses.sensitivities.record import SensitivityRecord
 from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.strokes import STROKES
-from klack.case.calibration import CaseCalibration
-from klack.case.case_tree import tree_of
+from klack.case.any_case import read_valve_case, tree_of
 from klack.case.key_path import quantity_at, split_path
+from klack.case.measurement import CaseCalibration
 from klack.case.points import points_of
 from klack.case.reader import read_case
 from klack.case.rewriting import rewritten, written_quantity
-from klack.case.valve_reader import read_valve_case
 from klack.cli.main import main
 from klack.errors import InputError
 from klack.input.problem import CaseProblem

@@ -14,12 +14,11 @@ from ruamel.yaml import YAML
 
 import klack
 from klack.analyses.stroke.run import run_stroke
-from klack.case.case_tree import read_case_tree, tree_of
-from klack.case.expansion import expanded
+from klack.case.any_case import load_valve_case, read_case_tree, read_valve_case, tree_of
 from klack.case.key_path import quantity_at
 from klack.case.parts import with_parts
+from klack.case.reader import expanded
 from klack.case.rewriting import moved_files, rewritten
-from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from klack.case import Case, CaseProblem, find_case, load_case, read_case, shipped_cases
-from klack.case.valve_reader import load_any_case, read_any_case
+from klack.case.any_case import load_any_case, read_any_case
 from klack.errors import InputError
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"

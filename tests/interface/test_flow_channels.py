@@ -7,7 +7,7 @@ import pytest
 
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.inertance import Inertance

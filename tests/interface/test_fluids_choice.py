@@ -7,7 +7,7 @@ import pytest
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import ConvergenceError, InputError
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_choice import FluidChoice

@@ -8,7 +8,7 @@ from doubts import doubts
 
 from klack.analyses.stroke.axis_place import guide_of
 from klack.assembling.valve import build_valve
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import InputError
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "half_section_stroke.yaml"

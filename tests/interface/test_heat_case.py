@@ -13,8 +13,8 @@ from klack.analyses.heat.summary import answer
 from klack.analyses.heat.warm_valve import aspects_of, warm_valve
 from klack.analyses.stroke.run import one_variant
 from klack.assembling.valve import Valve, build_valve
+from klack.case.any_case import read_valve_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.errors import InputError
 from klack.progress import silent

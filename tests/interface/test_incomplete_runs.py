@@ -14,7 +14,7 @@ import pytest
 from klack.analyses.noise.source import _notes
 from klack.analyses.stroke import run as stroke
 from klack.analyses.stroke.analysis import STROKE
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.cli.main import main
 from klack.errors import ConvergenceError
 from klack.finite import require_finite

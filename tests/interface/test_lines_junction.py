@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.errors import InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid

@@ -5,8 +5,8 @@ import pytest
 
 from klack.assembling.given_bodies import reduced_from_file
 from klack.case import load_case
-from klack.case.shipped import find_case
-from klack.case.valve_reader import load_any_case
+from klack.case.any_case import load_any_case
+from klack.case.reader import find_case
 from klack.exchange.case_models import case_models
 from klack.exchange.matlab_model import write_matlab
 from klack.exchange.text_model import write_text

@@ -16,8 +16,8 @@ from klack.assembling.bodies import mesh_body, place_meshes
 from klack.assembling.mesh_messages import coarsest_sound, meshed_for_case
 from klack.assembling.valve import mesh_valve_bodies
 from klack.case import find_case, load_case
+from klack.case.any_case import load_any_case
 from klack.case.reader import read_case
-from klack.case.valve_reader import load_any_case
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh

@@ -17,9 +17,8 @@ from klack.app.parts import part_of_step, part_of_table
 from klack.app.plan_review import review
 from klack.app.uploads import Uploads
 from klack.app.valve_plan import BODIES, Plans, ValvePlan
-from klack.case.reader import read_case
-from klack.case.shipped import find_case
-from klack.case.valve_reader import load_any_case
+from klack.case.any_case import load_any_case
+from klack.case.reader import find_case, read_case
 from klack.errors import InputError
 from klack.mesh.profile import Profile
 from klack.mesh.solid import write_step_revolved

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import InputError
 
 FILE = Path(__file__).parents[2] / "docs" / "how-to" / "guided_magnet.yaml"

@@ -12,9 +12,8 @@ import yaml
 from klack.analyses.linearisation.run import run_linearisation
 from klack.analyses.operating_point.run import run_operating_points
 from klack.analyses.stroke.run import run_stroke
-from klack.case.case_tree import tree_of
+from klack.case.any_case import load_valve_case, read_valve_case, tree_of
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.exchange.case_models import case_models
 

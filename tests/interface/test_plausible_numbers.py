@@ -11,8 +11,8 @@ from doubts import doubts
 from klack.assembling.bodies import wanted_sizes
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.case import shipped_cases
+from klack.case.any_case import read_any_case
 from klack.case.reader import read_case
-from klack.case.valve_reader import read_any_case
 from klack.cli.main import main
 from klack.errors import InputError
 

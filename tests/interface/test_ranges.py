@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from doubts import doubts
 
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.controlled_pressure import ControlledPressure

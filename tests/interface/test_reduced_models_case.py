@@ -17,8 +17,8 @@ from klack.analyses.reduction.analysis import REDUCTION
 from klack.analyses.reduction.run import run_reduce
 from klack.assembling.given_pair import build_given_pair
 from klack.case import load_case, shipped_cases
+from klack.case.any_case import load_any_case
 from klack.case.schema import Case
-from klack.case.valve_reader import load_any_case
 from klack.contact.laws import HertzLaw, LinearLaw
 from klack.elasticity.body import elastic_body
 from klack.errors import InputError

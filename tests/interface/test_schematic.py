@@ -11,8 +11,8 @@ import pytest
 from rigid_valve import TEXT
 from schematic_rules import FLUID, Actuator, broken_rules, random_network
 
-from klack.case.shipped import shipped_cases
-from klack.case.valve_reader import load_any_case, read_valve_case
+from klack.case.any_case import load_any_case, read_valve_case
+from klack.case.reader import shipped_cases
 from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pressure_source import PressureSource

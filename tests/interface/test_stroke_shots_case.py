@@ -7,8 +7,8 @@ import pytest
 from shots_valve import GUIDE, valve_case, valve_text
 
 from klack.analyses.stroke_shots.one_stroke import Starts, shots_of_valve
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.case.distribution import Distribution
-from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.cli.main import main
 from klack.errors import InputError
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import start_text, stroke_to_json
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 

@@ -23,10 +23,10 @@ from klack.analyses.study.evaluation import KeptPoint, point_key
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.points import parameters_of, short_names
 from klack.analyses.study.wording import steps_texts
+from klack.case.any_case import load_any_case
 from klack.case.reader import parse
 from klack.case.study import CaseStudy
 from klack.case.study_source import StudySource
-from klack.case.valve_reader import load_any_case
 from klack.cli.main import main
 from klack.errors import InputError
 from klack.report.html import write_report
@@ -226,7 +226,7 @@ class TestKept:
 
     def test_a_changed_file_is_another_point(self, tmp_path):
         from klack.analyses.study.evaluation import point_key
-        from klack.case.case_tree import read_case_tree
+        from klack.case.any_case import read_case_tree
 
         case = tmp_path / "case.yaml"
         case.write_text(SMALL.read_text())

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from klack.case import read_case
-from klack.case.bodies import CaseBody
-from klack.case.valve import ValveCase
-from klack.case.valve_reader import (
+from klack.case.any_case import (
     load_any_case,
     load_valve_case,
     read_valve_case,
     valve_case_schema,
 )
+from klack.case.bodies import CaseBody
+from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import BodyPort, CaseStop, StrokeRun, ValveBody
 from klack.errors import InputError

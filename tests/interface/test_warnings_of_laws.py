@@ -6,8 +6,8 @@ import pytest
 
 from klack.analyses.impact.run import run_impact
 from klack.assembling.valve import build_valve
+from klack.case.any_case import load_valve_case
 from klack.case.reader import load_case
-from klack.case.valve_reader import load_valve_case
 from klack.contact import local_law
 from klack.stages import collected_warnings
 

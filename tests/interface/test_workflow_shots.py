@@ -34,7 +34,7 @@ from klack.api import Result
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.case import load_case
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.progress import silent
 

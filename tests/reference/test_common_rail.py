@@ -10,7 +10,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from klack.analyses.operating_point.analysis import OPERATING_POINT
-from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
 

@@ -16,7 +16,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.cli.main import main
 from klack.errors import InputError
 from klack.mesh.files import catalogue as mesh_catalogue

@@ -18,7 +18,7 @@ from klack.acoustics.spectrum import (
     impulse_spectrum,
 )
 from klack.acoustics.third_octave import band_energies
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.contact.laws import LinearLaw
 from klack.contact.restitution import measure_impact
 from klack.signals import TimeSeries

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from klack.case import case_schema
-from klack.case.valve_reader import valve_case_schema
+from klack.case.any_case import valve_case_schema
 
 DOCS = Path(__file__).parents[2] / "docs"
 

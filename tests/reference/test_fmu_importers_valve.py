@@ -12,7 +12,7 @@ from c_compiler import needs_compiler
 
 from klack.assembling.valve import build_valve
 from klack.case import find_case
-from klack.case.valve_reader import load_any_case
+from klack.case.any_case import load_any_case
 from klack.contact.laws import HuntCrossley
 from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu

@@ -17,8 +17,8 @@ from klack.analyses.stroke.run import run_stroke, variant_network
 from klack.analyses.stroke.summary import stroke_to_json
 from klack.analyses.stroke_shots.run import run_stroke_shots
 from klack.assembling.valve import build_valve
+from klack.case.any_case import read_valve_case
 from klack.case.reader import read_case
-from klack.case.valve_reader import read_valve_case
 from klack.errors import AccuracyWarning
 from klack.simulation.network_run import simulate_network
 from klack.transient.ring_arcs import ArcWatch, RingArcs

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from klack.analyses.heat.run import run_heat
-from klack.case.shipped import shipped_cases
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
+from klack.case.reader import shipped_cases
 
 PAGE = (Path(__file__).parents[2] / "docs" / "how-to" / "warm-up.md").read_text(encoding="utf-8")
 

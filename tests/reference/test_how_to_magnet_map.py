@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "magnet_from_a_map.yaml"
 CIRCUIT = """

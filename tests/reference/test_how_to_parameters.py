@@ -10,7 +10,7 @@ import pytest
 
 import klack
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import load_valve_case, read_valve_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"

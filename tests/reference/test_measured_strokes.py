@@ -19,10 +19,10 @@ from klack.analyses.comparison.strokes import compare_strokes
 from klack.analyses.comparison.strokes_record import MeasuredStrokeStudy
 from klack.analyses.comparison.strokes_summary import agreement
 from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.case.key_path import quantity_at, split_path
-from klack.case.shipped import shipped_cases
+from klack.case.reader import shipped_cases
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_valve_case, read_valve_case
 from klack.measurement.loading import load_stroke_set
 
 CASE = shipped_cases()["measured"]

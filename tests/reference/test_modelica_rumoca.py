@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from klack.case.shipped import find_case
-from klack.case.valve_reader import load_any_case
+from klack.case.any_case import load_any_case
+from klack.case.reader import find_case
 from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
 from klack.exchange.case_models import case_models
 from klack.exchange.modal_model import Provenance, body_model

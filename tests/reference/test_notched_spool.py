@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ruamel.yaml import YAML
 
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 from klack.simulation.network_run import simulate_network
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"

@@ -13,7 +13,7 @@ import pytest
 from klack.analyses.stroke.axis_figures import axis_over_time_chart
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import InputError
 from klack.hydraulics.off_axis_seat import SeatFace, flow_area
 from klack.magnetics.off_axis_gap import guide_ring

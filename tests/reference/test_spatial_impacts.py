@@ -14,7 +14,7 @@ from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.impact_order import recorded_impacts
 from klack.analyses.stroke.run import run_stroke, variant_network
 from klack.assembling.valve import build_valve
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.simulation.film_sectors import sector_pressure
 from klack.simulation.network_compile import compile_network
 from klack.simulation.step_sizes import step_sizes

@@ -17,7 +17,7 @@ from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.impact_order import recorded_impacts
 from klack.analyses.stroke.run import run_stroke
 from klack.assembling.valve_shapes import valve_shapes
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.cli.main import main
 from klack.elasticity.stress import StressField
 from klack.errors import InputError

@@ -15,7 +15,7 @@ from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_c
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.summary import stroke_to_json
 from klack.assembling.valve import build_valve
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.errors import InputError
 from klack.mechanics.force import ConstantForce
 from klack.mechanics.spring import Spring

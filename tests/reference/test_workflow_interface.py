@@ -13,7 +13,7 @@ from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.summary import estimate_lines, study_to_json
 from klack.case import load_case, shipped_cases
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.restitution import Deviation
 

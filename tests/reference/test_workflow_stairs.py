@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.shipped import find_case
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
+from klack.case.reader import find_case
 
 pytestmark = pytest.mark.slow
 

@@ -12,7 +12,7 @@ import pytest
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.case import shipped_cases
-from klack.case.valve_reader import load_valve_case
+from klack.case.any_case import load_valve_case
 
 pytestmark = pytest.mark.slow
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.shipped import find_case
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
+from klack.case.reader import find_case
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
 

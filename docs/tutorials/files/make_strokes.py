@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.analyses.stroke.run import run_stroke
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.measurement.lift_sensor import sense
 from klack.measurement.sensor import LiftSensor
 

@@ -44,10 +44,9 @@ from klack.app.listening import common_scale
 from klack.app.sliders import sliders_of, written
 from klack.assembling.problem import contact_problem
 from klack.assembling.valve import Valve, build_valve, filled_network
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree, tree_of
-from klack.case.inserting import with_values
+from klack.case.any_case import AnyCase, CaseTree, tree_of
 from klack.case.points import case_at
+from klack.case.rewriting import with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles

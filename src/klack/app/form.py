@@ -8,9 +8,9 @@ from pydantic.fields import FieldInfo
 
 from klack.app.answers import Checked, FormField
 from klack.app.study_texts import is_study, study_source, study_words
-from klack.case.case_tree import CaseTree, tree_of
-from klack.case.inserting import with_values
+from klack.case.any_case import CaseTree, tree_of
 from klack.case.key_path import kind_at, node_at
+from klack.case.rewriting import with_values
 from klack.errors import KlackError
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import Section

@@ -13,7 +13,7 @@ from klack.analyses.study.point_case import written_of_point
 from klack.analyses.study.record import StudyRecord
 from klack.app.answers import Heard
 from klack.app.study_points import StudyPoints
-from klack.case.case_tree import tree_of
+from klack.case.any_case import tree_of
 from klack.errors import InputError
 from klack.progress import silent
 from klack.signals import TimeSeries

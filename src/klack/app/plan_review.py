@@ -19,7 +19,7 @@ from klack.app.plan_case import BodySizes, case_text
 from klack.app.valve_plan import BODIES, ValvePlan
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.case import plausible
-from klack.case.case_tree import tree_of
+from klack.case.any_case import tree_of
 from klack.contact.hertz import line_half_width, point_radius
 from klack.errors import KlackError
 from klack.material_library import library_material

@@ -13,7 +13,7 @@ from klack.app.answers import PartFacts, Review, typed
 from klack.app.parts import Part, part_of_step, part_of_table
 from klack.app.plan_review import review
 from klack.app.valve_plan import ValvePlan
-from klack.case.case_tree import tree_of
+from klack.case.any_case import tree_of
 from klack.errors import InputError
 from klack.viewer.of_case import body_view, view_of_case
 from klack.viewer.payload import payload_of

@@ -6,8 +6,7 @@ from typing import Any
 
 from klack.analyses.study.kinds import kind_of
 from klack.app.answers import Slider
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.key_path import quantity_at, written_at
 from klack.case.schema import Case
 from klack.errors import InputError

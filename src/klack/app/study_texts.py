@@ -13,7 +13,7 @@ from klack.analyses.study.kinds import kind_of, measure_names
 from klack.analyses.study.run import asked_points
 from klack.app.answers import Checked, MeasureOffer, StudyChoice, StudyOffer, typed
 from klack.app.sliders import sliders_of
-from klack.case.case_tree import CaseTree, tree_of
+from klack.case.any_case import CaseTree, tree_of
 from klack.case.reader import parse, validated
 from klack.case.study import CaseStudy, StudyFile
 from klack.case.study_source import StudySource, study_of

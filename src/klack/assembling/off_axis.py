@@ -17,7 +17,7 @@ from klack.assembling.held_nodes import held_nodes
 from klack.assembling.modes import selection_of
 from klack.assembling.problem import ContactProblem
 from klack.case.bodies import CaseFile
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.contact.mortar import ContactSpace, contact_space

@@ -10,7 +10,7 @@ import warnings
 from klack.assembling.problem import ContactProblem, contact_problem, place_bodies
 from klack.case.bodies import CaseBody
 from klack.case.geometry import ContactRefinement
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import highest_load

@@ -14,8 +14,7 @@ from klack.assembling.off_axis_points import off_axis_space, touch_height
 from klack.assembling.position_in_guide import axis_through, in_disc
 from klack.assembling.stops import StopContact
 from klack.assembling.tilting_land import tilting_film
-from klack.case.guide import LinearGuideLaw
-from klack.case.motion_of_valve import ValveGuide
+from klack.case.guide import LinearGuideLaw, ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.face_friction import FaceFriction

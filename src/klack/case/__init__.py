@@ -2,9 +2,8 @@
 
 from klack.case.bodies import SurfaceName
 from klack.case.levels import LEVELS
-from klack.case.reader import case_schema, load_case, read_case
+from klack.case.reader import case_schema, find_case, load_case, read_case, shipped_cases
 from klack.case.schema import Case
-from klack.case.shipped import find_case, shipped_cases
 from klack.input.problem import CaseProblem
 
 __all__ = [

@@ -1,11 +1,32 @@
-"""A case of either kind: an impact of two bodies, or a whole valve."""
+"""Cases of both kinds: which one a file holds, read and as a tree."""
 
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
+from klack.case.parts import self_contained
+from klack.case.reader import Lines, parse, schema_of, text_of, validated
 from klack.case.schema import Case
-from klack.case.valve import ValveCase
+from klack.case.valve import ValveCase, require_valve
+from klack.input.problem import Key
+from klack.network.component import Component
+from klack.network.own_component import component_word
 
-__all__ = ["AnyCase", "case_kind"]
+__all__ = [
+    "AnyCase",
+    "CaseTree",
+    "OwnComponents",
+    "exchanged",
+    "load_any_case",
+    "load_valve_case",
+    "read_any_case",
+    "read_case_tree",
+    "read_valve_case",
+    "tree_of",
+    "valve_case_schema",
+]
+
 
 AnyCase = Case | ValveCase
 
@@ -13,3 +34,117 @@ AnyCase = Case | ValveCase
 def case_kind(data: Any) -> type[Case] | type[ValveCase]:
     """Kind of the case that the parsed text of a file describes: a valve has a network."""
     return ValveCase if "network" in data else Case
+
+
+OwnComponents = Iterable[type[Component]]
+"""User components that a case may name."""
+
+
+def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCase:
+    """Read and check the case file of a whole valve; see :func:`klack.case.reader.load_case`.
+
+    Parameters
+    ----------
+    path : str or Path
+    components : iterable of type
+        Components of the user's own that the case may name, as ``package.module:Class``.
+    """
+    path = Path(path)
+    return read_valve_case(text_of(path), path, components)
+
+
+def load_any_case(path: str | Path, components: OwnComponents = ()) -> AnyCase:
+    """Read and check a case file of either kind: with a section ``network`` it is a valve."""
+    path = Path(path)
+    return read_any_case(text_of(path), path, components)
+
+
+def read_valve_case(text: str, path: Path, components: OwnComponents = ()) -> ValveCase:
+    """Check the text of a case of a whole valve that lies (or will lie) at ``path``."""
+    data, lines = parse(text, path)
+    require_valve(data, path, lines)
+    own = {component_word(kind): kind for kind in components}
+    return validated(ValveCase, text, path, data, lines, own)
+
+
+def read_any_case(text: str, path: Path, components: OwnComponents = ()) -> AnyCase:
+    """Check the text of a case of either kind."""
+    data, lines = parse(text, path)
+    own = {component_word(kind): kind for kind in components}
+    return validated(case_kind(data), text, path, data, lines, own)
+
+
+def valve_case_schema() -> dict[str, Any]:
+    """JSON schema of a case of a whole valve, with all components."""
+    return schema_of(ValveCase)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CaseTree:
+    """Text of a case, and the plain data in it.
+
+    Parameters
+    ----------
+    path : Path
+    text : str
+    data : mapping
+    lines : Lines
+    components : mapping of str to type
+        Of the user's own, by the words that the case may name them with.  A worker process knows
+        a class of a script under another module, so that the word is kept.
+    """
+
+    path: Path
+    text: str
+    data: Any
+    lines: Lines
+    components: Mapping[str, type[Component]] = field(default_factory=dict)
+
+    def case(self, values: Mapping[Key, object] | None = None) -> ValveCase:
+        """Check the case of a whole valve with other values at some keys that it has.
+
+        Raises
+        ------
+        InputError
+            With file, line and key, as when the case is read; for a case of an impact.
+        """
+        data = self.data
+        for key, value in (values or {}).items():
+            data = exchanged(data, key, value)
+        require_valve(data, self.path, self.lines)
+        return validated(ValveCase, self.text, self.path, data, self.lines, self.components)
+
+    def any_case(self) -> AnyCase:
+        """Check the case, an impact or a whole valve.
+
+        Raises
+        ------
+        InputError
+            With file, line and key, as when the case is read.
+        """
+        kind = case_kind(self.data)
+        return validated(kind, self.text, self.path, self.data, self.lines, self.components)
+
+
+def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
+    """Read the file of a case; ``components`` are those of the user's own that it may name."""
+    return tree_of(text_of(path), path, components)
+
+
+def tree_of(text: str, path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
+    """Parse the text of a case that lies (or will lie) at ``path``."""
+    data, lines = parse(text, path)
+    if "network" in data and data.get("include"):
+        text, data, lines = self_contained(text, path, data, lines)
+    own = {component_word(kind): kind for kind in components}
+    return CaseTree(path=path, text=text, data=data, lines=lines, components=own)
+
+
+def exchanged(data: Any, key: Key, value: object) -> Any:
+    """Copy of the data with another value; everything off the path is shared."""
+    if not key:
+        return value
+    head, rest = key[0], key[1:]
+    copy: Any = dict(data) if isinstance(data, dict) else list(data)
+    copy[head] = exchanged(data[head], rest, value)
+    return copy

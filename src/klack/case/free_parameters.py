@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from klack.case.calibration import CalibrationParameter
 from klack.case.key_path import Quantity, quantity_at, split_path
+from klack.case.measurement import CalibrationParameter
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError, refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of

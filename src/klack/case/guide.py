@@ -1,14 +1,25 @@
-"""The guide of the moving body: a bore around its shaft, with little room."""
+"""Guides, and where bodies start in them."""
 
+from math import radians
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from klack.input.problem import CaseProblem
 from klack.input.section import Name, Section
-from klack.units import DampingCoefficient, Length, Ratio, Stiffness, format_si
+from klack.units import Angle, DampingCoefficient, Length, Ratio, Stiffness, format_si
 
-__all__ = ["CaseGuide", "ConsistentGuideLaw", "GuideLaw", "LinearGuideLaw"]
+__all__ = [
+    "CaseGuide",
+    "ConsistentGuideLaw",
+    "GuideFilm",
+    "GuideLaw",
+    "LinearGuideLaw",
+    "Placement",
+    "ValveGuide",
+    "ValveMotion",
+    "ValvePlacement",
+]
 
 
 class ConsistentGuideLaw(Section):
@@ -69,3 +80,70 @@ class CaseGuide(Section):
         """How far off its bore the axis of a rigid shaft can be at a height [m]."""
         share = (height - self.heights[0]) / (self.heights[-1] - self.heights[0])
         return self.clearance * (abs(1.0 - share) + abs(share))
+
+
+_LARGEST_TILT = radians(5.0)
+
+
+class Placement(Section):
+    """Small rigid displacement of the moving body, eccentric and tilted.
+
+    The body is first tilted: its upper end goes towards ``tilt_direction``, about the point of its
+    axis at the height of first touch.  Then it is shifted by ``eccentricity`` towards
+    ``direction``, and last moved along z to the gap.  Directions count from x towards y.
+    """
+
+    eccentricity: Length = Field(default=0.0, ge=0, description="Distance from the axis.")
+    direction: Angle = Field(default=0.0, description="Its direction, from x towards y.")
+    tilt: Angle = Field(
+        default=0.0, ge=0, le=_LARGEST_TILT, description="Angle between its axis and z."
+    )
+    tilt_direction: Angle = Field(
+        default=0.0, description="Direction in which its upper end is tilted, from x towards y."
+    )
+
+    @property
+    def is_centred(self) -> bool:
+        """True if the body stands on the axis, upright."""
+        return self.eccentricity == 0.0 and self.tilt == 0.0
+
+
+ValveMotion = Literal["axial", "three-dimensional"]
+"""Freedoms of the bodies of a valve."""
+
+
+class GuideFilm(Section):
+    """Film of the fluid of the network at each height of a guide, a short bearing that is squeezed.
+
+    Its drag along the axis and its leakage are those of an annulus.
+    """
+
+    length: Length = Field(gt=0, description="Of the guiding land at each height, along the axis.")
+    cut_off: Length = Field(
+        default=0.3e-6,
+        gt=0,
+        description="Height that the roughness leaves where the shaft touches.",
+    )
+
+
+class ValveGuide(CaseGuide):
+    """Guide of a needle in a valve, dry or with a film."""
+
+    film: GuideFilm | None = Field(
+        default=None, description="Film across the guide, in variants with fluid."
+    )
+
+
+class ValvePlacement(Placement):
+    """Position of the needle at the start, off its axis and tilted, or drawn at random.
+
+    The needle is tilted about the point of its axis at the height of its seat, then shifted.  On a
+    closed seat it settles from there under the forces on it.
+    """
+
+    seed: int | None = Field(
+        default=None,
+        ge=0,
+        description="Draw the position instead: axis uniformly within the clearance at the lowest "
+        "and the highest height of the guide, from this seed.",
+    )

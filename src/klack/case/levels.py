@@ -1,8 +1,9 @@
-"""Levels of an impact, from rigid masses to every degree of freedom."""
+"""Levels of impacts and variants of strokes."""
 
 from typing import Literal, get_args
 
-__all__ = ["LEVELS", "OFF_AXIS_LEVELS", "ROUGH_LEVELS", "Level"]
+__all__ = ["LEVELS", "OFF_AXIS_LEVELS", "ROUGH_LEVELS", "VARIANTS", "Level", "Variant"]
+
 
 Level = Literal[
     "lumped",
@@ -26,3 +27,7 @@ ROUGH_LEVELS: tuple[Level, ...] = (
 
 OFF_AXIS_LEVELS: tuple[Level, ...] = ("lumped", "interface")
 """Levels of axisymmetric bodies that meet off their axis."""
+
+
+Variant = Literal["wet", "dry", "wet-lumped", "dry-lumped"]
+VARIANTS: tuple[Variant, ...] = ("wet", "dry", "wet-lumped", "dry-lumped")

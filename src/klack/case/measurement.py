@@ -1,16 +1,18 @@
-"""Measurement of a valve: channels, start of a stroke, sensor."""
+"""Measurements of the valve, and what is calibrated by them."""
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from klack.input.section import Section
+from klack.case.study import Written
+from klack.input.section import Count, Name, Section, Text
 from klack.measurement.channels import Channels
 from klack.measurement.sensor import LiftSensor
 from klack.measurement.trigger import Trigger
 from klack.units import Frequency, Time
 
-__all__ = ["CaseMeasurement"]
+__all__ = ["CalibrationParameter", "CaseCalibration", "CaseMeasurement"]
 
 
 class CaseMeasurement(Section):
@@ -38,4 +40,48 @@ class CaseMeasurement(Section):
         default=None,
         gt=0,
         description="Bandwidth of the velocity from the lift; default chosen by its noise.",
+    )
+
+
+class CalibrationParameter(Section):
+    """One fitted number, and its keys in the case.
+
+    Its value in the case is where the search begins.
+    """
+
+    key: tuple[Text, ...] = Field(
+        min_length=1,
+        description="Path of the key in the case, e.g. network.components.spring.preload; a list "
+        "of paths gets one value.",
+    )
+    lower: Written = Field(description="Lower bound, with the unit of the key.")
+    upper: Written = Field(description="Upper bound.")
+
+    @field_validator("key", mode="before")
+    @classmethod
+    def _one_key(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+
+class CaseCalibration(Section):
+    """Parameters that are fitted to measured strokes."""
+
+    variant: Literal["wet", "dry"] = Field(
+        default="wet", description="Measured valve: with its fluid, or dry."
+    )
+    parameters: Mapping[Name, CalibrationParameter] = Field(
+        min_length=1, description="name: the fitted key of the case, and its bounds."
+    )
+    profile: tuple[Name, ...] = Field(
+        default=(),
+        description="Parameters whose profile likelihood is computed: an interval without the "
+        "assumption that the model is linear.",
+    )
+    impacts: Count = Field(
+        default=1,
+        le=20,
+        description="Impacts on each stop that are fitted, with the flights before and after.",
+    )
+    channels: tuple[Literal["lift", "current"], ...] = Field(
+        default=("lift",), min_length=1, description="Fitted channels: lift, current."
     )

@@ -6,18 +6,157 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
-from klack.case.arguments import argument_values, copy_names
 from klack.case.case_text import parse
-from klack.case.filling import filled
 from klack.case.origin import Filled, Origin
-from klack.case.parameters import Scope, parameters_of_text
-from klack.case.part_sections import CaseInclude, PartFile
-from klack.case.parts import DEEPEST, part_name
+from klack.case.parameters import (
+    ParameterValue,
+    Scope,
+    evaluated,
+    is_expression,
+    parameter_value,
+    parameters_of_text,
+)
+from klack.case.parts import DEEPEST, CaseInclude, PartFile, part_name
 from klack.errors import InputError
+from klack.expressions.dimension import NUMBER
 from klack.input.problem import Key, nearest, one_of
 from klack.input.section import Section
 
-__all__ = ["Checked", "Merging"]
+__all__ = ["COUNTER", "Checked", "Merging", "filled", "has_expression", "shown_include"]
+
+
+_LITERAL = ("title", "description", "parameters", "include", "parts")
+_LINKED = ("study", "linked")
+
+
+def has_expression(data: Any, key: Key = ()) -> bool:
+    """Whether plain data hold a value that begins with ``=``."""
+    if isinstance(data, dict):
+        return any(
+            has_expression(value, (*key, name))
+            for name, value in data.items()
+            if not _is_literal((*key, name))
+        )
+    if isinstance(data, list):
+        return any(has_expression(value, (*key, i)) for i, value in enumerate(data))
+    return is_expression(data)
+
+
+def filled(data: Any, key: Key, scope: Scope, origin: Origin, found: dict[Key, Filled]) -> Any:
+    """Copy of plain data with values in place of expressions.
+
+    Parameters
+    ----------
+    data : object
+    key : tuple of str and int
+        In the expanded case.
+    scope : mapping
+        Names that expressions may use.
+    origin : Origin
+        Of the data.
+    found : dict
+        Takes the expressions by their keys in the expanded case.
+
+    Raises
+    ------
+    InputError
+        With file, line, key and the place in the expression.
+    """
+    if isinstance(data, Mapping):
+        return {
+            name: value
+            if _is_literal((*key, name))
+            else filled(value, (*key, name), scope, origin.below(name), found)
+            for name, value in data.items()
+        }
+    if isinstance(data, list):
+        return [
+            filled(value, (*key, i), scope, origin.below(i), found) for i, value in enumerate(data)
+        ]
+    if not is_expression(data):
+        return data
+    value, sources = evaluated(data, scope, origin.where())
+    found[key] = Filled(data.strip(), sources)
+    return value
+
+
+def _is_literal(key: Key) -> bool:
+    """Whether texts there are left as they are: words, and expressions of a study's parameters."""
+    return (len(key) == 1 and key[0] in _LITERAL) or key == _LINKED
+
+
+COUNTER = "number"
+"""Name by which arguments know which copy they are for, counted from 1."""
+
+
+def copy_names(item: CaseInclude) -> tuple[str, ...]:
+    """Names of the copies of an included part."""
+    if item.count is None:
+        return (item.name,)
+    return tuple(f"{item.name}{number}" for number in range(1, item.count + 1))
+
+
+def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin) -> Scope:
+    """Values for the parameters of one copy.
+
+    Parameters
+    ----------
+    item : CaseInclude
+    number : int
+        Of the copy, from 1.
+    scope : mapping
+        Of the file that includes the part.
+    origin : Origin
+        Of the include.
+
+    Raises
+    ------
+    InputError
+        With file, line and key.
+    """
+    if item.count is not None:
+        if COUNTER in scope:
+            raise InputError(
+                origin.where(("count",), on_key=True),
+                got=f"a count beside a parameter '{COUNTER}'",
+                expected=f"no such parameter: '{COUNTER}' counts the copies",
+                hint="rename the parameter.",
+            )
+        scope = {**scope, COUNTER: ParameterValue(float(number), NUMBER, str(number))}
+    found = {}
+    for name, text in item.arguments.items():
+        key: Key = ("with", name)
+        if isinstance(text, list):
+            _require_count(item, text, origin.where(key))
+            key, text = (*key, number - 1), text[number - 1]
+        # an argument inside a part is no key of the case
+        own = () if origin.copy else (*origin.key, *key)
+        found[name] = parameter_value(text, scope, origin.where(key), own)
+    return found
+
+
+def shown_include(item: CaseInclude, scope: Scope, origin: Origin) -> dict[str, Any]:
+    """Include with the values of its arguments: those of the first copy, and lists of all."""
+    copies = [argument_values(item, n + 1, scope, origin) for n in range(len(copy_names(item)))]
+    values = {
+        name: tuple(copy[name] for copy in copies) if isinstance(text, list) else copies[0][name]
+        for name, text in item.arguments.items()
+    }
+    count = {} if item.count is None else {"count": item.count}
+    return {"file": item.file, "as": item.name, **count, "with": values}
+
+
+def _require_count(item: CaseInclude, values: list[Any], where: str) -> None:
+    if item.count is None or len(values) != item.count:
+        raise InputError(
+            where,
+            got=f"a list of {len(values)}",
+            expected="one value, or a count beside the list"
+            if item.count is None
+            else f"one value for each of the {item.count} copies",
+            hint="count and list belong together: {count: 2, with: {lift: [80 um, 82 um]}}.",
+        )
+
 
 _MOST_COPIES = 1000
 _WORDS = ("ground", "ambient")

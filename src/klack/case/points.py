@@ -6,11 +6,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
-from klack.case.inserting import merged
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.key_path import kind_at, node_at, split_path
 from klack.case.reader import validated
+from klack.case.rewriting import merged
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError

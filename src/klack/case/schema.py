@@ -8,10 +8,9 @@ from typing import Self
 
 from pydantic import model_validator
 
-from klack.case.consistency import check_consistency
+from klack.case.consistency import check_consistency, check_noise
 from klack.case.impact_sections import ImpactSections
 from klack.case.levels import LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
-from klack.case.noise_consistency import check_noise
 from klack.errors import InputError, refuse
 from klack.input.problem import nearest, one_of
 

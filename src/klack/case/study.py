@@ -5,9 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Field, Strict, model_validator
 
-from klack.case.levels import Level
+from klack.case.levels import Level, Variant
 from klack.case.parameters import as_written
-from klack.case.variants import Variant
 from klack.errors import refuse
 from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, one_of

@@ -4,8 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.reader import Lines, parse, text_of, validated
 from klack.case.study import CaseStudy, StudyFile
 from klack.errors import InputError

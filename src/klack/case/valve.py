@@ -6,14 +6,13 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
+from klack.case.consistency import check_noise
 from klack.case.free_parameters import free_parameters
-from klack.case.noise_consistency import check_noise
+from klack.case.levels import VARIANTS, Variant
 from klack.case.reader import Lines
 from klack.case.spatial_consistency import require_bodies
-from klack.case.thermal_consistency import check_thermal
-from klack.case.valve_consistency import check_valve
+from klack.case.valve_consistency import check_thermal, check_valve
 from klack.case.valve_sections import ValveSections
-from klack.case.variants import VARIANTS, Variant
 from klack.errors import InputError, refuse
 from klack.input.problem import nearest, one_of
 from klack.network.own_component import source_digests

@@ -10,17 +10,16 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from klack.case.bodies import BodySurface, CaseBody, CaseFile, CaseMaterial, Reduction, SurfaceName
-from klack.case.calibration import CaseCalibration
+from klack.case.guide import ValveGuide, ValveMotion, ValvePlacement
 from klack.case.impact_sections import CaseWorn, Lumped
-from klack.case.measurement import CaseMeasurement
-from klack.case.motion_of_valve import ValveGuide, ValveMotion, ValvePlacement
+from klack.case.levels import Variant
+from klack.case.measurement import CaseCalibration, CaseMeasurement
 from klack.case.noise import CaseNoise
-from klack.case.part_sections import INCLUDE, PARTS, CaseInclude
+from klack.case.parts import INCLUDE, PARTS, CaseInclude
 from klack.case.plausible import PART_MASS, SPEED, Number
 from klack.case.shots import StrokeShots
 from klack.case.study import CaseStudy
 from klack.case.thermal import CaseThermal
-from klack.case.variants import Variant
 from klack.contact.friction import MOST_FRICTION
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Section, Text

@@ -16,8 +16,8 @@ from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.analyses.impact.record import ImpactStudy
+    from klack.case.any_case import OwnComponents
     from klack.case.measurement import CaseMeasurement
-    from klack.case.valve_reader import OwnComponents
     from klack.low_pass import LowPass
 
 __all__ = ["compare"]
@@ -205,8 +205,7 @@ def _with_pulses(
 def _low_pass_in(case: Path, study: "ImpactStudy", sensor: _Sensor) -> "LowPass | None":
     """Low pass of the same output in another case."""
     from klack.analyses.comparison.impacts import gauge_of
-    from klack.case.reader import load_case
-    from klack.case.shipped import find_case
+    from klack.case.reader import find_case, load_case
 
     name = gauge_of(study, sensor.level, sensor.output).name
     outputs = {item.name: item for item in load_case(find_case(case)).outputs}
@@ -233,7 +232,7 @@ def _require_file(text: str, path: Path, expected: str) -> None:
 
 def _files(given: Sequence[str], usual: str) -> Mapping[str, list[Path]]:
     """Files by variant; all of them must be there."""
-    from klack.case.variants import VARIANTS
+    from klack.case.levels import VARIANTS
 
     files: dict[str, list[Path]] = {}
     for text in given:
@@ -256,8 +255,8 @@ def _section(
     text: str, result: Path, case: Path | None, own: "OwnComponents"
 ) -> "tuple[CaseMeasurement | None, str | None]":
     """Section ``measurement`` of the result, or of another case with its text."""
-    from klack.case.shipped import find_case
-    from klack.case.valve_reader import load_any_case, read_any_case
+    from klack.case.any_case import load_any_case, read_any_case
+    from klack.case.reader import find_case
 
     if case is None:
         return read_any_case(text, result / "case.yaml", own).measurement, None

@@ -198,8 +198,8 @@ def export(
 
         raise parquet_is_for_studies(f"'{source}', which is no stored result")
 
-    from klack.case.shipped import find_case
-    from klack.case.valve_reader import load_any_case
+    from klack.case.any_case import load_any_case
+    from klack.case.reader import find_case
 
     case = load_any_case(find_case(source), imported(component))
     folder = out if out is not None else Path("klack-results") / case.name

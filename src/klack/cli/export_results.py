@@ -10,9 +10,9 @@ from klack.terminal.progress import show_progress
 
 if TYPE_CHECKING:
     from klack.analyses.study.record import StudyRecord
+    from klack.case.any_case import OwnComponents
     from klack.case.schema import Case
     from klack.case.valve import ValveCase
-    from klack.case.valve_reader import OwnComponents
 
 __all__ = [
     "StoredImpact",
@@ -184,7 +184,7 @@ def export_stored_impact(
     """Write the bodies and the line load of an impact of a stored stroke, for ParaView."""
     from klack.analyses.catalogue import load_result
     from klack.analyses.stroke.record import StrokeStudy
-    from klack.case.valve_reader import read_valve_case
+    from klack.case.any_case import read_valve_case
     from klack.exchange.results.spatial_series import write_spatial_series
     from klack.terminal.output import require_folder
 

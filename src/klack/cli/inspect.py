@@ -47,14 +47,14 @@ def inspect(
     bodies that come from other programs, checked as a run checks them.
     """
     from klack.analyses.inspection import inspect_case, inspect_file
-    from klack.case.shipped import find_case, shipped_cases
+    from klack.case.reader import find_case, shipped_cases
     from klack.errors import InputError
     from klack.mesh.files.catalogue import STEP_ENDINGS
     from klack.units import LENGTH, parse_quantity
 
     is_case = file.suffix.lower() in (".yaml", ".yml") or (file / "case.yaml").is_file()
     if is_case or (not file.exists() and str(file) in shipped_cases()):
-        from klack.case.valve_reader import load_any_case
+        from klack.case.any_case import load_any_case
 
         parts = inspect_case(load_any_case(find_case(file), imported(component)))
         _show(str(file), parts, wanted)

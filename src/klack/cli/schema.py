@@ -39,7 +39,7 @@ def schema(
 def _schema_of(kind: str) -> dict[str, Any]:
     # the components of a network take a while to import
     if kind == "stroke":
-        from klack.case.valve_reader import valve_case_schema
+        from klack.case.any_case import valve_case_schema
 
         return valve_case_schema()
 

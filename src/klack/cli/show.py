@@ -86,8 +86,8 @@ def _draw_schematic(
     source: Path, out: Path | None, own: "Sequence[type[Component]]", wanted: Shown
 ) -> int:
     from klack.analyses.result_folder import is_result
-    from klack.case.shipped import find_case
-    from klack.case.valve_reader import load_valve_case
+    from klack.case.any_case import load_valve_case
+    from klack.case.reader import find_case
 
     if is_result(source):
         return _draw_stored(source, out, wanted)

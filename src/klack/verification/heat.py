@@ -14,7 +14,7 @@ from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
 from klack.analyses.heat.run import run_heat
 from klack.analyses.heat.warm_valve import aspects_of, warm_valve
 from klack.assembling.valve import build_valve
-from klack.case.valve_reader import read_valve_case
+from klack.case.any_case import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.network.component import Component
 from klack.network.network import Network

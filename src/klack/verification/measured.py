@@ -14,8 +14,7 @@ from klack.analyses.comparison.impacts import compare_impact
 from klack.analyses.comparison.impacts_record import ComparedPulse, MeasuredImpactStudy
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
-from klack.case.reader import read_case, text_of
-from klack.case.shipped import find_case
+from klack.case.reader import find_case, read_case, text_of
 from klack.stages import collected_warnings
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.oblique_spheres import oblique_spheres

@@ -12,8 +12,8 @@ from klack import __version__
 from klack.analyses.impact.record import BodyPicture, ImpactStudy
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.assembling.touch_ring import goes_round
+from klack.case.any_case import read_valve_case
 from klack.case.reader import read_case
-from klack.case.valve_reader import read_valve_case
 from klack.errors import InputError
 from klack.network.component import Component
 from klack.progress import Progress, silent

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 from klack.analyses.catalogue import load_result
 from klack.analyses.result_folder import is_result
-from klack.case.shipped import find_case
+from klack.case.any_case import load_any_case
+from klack.case.reader import find_case
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import load_any_case
 from klack.errors import InputError
 from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS
 from klack.network.component import Component

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.reader import parse
 from klack.case.valve import ValveCase
 

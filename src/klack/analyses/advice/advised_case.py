@@ -7,11 +7,9 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from klack.analyses.advice.advice import Advice
-from klack.case.case_tree import CaseTree
-from klack.case.inserting import merged, plain_data, with_values
+from klack.case.any_case import CaseTree, read_any_case
 from klack.case.key_path import written_at
-from klack.case.rewriting import moved_files
-from klack.case.valve_reader import read_any_case
+from klack.case.rewriting import merged, moved_files, plain_data, with_values
 from klack.errors import InputError
 from klack.input.problem import Key
 from klack.units import FREQUENCY, LENGTH, TIME, format_si, parse_quantity

@@ -69,9 +69,8 @@ def advise(
     decibel = _within("--bands", bands, _decibel(bands), _MOST_LEVEL, "1 dB")
     highest = None if up_to is None else parse_quantity(up_to, FREQUENCY, "--up-to")
 
-    from klack.case.case_tree import read_case_tree
-    from klack.case.shipped import find_case
-    from klack.case.valve_reader import read_any_case
+    from klack.case.any_case import read_any_case, read_case_tree
+    from klack.case.reader import find_case
 
     tree = read_case_tree(find_case(case), imported(component))
     checked = read_any_case(tree.text, tree.path, tree.components.values())

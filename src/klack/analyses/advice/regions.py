@@ -5,7 +5,7 @@ from math import isnan, nan
 
 from klack.analyses.advice.settings import Setting, SettingValue
 from klack.case.bodies import CaseBody, ModeChoice, SurfaceName
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.statics import COARSE
 

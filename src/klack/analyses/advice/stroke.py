@@ -22,10 +22,10 @@ from klack.analyses.advice.settings import Setting, SettingValue, applied
 from klack.analyses.stroke.run import run_variant, variant_network
 from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.valve import Valve, build_valve, build_valve_bodies
+from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
-from klack.case.variants import Variant
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
 from klack.progress import Progress, silent

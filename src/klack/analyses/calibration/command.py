@@ -50,8 +50,8 @@ def calibrate(
         if number is not None:
             require_positive(option, number, unit)
 
-    from klack.case.case_tree import read_case_tree
-    from klack.case.shipped import find_case
+    from klack.case.any_case import read_case_tree
+    from klack.case.reader import find_case
 
     tree = read_case_tree(find_case(case), imported(component))
     checked = tree.case()

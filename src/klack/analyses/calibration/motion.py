@@ -18,7 +18,7 @@ from klack.analyses.workers import LoggedWork
 from klack.assembling.damping_choice import damping_of
 from klack.assembling.stops import StopFaces
 from klack.assembling.valve import filled_network
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.free_parameters import FreeParameter
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles

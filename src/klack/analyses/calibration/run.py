@@ -28,15 +28,13 @@ from klack.analyses.calibration.record import (
 from klack.analyses.comparison.strokes import require_same_way
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.valve import build_valve
-from klack.case.calibration import CaseCalibration
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree, read_valve_case
 from klack.case.free_parameters import FreeParameter, free_parameters
 from klack.case.key_path import written_at
-from klack.case.measurement import CaseMeasurement
+from klack.case.measurement import CaseCalibration, CaseMeasurement
 from klack.case.rewriting import moved_files, rewritten, written_quantity
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
-from klack.case.valve_reader import read_valve_case
 from klack.case.valve_roles import find_roles
 from klack.cores import available_cores
 from klack.errors import InputError, refuse_if

@@ -57,8 +57,8 @@ def heat(
             hint="--soak computes single strokes, at temperatures that stay.",
         )
     with show_progress(wanted.quiet):
-        from klack.case.shipped import find_case
-        from klack.case.valve_reader import load_valve_case
+        from klack.case.any_case import load_valve_case
+        from klack.case.reader import find_case
 
         checked = load_valve_case(find_case(case), imported(component))
     if duration is not None and checked.thermal is not None:

@@ -9,9 +9,9 @@ import numpy as np
 from klack.analyses.heat.warm_valve import Aspect, warm_valve
 from klack.analyses.stroke.run import one_variant
 from klack.assembling.valve import Valve
+from klack.case.levels import Variant
 from klack.case.thermal import CaseThermal
 from klack.case.valve_roles import ValveRoles
-from klack.case.variants import Variant
 from klack.errors import ConvergenceError, InputError
 from klack.input.problem import nearest, one_of
 from klack.magnetics.driver import Driver

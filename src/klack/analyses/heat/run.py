@@ -17,11 +17,11 @@ from klack.analyses.heat.warm_valve import Aspect, aspects_of, hot_windings
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
+from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.thermal import CaseThermal
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.case.variants import Variant
 from klack.errors import InputError
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings

@@ -18,7 +18,7 @@ from klack.analyses.record import case_fields, run_fields
 from klack.assembling.given_pair import GivenPair, build_given_pair
 from klack.assembling.modes import elastic_count
 from klack.cache.setting import result_cache
-from klack.case.given_consistency import GIVEN_LEVELS
+from klack.case.consistency import GIVEN_LEVELS
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import HertzLaw, LinearLaw

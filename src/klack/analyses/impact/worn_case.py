@@ -3,11 +3,10 @@
 from pathlib import Path
 
 from klack.analyses.impact.record import RunningIn
-from klack.case.case_tree import CaseTree
-from klack.case.inserting import with_values
+from klack.case.any_case import CaseTree
 from klack.case.key_path import written_at
 from klack.case.reader import parse, read_case
-from klack.case.rewriting import moved_files
+from klack.case.rewriting import moved_files, with_values
 from klack.input.problem import Key
 
 __all__ = ["WORN", "worn_text"]

@@ -106,8 +106,8 @@ def linearise(
 ) -> int:
     """Linear state space about the operating point: eigenvalues, response, margins, stability."""
     with show_progress(asked.quiet):
-        from klack.case.case_tree import read_case_tree
-        from klack.case.shipped import find_case
+        from klack.case.any_case import read_case_tree
+        from klack.case.reader import find_case
 
         tree = read_case_tree(find_case(case), imported(component))
         checked = tree.case()

@@ -25,11 +25,11 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.run import variant_network
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
+from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
-from klack.case.variants import Variant
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
 from klack.magnetics.constant_drive import coils_of, driven

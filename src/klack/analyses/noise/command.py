@@ -14,8 +14,7 @@ from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.analyses.noise.source import NoiseSource
-    from klack.case.any_case import AnyCase
-    from klack.case.valve_reader import OwnComponents
+    from klack.case.any_case import AnyCase, OwnComponents
 
 __all__ = ["noise"]
 
@@ -74,8 +73,8 @@ def noise(
 
 def _cases(paths: Sequence[Path], own: "OwnComponents") -> "list[AnyCase | None]":
     """Read every case before the long work begins; None for stored results."""
-    from klack.case.shipped import find_case
-    from klack.case.valve_reader import load_any_case
+    from klack.case.any_case import load_any_case
+    from klack.case.reader import find_case
 
     return [None if is_result(path) else load_any_case(find_case(path), own) for path in paths]
 

@@ -26,11 +26,10 @@ from klack.analyses.stroke.run import run_stroke
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.structures import IMPACT_STOP
 from klack.case.bodies import CaseMaterial
-from klack.case.levels import LEVELS
+from klack.case.levels import LEVELS, VARIANTS
 from klack.case.noise import CaseNoise
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.case.variants import VARIANTS
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.progress import Progress, silent

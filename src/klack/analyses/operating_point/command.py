@@ -31,8 +31,8 @@ def show_operating_points(
         from klack.analyses.operating_point.figures import sweep_charts
         from klack.analyses.operating_point.run import run_operating_points
         from klack.analyses.operating_point.table import CSV_NAME, write_csv
-        from klack.case.case_tree import read_case_tree
-        from klack.case.shipped import find_case
+        from klack.case.any_case import read_case_tree
+        from klack.case.reader import find_case
         from klack.units import CURRENT, LENGTH, VOLTAGE, parse_quantity
 
         tree = read_case_tree(find_case(path), imported(component))

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.key_path import Quantity, quantity_at, split_path
 from klack.case.points import with_changes
 from klack.case.valve import ValveCase

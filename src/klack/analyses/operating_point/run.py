@@ -25,12 +25,12 @@ from klack.analyses.stroke.run import variant_network
 from klack.analyses.study.strokes import STROKES
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.cache.setting import result_cache
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
+from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.points import case_at
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.case.variants import Variant
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
 from klack.magnetics.constant_drive import driven, hysteretic_coils, start_currents
 from klack.network.checks import LooseBodyWarning

@@ -56,8 +56,8 @@ def sensitivities(
         require_files("--study", [study])
 
     with show_progress(wanted.quiet):
-        from klack.case.case_tree import read_case_tree
-        from klack.case.shipped import find_case
+        from klack.case.any_case import read_case_tree
+        from klack.case.reader import find_case
         from klack.case.study_source import study_if_any
 
         tree = read_case_tree(find_case(case), imported(component))

@@ -30,7 +30,7 @@ from klack.analyses.study.kinds import kind_of
 from klack.analyses.study.measures import impact_measures
 from klack.analyses.study.run_points import run_points
 from klack.analyses.study.where import Where
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.schema import Case
 from klack.case.study_source import StudySource
 from klack.errors import ConvergenceError

@@ -18,7 +18,7 @@ from klack.analyses.sensitivities.record import (
 from klack.analyses.sensitivities.slopes import SlopeRunner, has_slope, measured
 from klack.analyses.stroke.record import StrokeVariant
 from klack.analyses.study.measures import TIMES, ChosenMeasure, StrokeOfPoint, stroke_measures
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial
 from klack.case.study_source import StudySource

@@ -24,11 +24,11 @@ from klack.analyses.stroke.run import (
 )
 from klack.analyses.study.measures import TIMES, ChosenMeasure, PointNoise, StrokeOfPoint
 from klack.assembling.valve import Valve, build_valve, filled_network
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
+from klack.case.levels import Variant
 from klack.case.points import case_at, checked_parts, points_of
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.case.variants import Variant
 from klack.errors import InputError
 from klack.network.rows import Rows
 from klack.progress import Progress

@@ -69,9 +69,9 @@ def shots(
         require_positive("--workers", workers, "processes")
 
     from klack.analyses.shots.draw import shots_of
-    from klack.case.shipped import find_case
+    from klack.case.any_case import load_any_case
+    from klack.case.reader import find_case
     from klack.case.valve import ValveCase
-    from klack.case.valve_reader import load_any_case
 
     checked = load_any_case(find_case(case), imported(component))
     if isinstance(checked, ValveCase):

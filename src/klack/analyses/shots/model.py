@@ -17,7 +17,7 @@ from klack.analyses.shots.one_shot import ShotSetup
 from klack.assembling.off_axis_points import off_axis_space, touch_height
 from klack.assembling.pressure_limit import pressure_limit
 from klack.assembling.problem import ContactProblem, contact_problem
-from klack.case.placement import Placement
+from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace

@@ -6,7 +6,7 @@ import numpy as np
 from ruamel.yaml import YAML
 
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
-from klack.case.motion_of_valve import ValveGuide
+from klack.case.guide import ValveGuide
 
 __all__ = ["AxisPlace", "acts_across", "axis_place", "guide_of", "moves_in_space"]
 

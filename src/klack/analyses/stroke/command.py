@@ -94,7 +94,7 @@ def stroke(
         from klack.analyses.operating_point.command import show_operating_points
 
         return show_operating_points(case, variant or (), at_rest, component, asked)
-    from klack.case.shipped import find_case
+    from klack.case.reader import find_case
 
     with show_progress(asked.quiet):
         case_file, components = find_case(case), imported(component)
@@ -140,7 +140,7 @@ def _checked_case(
     check_steps: bool | None = None,
 ) -> "ValveCase":
     """Read the case; duration, step and accuracy of the command line replace its own."""
-    from klack.case.valve_reader import load_valve_case
+    from klack.case.any_case import load_valve_case
 
     case = load_valve_case(path, components)
     changes: dict[str, float | str] = {

@@ -22,10 +22,10 @@ from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.spatial import placement_of, seat_height
 from klack.assembling.valve import Valve
+from klack.case.levels import Variant
 from klack.case.shots import StrokeShots
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
-from klack.case.variants import Variant
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, InputError, KlackError, refuse_if
 from klack.mesh.rigid import rigid_placement

@@ -34,10 +34,10 @@ from klack.analyses.stroke_shots.record import (
 from klack.analyses.workers import LoggedWork, grouped_doubts
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
+from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
-from klack.case.variants import Variant
 from klack.errors import ConvergenceError, InputError
 from klack.progress import Progress, silent
 from klack.schematic.picture import schematic_svg

@@ -10,8 +10,8 @@ from typing import Any, Generic, NamedTuple
 from typing_extensions import TypeVar
 
 from klack.analyses.study.measures import ChosenMeasure
+from klack.case.any_case import CaseTree
 from klack.case.bodies import CaseFile
-from klack.case.case_tree import CaseTree
 from klack.case.points import PointKey, Points, PointValue
 from klack.case.study import CaseStudy
 from klack.errors import AccuracyWarning, KlackError, refuse_if

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from klack.analyses.study.record import StudyRecord
-    from klack.case.case_tree import CaseTree
+    from klack.case.any_case import CaseTree
     from klack.progress import Progress
 
 __all__ = ["optimise", "study"]
@@ -91,9 +91,9 @@ def optimise(
 
 def _tree(case: Path, component: Components, check_steps: bool | None) -> "CaseTree":
     """Case as it was written, with the check of the steps that the command line asks for."""
-    from klack.case.case_tree import read_case_tree, tree_of
-    from klack.case.inserting import with_values
-    from klack.case.shipped import find_case
+    from klack.case.any_case import read_case_tree, tree_of
+    from klack.case.reader import find_case
+    from klack.case.rewriting import with_values
 
     own = imported(component)
     tree = read_case_tree(find_case(case), own)

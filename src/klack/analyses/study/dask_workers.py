@@ -16,8 +16,7 @@ from klack.analyses.study.asked_points import AskedPoints, PointRow, groups_of
 from klack.analyses.study.computing import Agenda, PointWorkers, Tally
 from klack.analyses.study.where import Answer, PointOrder, SentCase, answered, died_row
 from klack.analyses.workers import Failure, unwrapped
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.errors import ConvergenceError, InputError, MissingExtraError
 from klack.progress import Progress, remark
 

@@ -24,8 +24,7 @@ from klack.analyses.study.kinds import ask, kind_of
 from klack.analyses.study.points import Space, Values
 from klack.analyses.study.record import StudyColumn
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import GivenPoints, PointValue
 from klack.case.study_source import StudySource
 from klack.errors import InputError

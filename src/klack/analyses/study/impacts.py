@@ -40,7 +40,7 @@ from klack.analyses.study.measures import (
     impact_measures,
     shot_notes,
 )
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.points import case_at
 from klack.case.schema import Case
 from klack.case.study import CaseStudy

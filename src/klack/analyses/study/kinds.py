@@ -7,8 +7,7 @@ from klack.analyses.study.asked_points import AskedPoints, PointKind
 from klack.analyses.study.impacts import IMPACTS
 from klack.analyses.study.measures import impact_measure_names, stroke_measure_names
 from klack.analyses.study.strokes import STROKES
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import GivenPoints, points_of
 from klack.case.schema import Case
 

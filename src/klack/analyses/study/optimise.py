@@ -29,8 +29,7 @@ from klack.analyses.study.points import Space, Values, require_varied, space_of
 from klack.analyses.study.record import Optimum, PointSound, StudyColumn, StudyRecord
 from klack.analyses.study.where import HERE, Where
 from klack.analyses.study.wording import number_text
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase

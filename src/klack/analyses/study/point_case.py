@@ -4,10 +4,9 @@ import json
 from pathlib import Path
 
 from klack.analyses.study.record import StudyColumn, StudyRecord
-from klack.case.case_tree import tree_of
-from klack.case.inserting import with_values
+from klack.case.any_case import read_any_case, tree_of
 from klack.case.key_path import split_path
-from klack.case.valve_reader import read_any_case
+from klack.case.rewriting import with_values
 from klack.errors import InputError
 
 __all__ = ["case_of_point", "written_of_point"]

@@ -28,8 +28,7 @@ from klack.analyses.study.made_valves import made_space
 from klack.analyses.study.points import StudyPoints, points_in, space_of
 from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.where import HERE, Where
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.study_source import StudySource
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings

@@ -8,8 +8,7 @@ from klack.analyses.study.evaluation import step_columns
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.record import steps_of
 from klack.analyses.study.where import HERE, Where
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import GivenPoints
 from klack.case.schema import Case
 from klack.case.valve import ValveCase

@@ -38,7 +38,7 @@ from klack.analyses.study.measures import (
 )
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.valve import Valve, build_valve, filled_network
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import CaseTree
 from klack.case.placed_errors import tells_place
 from klack.case.points import PointValue, case_at, checked_parts
 from klack.case.study import CaseStudy

@@ -27,8 +27,7 @@ from klack.analyses.study.evaluation import point_log_form
 from klack.analyses.study.kinds import kind_of
 from klack.analyses.unfinished import code_of_klack
 from klack.analyses.workers import Failure, WorkerDied, WorkerPool, answer, shared, unwrapped
-from klack.case.any_case import AnyCase
-from klack.case.case_tree import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import PointKey, Points, PointValue
 from klack.cores import available_cores
 from klack.elasticity.factorization import chosen_backend

@@ -274,7 +274,7 @@ class _Overview:
         self._show_jobs()
 
     def _ask_new(self) -> None:
-        from klack.case.shipped import shipped_cases  # with all of the schema
+        from klack.case.reader import shipped_cases  # with all of the schema
 
         shipped = shipped_cases()
         first = "demo-valve-axisymmetric"
