@@ -49,8 +49,8 @@ class Row:
 
 def restitution_rows() -> list[Row]:
     """Deviation of the restitution of the first impact, over noise seeds."""
+    from klack.measurement.channels import LiftSensor
     from klack.measurement.lift_sensor import sense
-    from klack.measurement.sensor import LiftSensor
     from klack.measurement.set_measures import measure_set
     from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
 
@@ -196,8 +196,8 @@ def write_mdf(path: Path) -> None:
 def cut(path: Path) -> None:
     """Cut a file into strokes, and print their number, the time [s] and the memory [bytes]."""
     from klack.case.measurement import CaseMeasurement
+    from klack.measurement.channels import Trigger
     from klack.measurement.loading import load_stroke_set
-    from klack.measurement.trigger import Trigger
 
     begin = perf_counter()
     section = CaseMeasurement(trigger=Trigger(level="1 A", before=0.5e-3, after=5e-3))

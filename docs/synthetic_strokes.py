@@ -33,8 +33,8 @@ from klack.case.levels import Variant
 from klack.case.reader import parse, shipped_cases, text_of, validated
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
+from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
 
 Floats = NDArray[np.float64]
 

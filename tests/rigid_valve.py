@@ -9,8 +9,8 @@ import numpy as np
 
 from klack.case.any_case import CaseTree
 from klack.case.reader import parse
+from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
 from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
 from klack.simulation.network_run import simulate_network
 

@@ -5,9 +5,14 @@ import pytest
 from scipy.stats import t as student
 
 from klack.measurement.fitting import fit_within_bounds
-from klack.measurement.identifiability import identifiability, identifiability_warnings
 from klack.measurement.profile_likelihood import follow_profiles
-from klack.measurement.shot_covariance import noise_covariance, shot_covariance, shot_estimates
+from klack.measurement.shot_covariance import (
+    identifiability,
+    identifiability_warnings,
+    noise_covariance,
+    shot_covariance,
+    shot_estimates,
+)
 
 M, N = 200, 8  # samples, strokes
 TRUE = np.array([0.4, 0.6, 0.55])

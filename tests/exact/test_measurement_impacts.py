@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
+from klack.measurement.channels import LiftSensor
 from klack.measurement.flight import fit_flight
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import sense, sensor_polynomial
-from klack.measurement.sensor import LiftSensor
 from klack.measurement.set_measures import (
     Column,
     expected_maximum,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
+from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import differentiator_gain, noise_floor, velocity_of
 from klack.measurement.lift_sensor import sense, sensor_delay, sensor_poles, sensor_polynomial
-from klack.measurement.sensor import LiftSensor
 from klack.verification.bouncing_flight import BouncingDrop
 
 BANDWIDTH = 50e3  # [Hz]

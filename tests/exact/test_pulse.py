@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.measurement.pulse import measure_pulse
-from klack.measurement.pulse_fit import fit_pulse
+from klack.measurement.pulse import fit_pulse, measure_pulse
 
 TIME = np.arange(-50e-6, 200e-6, 0.1e-6)
 

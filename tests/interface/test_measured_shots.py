@@ -18,8 +18,8 @@ from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, Sh
 from klack.case.measurement import CaseMeasurement
 from klack.cli.main import main
 from klack.errors import InputError
+from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
 
 SPEED, FORCE, MASS = 0.3, 6.0, 5e-3
 DECELERATION = FORCE / MASS

@@ -207,8 +207,8 @@ def test_files_that_are_no_text_are_refused(tmp_path, head):
 
 
 def test_large_tables_are_parsed_again_in_blocks(tmp_path, monkeypatch):
-    monkeypatch.setattr("klack.measurement.files.number_table._KEPT", 900)
-    monkeypatch.setattr("klack.measurement.files.number_table._BLOCK", 300)
+    monkeypatch.setattr("klack.measurement.files.csv_file._KEPT", 900)
+    monkeypatch.setattr("klack.measurement.files.csv_file._BLOCK", 300)
     rows = np.column_stack([1e-6 * np.arange(5000), np.arange(5000) % 97])
     with open_recording(written(tmp_path / "a.csv", "t [s];lift [um]", rows)) as recording:
         for first, last in [(0, 10), (250, 260), (4000, 5000), (255, 1300), (0, 5000)]:

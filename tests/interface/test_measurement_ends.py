@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from klack.measurement.impact_search import find_touches
-from klack.measurement.stop_levels import SmoothLift
+from klack.measurement.stop_levels import SmoothLift, find_touches
 
 
 @pytest.mark.parametrize("end", [slice(0, 3), slice(-3, None)])

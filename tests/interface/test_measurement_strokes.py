@@ -6,11 +6,9 @@ import pytest
 from klack.analyses.comparison.strokes import require_same_way
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
-from klack.measurement.alignment import common_axis, onto_axis
-from klack.measurement.cutting import Piece, cut_strokes, trigger_level
-from klack.measurement.loading import load_stroke_set
-from klack.measurement.outliers import find_outliers
-from klack.measurement.trigger import Trigger
+from klack.measurement.channels import Trigger
+from klack.measurement.cutting import Piece, common_axis, cut_strokes, onto_axis, trigger_level
+from klack.measurement.loading import find_outliers, load_stroke_set
 from klack.signals import TimeSeries
 
 STEP = 2e-6  # [s]

@@ -18,8 +18,7 @@ from scipy.sparse import coo_array, csc_array
 
 from klack.errors import InputError
 from klack.model_files.modal_data import read_modal_data
-from klack.model_files.reduced_matrices import read_reduced_matrices
-from klack.model_files.state_space import FileStateSpace, read_state_space
+from klack.model_files.reduced_models import FileStateSpace, read_reduced_matrices, read_state_space
 from klack.reduction.reduced_body import StateSpace
 from klack.simulation.bodies import rod_body
 

@@ -14,7 +14,7 @@ from klack.exchange.modelica import modelica_text, write_modelica
 from klack.exchange.state_space import state_space
 from klack.exchange.text_model import write_text
 from klack.model_files.modal_data import read_modal_data
-from klack.model_files.state_space import read_state_space
+from klack.model_files.reduced_models import read_state_space
 from klack.reduction.from_state_space import body_of_state_space
 from klack.reduction.reduced_body import StateSpace
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body

@@ -12,8 +12,8 @@ import numpy as np
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import read_valve_case
 from klack.case.reader import find_case
+from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
 
 LIFT = LiftSensor(bandwidth=100e3), 0.1e-6  # [Hz], rms per sample [m]
 VELOCITY = LiftSensor(bandwidth=200e3), 5e-3  # [Hz], [m/s]

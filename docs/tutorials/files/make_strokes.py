@@ -12,8 +12,8 @@ import numpy as np
 
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import read_valve_case
+from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
 
 HIDDEN = {"preload: 8 N": 8.35, "coulomb: 0.4 N": 0.62, "restitution: 0.5": 0.43}
 SCATTER = {"preload: 8 N": 0.004, "coulomb: 0.4 N": 0.04, "restitution: 0.5": 0.01}

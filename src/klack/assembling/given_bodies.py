@@ -13,9 +13,8 @@ from klack.case.foreign import ModelPort, ReducedModel
 from klack.errors import AccuracyWarning, InputError
 from klack.input.problem import nearest, one_of
 from klack.model_files.modal_data import read_modal_data
-from klack.model_files.reduced_matrices import read_reduced_matrices
-from klack.model_files.state_space import read_state_space
-from klack.model_files.uff_modes import FileModalData
+from klack.model_files.reduced_models import read_reduced_matrices, read_state_space
+from klack.model_files.uff import FileModalData
 from klack.reduction.damping import Damping
 from klack.reduction.from_craig_bampton import body_of_craig_bampton
 from klack.reduction.from_modal_data import body_of_modal_data

@@ -7,9 +7,7 @@ from pydantic import Field, field_validator
 
 from klack.case.study import Written
 from klack.input.section import Count, Name, Section, Text
-from klack.measurement.channels import Channels
-from klack.measurement.sensor import LiftSensor
-from klack.measurement.trigger import Trigger
+from klack.measurement.channels import Channels, LiftSensor, Trigger
 from klack.units import Frequency, Time
 
 __all__ = ["CalibrationParameter", "CaseCalibration", "CaseMeasurement"]

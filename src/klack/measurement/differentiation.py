@@ -28,7 +28,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError, require_positive
-from klack.measurement.uniform import uniform_step
+from klack.measurement.time_base import uniform_step
 
 __all__ = ["VelocityEstimate", "differentiator_gain", "noise_floor", "velocity_of"]
 

@@ -10,9 +10,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from klack.errors import InputError
-from klack.measurement.channels import ChannelChoice
+from klack.measurement.channels import ROLES, ChannelChoice, Role
 from klack.measurement.recording import ChannelInfo, Recording, some_names
-from klack.measurement.roles import ROLES, Role
 from klack.measurement.unit_text import no_unit, roles_of_unit, unit_factor
 
 __all__ = ["FoundChannel", "find_channels"]

@@ -1,7 +1,7 @@
 r"""Impacts of one stroke from its lift alone.
 
 1. Levels of rest on the stops (given, or found: :mod:`klack.measurement.stop_levels`).
-2. Turns of the smoothed lift at these levels (:mod:`klack.measurement.impact_search`).
+2. Turns of the smoothed lift at these levels (:mod:`klack.measurement.stop_levels`).
 3. The raw lift of each flight between two impacts, without the time in which the sensor still
    shows the impact before, is fitted by a polynomial of the least degree (2, 3 or 4) that the next
    coefficient does not improve significantly; of a flight that comes from elsewhere, the longest
@@ -23,14 +23,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.measurement.channels import LiftSensor
 from klack.measurement.flight import Crossing, Flight, correlation_factor, fit_flight
 from klack.measurement.flight_train import FlightTrain, join_flights
-from klack.measurement.impact_search import Touch, find_touches
 from klack.measurement.lift_sensor import sensor_poles, sensor_polynomial
-from klack.measurement.sensor import LiftSensor
-from klack.measurement.stop_levels import SmoothLift, find_levels, smooth_lift
+from klack.measurement.stop_levels import SmoothLift, Touch, find_levels, find_touches, smooth_lift
 from klack.measurement.stroke_measures import FlightShape, MeasuredImpact, Stop, StrokeMeasures
-from klack.measurement.uniform import uniform_step
+from klack.measurement.time_base import uniform_step
 
 __all__ = ["FittedStroke", "fit_flights", "measure_stroke", "read_flights"]
 

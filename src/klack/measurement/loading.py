@@ -9,19 +9,92 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.measurement.alignment import between_samples, common_axis, covers, onto_axis
-from klack.measurement.channels import Channels
-from klack.measurement.cutting import Piece, cut_strokes, trigger_level, whole_piece
+from klack.measurement.channels import LIFT_ALONE, ROLES, Channels, Role, Trigger
+from klack.measurement.cutting import (
+    Piece,
+    between_samples,
+    common_axis,
+    covers,
+    cut_strokes,
+    onto_axis,
+    trigger_level,
+    whole_piece,
+)
+from klack.measurement.differentiation import noise_floor
 from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import FoundChannel, find_channels
-from klack.measurement.outliers import find_outliers
 from klack.measurement.read_channels import common_time, read_channels, windows
 from klack.measurement.recording import Recording
-from klack.measurement.roles import LIFT_ALONE, ROLES, Role
 from klack.measurement.stroke_set import MeasuredStroke, Rejection, StrokeSet
-from klack.measurement.trigger import Trigger
 
-__all__ = ["MeasurementSection", "load_stroke_set"]
+__all__ = ["MeasurementSection", "find_outliers", "load_stroke_set"]
+
+
+Matrix = NDArray[np.float64]
+
+_MOTION = 0.2
+_CLIPPED_SAMPLES = 10
+_CLIPPED_NOISE = 5.0
+_NOISE = 3.0
+_DISTANCE, _SPREAD = 4.0, 6.0
+_FEWEST = 6
+
+
+def find_outliers(time: NDArray[np.float64], lift: Matrix) -> dict[int, str]:
+    """Reasons by the row of the stroke.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+    lift : array, shape (strokes, n) [m]
+    """
+    step = float(time[1] - time[0])
+    way = np.quantile(lift, 0.99, axis=1) - np.quantile(lift, 0.01, axis=1)
+    noise = np.array([noise_floor(row[None], step)[1] for row in lift])
+    out: dict[int, str] = {}
+    for k in np.flatnonzero(way < _MOTION * np.median(way)).tolist():
+        out[k] = f"no motion: moves by {1e6 * way[k]:.3g} um, the others by "
+        out[k] += f"{1e6 * float(np.median(way)):.3g} um"
+    good = [k for k in range(len(lift)) if k not in out]
+    middle, usual = np.median(lift[good], axis=0), float(np.median(noise[good]))
+    for k in good:
+        if len(good) > 2 and (reason := _clipped(lift[k], middle, usual)):
+            out[k] = reason
+        elif len(good) > 2 and noise[k] > _NOISE * usual > 0.0:
+            out[k] = f"noise of {1e6 * noise[k]:.3g} um, the others {1e6 * usual:.3g} um"
+    good = [k for k in good if k not in out]
+    if len(good) >= _FEWEST:
+        out.update(_far(lift, good))
+    return out
+
+
+def _clipped(row: Matrix, middle: Matrix, noise: float) -> str:
+    for sign, word in ((1.0, "highest"), (-1.0, "lowest")):
+        limit = float(np.max(sign * row))
+        stays = sign * row == limit
+        missed = stays & (sign * middle > limit + _CLIPPED_NOISE * noise)
+        if _longest_run(stays & missed) >= _CLIPPED_SAMPLES:
+            return f"clipped: stays at its {word} value of {sign * limit * 1e6:.4g} um"
+    return ""
+
+
+def _longest_run(mask: NDArray[np.bool_]) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return int(np.max(edges[1::2] - edges[::2], initial=0))
+
+
+def _far(lift: Matrix, good: list[int]) -> dict[int, str]:
+    middle = np.median(lift[good], axis=0)
+    distance = np.sqrt(np.mean((lift[good] - middle) ** 2, axis=1))
+    usual = float(np.median(distance))
+    spread = 1.4826 * float(np.median(np.abs(distance - usual)))
+    limit = max(_DISTANCE * usual, usual + _SPREAD * spread)
+    return {
+        k: f"shape: {1e6 * d:.3g} um (RMS) from the median stroke, the others {1e6 * usual:.3g} um"
+        for k, d in zip(good, distance.tolist(), strict=True)
+        if d > limit
+    }
+
 
 _WINDOW = 1_000_000  # samples
 _WINDOW_TIMES = 20.0  # of one stroke: windows are not shorter

@@ -1,10 +1,11 @@
-r"""A pulse with a front, a plateau and an end, as a struck bar carries it: read off one record.
+"""A pulse with a front, a plateau and an end, as a struck bar carries it: read off one record.
 
 The plateau is the mean over the middle half of the time above half of itself, found by iteration.
 Front and end are where the record crosses shares of the plateau, on straight lines between samples.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import NoReturn
 
 import numpy as np
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 
-__all__ = ["Pulse", "measure_pulse"]
+__all__ = ["Pulse", "PulseFit", "fit_pulse", "measure_pulse"]
+
 
 Floats = NDArray[np.float64]
 
@@ -211,3 +213,81 @@ def _refuse(where: str, got: str) -> NoReturn:
         hint="cut the record so that it begins before the front and ends after the pulse; smooth "
         "noise of more than a twentieth of the plateau.",
     )
+
+
+_BEFORE, _BEHIND = 0.2, 0.2  # of the length
+_REACH = 0.1  # of the length: how far from front on front the best shift may be
+_TRIES = 9
+_FIT_SETTLED = 1e-6  # of the length
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PulseFit:
+    """Best shift and factor.
+
+    Parameters
+    ----------
+    shift : float [s]
+        Computed time minus measured time of the same instant.
+    factor : float [-]
+        Measured over computed.
+    rms : float [-]
+        Root mean square of what is left, over the measured plateau.
+    """
+
+    shift: float
+    factor: float
+    rms: float
+
+
+def fit_pulse(
+    time: Floats,
+    measured: Floats,
+    pulse: Pulse,
+    computed_time: Floats,
+    computed: Floats,
+    computed_pulse: Pulse,
+    *,
+    factor: float | None = None,
+) -> PulseFit:
+    """Lay a computed pulse over a measured one.
+
+    Parameters
+    ----------
+    time, measured : array, shape (n,)
+    pulse : Pulse
+        Of it.
+    computed_time, computed : array, shape (m,)
+    computed_pulse : Pulse
+    factor : float, optional
+        Kept as it is; fitted by default.
+    """
+    first = pulse.front - _BEFORE * pulse.length
+    last = pulse.end + _BEHIND * pulse.length
+    seen = (time >= first) & (time <= last)
+    t = time[seen]
+    x = pulse.sign * (measured[seen] - pulse.rest)
+    y_all = computed_pulse.sign * (computed - computed_pulse.rest)
+
+    def at(shift: float) -> tuple[float, float]:
+        y = np.interp(t + shift, computed_time, y_all)
+        a = float(x @ y / (y @ y)) if factor is None else factor
+        return float(np.sqrt(np.mean((a * y - x) ** 2))) / pulse.plateau, a
+
+    middle, length = computed_pulse.front - pulse.front, pulse.length
+    edges = np.linspace(-_REACH, _REACH, _TRIES)
+    best = min(
+        (
+            scipy.optimize.minimize_scalar(
+                lambda part: at(middle + part * length)[0],
+                bounds=(a, b),
+                method="bounded",
+                options={"xatol": _FIT_SETTLED},
+            )
+            for a, b in pairwise(edges)
+        ),
+        key=lambda found: float(found.fun),
+    )
+    shift = middle + float(best.x) * length
+    rms, found = at(shift)
+    return PulseFit(shift=shift, factor=found, rms=rms)

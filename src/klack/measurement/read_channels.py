@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import AccuracyWarning, InputError
+from klack.measurement.channels import ROLES, Role
 from klack.measurement.find_channels import FoundChannel
 from klack.measurement.recording import Recording
-from klack.measurement.roles import ROLES, Role
 from klack.measurement.time_base import TimeBase
 from klack.signals import TimeSeries
 

@@ -26,8 +26,8 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.errors import InputError
+from klack.measurement.channels import LiftSensor
 from klack.measurement.impacts import fit_flights, read_flights
-from klack.measurement.sensor import LiftSensor
 from klack.measurement.stroke_measures import FlightShape, MeasuredImpact, Stop, StrokeMeasures
 from klack.measurement.stroke_set import StrokeSet
 

@@ -18,7 +18,7 @@ class MeasuredStroke:
     name : str
         Where it comes from, for example ``"bench.mf4 #12"`` or ``"bench.csv lift_12"``.
     values : mapping of str to array, shape (n,)
-        By role (see :data:`klack.measurement.roles.ROLES`), SI, all on the time axis of the set.
+        By role (see :data:`klack.measurement.channels.ROLES`), SI, all on the time axis of the set.
     start : float [s]
         Time of the trigger in the recording.
     """

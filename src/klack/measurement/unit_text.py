@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from klack.errors import InputError
-from klack.measurement.roles import ROLES, Role
+from klack.measurement.channels import ROLES, Role
 from klack.units import TIME, Kind, parse_quantity
 
 __all__ = ["UnitFactor", "is_unit", "no_unit", "plain_unit", "roles_of_unit", "unit_factor"]

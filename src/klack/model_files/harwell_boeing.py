@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.model_files.fortran_numbers import FixedFormat, fixed_numbers, free_numbers
+from klack.model_files.number_lines import FixedFormat, fixed_numbers, free_numbers
 from klack.model_files.system_matrix import Role, SystemMatrix, symmetric_matrix
 
 __all__ = ["read_harwell_boeing"]

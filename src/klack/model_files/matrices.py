@@ -5,15 +5,17 @@ from pathlib import Path
 
 from klack.errors import InputError
 from klack.input.existing_file import refuse_lfs_pointer
-from klack.model_files.abaqus_mtx import read_abaqus_mtx
 from klack.model_files.ansys_full import read_ansys_full
-from klack.model_files.calculix_storage import read_calculix_storage
+from klack.model_files.coordinate_files import (
+    is_matrix_market,
+    read_abaqus_mtx,
+    read_calculix_storage,
+    read_matrix_market,
+)
 from klack.model_files.harwell_boeing import read_harwell_boeing
-from klack.model_files.matlab_matrices import read_matlab_matrix
-from klack.model_files.matrix_market import is_matrix_market, read_matrix_market
 from klack.model_files.nastran_op4 import read_nastran_op4
 from klack.model_files.nastran_pch import read_nastran_pch
-from klack.model_files.numpy_matrices import read_numpy_matrix
+from klack.model_files.stored_matrices import read_matlab_matrix, read_numpy_matrix
 from klack.model_files.system_matrix import Role, SystemMatrix
 
 __all__ = ["MATRIX_FORMATS", "read_matrix"]

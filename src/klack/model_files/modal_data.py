@@ -1,6 +1,6 @@
 """Results of a modal analysis from a file: frequencies, damping and shapes, as they were written.
 
-Three forms are read: universal files (:mod:`klack.model_files.uff_modes`), arrays by name, and a
+Three forms are read: universal files (:mod:`klack.model_files.uff`), arrays by name, and a
 table with one mode per row::
 
     frequency [Hz], damping, modal mass, tip, top
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.model_files.named_arrays import NamedArrays, read_named_arrays
-from klack.model_files.uff_modes import FileModalData, read_uff_modes
+from klack.model_files.uff import FileModalData, read_uff_modes
 
 __all__ = ["read_modal_data"]
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.model_files.abaqus_mtx import places_of_entries
+from klack.model_files.coordinate_files import places_of_entries
 from klack.model_files.number_lines import numbers_in, whole_numbers
 from klack.model_files.system_matrix import Role, SystemMatrix, choose_matrix, symmetric_matrix
 

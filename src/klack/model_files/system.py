@@ -10,8 +10,7 @@ from scipy.sparse import coo_array, csr_array
 
 from klack.errors import InputError
 from klack.model_files.matrices import read_matrix
-from klack.model_files.row_places import read_row_places
-from klack.model_files.system_matrix import RowPlaces, SystemMatrix
+from klack.model_files.system_matrix import RowPlaces, SystemMatrix, read_row_places
 
 __all__ = ["FileSystem", "NodeSystem", "on_nodes", "read_system"]
 

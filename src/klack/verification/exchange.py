@@ -22,7 +22,7 @@ from klack.elasticity.given_matrices import body_of_matrices
 from klack.exchange.modal_model import ModalModel, Provenance, body_model, pair_model
 from klack.materials import Material
 from klack.mesh.files.mesh_file import read_mesh_file
-from klack.model_files.state_space import read_state_space
+from klack.model_files.reduced_models import read_state_space
 from klack.model_files.system import on_nodes, read_system
 from klack.reduction.from_state_space import body_of_state_space
 from klack.reduction.reduced_body import ReducedBody, StateSpace

@@ -5,10 +5,10 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import sense
-from klack.measurement.sensor import LiftSensor
 from klack.measurement.set_measures import expected_maximum, measure_set
 from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
 from klack.verification.bouncing_flight import BouncingDrop

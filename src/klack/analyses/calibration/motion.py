@@ -24,10 +24,9 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.errors import InputError
 from klack.input.problem import Key, one_of
-from klack.measurement.computed_stroke import recorded_stroke
-from klack.measurement.sensor import LiftSensor
+from klack.measurement.channels import LiftSensor, Trigger
+from klack.measurement.lift_sensor import recorded_stroke
 from klack.measurement.stroke_set import StrokeSet
-from klack.measurement.trigger import Trigger
 from klack.network.network import Network
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_run import simulate_network

@@ -39,7 +39,7 @@ from klack.case.valve_roles import find_roles
 from klack.cores import available_cores
 from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
-from klack.measurement.computed_stroke import trigger_instant
+from klack.measurement.channels import ROLES, LiftSensor
 from klack.measurement.fit_window import (
     FitWindow,
     fit_windows,
@@ -48,13 +48,16 @@ from klack.measurement.fit_window import (
     window_taper,
 )
 from klack.measurement.fitting import Fit, fit_within_bounds
-from klack.measurement.identifiability import identifiability, identifiability_warnings
 from klack.measurement.impacts import measure_stroke
-from klack.measurement.lift_sensor import sense
+from klack.measurement.lift_sensor import sense, trigger_instant
 from klack.measurement.profile_likelihood import Profile, follow_profiles
-from klack.measurement.roles import ROLES
-from klack.measurement.sensor import LiftSensor
-from klack.measurement.shot_covariance import ShotCovariance, noise_covariance, shot_covariance
+from klack.measurement.shot_covariance import (
+    ShotCovariance,
+    identifiability,
+    identifiability_warnings,
+    noise_covariance,
+    shot_covariance,
+)
 from klack.measurement.stroke_set import StrokeSet
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings

@@ -17,8 +17,7 @@ from klack.errors import AccuracyWarning, InputError
 from klack.gauges.gauge import GaugeKind, GaugeRecord
 from klack.low_pass import LowPass
 from klack.measurement.files.opening import open_recording
-from klack.measurement.pulse import Pulse, measure_pulse
-from klack.measurement.pulse_fit import fit_pulse
+from klack.measurement.pulse import Pulse, fit_pulse, measure_pulse
 from klack.measurement.recording import ChannelInfo, Recording, some_names
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.progress import Progress, silent

@@ -28,9 +28,9 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.record import FIRST_IMPACT, Shot, ShotColumns, ShotsStudy, ShotTraces
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
+from klack.measurement.channels import LIFT_ALONE
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.roles import LIFT_ALONE
 from klack.measurement.stroke_measures import MeasuredImpact
 from klack.measurement.stroke_set import Rejection, StrokeSet
 from klack.progress import Progress, silent

@@ -20,17 +20,131 @@ from klack.measurement.files.csv_dialect import (
     SEQUENCE,
     Column,
     Dialect,
+    TableHeader,
     encoding_of,
     find_dialect,
     first_row,
     read_columns,
+    read_header,
     rows_above,
 )
-from klack.measurement.files.csv_header import TableHeader, read_header
-from klack.measurement.files.number_table import NumberTable
+from klack.measurement.files.number_kernel import TOO_MANY, parse_rows
 from klack.measurement.recording import ChannelInfo, Recording
 
 __all__ = ["CsvFile"]
+
+
+_KEPT = 32_000_000  # numbers kept in memory, 256 MB
+_BLOCK = 1_000_000  # numbers parsed at once
+_RECENT = 16  # blocks of a large table kept, 128 MB
+_CELL = 40  # bytes of a faulty cell shown
+
+
+class NumberTable:
+    """Columns of numbers.
+
+    Parameters
+    ----------
+    path : Path
+        For errors.
+    data : array of bytes
+        Text of the whole file, in an encoding that agrees with ASCII.
+    start : int
+        First byte of the rows.
+    dialect : Dialect
+
+    Raises
+    ------
+    InputError
+        If a cell is no number or a row has too many; names the line.
+    """
+
+    def __init__(self, path: Path, data: NDArray[np.uint8], start: int, dialect: Dialect) -> None:
+        self.path, self._data, self._dialect = path, data, dialect
+        self._comments = np.frombuffer(dialect.comments.encode(), np.uint8)
+        self._place = np.arange(dialect.width)
+        self._block_rows = max(_BLOCK // dialect.width, 256)
+        self._kept: dict[int, NDArray[np.float64]] = {}
+        self._offsets: list[int] = []
+        self.rows = 0
+        self.filled = np.zeros(dialect.width, dtype=np.int64)
+        self._go_through(start)
+
+    def _go_through(self, at: int) -> None:
+        while at < self._data.size:
+            block, behind = self._parse(at)
+            if block.shape[1] == 0:
+                break
+            for column, values in enumerate(block):
+                present = np.flatnonzero(np.isfinite(values[-1:]))
+                if present.size == 0:
+                    present = np.flatnonzero(np.isfinite(values))
+                    last = present[-1] + 1 if present.size else 0
+                else:
+                    last = values.size
+                if last:
+                    self.filled[column] = self.rows + last
+            if self.rows * self._dialect.width < _KEPT:
+                self._kept[len(self._offsets)] = block
+            self._offsets.append(at)
+            self.rows += block.shape[1]
+            at = behind
+        if self.rows * self._dialect.width >= _KEPT:
+            self._kept.clear()
+
+    def _parse(self, at: int) -> tuple[NDArray[np.float64], int]:
+        out = np.empty((self._dialect.width, self._block_rows))
+        rows, behind, error, column = parse_rows(
+            self._data,
+            at,
+            self._dialect.separator_byte,
+            ord(self._dialect.decimal),
+            self._comments,
+            self._place,
+            out,
+        )
+        if error:
+            raise self._fault(error, behind, column)
+        return (out if rows == out.shape[1] else out[:, :rows].copy()), behind
+
+    def _fault(self, error: int, at: int, column: int) -> InputError:
+        line = np.count_nonzero(self._data[:at] == ord("\n")) + 1
+        text = self._data[at : at + _CELL].tobytes().decode("latin-1").splitlines()[0]
+        cell = (
+            text.split(self._dialect.separator)[0] if self._dialect.separator else text.split()[0]
+        )
+        where = f"{self.path}:{line}, column {column + 1}"
+        if error == TOO_MANY:
+            return InputError(
+                where,
+                got=f"a value '{cell.strip()}' too many",
+                expected=f"{self._dialect.width} values ({self._dialect})",
+                hint="check the line; every row needs the same columns.",
+            )
+        return InputError(
+            where,
+            got=f"'{cell.strip()}'",
+            expected=f"a number ({self._dialect})",
+            hint="correct the line, or begin it with # if it is a comment.",
+        )
+
+    def column(self, column: int, first: int, last: int) -> NDArray[np.float64]:
+        """Values of rows ``first`` to before ``last``; missing ones are nan."""
+        parts = [
+            self._block(k)[
+                column, max(first - k * self._block_rows, 0) : last - k * self._block_rows
+            ]
+            for k in range(first // self._block_rows, -(-last // self._block_rows))
+        ]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    def _block(self, k: int) -> NDArray[np.float64]:
+        if k not in self._kept:
+            if self.rows * self._dialect.width >= _KEPT and len(self._kept) >= _RECENT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[k], _ = self._parse(self._offsets[k])
+        return self._kept[k]
+
 
 Vector = NDArray[np.float64]
 Value = TypeVar("Value")
@@ -45,7 +159,7 @@ _APART = ".wfm.csv"
 _LENGTHS = (("SignalHardwareRecordLength", "HardwareXStart"), ("RecordLength", "XStart"))
 _HEAD = 1 << 18  # bytes in which the header must end
 _SAMPLE = 1 << 14  # bytes looked at in the middle and at the end
-_BLOCK = 1 << 20  # rows looked at together
+_TIME_BLOCK = 1 << 20  # rows looked at together
 _SHORTEST_SEGMENT, _MOST_SEGMENTS = 20, 10_000  # rows, segments
 _TRIED = 1000  # rows by which a first column without name is recognised as time
 
@@ -159,8 +273,8 @@ class CsvFile(Recording):
         if clock in self._segments:
             return self._segments[clock]
         count, begins, last = int(self._table.filled[clock]), [0], np.inf
-        for first in range(0, count, _BLOCK):
-            time = self._table.column(clock, first, min(first + _BLOCK, count))
+        for first in range(0, count, _TIME_BLOCK):
+            time = self._table.column(clock, first, min(first + _TIME_BLOCK, count))
             back = np.flatnonzero(np.diff(time, prepend=last) < 0.0)
             begins += (first + back[back + first > 0]).tolist()
             last = float(time[-1])

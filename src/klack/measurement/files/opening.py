@@ -73,7 +73,7 @@ def _open(path: Path, head: bytes, time_step: float | None) -> Recording:
 
         return NetCdf3File(path, time_step)
     if head[:6] == b"MATLAB" or path.suffix.lower() == ".mat":
-        from klack.measurement.files.matlab_file import MatlabFile
+        from klack.measurement.files.stored_arrays import MatlabFile
 
         return MatlabFile(path, time_step)
     if path.suffix.lower() in (".uff", ".unv", ".uf58") or _is_uff(head):

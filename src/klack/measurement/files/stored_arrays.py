@@ -22,19 +22,23 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.measurement.files.clock import (
+    PACKED,
     clock_factor,
     instant,
     is_clock,
     no_clock,
     since,
     unique_names,
+    unknown_scales,
+    unpacked,
 )
 from klack.measurement.files.csv_dialect import split_label
-from klack.measurement.files.scales import PACKED, unknown_scales, unpacked
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
+from klack.model_files.mat5 import MatValue, read_mat5
 
-__all__ = ["ArrayRecording", "StoredArray", "StoredGroup", "stored_array"]
+__all__ = ["ArrayRecording", "MatlabFile", "StoredArray", "StoredGroup", "stored_array"]
+
 
 Vector = NDArray[np.float64]
 
@@ -426,3 +430,51 @@ def _start(about: Mapping[str, str | float]) -> float | None:
 def _date(about: Mapping[str, str | float]) -> int | None:
     found = (instant(v) for key in _DATES if isinstance(v := about.get(key), str))
     return next((date for date in found if date is not None), None)
+
+
+_DEEPEST = 8
+
+
+class MatlabFile(ArrayRecording):
+    """Variables and structures of numbers of a MATLAB file.
+
+    Parameters
+    ----------
+    path : Path
+    time_step : float, optional [s]
+        Of variables without time.
+    """
+
+    def __init__(self, path: Path, time_step: float | None = None) -> None:
+        super().__init__(path, _group(read_mat5(path), "", 0), time_step)
+
+
+def _group(fields: dict[str, MatValue], path: str, depth: int) -> StoredGroup:
+    arrays, groups, unread = [], [], []
+    about: dict[str, str | float] = {}
+    for key, value in fields.items():
+        if depth > _DEEPEST:
+            continue
+        below = f"{path}/{key}" if path else key
+        if isinstance(value, dict):
+            groups.append(_group(value, below, depth + 1))
+        elif isinstance(value, list):
+            # one group per element of an array of structures
+            groups += [
+                _group(item, f"{below}/{k + 1}", depth + 1)
+                for k, item in enumerate(value)
+                if isinstance(item, dict)
+            ]
+        elif isinstance(value, tuple):
+            if len(value) == 1:
+                about[key.lower()] = str(value[0])
+        elif not isinstance(value, np.ndarray) or np.iscomplexobj(value):
+            unread.append(below)
+        elif value.size == 1:
+            about[key.lower()] = float(value.ravel()[0])
+        elif value.size and value.ndim == 2:
+            arrays.append(stored_array(key, value))
+        else:
+            unread.append(below)
+    reasons = {"no vector or matrix of real numbers": unread} if unread else {}
+    return StoredGroup(path=path, arrays=arrays, about=about, groups=groups, unread=reasons)

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import foreign_reading, optional_package
-from klack.measurement.files.clock import clock_factor, is_clock, no_clock
+from klack.measurement.files.clock import clock_factor, is_clock, no_clock, unknown_scales
 from klack.measurement.files.csv_dialect import split_label
-from klack.measurement.files.scales import unknown_scales
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
 
