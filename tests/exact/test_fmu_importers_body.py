@@ -9,7 +9,7 @@ from c_compiler import needs_compiler
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
 from klack.exchange.fmu.build import build_fmu
-from klack.exchange.fmu.pictures import receptance
+from klack.exchange.fmu.documentation import receptance
 
 fmpy = pytest.importorskip("fmpy")
 validation = pytest.importorskip("fmpy.validation")

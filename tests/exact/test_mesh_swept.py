@@ -7,6 +7,7 @@ the fourth power of the number of layers.
 import numpy as np
 import pytest
 
+from klack.assembling.held_nodes import sector_nodes, surface_nodes
 from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.errors import InputError
@@ -17,7 +18,6 @@ from klack.mesh.mesh import ElementBlock, Mesh, Surface
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import require_connected
 from klack.mesh.sizing import MeshSizing, Refinement
-from klack.mesh.supports import sector_nodes, surface_nodes
 from klack.mesh.swept import sweep
 
 MM = 1e-3

@@ -11,8 +11,7 @@ from c_compiler import needs_compiler, needs_gcc
 from klack.contact.laws import HuntCrossley, LinearLaw, TableLaw
 from klack.errors import ConvergenceError, InputError
 from klack.exchange.fmu import build, compiler
-from klack.exchange.fmu.build import build_fmu, source_texts
-from klack.exchange.fmu.data_header import data_header
+from klack.exchange.fmu.build import build_fmu, data_header, source_texts
 from klack.exchange.fmu.model_description import SOURCE_FILES
 from klack.exchange.modal_model import Provenance, body_model, pair_model
 from klack.network.rows import FilmRow

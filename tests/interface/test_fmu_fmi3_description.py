@@ -11,9 +11,12 @@ import numpy as np
 import pytest
 
 from klack.contact.laws import HuntCrossley, LinearLaw
-from klack.exchange.fmu.build_description import build_description
 from klack.exchange.fmu.documentation import documentation_files
-from klack.exchange.fmu.model_description import communication_step, model_description
+from klack.exchange.fmu.model_description import (
+    build_description,
+    communication_step,
+    model_description,
+)
 from klack.exchange.fmu.variables import fmu_variables
 from klack.exchange.modal_model import (
     ModalModel,

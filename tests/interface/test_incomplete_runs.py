@@ -205,7 +205,7 @@ def test_a_stroke_that_fails_late_is_written_and_marked(
 def test_a_cut_fine_record_is_said_everywhere(
     case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys
 ):
-    from klack.exchange.results.stroke_table import stroke_table
+    from klack.exchange.results.study_table import stroke_table
     from klack.simulation import network_recorder
 
     monkeypatch.setattr(network_recorder, "_MOST_FINE", 20)

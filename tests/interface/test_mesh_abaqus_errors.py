@@ -223,7 +223,7 @@ def test_members_of_all_sets_are_limited(tmp_path, monkeypatch):
 
 
 def test_nodes_of_all_instances_are_limited(tmp_path, monkeypatch):
-    monkeypatch.setattr("klack.mesh.files.abaqus.instances.LARGEST_NODES", 7)
+    monkeypatch.setattr("klack.mesh.files.abaqus.deck.LARGEST_NODES", 7)
     (tmp_path / "x.inp").write_text(PART + INSTANCE + INSTANCE.replace("NAME=i", "NAME=j"))
 
     with pytest.raises(InputError, match=r"x.inp:12: .INSTANCE: got 8 nodes with this"):

@@ -13,7 +13,7 @@ import pytest
 
 from klack import memory
 from klack.assembling.bodies import mesh_body, place_meshes
-from klack.assembling.mesh_messages import coarsest_sound, meshed_for_case
+from klack.assembling.generated_mesh import coarsest_sound, meshed_for_case
 from klack.assembling.valve import mesh_valve_bodies
 from klack.case import find_case, load_case
 from klack.case.any_case import load_any_case

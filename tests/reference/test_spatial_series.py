@@ -16,12 +16,11 @@ from shots_valve import FILE, valve_text
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.impact_order import recorded_impacts
 from klack.analyses.stroke.run import run_stroke
-from klack.assembling.valve_shapes import valve_shapes
 from klack.case.any_case import read_valve_case
 from klack.cli.main import main
 from klack.elasticity.stress import StressField
 from klack.errors import InputError
-from klack.exchange.results.spatial_series import write_spatial_series
+from klack.exchange.results.spatial_series import valve_shapes, write_spatial_series
 
 pytestmark = pytest.mark.slow  # one build of a valve
 

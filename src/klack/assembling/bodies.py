@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 from klack.assembling.assembled_bodies import assembled_from_matrices, node_mesh
 from klack.assembling.face_form import form_of_faces, layer_of_faces
 from klack.assembling.gauges import place_gauges
-from klack.assembling.generated_mesh import meshed_profiles, meshed_step
+from klack.assembling.generated_mesh import (
+    coarsest_sound,
+    meshed_for_case,
+    meshed_profiles,
+    meshed_step,
+)
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.held_nodes import held_nodes
-from klack.assembling.mesh_messages import coarsest_sound, meshed_for_case
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import damping_of
 from klack.case.bodies import CaseFile
 from klack.case.foreign import ModelPort, ReducedModel
 from klack.errors import AccuracyWarning, InputError

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from klack.assembling.assembled_bodies import assembled_from_matrices
 from klack.assembling.bodies import assemble_body, mesh_body
 from klack.assembling.body_summary import BodySummary, summarise_body
-from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_bodies import reduced_from_file
-from klack.assembling.modes import elastic_count, mode_pool, selection_of
+from klack.assembling.modes import damping_of, elastic_count, mode_pool, selection_of
 from klack.assembling.reduced_pair import hertz_coefficient, impact_system
 from klack.cache.setting import result_cache
 from klack.case.bodies import CaseBody, SurfaceName

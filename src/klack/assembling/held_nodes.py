@@ -4,10 +4,89 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.case.bodies import CaseBody
+from klack.errors import InputError, refuse, require_positive
 from klack.mesh.mesh import Mesh
-from klack.mesh.supports import sector_nodes, surface_nodes
 
-__all__ = ["held_nodes"]
+__all__ = ["held_nodes", "sector_nodes", "surface_nodes"]
+
+
+def surface_nodes(mesh: Mesh, surface: str) -> NDArray[np.int64]:
+    """Sorted numbers of all nodes of a named surface."""
+    return mesh.surface(surface).nodes
+
+
+def sector_nodes(
+    mesh: Mesh, surface: str, count: int, width_rad: float, first_rad: float = 0.0
+) -> NDArray[np.int64]:
+    """Nodes of a surface within equal sectors around the z axis, for a body held at a few places.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Of dimension 3.
+    surface : str
+    count : int
+        Number of sectors, spread evenly over the circumference.
+    width_rad : float [rad]
+        Angle that each sector covers.
+    first_rad : float [rad]
+        Angle of the middle of the first sector, from the x axis towards y.
+
+    Returns
+    -------
+    int array
+        Sorted node numbers; nodes on the axis belong to no sector.
+
+    Raises
+    ------
+    InputError
+        For an axisymmetric mesh, sectors that overlap, or a sector without a node.
+    """
+    refuse(
+        (
+            mesh.dimension != 3,
+            InputError(
+                f"sector_nodes: surface '{surface}'",
+                got="an axisymmetric mesh",
+                expected="a solid mesh, because sectors are not axisymmetric",
+                hint="hold the whole surface, or sweep the meridian to a solid first.",
+            ),
+        ),
+        (
+            count < 1,
+            InputError(
+                "sector_nodes: count",
+                got=str(count),
+                expected="at least one sector",
+                hint="three sectors act like a chuck.",
+            ),
+        ),
+    )
+    require_positive("sector_nodes: width_rad", width_rad, "rad")
+    pitch = 2 * np.pi / count
+    if width_rad > pitch * (1 + 1e-12):
+        raise InputError(
+            "sector_nodes: width_rad",
+            got=f"{count} sectors of {np.degrees(width_rad):.6g} deg",
+            expected=f"up to {np.degrees(pitch):.6g} deg each, so that they do not overlap",
+            hint="make the sectors narrower, or hold the whole surface.",
+        )
+    nodes = mesh.surface(surface).nodes
+    x, y, _ = mesh.points[nodes].T
+    r = np.hypot(x, y)
+    off_axis = r > 1e-9 * r.max()
+    turn = (np.arctan2(y, x) - first_rad + 0.5 * pitch) % (2 * np.pi)
+    from_middle = np.abs(turn % pitch - 0.5 * pitch)
+    inside = off_axis & (from_middle <= 0.5 * width_rad + 1e-9)
+    filled = np.unique((turn[inside] // pitch).astype(int) % count)
+    if len(filled) < count:
+        raise InputError(
+            f"sector_nodes: surface '{surface}'",
+            got=f"nodes in {len(filled)} of {count} sectors",
+            expected="nodes in every sector",
+            hint="mesh finer around the circumference, or make the sectors wider.",
+        )
+    return nodes[inside]
 
 
 def held_nodes(body: CaseBody, mesh: Mesh) -> NDArray[np.int64]:

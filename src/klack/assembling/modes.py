@@ -3,13 +3,18 @@
 from collections.abc import Mapping
 from functools import partial
 
+import numpy as np
+from numpy.typing import NDArray
+
 from klack.assembling.problem import ContactProblem, PlacedBodies
-from klack.case.bodies import ModeChoice
+from klack.case.bodies import BodyDamping, ModeChoice
+from klack.case.schema import Case
 from klack.cores import side_by_side
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.progress import Progress
+from klack.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes as chosen_modes
 from klack.reduction.reduced_body import ReducedBody
@@ -17,13 +22,17 @@ from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, Mod
 
 __all__ = [
     "PARTICIPATION_POOL",
+    "damping_of",
     "elastic_count",
+    "is_damped",
     "kept_modes",
     "mode_pool",
     "mode_pools",
     "participating",
     "selection_of",
+    "shape_marks",
 ]
+
 
 PARTICIPATION_POOL = 100
 """Modes of each body from which the level ``reduced-participation`` chooses."""
@@ -132,3 +141,33 @@ def participating(pair_names: tuple[str, str]) -> dict[str, ModeSelection]:
 def elastic_count(body: ReducedBody) -> int:
     """Number of elastic modes without attachment modes."""
     return body.mode_count - body.rigid_count - body.attachment_count
+
+
+Floats = NDArray[np.float64]
+
+_FRACTION = 0.6180339887498949  # of the golden section: no two nodes get nearly the same weight
+
+
+def shape_marks(shapes: Floats) -> Floats:
+    """Sum of each shape with fixed weights between -1 and 1, shape (m,).
+
+    Parameters
+    ----------
+    shapes : array, shape (n_dof, m)
+    """
+    weights = 2.0 * ((1.0 + np.arange(len(shapes))) * _FRACTION % 1.0) - 1.0
+    return np.asarray(weights @ shapes)
+
+
+def damping_of(damping: BodyDamping) -> Damping:
+    """Damping model of a case."""
+    if damping.modal is not None:
+        return ModalDamping(ratio=damping.modal)
+    if damping.rayleigh is not None:
+        return RayleighDamping(alpha=damping.rayleigh.alpha, beta=damping.rayleigh.beta)
+    return LossFactor(eta=damping.loss_factor or 0.0)
+
+
+def is_damped(case: Case, name: str) -> bool:
+    """Whether a case gives a body any damping."""
+    return bool(damping_of(case.bodies[name].damping).ratios([1.0])[0] > 0.0)

@@ -6,17 +6,20 @@ axis is least where they touch.
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from math import cos, pi, sin, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.case.guide import CaseGuide
 from klack.contact.pairing import face_geometry, face_lattice, project_to_surface
 from klack.errors import InputError
 from klack.mesh.curve import Curve
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.profile import Profile
 
-__all__ = ["Touch", "first_touch_of_meshes", "first_touch_of_profiles"]
+__all__ = ["Touch", "axis_through", "first_touch_of_meshes", "first_touch_of_profiles", "in_disc"]
+
 
 _SAMPLES = 4001
 _SECTORS = 48
@@ -168,3 +171,20 @@ def first_touch_of_meshes(
 
 def _points(array: NDArray[np.float64]) -> tuple[tuple[float, ...], ...]:
     return tuple(tuple(float(x) for x in row) for row in array)
+
+
+Vector = NDArray[np.float64]
+
+
+def axis_through(
+    guide: CaseGuide, height: float, low: Vector, high: Vector
+) -> tuple[Vector, Vector]:
+    """Position at a height and slope of the axis through two points at the outer guide heights."""
+    slope = (high - low) / (guide.heights[-1] - guide.heights[0])
+    return low + slope * (height - guide.heights[0]), slope
+
+
+def in_disc(shares: Vector, radius: float) -> Vector:
+    """Point of a disc, all places alike, from two numbers between 0 and 1."""
+    distance, angle = radius * sqrt(shares[0]), 2.0 * pi * shares[1]
+    return distance * np.array([cos(angle), sin(angle)])

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.damping_choice import damping_of
-from klack.assembling.modes import elastic_count, selection_of
+from klack.assembling.modes import damping_of, elastic_count, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.rubbing import fitted_loops
 from klack.assembling.yielding import law_with_yield

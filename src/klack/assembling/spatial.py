@@ -7,13 +7,10 @@ from math import cos, hypot, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.damping_choice import damping_of
-from klack.assembling.mode_marks import shape_marks
-from klack.assembling.modes import selection_of
-from klack.assembling.off_axis_points import off_axis_space, touch_height
-from klack.assembling.position_in_guide import axis_through, in_disc
+from klack.assembling.modes import damping_of, selection_of, shape_marks
+from klack.assembling.off_axis import off_axis_space, touch_height
+from klack.assembling.placement import axis_through, in_disc
 from klack.assembling.stops import StopContact
-from klack.assembling.tilting_land import tilting_film
 from klack.case.guide import LinearGuideLaw, ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
@@ -28,6 +25,8 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
+from klack.hydraulics.film import ConeFilm, DiscFilm, FilmShape, RingFilm
+from klack.hydraulics.tilted_film import SectorFilm, sector_film
 from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
@@ -40,7 +39,7 @@ from klack.transient.interface_model import (
     interface_model,
 )
 from klack.transient.spatial_run import SpatialValve
-from klack.transient.tilting_film import BearingFilm
+from klack.transient.tilting_film import BearingFilm, TiltingFilm
 from klack.units import format_si
 
 __all__ = [
@@ -54,6 +53,55 @@ __all__ = [
     "seat_height",
     "valve_of_meetings",
 ]
+
+
+_WIDE = 0.1  # width over mean radius, above which heights differ across the land
+_TOUCHING = 0.05  # share of the reach: points that touch first
+
+
+def tilting_film(
+    stop: str, film: FilmShape, space: ContactSpace | RingSpace, reach: float
+) -> TiltingFilm:
+    """Land of a film, and the lift and tilts of it in the gaps of contact points.
+
+    A conical land is unrolled: a flat ring of its mean radius and its width, whose height is normal
+    to the cone.
+
+    Parameters
+    ----------
+    stop : str
+    film : FilmShape
+    space : ContactSpace or RingSpace
+        Contact points of the stop, centred, all round.
+    reach : float [m]
+        Their largest gap in touch.
+    """
+    slope, land, cubic = 1.0, None, 1.0
+    if isinstance(film, RingFilm):
+        land = _ring(film.inner_radius, film.outer_radius, film.sectors)
+        cubic = film.coefficients()[0]
+    elif isinstance(film, DiscFilm):
+        land = sector_film(0.0, film.radius, sectors=film.sectors, circles=2)
+        cubic = film.coefficients()[0]
+    elif isinstance(film, ConeFilm):
+        half = 0.5 * min(film.width, 1.9 * film.mean_radius)
+        inner, outer = film.mean_radius - half, film.mean_radius + half
+        land, slope = _ring(inner, outer, film.sectors), sin(film.half_angle)
+        flat = RingFilm(shape="ring", inner_radius=inner, outer_radius=outer)
+        cubic = flat.coefficients()[0]
+    lift = space.gap / np.maximum(space.axial * np.sign(np.sum(space.axial)), 1e-6)
+    near = lift <= lift.min() + _TOUCHING * reach
+    weight = np.where(near, space.area, 0.0)
+    shapes = np.column_stack([np.ones(len(space.gap)), space.points[:, :2]])
+    fit = np.linalg.solve((shapes.T * weight) @ shapes, shapes.T * weight)
+    touching = space.gap - lift.min() * np.abs(space.axial)
+    return TiltingFilm(stop=stop, land=land, cubic=cubic, slope=slope, fit=fit, base=fit @ touching)
+
+
+def _ring(inner: float, outer: float, sectors: int) -> SectorFilm:
+    wide = outer - inner > _WIDE * 0.5 * (inner + outer)
+    return sector_film(inner, outer, sectors=sectors, circles=2 if wide else 1)
+
 
 Vector = NDArray[np.float64]
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.modes import selection_of
-from klack.assembling.off_axis import ANGLES, turned
-from klack.assembling.off_axis_points import off_axis_rings
+from klack.assembling.off_axis import ANGLES, off_axis_rings, turned
 from klack.assembling.spatial import (
     Meeting,
     about_axis,

@@ -13,9 +13,8 @@ import numpy as np
 
 from klack.assembling.bodies import BodyPair
 from klack.assembling.candidates import Candidates
-from klack.assembling.damping_choice import damping_of
 from klack.assembling.ladder import effective_mass, static_ladder, wider_space
-from klack.assembling.modes import selection_of
+from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops
 from klack.assembling.yielding import law_loops, law_with_yield, loaded_body
 from klack.case.valve import ValveCase

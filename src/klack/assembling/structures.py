@@ -5,8 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.damping_choice import damping_of
-from klack.assembling.modes import selection_of
+from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
 from klack.assembling.stops import StopContact

@@ -17,9 +17,8 @@ from klack.assembling.bodies import (
     wanted_sizes,
     with_size,
 )
-from klack.assembling.damping_choice import damping_of
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
-from klack.assembling.modes import mode_pool, selection_of
+from klack.assembling.modes import damping_of, mode_pool, selection_of
 from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law

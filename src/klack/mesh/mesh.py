@@ -11,7 +11,7 @@ from klack.errors import InputError
 from klack.mesh.families import FAMILIES, ElementFamily
 from klack.mesh.rigid import Pose
 
-__all__ = ["ElementBlock", "FaceBlock", "Mesh", "Surface", "solid_at"]
+__all__ = ["ElementBlock", "FaceBlock", "Mesh", "Surface", "simplices", "solid_at"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,3 +163,19 @@ def solid_at(mesh: Mesh, surface: Surface) -> str:
     nodes = surface.nodes
     counts = [np.isin(nodes, block.connectivity).sum() for block in mesh.blocks]
     return mesh.blocks[int(np.argmax(counts))].solid
+
+
+_SIMPLICES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "line2": ((0, 1),),
+    "line3": ((0, 2), (2, 1)),
+    "tri3": ((0, 1, 2),),
+    "tri6": ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
+    "quad4": ((0, 1, 2), (0, 2, 3)),
+    "quad8": ((0, 4, 7), (1, 5, 4), (2, 6, 5), (3, 7, 6), (4, 5, 6), (4, 6, 7)),
+}
+
+
+def simplices(block: FaceBlock) -> NDArray[np.int64]:
+    """Triangles or segments of every face through all its nodes, shape (f, dimension)."""
+    local = np.array(_SIMPLICES[block.family])
+    return block.connectivity[:, local].reshape(-1, local.shape[1])

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from klack.mesh.boundary import outer_surface
-from klack.mesh.mesh import FaceBlock, Mesh
-from klack.mesh.simplices import simplices
+from klack.mesh.mesh import FaceBlock, Mesh, simplices
 
 __all__ = ["Skin", "skin_of_mesh"]
 

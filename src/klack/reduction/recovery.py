@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.mesh.mesh import Mesh
-from klack.mesh.simplices import simplices
+from klack.mesh.mesh import Mesh, simplices
 
 __all__ = ["Recovery", "surface_faces"]
 

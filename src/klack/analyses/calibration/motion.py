@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.analyses.workers import LoggedWork
-from klack.assembling.damping_choice import damping_of
+from klack.assembling.modes import damping_of
 from klack.assembling.stops import StopFaces
 from klack.assembling.valve import filled_network
 from klack.case.any_case import CaseTree

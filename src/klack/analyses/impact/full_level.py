@@ -9,7 +9,7 @@ from klack.analyses.impact.gauges import FullGauges
 from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
-from klack.assembling.damping_choice import damping_of, is_damped
+from klack.assembling.modes import damping_of, is_damped
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import starting_gap
 from klack.case.schema import (

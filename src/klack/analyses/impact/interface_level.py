@@ -13,8 +13,7 @@ from klack.analyses.impact.levels import level_result
 from klack.analyses.impact.pressure import pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
-from klack.assembling.damping_choice import damping_of
-from klack.assembling.modes import selection_of
+from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.off_axis import ANGLES, off_axis_model, ring_contacts
 from klack.assembling.problem import ContactProblem
 from klack.case.guide import CaseGuide, LinearGuideLaw

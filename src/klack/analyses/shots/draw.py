@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.assembling.position_in_guide import axis_through, in_disc
+from klack.assembling.placement import axis_through, in_disc
 from klack.case.any_case import AnyCase
 from klack.case.distribution import Distribution
 from klack.case.schema import Case

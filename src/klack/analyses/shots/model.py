@@ -14,7 +14,7 @@ from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.impact.run import ImpactBodies, impact_bodies
 from klack.analyses.shots.draw import extreme_placements, face_friction, shots_of
 from klack.analyses.shots.one_shot import ShotSetup
-from klack.assembling.off_axis_points import off_axis_space, touch_height
+from klack.assembling.off_axis import off_axis_space, touch_height
 from klack.assembling.pressure_limit import pressure_limit
 from klack.assembling.problem import ContactProblem, contact_problem
 from klack.case.guide import Placement

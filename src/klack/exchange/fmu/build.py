@@ -8,21 +8,170 @@ from pathlib import Path
 from typing import Literal
 from uuid import UUID
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from klack.contact.step_constants import LANES, NO_LAW, shared_constants
 from klack.errors import InputError
-from klack.exchange.fmu.build_description import build_description
-from klack.exchange.fmu.compiler import (
-    PLATFORMS,
-    compile_library,
-    require_compilers,
-    this_platform,
-)
-from klack.exchange.fmu.data_header import constants_header, data_header
+from klack.exchange.fmu.compiler import PLATFORMS, compile_library, require_compilers, this_platform
 from klack.exchange.fmu.documentation import documentation_files
-from klack.exchange.fmu.model_description import SOURCE_FILES, model_description
+from klack.exchange.fmu.model_description import (
+    SOURCE_FILES,
+    build_description,
+    model_description,
+    supports_model_exchange,
+)
+from klack.exchange.fmu.variables import fmu_variables
 from klack.exchange.modal_model import ModalModel
 from klack.whole_file import whole_file
 
-__all__ = ["build_fmu", "source_texts"]
+__all__ = ["build_fmu", "data_header", "source_texts"]
+
+
+def data_header(model: ModalModel, guid: str) -> str:
+    """Text of the header.
+
+    Parameters
+    ----------
+    model : ModalModel
+    guid : str
+        What an importing program has to show at the instantiation.
+
+    Raises
+    ------
+    InputError
+        For a number that is not finite.
+    """
+    variables = fmu_variables(model)
+    names = [variable.name for variable in variables]
+    states = [variable for variable in variables if variable.derivative_of is None][
+        -2 * model.mode_count :
+    ]
+    m = model.mode_count
+    films = [contact.film for contact in model.contacts]
+    laws = [None if c.law is None else c.law.flat() for c in model.contacts]
+    sizes = [0 if law is None else law.parameters.size for law in laws]
+    speed = next((v.start for v in variables if v.name == "start_velocity"), 0.0)
+    first_of_contact = [
+        len(model.inputs) + len(model.outputs) + sum(4 if film is None else 5 for film in films[:c])
+        for c in range(len(films) + 1)
+    ]
+    lines = [
+        f"/* Numbers of the model {model.name}, SI units; written by klack. */",
+        "#ifndef KLACK_DATA_H",
+        "#define KLACK_DATA_H",
+        "",
+        f"#define KLACK_SYMBOL(name) {model.name}_##name",
+        f'#define KLACK_NAME "{model.name}"',
+        f'#define KLACK_GUID "{guid}"',
+        f"#define KLACK_MODES {m}",
+        f"#define KLACK_PADDED {_padded(m)}",
+        f"#define KLACK_INPUTS {len(model.inputs)}",
+        f"#define KLACK_OUTPUTS {len(model.outputs)}",
+        f"#define KLACK_CONTACTS {len(model.contacts)}",
+        f"#define KLACK_FILMS {sum(film is not None for film in films)}",
+        f"#define KLACK_PAIR {int(model.kind == 'pair')}",
+        f"#define KLACK_VARIABLES {len(variables)}",
+        f"#define KLACK_INTERNAL_STEP {names.index('internal_step')} /* value reference */",
+        f"#define KLACK_HAS_MODEL_EXCHANGE {int(supports_model_exchange(model))}",
+        "",
+        "#ifdef KLACK_ARRAYS",
+        _number("klack_default_step", model.step),
+        _number("klack_default_velocity", 0.0 if speed is None else speed),
+        _array("klack_omega", model.omega),
+        _array("klack_damping", model.damping),
+        _array("klack_start", model.start),
+        _array("klack_start_speed", model.start_velocity),
+        _array("klack_rise", model.rise),
+        _array("klack_constant", model.constant),
+        _array("klack_nominal", [v.nominal if v.nominal is not None else 1.0 for v in states]),
+        _rows("klack_input", [item.shape for item in model.inputs], m),
+        _rows("klack_output", [item.shape for item in model.outputs], m),
+        _array("klack_output_offset", [item.offset for item in model.outputs]),
+        _integers("klack_output_moves", [item.quantity == "velocity" for item in model.outputs]),
+        _rows("klack_gap_row", [contact.shape for contact in model.contacts], _padded(m)),
+        _array("klack_gap", [contact.gap for contact in model.contacts]),
+        _array("klack_series", [contact.series_compliance for contact in model.contacts]),
+        _integers("klack_contact_first", first_of_contact),
+        _integers("klack_law_kind", [NO_LAW if law is None else law.kind for law in laws]),
+        _integers("klack_law_first", np.concatenate(([0], np.cumsum(sizes)))),
+        _array(
+            "klack_law",
+            np.concatenate([np.empty(0), *(w.parameters for w in laws if w is not None)]),
+        ),
+        _array("klack_dissipation", [0.0 if law is None else law.dissipation for law in laws]),
+        _integers("klack_has_film", [film is not None for film in films]),
+        _array("klack_cubic", [0.0 if film is None else film.cubic for film in films]),
+        _array("klack_linear", [0.0 if film is None else film.linear for film in films]),
+        _array("klack_cut_off", [1.0 if film is None else film.cut_off for film in films]),
+        _array("klack_suction", [0.0 if film is None else film.suction for film in films]),
+        "#endif",
+        "#endif",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def constants_header() -> str:
+    """Text of ``klack_constants.h``: what the C sources share with klack's own time step."""
+    lines = [
+        f"#define KLACK_{name} ({value}) /* {meaning} */"
+        for name, value, meaning in shared_constants("C")
+    ]
+    head = [
+        "/* Constants of laws and steps, SI units; written by klack. */",
+        "#ifndef KLACK_CONSTANTS_H",
+        "#define KLACK_CONSTANTS_H",
+        "",
+    ]
+    return "\n".join([*head, *lines, "", "#endif"]) + "\n"
+
+
+def _padded(modes: int) -> int:
+    """Modes are filled up, so that loops over them need no rest."""
+    return LANES * max(1, -(-modes // LANES))
+
+
+def _number(name: str, value: float) -> str:
+    return f"static const double {name} = {_digits(name, value)};"
+
+
+def _array(name: str, values: ArrayLike) -> str:
+    """One array; C has none without elements, so an empty one gets a zero."""
+    numbers = [_digits(name, x) for x in np.asarray(values, dtype=float).ravel()] or ["0"]
+    return f"static const double {name}[{len(numbers)}] = {{{_wrapped(numbers)}}};"
+
+
+def _rows(name: str, rows: Sequence[ArrayLike], width: int) -> str:
+    """Rows, filled up with zeros to ``width``."""
+    table = np.zeros((max(len(rows), 1), max(width, 1)))
+    for i, row in enumerate(rows):
+        given = np.asarray(row, dtype=float)
+        table[i, : given.size] = given
+    parts = [f"{{{_wrapped([_digits(name, x) for x in row])}}}" for row in table]
+    head = f"static const double {name}[{table.shape[0]}][{table.shape[1]}]"
+    return f"{head} = {{\n{','.join(parts)}}};"
+
+
+def _integers(name: str, values: ArrayLike) -> str:
+    numbers = [str(int(x)) for x in np.asarray(values).ravel()] or ["0"]
+    return f"static const int {name}[{len(numbers)}] = {{{_wrapped(numbers)}}};"
+
+
+def _digits(name: str, value: float) -> str:
+    if not np.isfinite(value):
+        raise InputError(
+            f"export of a model: {name.removeprefix('klack_')}",
+            got=f"{value}",
+            expected="finite numbers",
+            hint="check the body or the law of this model.",
+        )
+    return f"{float(value):.17g}"
+
+
+def _wrapped(numbers: Sequence[str]) -> str:
+    """Ten numbers to a line."""
+    return ",\n".join(",".join(numbers[i : i + 10]) for i in range(0, len(numbers), 10))
+
 
 _HERE = Path(__file__).parent
 _HEADERS = (

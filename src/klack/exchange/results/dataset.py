@@ -1,28 +1,225 @@
 """Results as xarray datasets, for notebooks."""
 
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from klack.analyses.analysis import Measured
 from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.measures import json_of
-from klack.analyses.noise.record import NoiseStudy
-from klack.analyses.shots.record import ShotsStudy
+from klack.analyses.measures import Measure, json_of
+from klack.analyses.noise.record import NoiseDesign, NoiseStudy
+from klack.analyses.shots.record import SHOT_MEASURES, ShotsStudy
 from klack.analyses.stroke.record import StrokeStudy
-from klack.analyses.stroke_shots.record import StrokeShotsStudy
-from klack.analyses.study.record import StudyRecord
+from klack.analyses.stroke_shots.record import (
+    FIRST_TOUCH_MEASURES,
+    STROKE_MEASURES,
+    StrokeShotsStudy,
+    VariantShots,
+)
+from klack.analyses.study.record import StudyColumn, StudyRecord
 from klack.errors import InputError, optional_package
-from klack.exchange.results.about import about_study
 from klack.exchange.results.naming import identifiers
-from klack.exchange.results.noise_dataset import noise_variables
-from klack.exchange.results.points_dataset import points_variables
-from klack.exchange.results.shots_dataset import shots_variables
-from klack.exchange.results.strokes_dataset import strokes_variables
-from klack.exchange.results.study_table import result_table
+from klack.exchange.results.study_table import about_study, result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar
-from klack.exchange.results.variables import Variable, about_measure
+from klack.signals import TimeSeries
 
 __all__ = ["dataset_of"]
+
+
+class Variable(NamedTuple):
+    """Dimensions, values and attributes (``units``, ``long_name``, ``comment``) of one quantity."""
+
+    dimensions: tuple[str, ...]
+    values: NDArray[Any] | float | int | bool
+    attributes: dict[str, str]
+
+
+def about_measure(measure: Measure[Any]) -> dict[str, str]:
+    """Attributes of the values of a measure."""
+    return {"units": measure.unit, "long_name": measure.name, "comment": measure.definition}
+
+
+Floats = NDArray[np.float64]
+
+
+def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """Variables and coordinates of a design: forces of the stops, bodies, sound of one click.
+
+    Over ``band``, the middles of third octaves: energies of force, radiated energy, sound
+    exposure.  Forces share the axis ``time`` where they are sampled alike; every stop has a
+    frequency axis of its own.
+
+    Parameters
+    ----------
+    design : NoiseDesign
+    """
+    bands = design.band_middle
+    coordinates = {
+        "band": Variable(
+            ("band",), bands, {"units": "Hz", "long_name": "middle of the third octave"}
+        )
+    }
+    variables = {
+        "net_share": Variable(
+            ("band",),
+            design.net_share,
+            {"units": "1", "long_name": "share of the energy of the forces not balanced within"},
+        )
+    }
+
+    sampled: dict[tuple[float, float, int], str] = {}
+
+    def add_series(name: str, series: TimeSeries, meaning: str) -> None:
+        new = f"{name}_time" if sampled else "time"
+        axis = sampled.setdefault((series.start, series.step, series.values.size), new)
+        coordinates[axis] = Variable((axis,), series.time, {"units": "s", "long_name": "time"})
+        variables[name] = Variable(
+            (axis,), series.values, {"units": series.unit, "long_name": meaning}
+        )
+
+    def add_bands(name: str, energy: Floats, unit: str, meaning: str) -> None:
+        variables[name] = Variable(("band",), energy, {"units": unit, "long_name": meaning})
+
+    stops = identifiers([item.stop for item in design.stops])
+    for name, stop in zip(stops, design.stops, strict=True):
+        add_series(f"{name}_force", stop.force, f"force on '{stop.stop}', means over steps")
+        add_bands(f"{name}_force_energy", stop.bands.energy, "N^2 s", f"force on '{stop.stop}'")
+        axis = f"{name}_frequency"
+        coordinates[axis] = Variable(
+            (axis,), stop.frequency, {"units": "Hz", "long_name": "frequency"}
+        )
+        variables[f"{name}_force_level"] = Variable(
+            (axis,),
+            stop.level,
+            {"units": "dB", "long_name": f"strongest impact on '{stop.stop}', re 1 uN s"},
+        )
+    bodies = identifiers([body.name for body in design.bodies], stops)
+    for name, body in zip(bodies, design.bodies, strict=True):
+        radiated = body.radiated.sum(axis=0)
+        add_bands(f"{name}_radiated", radiated, "J", f"sound energy of '{body.name}', estimate")
+        add_series(f"{name}_blocked_force", body.blocked, f"force of '{body.name}' on its support")
+    if design.sound is not None:
+        add_series("sound_pressure", design.sound.pressure, "sound of one click, estimate")
+        exposure = np.full(bands.size, np.nan)  # heard from 20 Hz to 20 kHz only
+        heard = np.isin(design.stops[0].bands.number, design.sound.bands.number)
+        exposure[heard] = design.sound.bands.energy
+        add_bands("sound_exposure", exposure, "Pa^2 s", "sound of one click, estimate")
+    return variables, coordinates
+
+
+_SAID = {"failure": "why there are no measures", "doubts": "what speaks against the numbers"}
+
+
+def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """Variables and coordinates of all points, in the order of the design.
+
+    Parameters and measures are of shape (points,) over ``point``, by their names with underscores
+    for what Python does not take; ``failure`` says why a point has no measures, ``doubts`` what
+    speaks against its numbers.
+
+    Parameters
+    ----------
+    study : StudyRecord
+    """
+    names = identifiers([item.name for item in study.columns], ("point", *_SAID))
+    variables = {
+        name: Variable(
+            ("point",),
+            (np.array([item.words[int(i)] for i in item.values]) if item.words else item.values),
+            _about(item),
+        )
+        for name, item in zip(names, study.columns, strict=True)
+    }
+    for (name, long_name), texts in zip(_SAID.items(), (study.failures, study.notes), strict=True):
+        variables[name] = Variable(("point",), np.array(texts, dtype=str), {"long_name": long_name})
+    number = np.arange(study.count)
+    return variables, {"point": Variable(("point",), number, {"long_name": "number of the point"})}
+
+
+def _about(item: StudyColumn) -> dict[str, str]:
+    comment = {"comment": item.spread} if item.spread else {}
+    return {"units": item.unit or "1", "long_name": item.name, **comment}
+
+
+def shots_variables(study: ShotsStudy) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """Variables and coordinates of all shots and of the centred one.
+
+    Numbers of a shot are of shape (n + 1,) over ``shot``; height and force of shape (n + 1, k)
+    over ``shot`` and time.  Shots are counted from 1; the last row, shot 0, is the centred one.
+
+    Parameters
+    ----------
+    study : ShotsStudy
+    """
+    shots, centred = study.shot_traces, study.centric_traces
+    count = study.shots.count
+    rows = [*(study.shots.row(index) for index in range(count)), study.centric.row(0)]
+    variables = {
+        measure.key: Variable(
+            ("shot",), np.array([row[measure.key] for row in rows]), about_measure(measure)
+        )
+        for measure in SHOT_MEASURES
+    }
+    variables["height"] = Variable(
+        ("shot", "time"),
+        np.vstack([shots.height, centred.height]),
+        {"units": "m", "long_name": "height of the centre of mass above that at first touch"},
+    )
+    variables["contact_force"] = Variable(
+        ("shot", "force_time"),
+        np.vstack([shots.force, centred.force]),
+        {"units": "N", "long_name": "axial contact force of the first impact"},
+    )
+    after = {"units": "s", "long_name": "time after the first touch"}
+    coordinates = {
+        "shot": Variable(
+            ("shot",),
+            np.append(np.arange(1, count + 1), 0),
+            {"long_name": "number of the shot; 0 is the centred one"},
+        ),
+        "time": Variable(("time",), shots.time, after),
+        "force_time": Variable(("force_time",), shots.force_time, after),
+    }
+    return variables, coordinates
+
+
+def strokes_variables(shots: VariantShots) -> tuple[dict[str, Variable], dict[str, Variable]]:
+    """Variables and coordinates of all strokes of a variant and of the centred one.
+
+    Numbers of a stroke are of shape (n + 1,) over ``stroke``, those of the first impact on a stop
+    behind its name, ``seat_peak_force``; the lift is of shape (n + 1, k) over ``stroke`` and
+    ``time``.  Strokes are counted from 0; the last row, stroke -1, is the centred one.
+    """
+    variables = {
+        measure.key: _column(measure, shots.strokes, shots.centric) for measure in STROKE_MEASURES
+    }
+    for stop, columns in shots.stops.items():
+        variables |= {
+            f"{stop}_{measure.key}": _column(measure, columns, shots.centric_stops[stop])
+            for measure in FIRST_TOUCH_MEASURES
+        }
+    variables["lift"] = Variable(
+        ("stroke", "time"),
+        np.vstack([shots.lift, shots.centric_lift]),
+        {"units": "m", "long_name": "displacement of the point of the lift"},
+    )
+    coordinates = {
+        "stroke": Variable(
+            ("stroke",),
+            np.append(np.arange(shots.strokes.count), -1),
+            {"long_name": "number of the stroke; -1 is the one that starts centred"},
+        ),
+        "time": Variable(("time",), shots.time, {"units": "s", "long_name": "time"}),
+    }
+    return variables, coordinates
+
+
+def _column(measure: Measure[Mapping[str, float]], every: Any, alone: Any) -> Variable:
+    values = np.append(getattr(every, measure.key), getattr(alone, measure.key))
+    return Variable(("stroke",), values, about_measure(measure))
+
 
 Variables = dict[str, Variable]
 
@@ -122,12 +319,14 @@ def _table_variables(run: ResultRun) -> tuple[Variables, Variables]:
     words = [item.name for item in run.channels] + [item.name for item in run.scalars]
     names = identifiers(words, axes)
     curves = {
-        name: Variable((dimension[item.axis],), item.values, _about(item))
+        name: Variable((dimension[item.axis],), item.values, _about_item(item))
         for name, item in zip(names, run.channels, strict=False)
     }
     numbers = zip(names[len(run.channels) :], run.scalars, strict=True)
-    return curves | {name: Variable((), n.value, _about(n)) for name, n in numbers}, coordinates
+    return curves | {
+        name: Variable((), n.value, _about_item(n)) for name, n in numbers
+    }, coordinates
 
 
-def _about(item: ResultChannel | ResultScalar) -> dict[str, str]:
+def _about_item(item: ResultChannel | ResultScalar) -> dict[str, str]:
     return {"units": item.unit, "long_name": item.name, "comment": item.meaning}

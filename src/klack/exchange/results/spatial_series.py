@@ -11,22 +11,135 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from klack.analyses.stroke.impact_order import recorded_impacts
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
-from klack.assembling.mode_marks import shape_marks
-from klack.assembling.valve_shapes import BodyShapes, valve_shapes
+from klack.assembling.modes import shape_marks
+from klack.assembling.spatial import modes_in_network
+from klack.assembling.valve import build_valve_bodies, valve_parts
 from klack.case.valve import ValveCase
+from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError, refuse
 from klack.exchange.results.naming import file_stems
-from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
-from klack.exchange.results.vtu_ring import write_ring
+from klack.exchange.results.vtu import SeriesFile, VtuGrid, data_array, write_pvd
 from klack.progress import Progress, silent
 from klack.simulation.spatial_impact import ModalMoments, SpatialImpact
 from klack.whole_file import whole_files
 
-__all__ = ["write_spatial_series"]
+__all__ = ["valve_shapes", "write_spatial_series"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BodyShapes:
+    """A body and the shapes of its coordinates.
+
+    Parameters
+    ----------
+    body : ElasticBody
+    shapes : array, shape (n_dof, m) [1/sqrt(kg)]
+        Rigid ones first.
+    omega : array, shape (m,) [rad/s]
+    above : mapping of str to float [m]
+        By stop: how far the upper body stands above its drawing where the network has its
+        displacements 0, the lower one as it is drawn; of the stops of this body.
+    is_upper : mapping of str to bool
+        By stop.
+    """
+
+    body: ElasticBody
+    shapes: NDArray[np.float64]
+    omega: NDArray[np.float64]
+    above: Mapping[str, float]
+    is_upper: Mapping[str, bool]
+
+
+def valve_shapes(
+    case: ValveCase, progress: Progress = silent, *, threads: int | None = None
+) -> dict[str, BodyShapes]:
+    """Mesh the bodies of a valve, and compute the modes that its network keeps.
+
+    Meshes, factors and modes are those that a run has cached.
+
+    Parameters
+    ----------
+    case : ValveCase
+    progress : callable
+    threads : int, optional
+
+    Raises
+    ------
+    InputError
+        For a case that no valve can be built from.
+    """
+    with threadpool_limits(limits=threads or 1, user_api="blas"):
+        parts = valve_parts(case, build_valve_bodies(case, progress), progress, threads or 1)
+        for flexibility in parts.flexibilities.values():
+            flexibility.close()
+    found = {}
+    for name, body in parts.bodies.items():
+        kept = modes_in_network(case, name, parts.pools, parts.ports)
+        rigid = body.rigid_modes
+        touching = [
+            c for c in parts.contacts.values() if name in (c.pair.upper.name, c.pair.lower.name)
+        ]
+        found[name] = BodyShapes(
+            body=body,
+            shapes=np.hstack([rigid, kept.shapes]),
+            omega=np.append(np.zeros(rigid.shape[1]), kept.omega),
+            above={
+                c.name: c.pair.shift + float(getattr(case.network.components[c.name], "gap", 0.0))
+                for c in touching
+            },
+            is_upper={c.name: c.pair.upper.name == name for c in touching},
+        )
+    return found
+
+
+_LINE = 3  # VTK_LINE
+
+
+def write_ring(
+    path: Path,
+    radius: float,
+    height: float,
+    fields: Mapping[str, NDArray[np.float64]],
+    time: float,
+) -> None:
+    """Write as many lines round the axis z as there are values in each field.
+
+    Parameters
+    ----------
+    path : Path
+    radius, height : float [m]
+    fields : mapping of str to array, shape (S,)
+        Values of the sectors, the first of which begins at +x; in single precision.
+    time : float [s]
+    """
+    count = len(next(iter(fields.values())))
+    angle = 2.0 * np.pi / count * np.arange(count)
+    points = np.column_stack(
+        [radius * np.cos(angle), radius * np.sin(angle), np.full(count, height)]
+    )
+    ends = np.column_stack([np.arange(count), (np.arange(count) + 1) % count])
+    data = "".join(data_array(name, v.astype("f4")) for name, v in fields.items())
+    stamp = data_array("TimeValue", np.array([time]), tuples=True)
+    path.write_text(
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n'
+        f"<FieldData>\n{stamp}</FieldData>\n"
+        f'<Piece NumberOfPoints="{count}" NumberOfCells="{count}">\n'
+        f"<Points>\n{data_array('Points', points)}</Points>\n"
+        f"<Cells>\n{data_array('connectivity', ends.ravel().astype('i8'))}"
+        f"{data_array('offsets', 2 * np.arange(1, count + 1).astype('i8'))}"
+        f"{data_array('types', np.full(count, _LINE, dtype='u1'))}</Cells>\n"
+        f"<CellData>\n{data}</CellData>\n<PointData>\n</PointData>\n"
+        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+        encoding="ascii",
+    )
+
 
 Floats = NDArray[np.float64]
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.full_level import simulate_in_full
 from klack.analyses.impact.recovered_motion import recovered_motion
-from klack.assembling.damping_choice import is_damped
-from klack.assembling.modes import kept_modes, mode_pools
+from klack.assembling.modes import is_damped, kept_modes, mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.case.schema import Case
 from klack.elasticity.body import ElasticBody

@@ -1,4 +1,4 @@
-"""Unit of length of a mesh file, and the size of its body: the usual sign of a wrong unit."""
+"""What is refused of any mesh file: its size, its unit, and the extent of its body."""
 
 from pathlib import Path
 
@@ -8,7 +8,16 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 from klack.units import format_si
 
-__all__ = ["LARGEST_BODY", "SAY_UNIT", "SMALLEST_BODY", "require_plausible_size", "require_unit"]
+__all__ = [
+    "LARGEST_BODY",
+    "LARGEST_BYTES",
+    "SAY_UNIT",
+    "SMALLEST_BODY",
+    "read_bytes",
+    "require_plausible_size",
+    "require_unit",
+]
+
 
 SAY_UNIT = "add 'unit: mm' (or your unit) next to the file; for klack inspect, --unit mm."
 """Advice for a mesh file without a unit of length."""
@@ -69,3 +78,27 @@ def require_unit(path: Path, unit_length: float | None) -> float:
             hint=SAY_UNIT,
         )
     return unit_length
+
+
+LARGEST_BYTES = 2_000_000_000
+"""Largest size of a mesh file, or of all files of one model together."""
+
+
+def read_bytes(path: Path, kind: str) -> bytes:
+    """Content of a mesh file; raise if it is missing, empty or too large."""
+    if not path.is_file():
+        raise InputError(
+            str(path),
+            got="no such file",
+            expected=kind,
+            hint="check the path; it is relative to where you started the program.",
+        )
+    size = path.stat().st_size
+    if not 0 < size <= LARGEST_BYTES:
+        raise InputError(
+            str(path),
+            got="an empty file" if size == 0 else f"{size / 1e9:.3g} GB",
+            expected=f"{kind}, at most {LARGEST_BYTES / 1e9:.3g} GB",
+            hint="write the mesh only, without results or steps.",
+        )
+    return path.read_bytes()

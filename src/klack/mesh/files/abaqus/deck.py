@@ -1,18 +1,231 @@
 """Keywords of an Abaqus or CalculiX file, collected: parts, instances, assembly, materials."""
 
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from klack.errors import AccuracyWarning, InputError
-from klack.mesh.files.abaqus.instances import Placement, add_instance, read_placement
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.errors import AccuracyWarning, InputError, refuse
+from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword, read_keywords
-from klack.mesh.files.abaqus.numbers import number, records
-from klack.mesh.files.abaqus.scope import Scope, Section
-from klack.mesh.files.abaqus.surfaces import read_surface
+from klack.mesh.files.abaqus.numbers import is_integer, number, records
+from klack.mesh.files.abaqus.scope import FaceSelection, Instance, Scope, Section
 from klack.mesh.files.mesh_model import FileMaterial
+from klack.mesh.rigid import rotation_matrix
 
 __all__ = ["Deck", "read_deck"]
+
+
+LARGEST_NODES = 100_000_000
+"""Most nodes of all instances together."""
+
+Points = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placement:
+    """Rigid displacement of an instance, in the units of the file.
+
+    Parameters
+    ----------
+    shift : array, shape (3,)
+    turn : array, shape (3, 3)
+    about : array, shape (3,)
+        A point of the axis, after the shift.
+    """
+
+    shift: Points
+    turn: Points
+    about: Points
+
+    @property
+    def along_axis(self) -> bool:
+        """True if a body of revolution (r = x, z = y) stays one."""
+        return not self.shift[[0, 2]].any() and np.array_equal(self.turn, np.eye(3))
+
+    def of(self, points: Points) -> Points:
+        """Points of the part, shape (n, 3), where the instance has them."""
+        if not self.shift.any() and np.array_equal(self.turn, np.eye(3)):
+            return points
+        moved = points + self.shift
+        if np.array_equal(self.turn, np.eye(3)):
+            return moved
+        return (moved - self.about) @ self.turn.T + self.about
+
+
+def read_placement(keyword: Keyword) -> Placement:
+    """Placement of an *INSTANCE; without data lines it is left where the part is drawn."""
+    rows = [[number(line, t) for t in line.fields] for line in keyword.lines() if line.fields]
+    if [len(row) for row in rows] not in ([], [3], [3, 7]):
+        raise InputError(
+            f"{keyword.place}: *INSTANCE",
+            got=f"data lines of {', '.join(str(len(row)) for row in rows[:8])} numbers",
+            expected="a translation (3 numbers) and, if rotated, two points and an angle (7)",
+            hint="write both lines; zeros for no translation.",
+        )
+    shift = np.array(rows[0] if rows else [0.0, 0.0, 0.0])
+    if len(rows) < 2:
+        return Placement(shift, np.eye(3), np.zeros(3))
+    a, b, angle = np.array(rows[1][:3]), np.array(rows[1][3:6]), np.deg2rad(rows[1][6])
+    length = float(np.linalg.norm(b - a))
+    if not (length > 0 and np.isfinite(length)):
+        raise InputError(
+            f"{keyword.place}: *INSTANCE",
+            got=f"an axis of length {length:g}",
+            expected="two different points of the axis",
+            hint="check the second data line: two points and an angle in degrees.",
+        )
+    return Placement(shift, rotation_matrix((b - a) / length * angle), a)
+
+
+def add_instance(root: Scope, name: str, part: Scope, placement: Placement, place: str) -> None:
+    """Put an instance into the assembly; its sets and surfaces are called ``name.set``."""
+    refuse(
+        (
+            name.upper() in root.instances,
+            InputError(
+                f"{place}: *INSTANCE",
+                got=f"a second instance '{name[:80]}'",
+                expected="every name once",
+                hint="give every instance its own name.",
+            ),
+        ),
+        (
+            root.nodes.count + part.nodes.count > LARGEST_NODES,
+            InputError(
+                f"{place}: *INSTANCE",
+                got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
+                expected=f"at most {LARGEST_NODES}",
+                hint="leave out unneeded instances.",
+            ),
+        ),
+    )
+    _require_revolution(part, placement, place)
+    node, element = root.nodes.count, root.elements.count
+    root.instances[name.upper()] = Instance(name, part, node, element)
+    root.labels += part.labels
+    root.points += [placement.of(points) for points in part.points]
+    root.groups += [group.adopted(name, node, element) for group in part.groups]
+    root.nodes.count += part.nodes.count
+    root.elements.count += part.elements.count
+    root.nodes.sets.adopt(place, name, part.nodes.sets, node)
+    root.elements.sets.adopt(place, name, part.elements.sets, element)
+    root.node_surfaces.adopt(place, name, part.node_surfaces, node)
+    root.surfaces.adopt(
+        name, part.surfaces, lambda part: FaceSelection(part.elements + element, part.side)
+    )
+    root.listed += [f"{name}.{key}".upper() for key in part.listed]
+    root.sections += [Section(f"{name}.{s.elset}".upper(), s.material) for s in part.sections]
+
+
+def _require_revolution(part: Scope, placement: Placement, place: str) -> None:
+    flat = any(group.solid and FAMILIES[group.family].dimension == 2 for group in part.groups)
+    if flat and not placement.along_axis:
+        raise InputError(
+            f"{place}: *INSTANCE",
+            got="an axisymmetric part that is rotated, or moved away from its axis",
+            expected="a translation along y, which is the axis",
+            hint="draw the part at its radius.",
+        )
+
+
+Integers = NDArray[np.int64]
+
+_MARKER_SIDES = {"", "SPOS", "SNEG", "S1", "S2"}  # of surface elements: each is one face
+
+
+def read_surface(scope: Scope, keyword: Keyword) -> None:
+    """Put the surface of one *SURFACE keyword into its scope, all sets of which are known."""
+    name = keyword.parameter("NAME")
+    kind = keyword.parameters.get("TYPE", "ELEMENT").upper()
+    if "COMBINE" in keyword.parameters:
+        _combine(scope, keyword, name)
+    elif "CROP" in keyword.parameters:
+        raise _unsupported(keyword, "the parameter CROP", "a surface without a box")
+    elif kind == "NODE":
+        rows = [scope.named(line, line.fields[0], "node") for line in _filled(keyword)]
+        members = np.concatenate([np.empty(0, dtype=np.int64), *rows])
+        scope.node_surfaces.add(keyword.place, name, members)
+    elif kind == "ELEMENT":
+        scope.surfaces.add(name, *_selections(scope, list(_filled(keyword))))
+    else:
+        raise _unsupported(keyword, f"TYPE={kind[:40]}", "TYPE=ELEMENT or TYPE=NODE")
+
+
+def _filled(keyword: Keyword) -> list[DataLine]:
+    return [line for line in keyword.lines() if line.fields]
+
+
+def _unsupported(keyword: Keyword, got: str, expected: str) -> InputError:
+    return InputError(
+        f"{keyword.place}: *SURFACE",
+        got=got,
+        expected=expected,
+        hint="define the surface by element faces.",
+    )
+
+
+def _combine(scope: Scope, keyword: Keyword, name: str) -> None:
+    """Join surfaces that are defined above."""
+    how = keyword.parameter("COMBINE").upper()
+    if how != "UNION":
+        raise _unsupported(keyword, f"COMBINE={how[:40]}", "COMBINE=UNION")
+    for line in _filled(keyword):
+        for other in line.fields:
+            key = scope.surfaces.require(line.place, other)
+            scope.surfaces.add(name, *list(scope.surfaces.parts(key)))
+
+
+def _selections(scope: Scope, lines: Sequence[DataLine]) -> list[FaceSelection]:
+    """Faces of all data lines; lines with one number each are looked up together."""
+    found: list[FaceSelection] = []
+    single: dict[str, list[DataLine]] = {}
+    for line in lines:
+        label = line.fields[1].upper() if len(line.fields) > 1 else ""
+        if is_integer(line.fields[0]):
+            single.setdefault(label, []).append(line)
+        else:
+            rows = scope.named(line, line.fields[0], "element")
+            found.append(FaceSelection(rows, _side(scope, line, label, rows)))
+    for label, those in single.items():
+        numbers = np.array([int(line.fields[0]) for line in those], dtype=np.int64)
+        rows = scope.elements.numbering.find(numbers)
+        for index in np.flatnonzero(rows < 0).tolist():
+            rows[index] = scope.named(those[index], those[index].fields[0], "element")[0]
+        wrong = _wrong_sides(scope, label, rows)
+        line = those[int(np.argmax(wrong))] if wrong.any() else those[0]
+        found.append(FaceSelection(rows, _side(scope, line, label, rows)))
+    return found
+
+
+def _wrong_sides(scope: Scope, label: str, rows: Integers) -> NDArray[np.bool_]:
+    """True for every element that has no such face."""
+    side = int(label[1:]) if label[:1] == "S" and is_integer(label[1:]) else 0
+    wrong = [
+        not (label == "" or 1 <= side <= len(FAMILIES[group.family].faces))
+        if group.solid
+        else label not in _MARKER_SIDES
+        for group in scope.groups
+    ]
+    return np.array(wrong, dtype=bool)[scope.group_of(rows)]
+
+
+def _side(scope: Scope, line: DataLine, label: str, rows: Integers) -> int:
+    wrong = _wrong_sides(scope, label, rows)
+    if wrong.any():
+        group = scope.groups[int(scope.group_of(rows[wrong][:1])[0])]
+        sides = f"S1 to S{len(FAMILIES[group.family].faces)}" if group.solid else "SPOS or SNEG"
+        raise InputError(
+            line.place,
+            got=f"face '{label[:40]}'",
+            expected=f"{sides} ({group.family})",
+            hint="check the surface in the preprocessor.",
+        )
+    return int(label[1:]) if is_integer(label[1:]) else 0
+
 
 _GENERATING = {"NGEN", "NFILL", "NMAP", "NCOPY", "ELGEN", "ELCOPY"}
 _IGNORED = {

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from klack.errors import InputError, refuse
-from klack.mesh.files.file_bytes import LARGEST_BYTES
+from klack.mesh.files.plausible import LARGEST_BYTES
 
 __all__ = ["DataLine", "Keyword", "Segment", "read_keywords"]
 

@@ -21,8 +21,8 @@ from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.deck import Deck, read_deck
 from klack.mesh.files.abaqus.elements import ElementGroup
 from klack.mesh.files.abaqus.faces import FaceFinder, RowBlock, left_out
-from klack.mesh.files.abaqus.numbering import distinct
 from klack.mesh.files.abaqus.scope import Scope
+from klack.mesh.files.abaqus.sets import distinct
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.plausible import require_unit
 from klack.mesh.files.sound_mesh import require_right_of_axis, require_sound

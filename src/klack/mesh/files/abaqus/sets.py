@@ -2,7 +2,8 @@
 
 from array import array
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,11 +11,192 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.input.problem import one_of
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword
-from klack.mesh.files.abaqus.names import Names
-from klack.mesh.files.abaqus.numbering import Numbering, distinct
 from klack.mesh.files.abaqus.numbers import CUT_OFF, integer, integer_list, is_integer
 
-__all__ = ["NamedSets", "read_members"]
+__all__ = ["NamedSets", "Names", "Numbering", "distinct", "read_members"]
+
+
+T = TypeVar("T")
+
+
+@dataclass
+class Names(Generic[T]):
+    """Named items that a file defines piece by piece.
+
+    Parameters
+    ----------
+    kind : str
+        ``"node set"``, ``"element set"`` or ``"surface"``, for error texts.
+    """
+
+    kind: str
+    _shown: dict[str, str] = field(default_factory=dict)
+    _parts: dict[str, list[T]] = field(default_factory=dict)
+    _plain: dict[str, str] = field(default_factory=dict)  # of an instance's name, without it
+    _owners: dict[str, list[str]] = field(default_factory=dict)  # the other way round
+
+    def copy(self) -> "Names[T]":
+        """Independent copy of the names."""
+        parts = {key: list(part) for key, part in self._parts.items()}
+        return Names(self.kind, dict(self._shown), parts)
+
+    def add(self, name: str, *parts: T) -> str:
+        """Add parts to an item by name; return its key."""
+        key = name.upper()
+        self._shown.setdefault(key, name)
+        self._parts.setdefault(key, []).extend(parts)
+        return key
+
+    def parts(self, key: str) -> list[T]:
+        """All parts, which the caller may replace by fewer."""
+        return self._parts[key]
+
+    def find(self, name: str) -> str | None:
+        """Key of a name; a name that only one instance has is known without the instance."""
+        key = name.upper()
+        if key in self._parts:
+            return key
+        owners = self._owners.get(key, ())
+        return owners[0] if len(owners) == 1 else None
+
+    def require(self, place: str, name: str) -> str:
+        """Key of a name that must be there."""
+        key = self.find(name)
+        if key is not None:
+            return key
+        owners = self._owners.get(name.upper())
+        known = [self._shown[k] for k in (owners or list(self._shown))[:12]]
+        what = "a surface" if self.kind == "surface" else "a number, or a set"
+        raise InputError(
+            place,
+            got=f"{self.kind} '{name[:80]}'" + (" of several instances" if owners else ""),
+            expected=f"{what} defined above ({', '.join(known) or 'none'})",
+            hint="check the spelling, or define the set before it is used.",
+        )
+
+    def adopt(self, instance: str, part: "Names[T]", convert: Callable[[T], T]) -> None:
+        """Take over the names of a part as ``instance.name``."""
+        for key, shown in part._shown.items():
+            own = self.add(f"{instance}.{shown}", *map(convert, part._parts[key]))
+            self._plain[own] = shown
+            self._owners.setdefault(key, []).append(own)
+
+    def shortest(self, key: str) -> str:
+        """Name to show where only one can be: without the instance, if that is unique."""
+        plain = self._plain.get(key)
+        if plain is None or plain.upper() in self._parts:
+            return self._shown[key]
+        return plain if len(self._owners[plain.upper()]) == 1 else self._shown[key]
+
+    def public(self, *, single: bool) -> Iterator[tuple[str, str]]:
+        """Names to show, with their keys.
+
+        Parameters
+        ----------
+        single : bool
+            True where there is one instance: its names are shown without it, if they are free.
+            Otherwise those of instances come with the instance, and without it too if unique.
+        """
+        for key, shown in self._shown.items():
+            short = self.shortest(key)
+            if not single:
+                yield shown, key
+            if single or short != shown:
+                yield short, key
+
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class _Run:
+    """Ascending numbers with their rows."""
+
+    labels: Integers
+    rows: Integers
+
+    def find(self, wanted: Integers) -> Integers:
+        """Rows, -1 where there is none."""
+        first, last = self.labels[0], self.labels[-1]
+        if last - first + 1 == len(self.labels):
+            inside = (wanted >= first) & (wanted <= last)
+            return np.where(inside, self.rows[np.where(inside, wanted - first, 0)], -1)
+        at = np.minimum(np.searchsorted(self.labels, wanted), len(self.labels) - 1)
+        return np.where(self.labels[at] == wanted, self.rows[at], -1)
+
+    def within(self, first: int, last: int, step: int) -> Integers:
+        """Rows of the numbers first, first + step, ... up to last."""
+        low, high = np.searchsorted(self.labels, [first, last + 1])
+        if (last - first) // step + 1 < high - low:
+            rows = self.find(np.arange(first, last + 1, step))
+            return rows[rows >= 0]
+        return self.rows[low:high][(self.labels[low:high] - first) % step == 0]
+
+
+def _sorted_run(labels: Integers, rows: Integers) -> _Run:
+    if (labels[1:] > labels[:-1]).all():
+        return _Run(labels, rows)
+    order = np.argsort(labels, kind="stable")
+    return _Run(labels[order], rows[order])
+
+
+def distinct(values: Integers) -> Integers:
+    """Ascending, each once; by sorting, which beats hashing for numbers that are nearly sorted."""
+    if (values[1:] > values[:-1]).all():
+        return values
+    ordered = np.sort(values, kind="stable")
+    return ordered[np.append(True, ordered[1:] != ordered[:-1])]
+
+
+class Numbering:
+    """Numbers of a file, looked up while reading.
+
+    They lie in sorted runs, each at least twice as long as the next, so that neither many small
+    blocks nor few large ones are slow.
+    """
+
+    def __init__(self, runs: tuple[_Run, ...] = ()) -> None:
+        self._runs = list(runs)
+
+    def __len__(self) -> int:
+        return sum(len(run.labels) for run in self._runs)
+
+    def copy(self) -> "Numbering":
+        """Independent copy of the numbering."""
+        return Numbering(tuple(self._runs))
+
+    def find(self, labels: Integers) -> Integers:
+        """Rows of these numbers, -1 for the unknown."""
+        rows = np.full(np.shape(labels), -1, dtype=np.int64)
+        for run in self._runs:
+            rows = np.maximum(rows, run.find(labels))
+        return rows
+
+    def within(self, first: int, last: int, step: int) -> Integers:
+        """Rows of the known numbers among first, first + step, ... up to last."""
+        found = [run.within(first, last, step) for run in self._runs]
+        return np.concatenate(found) if found else np.empty(0, dtype=np.int64)
+
+    def repeated(self, labels: Integers) -> int | None:
+        """Smallest number that is already known, or repeated in ``labels``."""
+        ordered = labels if (labels[1:] > labels[:-1]).all() else np.sort(labels)
+        twice = ordered[1:][ordered[1:] == ordered[:-1]]
+        known = ordered[self.find(ordered) >= 0]
+        found = np.concatenate([twice, known])
+        return int(found.min()) if len(found) else None
+
+    def add(self, labels: Integers, first_row: int) -> None:
+        """Take in new numbers, whose rows count on from ``first_row``."""
+        if not len(labels):
+            return
+        run = _sorted_run(labels, np.arange(first_row, first_row + len(labels)))
+        while self._runs and len(self._runs[-1].labels) < 2 * len(run.labels):
+            last = self._runs.pop()
+            run = _sorted_run(
+                np.concatenate([last.labels, run.labels]), np.concatenate([last.rows, run.rows])
+            )
+        self._runs.append(run)
+
 
 LARGEST_MEMBERS = 200_000_000
 """Most members of all node sets, or of all element sets, together."""
@@ -23,8 +205,6 @@ _FLAGS = {"GENERATE", "INTERNAL", "UNSORTED"}
 _MANY = 50
 _FEW = 100_000
 _PER_ARRAY = 20  # numbers that would take the memory of an empty array
-
-Integers = NDArray[np.int64]
 
 
 @dataclass

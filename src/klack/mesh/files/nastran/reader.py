@@ -21,8 +21,7 @@ from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
 from klack.mesh.files.named_faces import ALSO_OTHERS
 from klack.mesh.files.nastran.cards import BulkData, read_bulk
-from klack.mesh.files.nastran.frames import Frames
-from klack.mesh.files.nastran.sets import names_in_comments, node_sets
+from klack.mesh.files.nastran.sets import Frames, names_in_comments, node_sets
 from klack.mesh.files.plausible import require_unit
 from klack.mesh.files.text_columns import integers, reals
 

@@ -21,9 +21,7 @@ from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.named_faces import ALSO_OTHERS
 from klack.mesh.files.plausible import require_unit
-from klack.mesh.files.vtk.grid import VtkGrid, refuse
-from klack.mesh.files.vtk.legacy import read_legacy
-from klack.mesh.files.vtk.xml import read_xml
+from klack.mesh.files.vtk.grid import VtkGrid, read_legacy, read_xml, refuse
 
 __all__ = ["read_vtk"]
 
