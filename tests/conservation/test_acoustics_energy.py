@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from klack.acoustics.force_response import modal_response
+from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density, injected_energy
 from klack.acoustics.mobility import (
     drive_point_mobility,
@@ -14,7 +14,6 @@ from klack.acoustics.mobility import (
 )
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Plate
-from klack.acoustics.port_forces import port_forces
 from klack.acoustics.radiation import power_transfer
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.surface_bands import face_band_velocity, radiated_bands, surface_spectra

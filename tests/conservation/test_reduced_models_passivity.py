@@ -11,8 +11,7 @@ import pytest
 from klack.contact.laws import LinearLaw
 from klack.errors import InputError
 from klack.reduction.damping import ModalDamping
-from klack.reduction.from_craig_bampton import body_of_craig_bampton
-from klack.reduction.from_modal_data import body_of_modal_data
+from klack.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
 from klack.reduction.from_state_space import body_of_state_space
 from klack.reduction.reduced_body import StateSpace
 from klack.simulation.bodies import fixed_body, rod_body

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from klack.acoustics.air import Air
+from klack.acoustics.plate import Air
 from klack.acoustics.radiation import power_transfer
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import Modes, eigenmodes

@@ -5,12 +5,11 @@ from math import factorial
 import numpy as np
 import pytest
 
-from klack.acoustics.air import Air
 from klack.acoustics.force_response import modal_response, surface_velocity
 from klack.acoustics.harmonic import harmonic_response
 from klack.acoustics.mobility import drive_point_mobility, support_force_transfer
 from klack.acoustics.mount import Mount, mounted
-from klack.acoustics.plate import Plate, baffled_plate_efficiency
+from klack.acoustics.plate import Air, Plate, baffled_plate_efficiency
 from klack.acoustics.radiation import piston_efficiency, power_transfer
 from klack.materials import Material
 from klack.signals import TimeSeries

@@ -10,7 +10,7 @@ from klack.case.reader import find_case, load_case
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.statics import contact_compliance
 from klack.elasticity.condensation import condensed_inverse
-from klack.elasticity.near_loads import NearLoads
+from klack.elasticity.loads import NearLoads
 from klack.progress import silent
 
 

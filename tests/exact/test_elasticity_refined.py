@@ -11,8 +11,7 @@ from scipy.sparse import csr_array, diags_array
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.factorization import available_backends, factorize
-from klack.elasticity.refined import RefinedFactorization
-from klack.elasticity.statics import Flexibility
+from klack.elasticity.statics import Flexibility, RefinedFactorization
 from klack.errors import ConvergenceError
 from klack.materials import Material
 from klack.verification.lattice import lattice_mesh

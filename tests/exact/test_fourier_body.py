@@ -10,8 +10,7 @@ from scipy.sparse import csr_array, eye_array, kron
 from klack.elasticity.assembly import assemble, assemble_order
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes, rigid_frequencies
-from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.fourier_rows import displacement_rows, rows_around
+from klack.elasticity.fourier_body import FourierBody, displacement_rows, fourier_body, rows_around
 from klack.elasticity.loads import order_load
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError

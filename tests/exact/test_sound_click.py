@@ -5,8 +5,12 @@ from math import pi
 import numpy as np
 import pytest
 
-from klack.acoustics.minimum_phase import minimum_phase_filter
-from klack.acoustics.sound import audio_band, click_pressure, pressure_transfer
+from klack.acoustics.sound import (
+    audio_band,
+    click_pressure,
+    minimum_phase_filter,
+    pressure_transfer,
+)
 from klack.errors import InputError
 from klack.signals import TimeSeries
 

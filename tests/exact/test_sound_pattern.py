@@ -8,6 +8,8 @@ import pytest
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.signal_statistics import (
     EXPOSURE_REFERENCE,
+    a_weighted,
+    a_weighting,
     crest_factor,
     equivalent_level,
     kurtosis,
@@ -16,7 +18,6 @@ from klack.acoustics.signal_statistics import (
     sound_exposure_level,
     sound_statistics,
 )
-from klack.acoustics.weighting import a_weighted, a_weighting
 from klack.errors import InputError
 from klack.signals import TimeSeries
 

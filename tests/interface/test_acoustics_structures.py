@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 import zarr
 
-from klack.acoustics.force_response import modal_response
+from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density
 from klack.acoustics.mobility import drive_point_mobility
 from klack.acoustics.mount import Mount, mounted
-from klack.acoustics.port_forces import port_forces
 from klack.acoustics.surface_bands import face_band_velocity
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.record import ImpactStudy

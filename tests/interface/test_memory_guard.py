@@ -24,9 +24,8 @@ from klack.contact.statics import contact_compliance
 from klack.elasticity import factor_memory
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.condensation import condensation_memory
-from klack.elasticity.eigen import eigenmodes
+from klack.elasticity.eigen import block_lanczos, eigenmodes
 from klack.elasticity.factorization import available_backends, factorize
-from klack.elasticity.lanczos import block_lanczos
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.materials import Material

@@ -18,7 +18,7 @@ from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.store import RESULT_NAME
 from klack.errors import InputError
-from klack.reduction.storage import read_arrays
+from klack.reduction.reduced_body import read_arrays
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
 SEED = int(os.environ.get("KLACK_SEED", "1"))

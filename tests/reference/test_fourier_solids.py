@@ -9,8 +9,7 @@ from scipy.sparse import csr_array
 
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.fourier_rows import rows_around
+from klack.elasticity.fourier_body import FourierBody, fourier_body, rows_around
 from klack.elasticity.loads import order_load, traction_load
 from klack.elasticity.statics import Flexibility
 from klack.gauges.fourier_field import field_rows

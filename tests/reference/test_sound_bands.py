@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from klack.acoustics.drive_pattern import drive_pattern
-from klack.acoustics.signal_statistics import pressure_third_octaves
+from klack.acoustics.signal_statistics import a_weighted, a_weighting, pressure_third_octaves
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
-from klack.acoustics.weighting import a_weighted, a_weighting
 from klack.signals import Spectrum, TimeSeries
 
 RATE = 48_000

@@ -18,7 +18,7 @@ from collections.abc import Mapping
 import numpy as np
 import scipy
 
-from klack.acoustics.port_forces import aligned_forces
+from klack.acoustics.force_response import aligned_forces
 from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.reduction.structure import Structure

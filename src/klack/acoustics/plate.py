@@ -19,11 +19,34 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.air import Air
 from klack.errors import require_positive
 from klack.materials import Material
 
-__all__ = ["Plate", "baffled_plate_efficiency"]
+__all__ = ["Air", "Plate", "baffled_plate_efficiency"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Air:
+    """Still air; the numbers given are those at 20 degC and 1013 hPa.
+
+    Parameters
+    ----------
+    density : float [kg/m^3]
+    sound_speed : float [m/s]
+    """
+
+    density: float = 1.204
+    sound_speed: float = 343.2
+
+    def __post_init__(self) -> None:
+        require_positive("Air.density", self.density, "kg/m^3")
+        require_positive("Air.sound_speed", self.sound_speed, "m/s")
+
+    @property
+    def impedance(self) -> float:
+        """Characteristic impedance ``rho c`` [Pa s/m]."""
+        return self.density * self.sound_speed
+
 
 Floats = NDArray[np.float64]
 

@@ -19,10 +19,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.acoustics.air import Air
 from klack.acoustics.harmonic import HarmonicResponse, harmonic_response
 from klack.acoustics.mount import Mount
-from klack.acoustics.plate import Plate
+from klack.acoustics.plate import Air, Plate
 from klack.reduction.structure import Structure
 
 __all__ = [

@@ -15,11 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.air import Air
+from klack.acoustics.force_response import aligned_forces
 from klack.acoustics.harmonic import harmonic_response
 from klack.acoustics.mount import Mount, support_mobility
-from klack.acoustics.plate import Plate
-from klack.acoustics.port_forces import aligned_forces
+from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
 from klack.acoustics.spectrum import force_spectrum
 from klack.errors import InputError, require_positive

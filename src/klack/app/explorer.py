@@ -50,7 +50,7 @@ from klack.case.rewriting import with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
-from klack.elasticity.near_loads import NearLoads
+from klack.elasticity.loads import NearLoads
 from klack.errors import InputError, KlackError
 from klack.progress import silent
 from klack.signals import TimeSeries

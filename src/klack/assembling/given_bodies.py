@@ -16,12 +16,10 @@ from klack.model_files.modal_data import read_modal_data
 from klack.model_files.reduced_models import read_reduced_matrices, read_state_space
 from klack.model_files.uff import FileModalData
 from klack.reduction.damping import Damping
-from klack.reduction.from_craig_bampton import body_of_craig_bampton
-from klack.reduction.from_modal_data import body_of_modal_data
+from klack.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data, fit_residual
 from klack.reduction.from_state_space import body_of_state_space, state_space_in_si
 from klack.reduction.given_modes import RIGID_FREQUENCY
 from klack.reduction.reduced_body import ReducedBody, StateSpace
-from klack.reduction.residual_fit import fit_residual
 
 __all__ = ["reduced_from_file"]
 

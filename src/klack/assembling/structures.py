@@ -15,7 +15,7 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
-from klack.elasticity.near_loads import NearLoads
+from klack.elasticity.loads import NearLoads
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.input.problem import one_of

@@ -1,4 +1,4 @@
-r"""An elastic body: its mesh, its matrices, its supports and its rigid-body modes.
+"""An elastic body: its mesh, its matrices, its supports and its rigid-body modes.
 
 Rigid modes are built exactly from the coordinates (translations, rotations about the centre of
 mass) and then made orthonormal in the mass, :math:`R^T M R = 1`.  A body of revolution can only
@@ -8,9 +8,11 @@ move along its axis.
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy
+from numpy import float64, int64
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
@@ -26,7 +28,7 @@ from klack.errors import InputError
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
 
-__all__ = ["ElasticBody", "checked_nodes", "elastic_body", "require_support"]
+__all__ = ["ElasticBody", "VibratingBody", "checked_nodes", "elastic_body", "require_support"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,3 +226,51 @@ def _check_one_piece(name: str, mesh: Mesh) -> None:
         hint="glue the solids before meshing, merge coincident nodes, or drop nodes that belong "
         "to no element.",
     )
+
+
+class VibratingBody(Protocol):
+    """A body with every freedom it has, or of revolution in one Fourier order around its axis.
+
+    :class:`~klack.elasticity.body.ElasticBody` and
+    :class:`~klack.elasticity.fourier_body.FourierBody`.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in messages."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """Nodes and elements."""
+
+    @property
+    def dimension(self) -> int:
+        """Degrees of freedom of each node."""
+
+    @property
+    def K(self) -> csr_array:
+        """Stiffness of all degrees of freedom, supports not applied."""
+
+    @property
+    def M(self) -> csr_array:
+        """Mass of all degrees of freedom."""
+
+    @property
+    def fixed(self) -> NDArray[int64]:
+        """Sorted degrees of freedom that are held at zero."""
+
+    @property
+    def free(self) -> NDArray[int64]:
+        """Sorted degrees of freedom that are not fixed."""
+
+    @property
+    def dof_count(self) -> int:
+        """Number of degrees of freedom, fixed ones included."""
+
+    @property
+    def rigid_modes(self) -> NDArray[float64]:
+        """Rigid modes, orthonormal in the mass; no columns for a fixed body."""
+
+    @property
+    def isostatic_support(self) -> NDArray[int64]:
+        """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""

@@ -15,7 +15,8 @@ from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
-__all__ = ["face_dashpots", "order_load", "traction_load"]
+__all__ = ["NearLoads", "face_dashpots", "order_load", "traction_load"]
+
 
 Traction = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
@@ -133,3 +134,66 @@ def _face_points(
         area = np.stack([tangents[:, :, 0, 1], -tangents[:, :, 0, 0]], axis=-1)
         area = area * (2.0 * np.pi * x[:, :, :1])
     return N, x, area * w[:, None]
+
+
+_CLOSE = 1e-3
+"""Error in the norm of the energy up to which a combination is taken."""
+
+_MOST = 48
+"""Answers kept; then it starts again."""
+
+Floats = NDArray[np.float64]
+
+
+class NearLoads:
+    """Loads of one body with their answers.
+
+    Examples
+    --------
+    >>> F = np.diag([1.0, 2.0, 3.0])
+    >>> near, solved = NearLoads(), []
+    >>> def solve(f):
+    ...     solved.append(f)
+    ...     return F @ f
+    >>> for f in np.array([[1.0, 0, 0], [0, 1.0, 0], [2.0, 3.0, 0]]):
+    ...     u = near.answer(f, float(f @ F @ f), solve)
+    >>> len(solved), u.tolist()
+    (2, [2.0, 6.0, 0.0])
+    """
+
+    def __init__(self) -> None:
+        self._forces: list[Floats] = []
+        self._answers: list[Floats] = []
+        self._gram = np.empty((0, 0))
+
+    def answer(self, force: Floats, energy: float, solve: Callable[[Floats], Floats]) -> Floats:
+        """Displacement [m] under a load.
+
+        Parameters
+        ----------
+        force : array, shape (n,) [N]
+        energy : float [J]
+            Twice the strain energy, ``f^T F f``.
+        solve : callable
+            For a load that is not close to those before.
+        """
+        for known, found in zip(self._forces, self._answers, strict=True):
+            if np.array_equal(known, force):
+                return found
+        if self._forces:
+            work = np.array([found @ force for found in self._answers])
+            share = np.linalg.lstsq(self._gram, work, rcond=1e-12)[0]
+            if energy - float(work @ share) <= _CLOSE**2 * energy:
+                return np.asarray(sum(c * u for c, u in zip(share, self._answers, strict=True)))
+        if len(self._forces) >= _MOST:
+            self._forces, self._answers = [], []
+            self._gram = np.empty((0, 0))
+        found = solve(force)
+        self._forces.append(force)
+        self._answers.append(found)
+        work = np.array([one @ force for one in self._answers])
+        count = len(work)
+        gram = np.empty((count, count))
+        gram[:-1, :-1], gram[-1], gram[:, -1] = self._gram, work, work
+        self._gram = gram
+        return found

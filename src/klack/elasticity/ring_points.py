@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye_array, kron, vstack
 
-from klack.elasticity.fourier_rows import rows_around
+from klack.elasticity.fourier_body import rows_around
 
 __all__ = ["RingPoints", "RingRows", "resolved_orders", "share_of_order"]
 

@@ -19,7 +19,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,16 +30,95 @@ from klack.cache.entry import Entry
 from klack.cache.remember import remembered
 from klack.cache.result_cache import ResultCache
 from klack.closing import Closing
+from klack.elasticity.body import VibratingBody
 from klack.elasticity.budget import WITHOUT, Budget
 from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.factor_memory import FactorMemoryError
 from klack.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
-from klack.elasticity.refined import RefinedFactorization
-from klack.elasticity.vibrating_body import VibratingBody
-from klack.errors import InputError
+from klack.errors import ConvergenceError, InputError
 from klack.memory import require_memory
 
-__all__ = ["Flexibility"]
+__all__ = ["Flexibility", "RefinedFactorization"]
+
+
+_ENERGY = 1e-11  # error of a solution in the energy norm, relative
+_ROUNDS = 40
+_COLUMNS = 16  # at once: five blocks of them are held
+
+
+class RefinedFactorization(Closing):
+    """A :class:`~klack.elasticity.factorization.Factorization` that corrects a rough one.
+
+    Parameters
+    ----------
+    A : sparse array, shape (n, n)
+        Symmetric positive definite.
+    rough : Factorization
+        Of A, in single precision; closed with this one.
+    """
+
+    def __init__(self, A: Any, rough: Factorization) -> None:
+        self._A, self._rough = A, rough
+        self.backend = f"{rough.backend}, single precision, refined"
+        self.size = rough.size
+        self.nonzeros = rough.nonzeros
+        self.memory = rough.memory
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve A X = B for one or several columns.
+
+        Raises
+        ------
+        ConvergenceError
+            If the factor is too rough for this matrix.
+        """
+        B = np.asarray(B, dtype=np.float64)
+        columns = B[:, None] if B.ndim == 1 else B
+        X = np.empty(columns.shape, order="F")
+        for at in range(0, columns.shape[1], _COLUMNS):
+            X[:, at : at + _COLUMNS] = self._solve_block(columns[:, at : at + _COLUMNS])
+        return X[:, 0] if B.ndim == 1 else X
+
+    def _solve_block(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Preconditioned conjugate gradients, one recurrence for each column."""
+        X = self._rough.solve(B)
+        R = B - self._A @ X
+        Z = self._rough.solve(R)
+        whole = np.abs(_products(X, B))
+        former, error = whole, _products(R, Z)
+        P = Z
+        for _ in range(_ROUNDS):
+            # one more correction is there already, and gains what the last one has gained
+            if np.all(error**2 <= _ENERGY**2 * whole * former):
+                return X + Z
+            image = self._A @ P
+            step = _ratio(error, _products(P, image))
+            X += P * step
+            before, R = R, R - image * step
+            Z = self._rough.solve(R)
+            # the form of Polak and Ribiere allows for a preconditioner that rounds
+            turn = _ratio(_products(Z, R - before), error)
+            former, error = error, _products(R, Z)
+            P = Z + P * np.maximum(turn, 0.0)
+        raise ConvergenceError(
+            f"solutions through a factor in single precision: {self.size} degrees of freedom did "
+            f"not converge in {_ROUNDS} rounds.\n"
+            "Try: a machine with twice the memory, or larger elements away from the contact."
+        )
+
+    def close(self) -> None:
+        """Give the memory back to the system."""
+        self._rough.close()
+
+
+def _products(X: NDArray[np.float64], Y: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.einsum("ij,ij->j", X, Y)
+
+
+def _ratio(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quotients, 0 where a column is solved already."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b != 0.0)
+
 
 _CHUNK = 64
 _COPIES = 2 * 12.0  # bytes for each entry of K: a copy, and what it passes through
@@ -62,7 +141,7 @@ class Flexibility(Closing):
     budget : Budget
         What has to fit beside the factor.  Where a factor in double precision does not, one in
         single precision is taken and its solutions are refined (pardiso only;
-        :mod:`klack.elasticity.refined`).
+        :mod:`klack.elasticity.statics`).
     at_once : bool
         Other bodies may be solved for at the same time: ``threads`` leaves them their cores.
     """

@@ -4,8 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.elasticity.fourier_body import FourierBody
-from klack.elasticity.fourier_rows import displacement_rows
+from klack.elasticity.fourier_body import FourierBody, displacement_rows
 from klack.elasticity.shape_functions import shape_functions
 from klack.gauges.located_point import locate
 

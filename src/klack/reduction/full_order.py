@@ -28,6 +28,7 @@ the bound is the geometric mean of theirs.)  Independent of all that, ``checks``
 solved directly and the deviation reported: ``klack verify`` does so.
 """
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,6 +37,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_array
 
+from klack.cache.entry import Entry
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.factorization import Backend
@@ -46,7 +48,13 @@ from klack.reduction.dynamic_stiffness import solve_symmetric
 from klack.reduction.ports import Port
 from klack.reduction.receptance import Receptance, frequency_axis, modal_sum
 
-__all__ = ["FullOrderReceptance", "direct_receptance", "full_order_receptance"]
+__all__ = [
+    "direct_receptance",
+    "entry_of_receptance",
+    "full_order_receptance",
+    "receptance_of_entry",
+]
+
 
 _DEPENDENT = 1e-10  # share of its M-norm below which what is new in a vector is round-off
 _PARALLEL = 1e-12  # least eigenvalue of the Gram matrix of unit vectors
@@ -343,3 +351,40 @@ def _deviations(
     difference = space.receptance(2.0 * np.pi * frequencies, 0.0) - truth
     scale = np.abs(truth).max(axis=(1, 2))
     return np.abs(difference).max(axis=(1, 2)) / scale
+
+
+def entry_of_receptance(full: FullOrderReceptance) -> Entry:
+    """Numbers and names of a receptance."""
+    receptance = full.receptance
+    names = {
+        "label": receptance.label,
+        "ports": list(receptance.port_names),
+        "basis size": full.basis_size,
+    }
+    return Entry(
+        arrays={
+            "frequencies": np.asarray(receptance.frequencies),
+            "values": np.ascontiguousarray(receptance.values),
+            "error bound": full.error_bound,
+            "checked frequencies": full.checked_frequencies,
+            "checked deviations": full.checked_deviations,
+        },
+        text=json.dumps(names),
+    )
+
+
+def receptance_of_entry(entry: Entry) -> FullOrderReceptance:
+    """Inverse of :func:`entry_of_receptance`."""
+    names, arrays = json.loads(entry.text), entry.arrays
+    return FullOrderReceptance(
+        receptance=Receptance(
+            label=names["label"],
+            port_names=tuple(names["ports"]),
+            frequencies=arrays["frequencies"],
+            values=arrays["values"],
+        ),
+        basis_size=names["basis size"],
+        error_bound=arrays["error bound"],
+        checked_frequencies=arrays["checked frequencies"],
+        checked_deviations=arrays["checked deviations"],
+    )

@@ -24,8 +24,7 @@ from klack.errors import InputError
 from klack.reduction.attachment import residual_attachment, shifted_attachment
 from klack.reduction.damping import Damping
 from klack.reduction.ports import Observer, Port
-from klack.reduction.recovery import Recovery, surface_faces
-from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.reduced_body import Recovery, ReducedBody, surface_faces
 from klack.reduction.selection import ByCount, ByFrequency, ModeSelection, select
 
 __all__ = ["Correction", "at_ports", "kept_modes", "reduce_body"]

@@ -1,5 +1,8 @@
 """An elastic body reduced to modal form: the object that every simulation works with."""
 
+import zipfile
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -8,10 +11,120 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.reduction.recovery import Recovery
-from klack.reduction.storage import read_arrays, write_arrays
+from klack.mesh.mesh import Mesh, simplices
+from klack.whole_file import whole_file
 
-__all__ = ["ReducedBody", "StateSpace"]
+__all__ = ["Recovery", "ReducedBody", "StateSpace", "read_arrays", "surface_faces"]
+
+
+Arrays = dict[str, NDArray[Any]]
+
+# a count that cannot be held, a password, an unknown packing
+_OTHERS = (MemoryError, RuntimeError, NotImplementedError, KeyError, SyntaxError)
+
+
+def write_arrays(path: Path, kind: str, version: int, arrays: Mapping[str, NDArray[Any]]) -> None:
+    """Write arrays to ``path``, all of them or none.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        What the file holds, for example ``"klack.reduced_body"``.
+    version : int
+    arrays : mapping of str to array
+        Numbers or text.
+    """
+    contents: Arrays = {"format": np.array(kind), "version": np.array(version), **arrays}
+    with whole_file(path) as new, new.open("wb") as stream:
+        np.savez(stream, **contents)  # type: ignore[arg-type]
+
+
+def read_arrays(path: Path, kind: str, version: int, required: Sequence[str]) -> Arrays:
+    """Read arrays back and check that the file is what it should be.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, truncated, of another kind or newer than this program.
+    """
+    where = f"file '{path}'"
+    try:
+        with path.open("rb") as stream:
+            if not zipfile.is_zipfile(stream):  # numpy would also take a bare .npy
+                raise zipfile.BadZipFile
+        with np.load(path, allow_pickle=False) as stored:
+            arrays: Arrays = {key: stored[key] for key in stored.files}
+    except FileNotFoundError as error:
+        raise InputError(
+            where, got="no such file", expected=f"a {kind} file", hint="check the path."
+        ) from error
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile, zlib.error, *_OTHERS) as error:
+        raise InputError(
+            where,
+            got=f"something unreadable ({type(error).__name__})",
+            expected=f"a complete {kind} file",
+            hint="the file is damaged or not written by klack; write it again.",
+        ) from error
+    _check_kind(where, arrays, kind, version)
+    missing = [key for key in required if key not in arrays]
+    if missing:
+        raise InputError(
+            where,
+            got=f"a file without {', '.join(missing)}",
+            expected=f"a complete {kind} file of version {version}",
+            hint="the file is damaged or was edited; write it again.",
+        )
+    return arrays
+
+
+def _check_kind(where: str, arrays: Arrays, kind: str, version: int) -> None:
+    found = str(arrays["format"]) if "format" in arrays else "nothing known"
+    if found != kind or "version" not in arrays:
+        raise InputError(
+            where,
+            got=f"a file that holds {found}",
+            expected=kind,
+            hint="choose a file written by klack for this purpose.",
+        )
+    if int(arrays["version"]) > version:
+        raise InputError(
+            where,
+            got=f"version {int(arrays['version'])}",
+            expected=f"version {version} or older",
+            hint="it was written by a newer version of klack; update this one.",
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Recovery:
+    """Displacement field of part of the surface, for pictures and radiated sound.
+
+    Parameters
+    ----------
+    nodes : int array, shape (n,)
+        Node numbers of the full mesh.
+    points : array, shape (n, dimension) [m]
+    shapes : array, shape (n * dimension, m) [1/sqrt(kg)]
+        ``u = shapes @ q``, ordered node by node like the degrees of freedom of the mesh.
+    faces : int array, shape (f, 3) or (f, 2)
+        Triangles (solid) or line segments (axisymmetric) in local numbers ``0 .. n-1``, through all
+        nodes, oriented outwards; none when nodes were given instead of surfaces.
+    """
+
+    nodes: NDArray[np.int64]
+    points: NDArray[np.float64]
+    shapes: NDArray[np.float64]
+    faces: NDArray[np.int64]
+
+
+def surface_faces(mesh: Mesh, surfaces: Sequence[str]) -> NDArray[np.int64]:
+    """Simplices of some surfaces in node numbers of the mesh, shape (f, dimension)."""
+    blocks = [block for name in surfaces for block in mesh.surface(name).blocks]
+    pieces = [simplices(block) for block in blocks]
+    empty = np.empty((0, mesh.dimension), dtype=np.int64)
+    return np.concatenate([empty, *pieces])
+
 
 FORMAT = "klack.reduced_body"
 VERSION = 1

@@ -12,8 +12,7 @@ from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, Surface
 from klack.reduction.damping import Damping
-from klack.reduction.face_samples import face_samples
-from klack.reduction.ports import Port
+from klack.reduction.ports import Port, face_samples
 from klack.reduction.reduce import at_ports
 from klack.reduction.structure import Structure
 

@@ -8,11 +8,14 @@ from numpy.typing import NDArray
 from klack.acoustics.cumulative import cumulative_energy
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.loudness import time_varying_loudness
-from klack.acoustics.minimum_phase import minimum_phase_filter
-from klack.acoustics.signal_statistics import crest_factor, kurtosis, sound_exposure_level
-from klack.acoustics.sound import audio_band, click_pressure
+from klack.acoustics.signal_statistics import (
+    a_weighting,
+    crest_factor,
+    kurtosis,
+    sound_exposure_level,
+)
+from klack.acoustics.sound import audio_band, click_pressure, minimum_phase_filter
 from klack.acoustics.spectrum import energy_spectral_density, force_spectrum
-from klack.acoustics.weighting import a_weighting
 from klack.signals import TimeSeries
 from klack.verification.check import Check, ComparedCurve, compare
 

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import j1
 
-from klack.acoustics.air import Air
 from klack.acoustics.force_response import modal_response
 from klack.acoustics.injected import injected_density, injected_energy
 from klack.acoustics.mobility import (
@@ -16,7 +15,7 @@ from klack.acoustics.mobility import (
     transfer_mobility,
 )
 from klack.acoustics.mount import Mount, mounted
-from klack.acoustics.plate import Plate
+from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import piston_efficiency, power_transfer
 from klack.acoustics.surface_bands import face_band_velocity
 from klack.elasticity.eigen import eigenmodes

@@ -102,7 +102,7 @@ from klack.contact.statics import ReachError, StaticContact, static_contact
 from klack.contact.submodel import LocalStiffness
 from klack.cores import available_cores
 from klack.elasticity.eigen import Modes
-from klack.elasticity.near_loads import NearLoads
+from klack.elasticity.loads import NearLoads
 from klack.errors import AccuracyWarning, InputError
 from klack.plasticity.loops import YieldingLoops
 from klack.progress import Progress, silent

@@ -15,10 +15,13 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility
 from klack.progress import Progress
 from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import full_order_receptance
+from klack.reduction.full_order import (
+    entry_of_receptance,
+    full_order_receptance,
+    receptance_of_entry,
+)
 from klack.reduction.ports import Port
 from klack.reduction.receptance import Receptance, reduced_receptance
-from klack.reduction.receptance_entry import entry_of_receptance, receptance_of_entry
 from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount
 from klack.reduction.transfer import TransferComparison, compare_receptances

@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.air import Air
 from klack.acoustics.force_bands import force_bands
-from klack.acoustics.force_response import ModalResponse, modal_response
+from klack.acoustics.force_response import ModalResponse, modal_response, port_forces
 from klack.acoustics.injected import injected_density, injected_energy
 from klack.acoustics.mobility import transfer_mobility
 from klack.acoustics.mount import Mount, mounted
-from klack.acoustics.plate import Plate
-from klack.acoustics.port_forces import port_forces
+from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import Efficiency, power_transfer
 from klack.acoustics.surface_bands import surface_spectra
 from klack.acoustics.third_octave import ThirdOctaves

@@ -6,12 +6,11 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.air import Air
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.force_bands import force_bands
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.mount import Mount
-from klack.acoustics.plate import Plate
+from klack.acoustics.plate import Air, Plate
 from klack.acoustics.signal_statistics import (
     pressure_third_octaves,
     sound_statistics,

@@ -27,10 +27,13 @@ from klack.gauges.located_point import locate
 from klack.mesh.rigid import Pose
 from klack.progress import Progress
 from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import full_order_receptance
+from klack.reduction.full_order import (
+    entry_of_receptance,
+    full_order_receptance,
+    receptance_of_entry,
+)
 from klack.reduction.ports import Observer, Port, node_observer
 from klack.reduction.receptance import observed_receptance
-from klack.reduction.receptance_entry import entry_of_receptance, receptance_of_entry
 from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.files.number_ranges import Ranges
 from klack.mesh.files.plausible import read_bytes
-from klack.mesh.files.text_columns import TextLines
+from klack.mesh.files.text_columns import Ranges, TextLines
 
 __all__ = ["Archive", "ElementTable", "read_archive"]
 

@@ -21,9 +21,8 @@ from klack.mesh.files.ansys.blocks import Archive, ElementTable, read_archive
 from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
 from klack.mesh.files.mesh_model import FileMaterial, MeshModel
 from klack.mesh.files.named_faces import ALSO_OTHERS
-from klack.mesh.files.number_ranges import within
 from klack.mesh.files.plausible import SAY_UNIT
-from klack.mesh.files.text_columns import TextLines
+from klack.mesh.files.text_columns import TextLines, within
 
 __all__ = ["read_ansys_archive"]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.files.nastran.cards import BulkData, Card
-from klack.mesh.files.number_ranges import Ranges, within
+from klack.mesh.files.text_columns import Ranges, within
 
 __all__ = ["Frames", "names_in_comments", "node_sets"]
 
