@@ -186,24 +186,41 @@ def check_consistency(case: ImpactSections) -> None:
     for name in case.reduction.modes:
         require_known(("reduction", "modes", name), name, case.bodies, "body", on_key=True)
     check_shifts(case, case.reduction)
-    _check_local_law(case)
-    _check_opposite(case)
-    _check_roughness(case)
-    _check_solid_only(case)
-    _check_off_axis(case)
-    _check_guide(case)
-    _check_shots(case)
-    _check_outputs(case)
-    _check_nodes(case)
-    _check_ends(case)
-    _check_worn(case)
-    if "lumped" in case.run.levels and case.lumped is None:
-        raise CaseProblem(
-            ("run", "levels"),
-            got="the level 'lumped' without a section 'lumped'",
-            expected="its stiffness",
-            hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the level.",
-        )
+    for check in (
+        _check_local_law,
+        _check_opposite,
+        _check_roughness,
+        _check_solid_only,
+        _check_off_axis,
+        _check_guide,
+        _check_shots,
+        _check_outputs,
+        _check_nodes,
+        _check_ends,
+    ):
+        check(case)
+    centred = case.motion.placement.is_centred and case.guide is None and case.shots is None
+    refuse(
+        (  # worn faces are those of a centred impact
+            case.contact.worn is not None and not (centred and case.has_surfaces),
+            CaseProblem(
+                ("contact", "worn"),
+                got="worn faces of bodies that meet off-axis, or of given models",
+                expected="a centred impact of bodies with meshes",
+                hint="remove 'worn', or the placement, guide or shots.",
+                on_key=True,
+            ),
+        ),
+        (
+            "lumped" in case.run.levels and case.lumped is None,
+            CaseProblem(
+                ("run", "levels"),
+                got="the level 'lumped' without a section 'lumped'",
+                expected="its stiffness",
+                hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the level.",
+            ),
+        ),
+    )
 
 
 def require_known(
@@ -403,39 +420,50 @@ def _check_roughness(case: ImpactSections) -> None:
         (("contact", "local_law"), contact.local_law.kind != "consistent", "a given local law"),
         (("opposite",), case.opposite is not None, "an upper stop"),
     ]
-    for key, is_there, what in others:
-        if is_there:
-            raise CaseProblem(
-                ("contact", "roughness"),
-                got=f"rough faces and {what} ({'.'.join(map(str, key))})",
-                expected="one of them: no level has a layer of asperities together with that",
-                hint="remove one of them; contact.crown goes with all.",
-                on_key=True,
+    refuse(
+        *(
+            (
+                is_there,
+                CaseProblem(
+                    ("contact", "roughness"),
+                    got=f"rough faces and {what} ({'.'.join(map(str, key))})",
+                    expected="one of them: no level has a layer of asperities together with that",
+                    hint="remove one of them; contact.crown goes with all.",
+                    on_key=True,
+                ),
             )
+            for key, is_there, what in others
+        )
+    )
 
 
 def _check_solid_only(case: ImpactSections) -> None:
     """Refuse what breaks the symmetry of axisymmetric bodies."""
     if case.dimension == 3:
         return
-    asked: list[tuple[Key, str]] = []
-    if case.guide is not None:
-        asked.append((("guide",), "a guide"))
-    if case.shots is not None:
-        asked.append((("shots",), "shots, which vary in their placement,"))
-    if case.contact.tilt:
-        asked.append((("contact", "tilt"), "a tilt between the faces"))
     waves = case.contact.waviness
-    if waves is not None and waves.direction is not None:
-        asked.append((("contact", "waviness", "direction"), "straight waves on the faces"))
-    for key, what in asked:
-        raise CaseProblem(
-            key,
-            got=f"{what} of axisymmetric bodies",
-            expected="three-dimensional bodies",
-            hint="take 'model: swept' with 'layers: 18' for both of them.",
-            on_key=True,
+    straight = waves is not None and waves.direction is not None
+    asked: list[tuple[Key, object, str]] = [
+        (("guide",), case.guide is not None, "a guide"),
+        (("shots",), case.shots is not None, "shots, which vary in their placement,"),
+        (("contact", "tilt"), case.contact.tilt, "a tilt between the faces"),
+        (("contact", "waviness", "direction"), straight, "straight waves on the faces"),
+    ]
+    refuse(
+        *(
+            (
+                is_there,
+                CaseProblem(
+                    key,
+                    got=f"{what} of axisymmetric bodies",
+                    expected="three-dimensional bodies",
+                    hint="take 'model: swept' with 'layers: 18' for both of them.",
+                    on_key=True,
+                ),
+            )
+            for key, is_there, what in asked
         )
+    )
 
 
 def _check_off_axis(case: ImpactSections) -> None:
@@ -454,15 +482,21 @@ def _check_off_axis(case: ImpactSections) -> None:
         (("contact", "roughness"), case.contact.roughness is not None, "rough faces"),
         (("outputs",), bool(case.outputs), "sensors, whose angle is not known,"),
     ]
-    for key, is_there, what in asked:
-        if is_there:
-            raise CaseProblem(
-                key,
-                got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
-                expected="faces without roughness, and no sensors",
-                hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
-                on_key=True,
+    refuse(
+        *(
+            (
+                is_there,
+                CaseProblem(
+                    key,
+                    got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
+                    expected="faces without roughness, and no sensors",
+                    hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
+                    on_key=True,
+                ),
             )
+            for key, is_there, what in asked
+        )
+    )
 
 
 def _check_ends(case: ImpactSections) -> None:
@@ -538,21 +572,6 @@ def _check_nodes(case: ImpactSections) -> None:
                 expected=f"[{', '.join(axes)}] of '{name}'",
                 hint="coordinates are those of the drawing.",
             )
-
-
-def _check_worn(case: ImpactSections) -> None:
-    """Refuse worn faces, which are those of a centred impact, of bodies that move aside."""
-    if case.contact.worn is None:
-        return
-    aside = not case.motion.placement.is_centred or case.guide is not None
-    if aside or case.shots is not None or not case.has_surfaces:
-        raise CaseProblem(
-            ("contact", "worn"),
-            got="worn faces of bodies that meet off-axis, or of given models",
-            expected="a centred impact of bodies with meshes",
-            hint="remove 'worn', or the placement, guide or shots.",
-            on_key=True,
-        )
 
 
 def _check_guide(case: ImpactSections) -> None:
