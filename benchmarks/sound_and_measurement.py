@@ -52,7 +52,7 @@ def restitution_rows() -> list[Row]:
     from klack.measurement.channels import LiftSensor
     from klack.measurement.lift_sensor import sense
     from klack.measurement.set_measures import measure_set
-    from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
+    from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
 
     sensor = LiftSensor(bandwidth=50e3)
     rows = []

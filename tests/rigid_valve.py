@@ -11,7 +11,7 @@ from klack.case.any_case import CaseTree
 from klack.case.reader import parse
 from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
-from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
+from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
 from klack.simulation.network_run import simulate_network
 
 TEXT = """

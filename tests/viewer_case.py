@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from klack.mesh.boundary import outer_surface
-from klack.mesh.mesh import ElementBlock, Mesh, Surface
+from klack.mesh.mesh import ElementBlock, Mesh, Surface, outer_surface
 from klack.mesh.skin import skin_of_mesh
 from klack.viewer.view import BodyView, ContactView, Curve, MotionView, View
 

@@ -11,12 +11,10 @@ from klack.acoustics.radiation import power_transfer
 from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.statics import Flexibility
-from klack.mesh.boundary import outer_surface
-from klack.mesh.mesh import Mesh
+from klack.mesh.mesh import Mesh, outer_surface
 from klack.reduction.damping import ModalDamping
 from klack.reduction.ports import surface_port
-from klack.reduction.structure import Structure
-from klack.reduction.structure_building import StructurePort, build_structure
+from klack.reduction.structure import Structure, StructurePort, build_structure
 from klack.verification.lattice import lattice_mesh
 from klack.verification.reduction import LENGTH, RADIUS, STEEL_WITHOUT_POISSON
 from klack.verification.vibration import STEEL, rod_structure

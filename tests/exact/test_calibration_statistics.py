@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from klack.measurement.fitting import fit_within_bounds
-from klack.measurement.profile_likelihood import follow_profiles
+from klack.measurement.fitting import fit_within_bounds, follow_profiles
 from klack.measurement.shot_covariance import (
     identifiability,
     identifiability_warnings,

@@ -10,8 +10,8 @@ from klack.analyses.impact.recovered_motion import recovered_motion
 from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.source import impact_sources
 from klack.analyses.reduction.run import run_reduce
-from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.problem import build_problem
+from klack.assembling.yielding import tell_elastic
 from klack.case.reader import load_case, read_case
 from klack.errors import AccuracyWarning
 from klack.exchange.case_models import case_models

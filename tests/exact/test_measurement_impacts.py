@@ -14,7 +14,7 @@ from klack.measurement.set_measures import (
     highest_rebound,
     measure_set,
 )
-from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
+from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
 from klack.verification.bouncing_flight import BouncingDrop
 
 SENSOR = LiftSensor(bandwidth="50 kHz")

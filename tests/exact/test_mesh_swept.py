@@ -11,10 +11,9 @@ from klack.assembling.held_nodes import sector_nodes, surface_nodes
 from klack.elasticity.quadrature import quadrature
 from klack.elasticity.shape_functions import shape_functions
 from klack.errors import InputError
-from klack.mesh.boundary import FaceTable, outer_surface
 from klack.mesh.families import FAMILIES
 from klack.mesh.meridian import mesh_meridian
-from klack.mesh.mesh import ElementBlock, Mesh, Surface
+from klack.mesh.mesh import ElementBlock, FaceTable, Mesh, Surface, outer_surface
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import require_connected
 from klack.mesh.sizing import MeshSizing, Refinement

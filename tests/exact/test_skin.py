@@ -6,9 +6,8 @@ from math import pi, sin
 import numpy as np
 import pytest
 
-from klack.mesh.boundary import outer_surface
 from klack.mesh.meridian import mesh_meridian
-from klack.mesh.mesh import ElementBlock, Mesh, Surface
+from klack.mesh.mesh import ElementBlock, Mesh, Surface, outer_surface
 from klack.mesh.profile import Line, Profile
 from klack.mesh.sizing import MeshSizing
 from klack.mesh.skin import Skin, skin_of_mesh

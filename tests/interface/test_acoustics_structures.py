@@ -26,8 +26,7 @@ from klack.case.reader import find_case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.reduction.damping import ModalDamping
-from klack.reduction.structure import Structure
-from klack.reduction.structure_building import build_structure
+from klack.reduction.structure import Structure, build_structure
 from klack.signals import TimeSeries
 from klack.verification.reduction import rod
 from klack.verification.vibration import oscillator, pulses, rod_structure

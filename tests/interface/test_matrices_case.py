@@ -19,9 +19,8 @@ from klack.cli.main import main
 from klack.elasticity.body import elastic_body
 from klack.errors import AccuracyWarning, InputError
 from klack.materials import Material
-from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
-from klack.mesh.mesh import Mesh
+from klack.mesh.mesh import FaceTable, Mesh
 from klack.progress import silent
 from klack.unit_systems import unit_system
 from klack.verification.lattice import lattice_mesh

@@ -7,9 +7,9 @@ import pytest
 from ruamel.yaml import YAML
 
 from klack.case.measurement import CaseMeasurement
-from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
 
 PAGE = (Path(__file__).parents[2] / "docs/how-to/measurement-files.md").read_text()
 TABLES = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)

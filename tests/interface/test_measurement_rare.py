@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from klack.errors import AccuracyWarning, InputError
-from klack.measurement.files.opening import open_recording
 from klack.measurement.loading import load_stroke_set
+from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
-from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
 
 STEP, START, COUNT = 1e-5, -1e-3, 300
 TIME = START + STEP * np.arange(COUNT)

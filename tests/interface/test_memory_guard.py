@@ -30,10 +30,9 @@ from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.materials import Material
 from klack.memory import available_memory, in_words, require_memory
-from klack.mesh.element_estimate import element_count
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
-from klack.mesh.sizing import MeshSizing, Refinement
+from klack.mesh.sizing import MeshSizing, Refinement, element_count
 from klack.mesh.solid import mesh_revolved
 from klack.mesh.swept import sweep
 from klack.reduction.full_order import full_order_receptance

@@ -15,7 +15,7 @@ from doubts import doubts
 
 from klack.cli.main import main
 from klack.errors import AccuracyWarning, InputError
-from klack.measurement.files.opening import open_recording
+from klack.measurement.recording import open_recording
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.quality import corner_volume
 from klack.model_files.matrices import read_matrix

@@ -26,14 +26,20 @@ from klack.errors import InputError
 from klack.exchange.results.csv_files import write_csv
 from klack.exchange.results.mat import write_mat
 from klack.exchange.results.mdf import write_mdf
-from klack.exchange.results.naming import file_stems, identifiers
 from klack.exchange.results.netcdf import write_netcdf
 from klack.exchange.results.study_table import result_table
-from klack.exchange.results.table import ResultAxis, ResultChannel, ResultRun, ResultTable
+from klack.exchange.results.table import (
+    ResultAxis,
+    ResultChannel,
+    ResultRun,
+    ResultTable,
+    file_stems,
+    identifiers,
+)
 from klack.measurement.channels import ChannelChoice
-from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,

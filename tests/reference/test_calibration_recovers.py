@@ -12,7 +12,7 @@ from rigid_valve import NO_PROFILE, SCATTER, TEXT, TRUTH, measured, tree_of
 
 from klack.analyses.calibration.run import _repeatable, calibrated_text, run_calibration
 from klack.measurement.fit_window import FitWindow
-from klack.measurement.stroke_set import MeasuredStroke
+from klack.measurement.stroke_measures import MeasuredStroke
 
 pytestmark = pytest.mark.slow
 

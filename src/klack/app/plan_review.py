@@ -24,11 +24,9 @@ from klack.contact.hertz import line_half_width, point_radius
 from klack.errors import KlackError
 from klack.material_library import library_material
 from klack.materials import Material
-from klack.mesh.curve import Curve
-from klack.mesh.element_estimate import mesh_nodes, run_time
 from klack.mesh.occ import MM
-from klack.mesh.profile import Profile
-from klack.mesh.sizing import MeshSizing, Refinement
+from klack.mesh.profile import Curve, Profile
+from klack.mesh.sizing import MeshSizing, Refinement, mesh_nodes, run_time
 from klack.units import FORCE, LENGTH, SPEED, format_si, parse_quantity
 
 __all__ = ["review"]

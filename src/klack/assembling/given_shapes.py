@@ -23,11 +23,10 @@ from klack.case.schema import Case
 from klack.case.surface_names import place_of, require_surface_names
 from klack.errors import AccuracyWarning, InputError
 from klack.memory import in_words
-from klack.mesh.element_estimate import element_memory, mesh_nodes, run_time
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Profile
 from klack.mesh.quality import corner_volume
-from klack.mesh.sizing import MeshSizing
+from klack.mesh.sizing import MeshSizing, element_memory, mesh_nodes, run_time
 from klack.mesh.step_content import step_content
 from klack.progress import Progress, remark, silent
 from klack.units import format_si

@@ -26,7 +26,7 @@ from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.ring_sections import RingSections
+from klack.elasticity.ring_points import RingSections
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import Pose, rotation_matrix

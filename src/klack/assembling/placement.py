@@ -14,9 +14,8 @@ from numpy.typing import NDArray
 from klack.case.guide import CaseGuide
 from klack.contact.pairing import face_geometry, face_lattice, project_to_surface
 from klack.errors import InputError
-from klack.mesh.curve import Curve
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.profile import Profile
+from klack.mesh.profile import Curve, Profile
 
 __all__ = ["Touch", "axis_through", "first_touch_of_meshes", "first_touch_of_profiles", "in_disc"]
 

@@ -31,7 +31,7 @@ from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
-from klack.elasticity.ring_sections import RingSections
+from klack.elasticity.ring_points import RingSections
 from klack.errors import AccuracyWarning
 from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port

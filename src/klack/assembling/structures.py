@@ -22,8 +22,7 @@ from klack.input.problem import one_of
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
 from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.structure import Structure
-from klack.reduction.structure_building import StructurePort, build_structure
+from klack.reduction.structure import Structure, StructurePort, build_structure
 
 __all__ = [
     "IMPACT_STOP",

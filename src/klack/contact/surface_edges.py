@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 
 from klack.contact.pairing import face_geometry, project_to_surface
 from klack.elasticity.shape_functions import reference_nodes
-from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
-from klack.mesh.mesh import FaceBlock, Mesh, Surface
+from klack.mesh.mesh import FaceBlock, FaceTable, Mesh, Surface
 
 __all__ = ["SHARP", "SurfaceEdges", "surface_edges", "turned_away"]
 

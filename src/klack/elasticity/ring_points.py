@@ -20,7 +20,8 @@ from scipy.sparse import csr_array, eye_array, kron, vstack
 
 from klack.elasticity.fourier_body import rows_around
 
-__all__ = ["RingPoints", "RingRows", "resolved_orders", "share_of_order"]
+__all__ = ["RingPoints", "RingRows", "RingSections", "resolved_orders", "share_of_order"]
+
 
 Floats = NDArray[np.float64]
 
@@ -160,3 +161,68 @@ def _by_difference(spectrum: Floats, is_sine: NDArray[np.bool_], count: int) -> 
     # irfft has 1/N for the orders 0 and N/2, and 2/N for those between
     scale = np.array([1.0 if n == 0 else 0.5 for n in range(len(spectrum))]) * count
     return np.asarray(np.fft.irfft(scale[:, None, None] * spectrum * phase, n=count, axis=0))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RingSections:
+    """Sections of a shaft of revolution.
+
+    Parameters
+    ----------
+    heights : array, shape (k,) [m]
+    weights : csr_array, shape (k, n_nodes) [-]
+        Of the rings of each section: their sum is 1, their mean height that of the section.
+    points : array, shape (n_nodes, 2) [m]
+        (r, z) of all nodes.
+    """
+
+    heights: Floats
+    weights: csr_array
+    points: Floats
+
+    @property
+    def count(self) -> int:
+        """Number of sections."""
+        return len(self.heights)
+
+    @property
+    def radius(self) -> Floats:
+        """Mean radius of each section [m]."""
+        return np.asarray(self.weights @ self.points[:, 0])
+
+    def of_order(self, order: int) -> csr_array:
+        """Displacement of each section, then rotation of each, shape (2 k, 3 n_nodes).
+
+        In order 0 along and about the axis; in order 1 towards the direction of bending, and about
+        the one across it; nothing of higher orders.
+        """
+        k, nodes = self.count, len(self.points)
+        if order > 1:
+            return csr_array((2 * k, 3 * nodes))
+        w, r = self.weights.tocoo(), self.points[:, 0]
+        row, node = (at.astype(np.int64) for at in w.coords)
+        if order == 0:
+            spin = w.data * r[node] / (self.weights @ r**2)[row]
+            turned = [(0, -spin), (1, spin)]  # V = b - a
+            moved = [(2, w.data)]
+        else:
+            above = self.points[node, 1] - self.heights[row]
+            inertia = np.bincount(row, w.data * (above**2 + 0.5 * r[node] ** 2), minlength=k)
+            share = w.data / inertia[row]
+            turned = [(0, share * above), (2, -0.5 * share * r[node])]
+            moved = [(0, w.data)]
+        return csr_array(vstack([_placed(part, row, node, k, nodes) for part in (moved, turned)]))
+
+
+def _placed(
+    parts: list[tuple[int, Floats]],
+    row: NDArray[np.int64],
+    node: NDArray[np.int64],
+    k: int,
+    nodes: int,
+) -> csr_array:
+    """Values on some of the three amplitudes of the nodes, shape (k, 3 n_nodes)."""
+    out = csr_array((k, 3 * nodes))
+    for amplitude, values in parts:
+        out = out + csr_array((values, (row, 3 * node + amplitude)), shape=out.shape)
+    return csr_array(out)

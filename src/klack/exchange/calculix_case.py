@@ -3,7 +3,7 @@
 import warnings
 
 from klack.assembling.bodies import build_bodies
-from klack.assembling.elastic_only import tell_elastic
+from klack.assembling.yielding import tell_elastic
 from klack.case.schema import Case
 from klack.contact.friction import Friction
 from klack.errors import AccuracyWarning, InputError

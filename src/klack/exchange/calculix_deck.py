@@ -35,9 +35,8 @@ from klack.contact.pairing import axial_distance, face_thickness
 from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, refuse, require_positive
 from klack.materials import Material
-from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
-from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.mesh import FaceTable, Mesh, Surface
 
 __all__ = [
     "LOWER",

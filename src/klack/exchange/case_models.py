@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 
 from klack import __version__
-from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.given_pair import build_given_pair
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.assembling.valve import build_valve
+from klack.assembling.yielding import tell_elastic
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.case.spatial_consistency import require_axial

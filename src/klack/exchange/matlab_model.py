@@ -11,7 +11,7 @@ from klack.contact.step_constants import shared_constants
 from klack.errors import InputError
 from klack.exchange.modal_model import ModalModel, ModelContact
 from klack.exchange.model_folder import model_folder, named_apart
-from klack.exchange.results.naming import octave_text
+from klack.exchange.results.table import octave_text
 from klack.exchange.state_space import (
     contact_kind,
     law_table,

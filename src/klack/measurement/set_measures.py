@@ -28,8 +28,13 @@ from numpy.typing import NDArray
 from klack.errors import InputError
 from klack.measurement.channels import LiftSensor
 from klack.measurement.impacts import fit_flights, read_flights
-from klack.measurement.stroke_measures import FlightShape, MeasuredImpact, Stop, StrokeMeasures
-from klack.measurement.stroke_set import StrokeSet
+from klack.measurement.stroke_measures import (
+    FlightShape,
+    MeasuredImpact,
+    Stop,
+    StrokeMeasures,
+    StrokeSet,
+)
 
 __all__ = [
     "Column",

@@ -12,14 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.curve import Curve, on_axis
-from klack.mesh.element_estimate import require_meshable
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, matching_curves, plane_face
-from klack.mesh.profile import Profile
+from klack.mesh.profile import Curve, Profile, on_axis
 from klack.mesh.quality import require_connected, require_positive_jacobians
-from klack.mesh.sizing import MeshSizing, disc_points
+from klack.mesh.sizing import MeshSizing, disc_points, require_meshable
 
 __all__ = ["mesh_meridian"]
 

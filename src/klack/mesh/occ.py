@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.curve import Curve
-from klack.mesh.profile import Profile
+from klack.mesh.profile import Curve, Profile
 
 __all__ = ["MM", "box_mm", "glue", "matching_curves", "plane_face", "revolved_solids"]
 

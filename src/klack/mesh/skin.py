@@ -12,8 +12,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
-from klack.mesh.boundary import outer_surface
-from klack.mesh.mesh import FaceBlock, Mesh, simplices
+from klack.mesh.mesh import FaceBlock, Mesh, outer_surface, simplices
 
 __all__ = ["Skin", "skin_of_mesh"]
 

@@ -14,14 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.boundary import FaceTable
-from klack.mesh.element_estimate import require_meshable
 from klack.mesh.families import FAMILIES
-from klack.mesh.mesh import ElementBlock, Mesh, Surface
+from klack.mesh.mesh import ElementBlock, FaceTable, Mesh, Surface
 from klack.mesh.occ import MM, box_mm, glue, revolved_solids
 from klack.mesh.profile import Profile
 from klack.mesh.quality import require_connected, require_positive_jacobians
-from klack.mesh.sizing import MeshSizing, Refinement, ball_points
+from klack.mesh.sizing import MeshSizing, Refinement, ball_points, require_meshable
 from klack.mesh.step_trial import require_readable_step
 
 __all__ = [

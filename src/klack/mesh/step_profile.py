@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.curve import Curve, on_axis
 from klack.mesh.occ import MM, box_mm
-from klack.mesh.profile import Arc, Line, Profile
+from klack.mesh.profile import Arc, Curve, Line, Profile, on_axis
 from klack.mesh.solid import face_names, read_step, solid_names
 
 __all__ = ["NotTurnedError", "profiles_of_shape", "profiles_of_step"]

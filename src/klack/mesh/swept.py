@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError, refuse
 from klack.memory import require_memory
-from klack.mesh.element_estimate import element_memory
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.quality import require_positive_jacobians
+from klack.mesh.sizing import element_memory
 
 __all__ = ["sweep"]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.elasticity.ring_sections import RingSections
+from klack.elasticity.ring_points import RingSections
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 from klack.transient.guide import ShaftSection, require_within

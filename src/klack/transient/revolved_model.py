@@ -13,8 +13,7 @@ from klack.contact.face_friction import lifted_offset
 from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.eigen import Modes
 from klack.elasticity.fourier_body import FourierBody
-from klack.elasticity.ring_points import RingPoints, RingRows
-from klack.elasticity.ring_sections import RingSections
+from klack.elasticity.ring_points import RingPoints, RingRows, RingSections
 from klack.errors import InputError
 from klack.memory import require_memory
 from klack.transient.interface_model import (

@@ -22,8 +22,13 @@ from threadpoolctl import threadpool_limits
 from klack.cache.result_cache import ResultCache
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.fourier_body import FourierBody
-from klack.elasticity.ring_points import RingPoints, RingRows, resolved_orders, share_of_order
-from klack.elasticity.ring_sections import RingSections
+from klack.elasticity.ring_points import (
+    RingPoints,
+    RingRows,
+    RingSections,
+    resolved_orders,
+    share_of_order,
+)
 from klack.elasticity.statics import Flexibility
 from klack.transient.interface_model import PointBody
 

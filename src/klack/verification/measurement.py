@@ -10,7 +10,7 @@ from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import sense
 from klack.measurement.set_measures import expected_maximum, measure_set
-from klack.measurement.stroke_set import MeasuredStroke, StrokeSet
+from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
 from klack.verification.bouncing_flight import BouncingDrop
 from klack.verification.check import Check, ComparedCurve, compare
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.spatial_rings import in_all_orders
-from klack.elasticity.ring_sections import RingSections
+from klack.elasticity.ring_points import RingSections
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mechanics.stop_law import LinearStopLaw

@@ -23,8 +23,7 @@ from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 from klack.reduction.damping import ModalDamping
 from klack.reduction.ports import Port, surface_port
-from klack.reduction.structure import Structure
-from klack.reduction.structure_building import StructurePort, build_structure
+from klack.reduction.structure import Structure, StructurePort, build_structure
 from klack.signals import TimeSeries
 from klack.verification.check import Check, ComparedCurve, compare
 from klack.verification.reduction import LENGTH, RADIUS, STEEL_WITHOUT_POISSON, rod

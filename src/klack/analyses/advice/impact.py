@@ -39,10 +39,10 @@ from klack.analyses.advice.target import (
 )
 from klack.analyses.impact.interface_level import build_interface, simulate_case
 from klack.assembling.bodies import BodyPair, build_bodies
-from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
+from klack.assembling.yielding import tell_elastic
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory

@@ -20,8 +20,8 @@ from klack.analyses.advice.modes import explicit_modes, mode_setting
 from klack.analyses.advice.regions import mesh_settings, unmeshed, unmeshed_notes
 from klack.analyses.advice.settings import Setting, SettingValue, applied
 from klack.analyses.stroke.run import run_variant, variant_network
-from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.valve import Valve, build_valve, build_valve_bodies
+from klack.assembling.yielding import tell_elastic
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial

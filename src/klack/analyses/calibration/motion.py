@@ -26,7 +26,7 @@ from klack.errors import InputError
 from klack.input.problem import Key, one_of
 from klack.measurement.channels import LiftSensor, Trigger
 from klack.measurement.lift_sensor import recorded_stroke
-from klack.measurement.stroke_set import StrokeSet
+from klack.measurement.stroke_measures import StrokeSet
 from klack.network.network import Network
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_run import simulate_network

@@ -47,10 +47,9 @@ from klack.measurement.fit_window import (
     touch_shifts,
     window_taper,
 )
-from klack.measurement.fitting import Fit, fit_within_bounds
+from klack.measurement.fitting import Fit, Profile, fit_within_bounds, follow_profiles
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import sense, trigger_instant
-from klack.measurement.profile_likelihood import Profile, follow_profiles
 from klack.measurement.shot_covariance import (
     ShotCovariance,
     identifiability,
@@ -58,7 +57,7 @@ from klack.measurement.shot_covariance import (
     noise_covariance,
     shot_covariance,
 )
-from klack.measurement.stroke_set import StrokeSet
+from klack.measurement.stroke_measures import StrokeSet
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si

@@ -16,9 +16,8 @@ from klack.analyses.record import case_fields, run_fields
 from klack.errors import AccuracyWarning, InputError
 from klack.gauges.gauge import GaugeKind, GaugeRecord
 from klack.low_pass import LowPass
-from klack.measurement.files.opening import open_recording
 from klack.measurement.pulse import Pulse, fit_pulse, measure_pulse
-from klack.measurement.recording import ChannelInfo, Recording, some_names
+from klack.measurement.recording import ChannelInfo, Recording, open_recording, some_names
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings

@@ -31,8 +31,7 @@ from klack.errors import InputError
 from klack.measurement.channels import LIFT_ALONE
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.stroke_measures import MeasuredImpact
-from klack.measurement.stroke_set import Rejection, StrokeSet
+from klack.measurement.stroke_measures import MeasuredImpact, Rejection, StrokeSet
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 

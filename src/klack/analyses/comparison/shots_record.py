@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.comparison.strokes_record import Compared
 from klack.analyses.record import CaseRecord
-from klack.measurement.stroke_set import Rejection
+from klack.measurement.stroke_measures import Rejection
 
 __all__ = ["MeasuredDistribution", "MeasuredShotsStudy"]
 

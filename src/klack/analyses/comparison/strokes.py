@@ -32,8 +32,7 @@ from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import recorded_stroke, trigger_instant
 from klack.measurement.loading import load_stroke_set
 from klack.measurement.set_measures import first_impact_column, highest_rebound
-from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures
-from klack.measurement.stroke_set import StrokeSet
+from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures, StrokeSet
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 from klack.units import format_si

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
-from klack.measurement.stroke_set import Rejection
+from klack.measurement.stroke_measures import Rejection
 
 __all__ = [
     "IMPACT_NUMBERS",

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.modes import damping_of, mode_pools, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
+from klack.assembling.yielding import tell_elastic
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.elasticity.statics import Flexibility

@@ -14,11 +14,11 @@ from klack.analyses.reduction.one_node import (
     one_node_impacts,
     one_nodes,
 )
-from klack.assembling.elastic_only import tell_elastic
 from klack.assembling.given_pair import build_given_pair
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
+from klack.assembling.yielding import tell_elastic
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.progress import Progress, silent

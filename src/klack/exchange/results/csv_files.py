@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 
-from klack.exchange.results.naming import file_stems
-from klack.exchange.results.table import ResultAxis, ResultChannel, ResultTable
+from klack.exchange.results.table import ResultAxis, ResultChannel, ResultTable, file_stems
 from klack.whole_file import whole_files
 
 __all__ = ["write_csv"]

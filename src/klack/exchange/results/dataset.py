@@ -20,9 +20,8 @@ from klack.analyses.stroke_shots.record import (
 )
 from klack.analyses.study.record import StudyColumn, StudyRecord
 from klack.errors import InputError, optional_package
-from klack.exchange.results.naming import identifiers
 from klack.exchange.results.study_table import about_study, result_table
-from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar
+from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar, identifiers
 from klack.signals import TimeSeries
 
 __all__ = ["dataset_of"]

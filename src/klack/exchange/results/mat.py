@@ -7,8 +7,7 @@ import numpy as np
 import scipy
 
 from klack.errors import InputError
-from klack.exchange.results.naming import identifiers, octave_text
-from klack.exchange.results.table import ResultRun, ResultTable
+from klack.exchange.results.table import ResultRun, ResultTable, identifiers, octave_text
 from klack.whole_file import whole_file
 
 __all__ = ["write_mat"]

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from klack.errors import optional_package
-from klack.exchange.results.naming import identifiers
-from klack.exchange.results.table import ResultRun, ResultTable
+from klack.exchange.results.table import ResultRun, ResultTable, identifiers
 from klack.whole_file import whole_file
 
 __all__ = ["write_netcdf"]

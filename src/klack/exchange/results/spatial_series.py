@@ -22,7 +22,7 @@ from klack.case.valve import ValveCase
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError, refuse
-from klack.exchange.results.naming import file_stems
+from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, data_array, write_pvd
 from klack.progress import Progress, silent
 from klack.simulation.spatial_impact import ModalMoments, SpatialImpact

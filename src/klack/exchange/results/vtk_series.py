@@ -20,7 +20,7 @@ from klack.case.schema import Case
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
-from klack.exchange.results.naming import file_stems
+from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.progress import Progress, silent
 from klack.transient.result import MotionOfBody, Snapshots

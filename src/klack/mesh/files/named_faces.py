@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.boundary import FaceTable
-from klack.mesh.mesh import ElementBlock, FaceBlock, Surface
+from klack.mesh.mesh import ElementBlock, FaceBlock, FaceTable, Surface
 
 __all__ = ["ALSO_OTHERS", "LOOSE", "MarkedFaces", "loose_faces", "named_faces"]
 

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.mesh.boundary import FaceTable
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.elements import ElementGroup
 from klack.mesh.files.abaqus.scope import FaceSelection, Scope
 from klack.mesh.files.abaqus.sets import distinct
 from klack.mesh.files.named_faces import ALSO_OTHERS
-from klack.mesh.mesh import ElementBlock, FaceBlock, Surface
+from klack.mesh.mesh import ElementBlock, FaceBlock, FaceTable, Surface
 
 __all__ = ["FaceFinder", "RowBlock", "left_out"]
 

@@ -23,9 +23,9 @@ from klack.mesh.files.abaqus.elements import ElementGroup
 from klack.mesh.files.abaqus.faces import FaceFinder, RowBlock, left_out
 from klack.mesh.files.abaqus.scope import Scope
 from klack.mesh.files.abaqus.sets import distinct
+from klack.mesh.files.file_mesh import require_right_of_axis, require_sound
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.plausible import require_unit
-from klack.mesh.files.sound_mesh import require_right_of_axis, require_sound
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 
 __all__ = ["read_abaqus"]

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
-from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model
+from klack.mesh.files.file_mesh import FileElements, FileMesh, mesh_model, same_nodes
 from klack.mesh.files.gmsh.sections import GmshContent, GmshElements, read_content
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.plausible import require_unit
-from klack.mesh.files.sound_mesh import same_nodes
 
 __all__ = ["read_gmsh"]
 
