@@ -29,7 +29,7 @@ from klack.elasticity.fourier_body import FourierBody, fourier_body
 from klack.elasticity.ring_points import RingSections
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.mesh.mesh import Mesh, Surface
-from klack.mesh.rigid import Pose, rotation_matrix
+from klack.mesh.rigid import rigid_placement, rotation_matrix
 from klack.reduction.selection import ByFrequency
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
@@ -37,7 +37,6 @@ from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_m
 __all__ = [
     "ANGLES",
     "off_axis_model",
-    "off_axis_rings",
     "off_axis_space",
     "ring_contacts",
     "touch_height",
@@ -197,14 +196,11 @@ def _touch_height(problem: ContactProblem) -> float:
 def _rigid_placement(pair: BodyPair, placement: Placement, about: Floats) -> Floats:
     """Translation of the centre of mass and rotation vector, shape (6,) [m], [rad]."""
     towards, leaning = (
-        np.array([np.cos(angle), np.sin(angle), 0.0])
+        np.array([np.cos(angle), np.sin(angle)])
         for angle in (placement.direction, placement.tilt_direction)
     )
-    # z x d: the upper end leans towards d
-    rotation = placement.tilt * np.cross([0.0, 0.0, 1.0], leaning)
-    pose = Pose(rotation=rotation, about=about, shift=placement.eccentricity * towards)
-    centre = _centre(pair)
-    return np.concatenate([pose.of(centre) - centre, rotation])
+    aside, lean = placement.eccentricity * towards, placement.tilt * leaning
+    return rigid_placement(aside, lean, about, _centre(pair))
 
 
 def turning_body(case: CaseFile, name: str, mesh: Mesh) -> Callable[[int], FourierBody]:
@@ -317,14 +313,18 @@ def off_axis_space(
     *,
     centre: Vector,
     upper_moves: bool = True,
+    angle: Vector | None = None,
 ) -> ContactSpace:
     """Contact points that close in a centred impact or in one from the farthest placements.
 
+    Of bodies of revolution these are hats of the half section, for whole rings: a needle may come
+    from any side.
+
     Parameters
     ----------
-    pair : BodyPair
+    pair
         In first touch.
-    space : ContactSpace
+    space
         Points of the centred contact.
     farthest : sequence of array, shape (6,) [m], [rad]
         Rigid placements of the moving body: translation of ``centre`` and rotation vector.
@@ -332,52 +332,23 @@ def off_axis_space(
         Largest distance from the axis among them.
     centre : array, shape (3,) [m]
         Centre of mass of the moving body.
-    upper_moves : bool
+    upper_moves
         Whether that is the upper one.
+    angle : array, shape (n,) [rad], or None
+        Of the points of every ring; None for solids.
     """
     reach = space.reach
     surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
     wide = contact_space(
         *surfaces, reach=_WIDER * reach + off_axis, slave=space.slave, form=pair.form
     )
-    rigid = RigidGaps.of(wide, *surfaces, centre=centre, form=pair.form)
-    gaps = PlacedGaps((rigid,), (upper_moves,))
-    keep = wide.gap <= wide.gap.min() + _SOFTER * reach
-    for placement in farthest:
-        keep |= _gaps_in_touch(gaps, wide.axial, placement, upper_moves) <= _SOFTER * reach
-    return _with_neighbours(wide, keep)
-
-
-def off_axis_rings(
-    pair: BodyPair,
-    space: ContactSpace,
-    farthest: Sequence[Vector],
-    off_axis: float,
-    *,
-    angle: Vector,
-    centre: Vector,
-    upper_moves: bool = True,
-) -> ContactSpace:
-    """Hats of a half section whose rings close in a centred impact or in one from afar.
-
-    Whole rings: a needle may come from any side.
-
-    Parameters
-    ----------
-    pair : BodyPair
-        Of bodies of revolution, in first touch.
-    angle : array, shape (n,) [rad]
-        Of the points of every ring.
-    space, farthest, off_axis, centre, upper_moves
-        As of :func:`off_axis_space`.
-    """
-    reach = space.reach
-    surfaces = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)
-    wide = contact_space(
-        *surfaces, reach=_WIDER * reach + off_axis, slave=space.slave, form=pair.form
-    )
-    rings = RingGaps.of(wide, *surfaces, angle=angle, centre=centre, form=pair.form)
-    gaps, axial = PlacedGaps((rings,), (upper_moves,)), np.repeat(wide.axial, len(angle))
+    moved: RigidGaps | RingGaps
+    if angle is None:
+        moved, axial = RigidGaps.of(wide, *surfaces, centre=centre, form=pair.form), wide.axial
+    else:
+        moved = RingGaps.of(wide, *surfaces, angle=angle, centre=centre, form=pair.form)
+        axial = np.repeat(wide.axial, len(angle))
+    gaps = PlacedGaps((moved,), (upper_moves,))
     keep = wide.gap <= wide.gap.min() + _SOFTER * reach
     for placement in farthest:
         near = _gaps_in_touch(gaps, axial, placement, upper_moves) <= _SOFTER * reach

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.modes import selection_of
-from klack.assembling.off_axis import ANGLES, off_axis_rings, turned
+from klack.assembling.off_axis import ANGLES, off_axis_space, turned
 from klack.assembling.spatial import (
     Meeting,
     about_axis,
@@ -173,7 +173,7 @@ def _meeting(
     upper_moves = pair.upper.name == needle
     centre = pair.upper.centre_in_space if upper_moves else body.centre_in_space
     angle = 2.0 * np.pi * np.arange(count) / count
-    section = off_axis_rings(
+    section = off_axis_space(
         pair,
         static.space,
         [rigid_placement(*position, *about) for position in farthest],
