@@ -171,8 +171,14 @@ class Recording(Closing):
         """Values of samples that exist, in the unit of the file."""
 
     def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        """Time of samples that exist [s]; formats that store it override this."""
+        """Time of samples that exist [s]: of even steps, or what a clock has stored."""
+        if channel.clock:
+            return self._clock_time(channel, first, last)
         return channel.start + channel.step * np.arange(first, last, dtype=np.float64)
+
+    def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+        """Stored time of samples that exist [s], of formats whose channels have a clock."""
+        raise NotImplementedError
 
     def close(self) -> None:  # many formats hold nothing open
         """Close the file."""

@@ -1,7 +1,7 @@
 """Matrices stored as arrays: NumPy (``.npz``) and MATLAB files."""
 
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -275,16 +275,20 @@ def _choice(
         raise
 
 
+def _full_name(path: Path, known: Collection[str], name: str | None, role: Role | None) -> str:
+    """Full name of the matrix asked for, whose last part is enough."""
+    last = {key.rpartition(".")[2]: key for key in known}
+    if name is not None and name not in last:
+        return choose_matrix(str(path), known, name, role)
+    return last[choose_matrix(str(path), last, name, role)]
+
+
 def _of_fields(
     path: Path, fields: Mapping[str, Any], name: str | None, role: Role | None
 ) -> SystemMatrix:
     """Choose among fields of structures, by their last name if necessary."""
     square = {key: value for key, value in fields.items() if _is_matrix(value)}
-    last = {key.rpartition(".")[2]: key for key in square}
-    if name is not None and name not in last:
-        chosen = choose_matrix(str(path), square, name, role)
-    else:
-        chosen = last[choose_matrix(str(path), last, name, role)]
+    chosen = _full_name(path, square, name, role)
     return _matlab_matrix(path, chosen, square[chosen])
 
 
@@ -303,11 +307,7 @@ def _hdf5(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     h5py = optional_package("h5py", f"reading {path.name} (MATLAB 7.3)", "exchange")
     with h5py.File(path, "r") as file:
         found = dict(_variables(file, ""))
-        last = {key.rpartition(".")[2]: key for key in found}
-        if name is not None and name not in last:
-            chosen = choose_matrix(str(path), found, name, role)
-        else:
-            chosen = last[choose_matrix(str(path), last, name, role)]
+        chosen = _full_name(path, found, name, role)
         item, where = found[chosen], f"{path}: {chosen}"
         if isinstance(item, h5py.Group):
             jc, ir, data = (_dataset(where, item, key) for key in ("jc", "ir", "data"))

@@ -328,9 +328,7 @@ class CsvFile(Recording):
         """Row of a sample among the rows of numbers."""
         return f"row {self._column[name][1] + sample + 1} of its numbers"
 
-    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        if not channel.clock:
-            return super()._time(channel, first, last)
+    def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         column, begin = self._clock_column[channel.clock]
         time = self._table.column(column, begin + first, begin + last)
         return self._factor[channel.clock] * time

@@ -160,9 +160,7 @@ class MdfFile(Recording):
             time = self._mdf.get_master(g, record_offset=first, record_count=last - first)
         return self._second[g] * np.asarray(time, dtype=np.float64)
 
-    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        if not channel.clock:
-            return super()._time(channel, first, last)
+    def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         return self._master(self._place[channel.name][0], first, last)
 
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:

@@ -185,10 +185,9 @@ class ArrayRecording(Recording):
         line = self._line[channel.name]
         return line.array.read(line.line, line.axis, first, last)
 
-    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
+    def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         clock = self._line[channel.name].clock
-        if clock is None:
-            return super()._time(channel, first, last)
+        assert clock is not None
         return clock[1] * clock[0].read(0, _long_axis(clock[0].shape), first, last)
 
 

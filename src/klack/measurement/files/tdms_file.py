@@ -140,9 +140,7 @@ class TdmsFile(Recording):
     def _values(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         return self._read(self._channel[channel.name], first, last)
 
-    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        if not channel.clock:
-            return super()._time(channel, first, last)
+    def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         clock, factor = self._clock[channel.clock]
         return factor * self._read(clock, first, last)
 

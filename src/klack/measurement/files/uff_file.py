@@ -114,9 +114,7 @@ class UffFile(Recording):
             )
         return values[first:last].astype(np.float64)
 
-    def _time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
-        if not channel.clock:
-            return super()._time(channel, first, last)
+    def _clock_time(self, channel: ChannelInfo, first: int, last: int) -> Vector:
         data = self._data(self._set[channel.name])
         if len(data["x"]) < channel.count:
             raise InputError(
