@@ -1,7 +1,7 @@
 """Cases of both kinds: which one a file holds, read and as a tree."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,17 +61,12 @@ def load_any_case(path: str | Path, components: OwnComponents = ()) -> AnyCase:
 
 def read_valve_case(text: str, path: Path, components: OwnComponents = ()) -> ValveCase:
     """Check the text of a case of a whole valve that lies (or will lie) at ``path``."""
-    data, lines = parse(text, path)
-    require_valve(data, path, lines)
-    own = {component_word(kind): kind for kind in components}
-    return validated(ValveCase, text, path, data, lines, own)
+    return _parsed(text, path, components).case()
 
 
 def read_any_case(text: str, path: Path, components: OwnComponents = ()) -> AnyCase:
     """Check the text of a case of either kind."""
-    data, lines = parse(text, path)
-    own = {component_word(kind): kind for kind in components}
-    return validated(case_kind(data), text, path, data, lines, own)
+    return _parsed(text, path, components).any_case()
 
 
 def valve_case_schema() -> dict[str, Any]:
@@ -126,16 +121,22 @@ class CaseTree:
         return validated(kind, self.text, self.path, self.data, self.lines, self.components)
 
 
-def read_case_tree(path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
+def read_case_tree(path: Path, components: OwnComponents = ()) -> CaseTree:
     """Read the file of a case; ``components`` are those of the user's own that it may name."""
     return tree_of(text_of(path), path, components)
 
 
-def tree_of(text: str, path: Path, components: Iterable[type[Component]] = ()) -> CaseTree:
+def tree_of(text: str, path: Path, components: OwnComponents = ()) -> CaseTree:
     """Parse the text of a case that lies (or will lie) at ``path``."""
+    tree = _parsed(text, path, components)
+    if "network" not in tree.data or not tree.data.get("include"):
+        return tree
+    text, data, lines = self_contained(text, path, tree.data, tree.lines)
+    return replace(tree, text=text, data=data, lines=lines)
+
+
+def _parsed(text: str, path: Path, components: OwnComponents) -> CaseTree:
     data, lines = parse(text, path)
-    if "network" in data and data.get("include"):
-        text, data, lines = self_contained(text, path, data, lines)
     own = {component_word(kind): kind for kind in components}
     return CaseTree(path=path, text=text, data=data, lines=lines, components=own)
 

@@ -95,22 +95,27 @@ def case_models(
     provenance = _provenance(
         case, {body.name: body.mesh for body in (problem.pair.upper, problem.pair.lower)}
     )
+    system = impact_system(case, reduced.upper, reduced.lower, reduced.law)
+    return _of_impact(case, (reduced.upper, reduced.lower), system, provenance)
+
+
+def _of_impact(
+    case: Case,
+    bodies: tuple[ReducedBody, ReducedBody],
+    system: ReducedSystem,
+    provenance: Provenance,
+) -> CaseModels:
     pair = pair_model(
         f"{case.name}_pair",
-        impact_system(case, reduced.upper, reduced.lower, reduced.law),
-        moving=reduced.upper.name,
+        system,
+        moving=bodies[0].name,
         contact_names=("contact",),
         speed=-case.motion.speed,
         step=case.run.reduced_step,
         duration=case.run.duration,
         provenance=provenance,
     )
-    return CaseModels(
-        bodies=(reduced.upper, reduced.lower),
-        pair=pair,
-        provenance=provenance,
-        step=case.run.reduced_step,
-    )
+    return CaseModels(bodies=bodies, pair=pair, provenance=provenance, step=case.run.reduced_step)
 
 
 def _frictionless(case: Case) -> Case:
@@ -143,20 +148,9 @@ def _smooth_valve(case: ValveCase) -> ValveCase:
 def _of_given(case: Case, progress: Progress, threads: int | None) -> CaseModels:
     """Bodies that other programs have reduced or assembled, joined at their ports."""
     given = build_given_pair(case, progress, threads=threads)
-    bodies = (given.upper, given.lower)
     sources = {item.name: item.source for item in given.summaries}
     provenance = replace(_provenance(case, {}), meshes=sources)
-    pair = pair_model(
-        f"{case.name}_pair",
-        given.system(case),
-        moving=given.upper.name,
-        contact_names=("contact",),
-        speed=-case.motion.speed,
-        step=case.run.reduced_step,
-        duration=case.run.duration,
-        provenance=provenance,
-    )
-    return CaseModels(bodies=bodies, pair=pair, provenance=provenance, step=case.run.reduced_step)
+    return _of_impact(case, (given.upper, given.lower), given.system(case), provenance)
 
 
 def _of_valve(case: ValveCase, progress: Progress, threads: int | None) -> CaseModels:

@@ -23,7 +23,8 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError, refuse
 from klack.exchange.results.table import file_stems
-from klack.exchange.results.vtu import SeriesFile, VtuGrid, data_array, write_pvd
+from klack.exchange.results.vtk_series import stress_grid
+from klack.exchange.results.vtu import SeriesFile, VtuGrid, grid_piece, write_grid, write_pvd
 from klack.progress import Progress, silent
 from klack.simulation.spatial_impact import ModalMoments, SpatialImpact
 from klack.whole_file import whole_files
@@ -123,22 +124,9 @@ def write_ring(
         [radius * np.cos(angle), radius * np.sin(angle), np.full(count, height)]
     )
     ends = np.column_stack([np.arange(count), (np.arange(count) + 1) % count])
-    data = "".join(data_array(name, v.astype("f4")) for name, v in fields.items())
-    stamp = data_array("TimeValue", np.array([time]), tuples=True)
-    path.write_text(
-        '<?xml version="1.0"?>\n'
-        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-        'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n'
-        f"<FieldData>\n{stamp}</FieldData>\n"
-        f'<Piece NumberOfPoints="{count}" NumberOfCells="{count}">\n'
-        f"<Points>\n{data_array('Points', points)}</Points>\n"
-        f"<Cells>\n{data_array('connectivity', ends.ravel().astype('i8'))}"
-        f"{data_array('offsets', 2 * np.arange(1, count + 1).astype('i8'))}"
-        f"{data_array('types', np.full(count, _LINE, dtype='u1'))}</Cells>\n"
-        f"<CellData>\n{data}</CellData>\n<PointData>\n</PointData>\n"
-        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
-        encoding="ascii",
-    )
+    types = np.full(count, _LINE, dtype="u1")
+    single = {name: values.astype("f4") for name, values in fields.items()}
+    write_grid(path, grid_piece(points, ends.ravel(), np.full(count, 2), types, single), {}, time)
 
 
 Floats = NDArray[np.float64]
@@ -328,11 +316,7 @@ def _parts(
         if name != names[0]:  # the needle stays as it is drawn
             side = 1.0 if found.is_upper[stop] else -1.0
             mesh = mesh.moved(np.array([0.0, 0.0, side * found.above[stop]]))
-        known = case.bodies[name].material is not None
-        materials = case.materials_of(name, mesh.solids) if known else {}
-        stress = StressField(mesh, materials) if known else None
-        grid = VtuGrid(mesh if stress is None else stress.mesh)
-        parts.append(_Part(name, stem, found, q, stress, grid))
+        parts.append(_Part(name, stem, found, q, *stress_grid(case, name, mesh)))
     return parts
 
 

@@ -17,11 +17,13 @@ from klack.analyses.impact.recovered_motion import recovered_motion
 from klack.assembling.modes import is_damped, kept_modes, mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.case.schema import Case
+from klack.case.valve import ValveCase
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
+from klack.mesh.mesh import Mesh
 from klack.progress import Progress, silent
 from klack.transient.result import MotionOfBody, Snapshots
 from klack.whole_file import whole_files
@@ -102,14 +104,8 @@ class _Film:
     ) -> None:
         self.folder, self.stems = folder, stems
         self.files: list[SeriesFile] = []
-        self.stress: list[StressField | None] = []
-        self.grids: list[VtuGrid] = []
-        for body in bodies:
-            known = case.bodies[body.name].material is not None
-            materials = case.materials_of(body.name, body.mesh.solids) if known else {}
-            field = StressField(body.mesh, materials) if known else None
-            self.stress.append(field)
-            self.grids.append(VtuGrid(body.mesh if field is None else field.mesh))
+        drawn = [stress_grid(case, body.name, body.mesh) for body in bodies]
+        self.stress, self.grids = zip(*drawn, strict=True)
 
     def add(self, time: float, motion: Sequence[MotionOfBody]) -> None:
         """Write all bodies at one instant."""
@@ -121,6 +117,15 @@ class _Film:
             self.files.append(
                 SeriesFile(time=time, part=part, name=body.name, file=f"{self.folder.name}/{name}")
             )
+
+
+def stress_grid(
+    case: Case | ValveCase, name: str, mesh: Mesh
+) -> tuple[StressField | None, VtuGrid]:
+    """Stress of a body, if its material is known, and the grid of its fields."""
+    known = case.bodies[name].material is not None
+    field = StressField(mesh, case.materials_of(name, mesh.solids)) if known else None
+    return field, VtuGrid(mesh if field is None else field.mesh)
 
 
 def _fields(stress: StressField | None, body: MotionOfBody) -> dict[str, NDArray[np.float64]]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from klack.mesh.mesh import Mesh
 
-__all__ = ["SeriesFile", "VtuGrid", "data_array", "write_pvd"]
+__all__ = ["SeriesFile", "VtuGrid", "grid_piece", "write_grid", "write_pvd"]
 
 _CELLS = {
     **{"tri3": 5, "quad4": 9, "tet4": 10, "hex8": 12, "wedge6": 13},
@@ -53,19 +53,7 @@ class VtuGrid:
         )
         self._points = len(points)
         nodes = np.concatenate([c.ravel() for c in cells])
-        self._head = (
-            '<?xml version="1.0"?>\n'
-            '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-            'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n'
-        )
-        self._piece = (
-            f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(sizes)}">\n'
-            f"<Points>\n{data_array('Points', points.astype('f8'))}</Points>\n"
-            f"<Cells>\n{data_array('connectivity', nodes.astype('i8'))}"
-            f"{data_array('offsets', np.cumsum(sizes).astype('i8'))}"
-            f"{data_array('types', types)}</Cells>\n"
-            f"<CellData>\n{data_array('solid', solid.astype('i8'))}</CellData>\n"
-        )
+        self._piece = grid_piece(points, nodes, sizes, types, {"solid": solid.astype("i8")})
 
     def write(self, path: Path, fields: Mapping[str, NDArray[Any]], time: float) -> None:
         """Write the grid with its fields.
@@ -77,19 +65,50 @@ class VtuGrid:
             Written in single precision.  Two components are those along x and z.
         time : float [s]
         """
-        data = "".join(data_array(name, self._three(values)) for name, values in fields.items())
-        stamp = data_array("TimeValue", np.array([time]), tuples=True)
-        path.write_text(
-            f"{self._head}<FieldData>\n{stamp}</FieldData>\n{self._piece}"
-            f"<PointData>\n{data}</PointData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
-            encoding="ascii",
-        )
+        three = {name: self._three(values) for name, values in fields.items()}
+        write_grid(path, self._piece, three, time)
 
     def _three(self, values: NDArray[Any]) -> NDArray[np.float32]:
         plain = np.asarray(values, dtype=np.float32).reshape(self._points, -1)
         if plain.shape[1] == 2:
             plain = np.column_stack([plain[:, 0], np.zeros_like(plain[:, 0]), plain[:, 1]])
         return plain[:, 0] if plain.shape[1] == 1 else plain
+
+
+def grid_piece(
+    points: NDArray[np.float64],
+    nodes: NDArray[Any],
+    sizes: NDArray[Any],
+    types: NDArray[np.uint8],
+    of_cells: Mapping[str, NDArray[Any]],
+) -> str:
+    """Points and cells, as the text of a grid has them; ``sizes`` are numbers of nodes."""
+    return (
+        f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{len(sizes)}">\n'
+        f"<Points>\n{data_array('Points', points.astype('f8'))}</Points>\n"
+        f"<Cells>\n{data_array('connectivity', nodes.astype('i8'))}"
+        f"{data_array('offsets', np.cumsum(sizes).astype('i8'))}"
+        f"{data_array('types', types)}</Cells>\n"
+        f"<CellData>\n{_arrays(of_cells)}</CellData>\n"
+    )
+
+
+def write_grid(path: Path, piece: str, of_points: Mapping[str, NDArray[Any]], time: float) -> None:
+    """Write a grid with its time [s]."""
+    stamp = data_array("TimeValue", np.array([time]), tuples=True)
+    path.write_text(
+        '<?xml version="1.0"?>\n'
+        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64" compressor="vtkZLibDataCompressor">\n<UnstructuredGrid>\n'
+        f"<FieldData>\n{stamp}</FieldData>\n{piece}"
+        f"<PointData>\n{_arrays(of_points)}</PointData>\n"
+        "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+        encoding="ascii",
+    )
+
+
+def _arrays(fields: Mapping[str, NDArray[Any]]) -> str:
+    return "".join(data_array(name, values) for name, values in fields.items())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
