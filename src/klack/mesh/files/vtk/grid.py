@@ -71,6 +71,10 @@ _TYPES = {
     **{"vtktypeuint64": "u8", "vtktypeuint32": "u4", "vtktypeint8": "i1", "vtktypeuint8": "u1"},
     **{"long_long": "i8", "unsigned_long_long": "u8", "signed_char": "i1"},
 }
+_COMPONENTS = {
+    **{"VECTORS": 3, "NORMALS": 3, "TENSORS": 9, "TENSORS6": 6},
+    **{"GLOBAL_IDS": 1, "PEDIGREE_IDS": 1},
+}
 _HEAD = re.compile(
     rb"# vtk DataFile Version (\d+)\.(\d+)[^\n]*\n[^\n]*\n\s*(ASCII|BINARY)\s*\n\s*"
     rb"DATASET\s+(\w+)",
@@ -144,14 +148,16 @@ class _Reader:
     def _words(self) -> list[str]:
         """Words of the next line that is not empty."""
         while self._at < len(self._data):
-            end = self._data.find(b"\n", self._at)
-            end = len(self._data) if end < 0 else end
-            line = self._data[self._at : min(end, self._at + 1000)]
-            self._at = end + 1
-            words = line.decode("utf-8", "replace").split()
-            if words:
+            if words := self._line()[:1000].decode("utf-8", "replace").split():
                 return words
         return []
+
+    def _line(self) -> bytes:
+        end = self._data.find(b"\n", self._at)
+        end = len(self._data) if end < 0 else end
+        line = self._data[self._at : end]
+        self._at = end + 1
+        return line
 
     def _count(self, words: list[str], position: int) -> int:
         text = words[position] if position < len(words) else ""
@@ -211,13 +217,8 @@ class _Reader:
         return flat[keep], offsets
 
     def _skip_metadata(self) -> None:
-        while self._at < len(self._data):
-            end = self._data.find(b"\n", self._at)
-            end = len(self._data) if end < 0 else end
-            line = self._data[self._at : end].strip()
-            self._at = end + 1
-            if not line:
-                return
+        while self._at < len(self._data) and self._line().strip():
+            pass
 
     def _attribute(self, words: list[str], kind: str, count: int) -> None:
         """Read one array of data; keep it if it has one integer per item."""
@@ -231,16 +232,10 @@ class _Reader:
                 if not table or table[0].upper() != "LOOKUP_TABLE":
                     self._at = start
                 self._keep(kind, label, self._array(words, 2, columns * count), columns)
-            case "VECTORS" | "NORMALS":
-                self._array(words, 2, 3 * count)
-            case "TENSORS":
-                self._array(words, 2, 9 * count)
-            case "TENSORS6":
-                self._array(words, 2, 6 * count)
+            case _ if name in _COMPONENTS:
+                self._array(words, 2, _COMPONENTS[name] * count)
             case "TEXTURE_COORDINATES":
                 self._array(words, 3, self._count(words, 2) * count)
-            case "GLOBAL_IDS" | "PEDIGREE_IDS":
-                self._array(words, 2, count)
             case "COLOR_SCALARS":
                 # VTK writes bytes so; in ASCII as a fraction of 255
                 columns = self._count(words, 2)
