@@ -126,7 +126,7 @@ def _on_seat(
 ) -> tuple[RingSpace, Floats]:
     """Contact points of the seat, and the placement of the moving body from where it is now."""
     pair, sides = problem.pair, _sides(problem.pair)
-    about = np.array([0.0, 0.0, _touch_height(problem)])
+    about = np.array([0.0, 0.0, touch_height(problem.space, of_upper=True)])
     more = _most_change(placement, problem.space)
     section = contact_space(
         *sides, reach=reach + 2.0 * more, slave=problem.space.slave, form=pair.form
@@ -181,16 +181,6 @@ def _sides(pair: BodyPair) -> tuple[Mesh, Surface, Mesh, Surface]:
 
 def _centre(pair: BodyPair) -> Floats:
     return np.array([0.0, 0.0, float(pair.upper.centre_of_mass[1])])
-
-
-def _touch_height(problem: ContactProblem) -> float:
-    """Height z [m] of the moving body, where it is, at which it touches first when centred."""
-    space = problem.space
-    facing = space.axial > 1e-6
-    lift = space.gap[facing] / space.axial[facing]
-    first = lift <= lift.min() + _FIRST * space.reach
-    height = space.points[facing][first, 1] + (lift[first] if space.slave == "b" else 0.0)
-    return float(np.mean(height))
 
 
 def _rigid_placement(pair: BodyPair, placement: Placement, about: Floats) -> Floats:
@@ -297,12 +287,13 @@ _SOFTER = 1.6
 _WIDER = 4.0
 
 
-def touch_height(space: ContactSpace) -> float:
-    """Height z [m] at which the centred bodies touch first."""
+def touch_height(space: ContactSpace, *, of_upper: bool = False) -> float:
+    """Height z [m] at which the centred bodies touch first; of the moving one where it is now."""
     facing = space.axial > 1e-6
     lift = space.gap[facing] / space.axial[facing]
     first = lift <= lift.min() + _FIRST * space.reach
-    return float(np.mean(space.points[facing][first, -1]))
+    moved = lift[first] if of_upper and space.slave == "b" else 0.0
+    return float(np.mean(space.points[facing][first, -1] + moved))
 
 
 def off_axis_space(

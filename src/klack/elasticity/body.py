@@ -18,6 +18,7 @@ from scipy.sparse import coo_array, csr_array
 
 from klack.elasticity.assembly import assemble
 from klack.elasticity.rigid_motions import (
+    at_distant_nodes,
     held_best,
     held_dofs,
     motions_left_free,
@@ -131,12 +132,7 @@ class ElasticBody:
         x = self.mesh.points
         if d == 2:
             return np.array([2 * np.argmin(x[:, 1]) + 1])
-        first = int(np.argmax(np.linalg.norm(x - self.centre_of_mass, axis=1)))
-        second = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
-        along = (x[second] - x[first]) / np.linalg.norm(x[second] - x[first])
-        third = int(np.argmax(np.linalg.norm(np.cross(x - x[first], along), axis=1)))
-        candidates = (3 * np.array([first, second, third])[:, None] + np.arange(3)).ravel()
-        return held_best(self.rigid_modes, candidates)
+        return held_best(self.rigid_modes, at_distant_nodes(x, self.centre_of_mass))
 
 
 def elastic_body(
@@ -191,15 +187,21 @@ def checked_nodes(name: str, mesh: Mesh, fixed_nodes: Iterable[int]) -> NDArray[
     return nodes
 
 
-def require_support(name: str, held: NDArray[np.float64]) -> None:
+def require_support(
+    name: str,
+    held: NDArray[np.float64],
+    key: str = "fixed_nodes",
+    what: str = "supports",
+    hint: str = "do not lie on one line, for example those of a whole surface.",
+) -> None:
     """Refuse a support that leaves rigid motions free, from their values at what it holds."""
     left = motions_left_free(held)
     if left:
         raise InputError(
-            f"body '{name}': fixed_nodes",
-            got=f"supports that leave {left} of {held.shape[1]} rigid motions free",
+            f"body '{name}': {key}",
+            got=f"{what} that leave {left} of {held.shape[1]} rigid motions free",
             expected="a support that constrains the body, or none (a free body)",
-            hint="fix nodes that do not lie on one line, for example those of a whole surface.",
+            hint=f"fix nodes that {hint}",
         )
 
 

@@ -23,7 +23,7 @@ import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, dia_array
 
-from klack.elasticity.body import ElasticBody
+from klack.elasticity.body import ElasticBody, require_support
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.plausible_material import (
     MaterialEstimate,
@@ -32,7 +32,6 @@ from klack.elasticity.plausible_material import (
 )
 from klack.elasticity.rigid_motions import (
     held_dofs,
-    motions_left_free,
     require_rigid_motions,
     rigid_motions,
     without_rigid_strain,
@@ -255,7 +254,14 @@ def checked_body(
     _require_sizes(where, K, M, mesh)
     held = rigid_motions(mesh)[fixed]
     if np.any(held):
-        _require_support(name, held)
+        require_support(
+            name,
+            held,
+            "supports",
+            "held degrees of freedom",
+            "are not on one line; constraints of the program that wrote the matrices apply here "
+            "too.",
+        )
     report = check_matrices(
         where, K, M, mesh, fixed=fixed, absent=absent, numbers=numbers, units=units
     )
@@ -360,15 +366,3 @@ def _require_one_mass(
     if d == 2:
         centre[0] = 0.0
     return mean, centre
-
-
-def _require_support(name: str, held: NDArray[np.float64]) -> None:
-    left = motions_left_free(held)
-    if left:
-        raise InputError(
-            f"body '{name}': supports",
-            got=f"held degrees of freedom that leave {left} of {held.shape[1]} rigid motions free",
-            expected="a support that constrains the body, or none (a free body)",
-            hint="fix nodes that are not on one line; constraints of the program "
-            "that wrote the matrices apply here too.",
-        )

@@ -37,9 +37,7 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
     """
     load = np.zeros((mesh.node_count, mesh.dimension))
     for block in surface.blocks:
-        N, x, area = _face_points(mesh, block)
-        size = np.linalg.norm(area, axis=-1)
-        normal = area / size[..., None]
+        N, x, size, normal = _face_points(mesh, block)
         t = traction(x.reshape(-1, mesh.dimension), normal.reshape(-1, mesh.dimension))
         forces = np.einsum("qi,fqa,fq->fia", N, t.reshape(x.shape), size)
         np.add.at(load, block.connectivity, forces)
@@ -70,9 +68,7 @@ def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> 
     circle = 0.5 if order > 0 else 1.0
     load = np.zeros((mesh.node_count, 3))
     for block in surface.blocks:
-        N, x, area = _face_points(mesh, block)
-        size = np.linalg.norm(area, axis=-1)
-        normal = area / size[..., None]
+        N, x, size, normal = _face_points(mesh, block)
         t = traction(x.reshape(-1, 2), normal.reshape(-1, 2)).reshape(*size.shape, 3)
         radial, around, axial = np.moveaxis(t, -1, 0)
         along = np.stack([radial - around, radial + around, axial], axis=-1)
@@ -105,9 +101,7 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
     d = mesh.dimension
     rows, columns, values = [], [], []
     for block in surface.blocks:
-        N, _, area = _face_points(mesh, block)
-        size = np.linalg.norm(area, axis=-1)
-        normal = area / size[..., None]
+        N, _, size, normal = _face_points(mesh, block)
         along = np.einsum("qi,fqa->fqia", N, normal).reshape(*size.shape, -1)
         matrices = resistance * np.einsum("fqi,fqj,fq->fij", along, along, size)
         dofs = (d * block.connectivity[..., None] + np.arange(d)).reshape(len(matrices), -1)
@@ -119,10 +113,8 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
     return csr_array(coo_array((np.concatenate(values), entries), shape=shape))
 
 
-def _face_points(
-    mesh: Mesh, block: FaceBlock
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Shape functions (q, n), points and weighted outward normals (faces, q, d)."""
+def _face_points(mesh: Mesh, block: FaceBlock) -> tuple[NDArray[np.float64], ...]:
+    """Shape functions (q, n), points (faces, q, d), weights (faces, q) and outward normals."""
     xi, w = quadrature(block.family, "mass")
     N, dN = shape_functions(block.family, xi)
     nodes = mesh.points[block.connectivity]
@@ -133,7 +125,9 @@ def _face_points(
     else:  # the material lies to the left of the edge
         area = np.stack([tangents[:, :, 0, 1], -tangents[:, :, 0, 0]], axis=-1)
         area = area * (2.0 * np.pi * x[:, :, :1])
-    return N, x, area * w[:, None]
+    area = area * w[:, None]
+    size = np.linalg.norm(area, axis=-1)
+    return N, x, size, area / size[..., None]
 
 
 _CLOSE = 1e-3

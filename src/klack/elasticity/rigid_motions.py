@@ -9,6 +9,7 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 
 __all__ = [
+    "at_distant_nodes",
     "held_best",
     "held_dofs",
     "motions_left_free",
@@ -228,7 +229,12 @@ def _support(mesh: Mesh) -> NDArray[np.int64]:
     x = mesh.points
     if mesh.dimension == 2:
         return np.array([2 * int(np.argmin(x[:, 1])) + 1])
-    first = int(np.argmax(np.linalg.norm(x - x.mean(axis=0), axis=1)))
+    return at_distant_nodes(x, x.mean(axis=0))
+
+
+def at_distant_nodes(x: NDArray[np.float64], centre: NDArray[np.float64]) -> NDArray[np.int64]:
+    """All directions of three nodes that are far from a centre, and from each other's line."""
+    first = int(np.argmax(np.linalg.norm(x - centre, axis=1)))
     second = int(np.argmax(np.linalg.norm(x - x[first], axis=1)))
     along = (x[second] - x[first]) / np.linalg.norm(x[second] - x[first])
     third = int(np.argmax(np.linalg.norm(np.cross(x - x[first], along), axis=1)))

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from klack.errors import InputError
-from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.reduced_body import ReducedBody, port_among
 
 __all__ = ["Receptance", "frequency_axis", "modal_sum", "observed_receptance", "reduced_receptance"]
 
@@ -40,14 +40,8 @@ class Receptance:
         return self.between(port, port)
 
     def _index(self, port: str) -> int:
-        if port not in self.port_names:
-            raise InputError(
-                f"receptance '{self.label}': port '{port}'",
-                got="a name that it does not have",
-                expected=f"one of: {', '.join(self.port_names)}",
-                hint="use the names given to the ports.",
-            )
-        return self.port_names.index(port)
+        hint = "use the names given to the ports."
+        return port_among(self.port_names, port, f"receptance '{self.label}'", "it", hint)
 
 
 def reduced_receptance(

@@ -14,7 +14,7 @@ from klack.errors import InputError
 from klack.mesh.mesh import Mesh, simplices
 from klack.whole_file import whole_file
 
-__all__ = ["Recovery", "ReducedBody", "StateSpace", "read_arrays", "surface_faces"]
+__all__ = ["Recovery", "ReducedBody", "StateSpace", "port_among", "read_arrays", "surface_faces"]
 
 
 Arrays = dict[str, NDArray[Any]]
@@ -94,6 +94,18 @@ def _check_kind(where: str, arrays: Arrays, kind: str, version: int) -> None:
             expected=f"version {version} or older",
             hint="it was written by a newer version of klack; update this one.",
         )
+
+
+def port_among(known: Sequence[str], name: str, where: str, what: str, hint: str) -> int:
+    """Place of a port among those of a body; raise if it has none of that name."""
+    if name not in known:
+        raise InputError(
+            f"{where}: port '{name}'",
+            got=f"a name that {what} does not have",
+            expected=f"one of: {', '.join(known)}",
+            hint=hint,
+        )
+    return known.index(name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -294,14 +306,8 @@ class ReducedBody:
         InputError
             If there is none of that name.
         """
-        if name not in self.port_names:
-            raise InputError(
-                f"reduced body '{self.name}': port '{name}'",
-                got="a name that the body does not have",
-                expected=f"one of: {', '.join(self.port_names)}",
-                hint="ports are named when the body is reduced.",
-            )
-        return self.port_names.index(name)
+        hint = "ports are named when the body is reduced."
+        return port_among(self.port_names, name, f"reduced body '{self.name}'", "the body", hint)
 
     def state_space(self, *, with_residual: bool) -> StateSpace:
         """First-order form for control and system tools.

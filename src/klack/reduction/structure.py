@@ -14,6 +14,7 @@ from klack.mesh.mesh import FaceBlock, Surface
 from klack.reduction.damping import Damping
 from klack.reduction.ports import Port, face_samples
 from klack.reduction.reduce import at_ports
+from klack.reduction.reduced_body import port_among
 
 __all__ = ["STRUCTURE_UNITS", "Structure", "StructurePort", "build_structure"]
 
@@ -129,14 +130,8 @@ class Structure:
         InputError
             If there is none of that name.
         """
-        if name not in self.port_names:
-            raise InputError(
-                f"body '{self.name}': port '{name}'",
-                got="a name that the body does not have",
-                expected=f"one of: {', '.join(self.port_names)}",
-                hint="a contact port is named like its surface; of klack impact 'contact'.",
-            )
-        return self.port_names.index(name)
+        hint = "a contact port is named like its surface; of klack impact 'contact'."
+        return port_among(self.port_names, name, f"body '{self.name}'", "the body", hint)
 
     @property
     def area(self) -> float:
