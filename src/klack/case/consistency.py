@@ -125,7 +125,7 @@ def check_given(case: ImpactSections) -> None:
         (
             form is not None,
             CaseProblem(
-                ("contact", form),
+                ("contact", str(form)),
                 got=f"the key '{form}' of faces with '{name}', {what}",
                 expected="bodies with surfaces",
                 hint=f"remove '{form}', or give '{name}' a mesh.",

@@ -276,7 +276,7 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
                 variables |= {
                     item.key: Variable(
                         (),
-                        (float("nan") if values[item.json_key] is None else values[item.json_key]),
+                        float("nan") if (value := values[item.json_key]) is None else value,
                         about_measure(item),
                     )
                     for item in measures
