@@ -1,9 +1,15 @@
 """One test for many draws: as many truths, one thing to collect."""
 
 import inspect
+import runpy
 from collections.abc import Callable, Iterable
 from functools import wraps
+from pathlib import Path
 from typing import Any
+
+import pytest
+
+BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 
 Test = Callable[..., None]
 
@@ -33,3 +39,10 @@ def each(names: str | tuple[str, ...], values: Iterable[Any]) -> Callable[[Test]
         return for_each
 
     return of
+
+
+def program(name: str) -> dict[str, Any]:
+    """Names of a program that draws at random as often as wanted; it is in ``benchmarks``."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(BENCHMARKS)
+        return runpy.run_path(str(BENCHMARKS / f"{name}.py"))

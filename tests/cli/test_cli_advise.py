@@ -204,9 +204,7 @@ def test_anchors_are_refused(path):
         (["--threads", "0"], ("--threads",)),
     ],
 )
-def test_what_is_refused(path, tmp_path, monkeypatch, capsys, options, words):
-    monkeypatch.chdir(tmp_path)
-
+def test_what_is_refused(path, tmp_path, capsys, options, words):
     code = main(["advise", path.name, *options])
 
     said = capsys.readouterr().err

@@ -91,11 +91,10 @@ def test_given_meshes_are_left_alone_and_said_to_be(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_solids_from_step_are_refined_around_the_case(tmp_path, monkeypatch, capsys):
+def test_solids_from_step_are_refined_around_the_case(tmp_path, capsys):
     """Convergence: advice brings a case that is far too coarse nearer to the finest run."""
     from netgen.occ import Box, Pnt, Sphere, Z
 
-    monkeypatch.chdir(tmp_path)
     dome = Sphere(Pnt(0, 0, 3), 3)
     dome.faces.name = "tip"
     (Box(Pnt(-0.7, -0.7, -1), Pnt(0.7, 0.7, 3)) * dome).WriteStep("pin.step")

@@ -26,12 +26,6 @@ DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
 NAMES = [command.__name__ for command in COMMANDS]
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    """Run each test in an empty folder, so that nothing is left in the project."""
-    monkeypatch.chdir(tmp_path)
-
-
 def contents(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
 

@@ -24,11 +24,6 @@ measurement:
 """
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture(scope="module")
 def result(tmp_path_factory) -> Path:
     """Folder with the computed strokes and the case that says how they were measured."""

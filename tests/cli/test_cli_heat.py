@@ -13,8 +13,7 @@ from klack.verification.heat import SMALL
 
 
 @pytest.fixture
-def case(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def case(tmp_path):
     path = tmp_path / "small.yaml"
     path.write_text(SMALL.replace("duration: 1 s", "duration: 0.3 s"), encoding="utf-8")
     return path

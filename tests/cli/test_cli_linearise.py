@@ -27,8 +27,7 @@ SWEEP = ("--sweep", "network.components.damper.diameter", "0.2 mm", "0.3 mm", "3
 
 
 @pytest.fixture(autouse=True)
-def _case(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def _case():
     Path("valve.yaml").write_text(MAGNET)
     Path("relief.yaml").write_text(RELIEF)
 

@@ -63,8 +63,7 @@ def test_a_mistake_is_told_before_anything_heavy_is_loaded(written, tmp_path):
         assert any(words in text for text in told), done.stderr
 
 
-def test_a_search_for_nothing_computes_nothing(monkeypatch, capsys, tmp_path):
-    monkeypatch.chdir(tmp_path)
+def test_a_search_for_nothing_computes_nothing(monkeypatch, capsys):
     monkeypatch.setattr("klack.analyses.study.optimise.asked_of", pytest.fail)
 
     assert main(["optimise", "demo-stroke"]) == 2

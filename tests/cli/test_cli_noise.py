@@ -37,11 +37,6 @@ NUMBERS = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture(scope="module")
 def impact(tmp_path_factory) -> Path:
     """Stored result of the shipped impact, reduced level."""

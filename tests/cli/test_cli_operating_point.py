@@ -21,8 +21,7 @@ CASE = (HOW_TO / "held_open.yaml").read_text(encoding="utf-8")
 
 
 @pytest.fixture(autouse=True)
-def _case(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def _case():
     Path("valve.yaml").write_text(CASE)
 
 

@@ -46,7 +46,6 @@ def evil(tmp_path, monkeypatch) -> Path:
     path = tmp_path / "case.yaml"
     path.write_text(CASE.format(word="evil:X"))
     (tmp_path / "recording.csv").write_text("time [s],lift [m]\n0,0\n1,0\n")
-    monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)  # as "python -m klack" or PYTHONPATH do
     return path
 
@@ -133,9 +132,8 @@ def test_an_option_for_another_class_lets_this_one_stay_out(evil, monkeypatch, c
 
 
 @pytest.mark.slow
-def test_a_class_that_was_let_in_acts_and_stands_in_the_record(tmp_path, monkeypatch):
+def test_a_class_that_was_let_in_acts_and_stands_in_the_record(monkeypatch):
     monkeypatch.syspath_prepend(HOW_TO)
-    monkeypatch.chdir(tmp_path)
     Path("case.yaml").write_text(CASE.format(word=BRAKE))
 
     assert (
@@ -161,10 +159,9 @@ def test_a_class_that_was_let_in_acts_and_stands_in_the_record(tmp_path, monkeyp
     assert load_any_case("case.yaml", [EddyBrake]).own_components != {BRAKE: digest}
 
 
-def test_noise_of_a_stored_stroke_names_it_too(tmp_path, monkeypatch, capsys):
+def test_noise_of_a_stored_stroke_names_it_too(monkeypatch, capsys):
     """Neither noise nor report reads the case as a case again, so that they need no option."""
     monkeypatch.syspath_prepend(HOW_TO)
-    monkeypatch.chdir(tmp_path)
     Path("case.yaml").write_text(CASE.format(word=BRAKE))
     assert main(["stroke", "case.yaml", "--component", BRAKE, "--out=o", "--no-report", "-q"]) == 0
 

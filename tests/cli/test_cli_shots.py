@@ -36,11 +36,6 @@ SHOT = {
 }
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> tuple[Path, str, dict]:
     """Folder, text and numbers of the command of the page."""

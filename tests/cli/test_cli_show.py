@@ -16,11 +16,6 @@ HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 VALVE = HOW_TO / "small_valve.yaml"
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 def components_in(file: Path) -> list[str]:
     root = ElementTree.parse(file).getroot()
     return sorted(item.get("data-name") for item in root.iter() if item.get("data-name"))

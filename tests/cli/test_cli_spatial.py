@@ -29,8 +29,7 @@ POLISHED = (
         *((["export", "--to", to], "") for to in ("fmu", "mat", "csv", "modelica")),
     ],
 )
-def test_what_knows_the_axis_only_says_so(command, added, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_what_knows_the_axis_only_says_so(command, added, tmp_path, capsys):
     case = tmp_path / "valve.yaml"
     case.write_text(CASE.read_text(encoding="utf-8") + added, encoding="utf-8")
 
@@ -43,9 +42,7 @@ def test_what_knows_the_axis_only_says_so(command, added, tmp_path, monkeypatch,
     assert sorted(path.name for path in tmp_path.iterdir()) == ["valve.yaml"]
 
 
-def test_an_impact_to_show_is_one_of_a_result(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-
+def test_an_impact_to_show_is_one_of_a_result(tmp_path, capsys):
     code = main(["export", str(CASE), "--to", "vtk", "--impact", "1", "--quiet"])
 
     assert code == 2

@@ -34,11 +34,6 @@ EVENT = {
 STUDY = {"events", "opening_time_s", "closing_time_s", "energy_residual", "steps", "wall_time_s"}
 
 
-@pytest.fixture(autouse=True)
-def _elsewhere(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Path:
     """Folder with the result and the numbers of the whole case."""

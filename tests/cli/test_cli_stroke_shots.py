@@ -45,7 +45,6 @@ def test_strokes_from_case_to_report(tmp_path):
 
 
 def test_ctrl_c_keeps_the_finished_strokes(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
     (tmp_path / "valve.yaml").write_text(valve_text())
 
     def stop(*args, folder, **kwargs):

@@ -15,11 +15,6 @@ from klack.cli.main import main
 from klack.verification import COVERS, GROUPS, Check, ComparedCurve, compare, run_checks
 
 
-@pytest.fixture(autouse=True)
-def _in_empty_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-
-
 def play(monkeypatch: pytest.MonkeyPatch, group: str, checks: Callable[[], list[Check]]) -> None:
     module = ModuleType(f"klack.verification.{group}")
     module.checks = checks  # type: ignore[attr-defined]

@@ -1,12 +1,10 @@
 """The commands on bodies of other programs, and the guide: truth = what they promise."""
 
-import contextlib
-import io
 import json
-import re
 from pathlib import Path
 
 import pytest
+from pages import blocks, printed
 
 from klack.case import load_case
 from klack.cli.main import main
@@ -16,8 +14,7 @@ CASE = Path(__file__).parents[2] / "cases/from-other-tools/case.yaml"
 
 
 @pytest.mark.slow
-def test_impact_and_reduce_of_the_shipped_case(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_impact_and_reduce_of_the_shipped_case(capsys):
     assert main(["impact", "from-other-tools", "--json", "numbers.json", "--quiet"]) == 0
     numbers = json.loads(Path("numbers.json").read_text())["levels"]
     assert numbers["reduced"]["restitution"] == pytest.approx(0.5, abs=0.005)
@@ -40,8 +37,7 @@ def test_impact_and_reduce_of_the_shipped_case(tmp_path, capsys, monkeypatch):
         (["export", "from-other-tools", "--to", "calculix"], "meshed surfaces"),
     ],
 )
-def test_what_needs_a_mesh_ends_with_a_message(tmp_path, capsys, monkeypatch, command, words):
-    monkeypatch.chdir(tmp_path)
+def test_what_needs_a_mesh_ends_with_a_message(capsys, command, words):
     assert main(command) == 2
     error = capsys.readouterr().err
     assert "Traceback" not in error
@@ -49,24 +45,17 @@ def test_what_needs_a_mesh_ends_with_a_message(tmp_path, capsys, monkeypatch, co
 
 
 @pytest.mark.slow
-def test_noise_knows_the_force_alone(tmp_path, capsys, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_noise_knows_the_force_alone(capsys):
     assert main(["noise", "from-other-tools"]) == 0
     assert "only the spectra of the force are known" in capsys.readouterr().out
 
 
 def test_example_of_the_guide_prints_what_it_says():
-    code, printed = (
-        re.search(rf"```{kind}\n(.*?)```", PAGE, re.DOTALL).group(1) for kind in ("python", "text")
-    )
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        exec(compile(code, "guide", "exec"), {})
-    assert out.getvalue() == printed
+    assert printed(blocks(PAGE, "python")[0], "guide") == blocks(PAGE, "text")[0]
 
 
 def test_case_of_the_guide_can_be_read(tmp_path):
-    text = re.search(r"```yaml\n(.*?)```", PAGE, re.DOTALL).group(1)
+    text = blocks(PAGE, "yaml")[0]
     for name in ("needle.mat", "seat.uff"):
         (tmp_path / name).write_text("")
     (tmp_path / "case.yaml").write_text(

@@ -3,18 +3,14 @@
 The draws are those of ``benchmarks/random_catalogue.py``, which runs as many as wanted.
 """
 
-import runpy
 from collections import Counter
-from pathlib import Path
 
 import pytest
+from draws import program
 
 from klack.network.catalogue import type_words
 
-ROOT = Path(__file__).parents[2]
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(ROOT / "benchmarks")
-    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_catalogue.py"))
+DRAWS = program("random_catalogue")
 
 
 @pytest.mark.slow

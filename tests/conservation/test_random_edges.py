@@ -3,20 +3,15 @@
 The draws are those of ``benchmarks/random_edges.py``, which runs as many as wanted.
 """
 
-import runpy
-from pathlib import Path
-
 import numpy as np
 import pytest
+from draws import program
 
 from klack.errors import InputError
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(ROOT / "benchmarks")
-    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_edges.py"))
+DRAWS = program("random_edges")
 
 # 45, 57: a face joined to a pressure source, whose work was missing from the energy balance
 SAMPLE = (*range(6), 7, 9, 45, 57)

@@ -3,15 +3,10 @@
 The draws are those of ``benchmarks/random_lines.py``, which runs as many as wanted.
 """
 
-import runpy
-from pathlib import Path
-
 import pytest
+from draws import program
 
-ROOT = Path(__file__).parents[2]
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(ROOT / "benchmarks")
-    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_lines.py"))
+DRAWS = program("random_lines")
 
 # 34, 100: cavities at junctions; 161: one that closes after many iterations; 20, 30: dead ends;
 # 1018, 1123: cavities on both sides of turbulent friction, at which the pressures did not converge;

@@ -4,17 +4,13 @@ The draws are those of ``benchmarks/random_supplies.py``, which runs as many as 
 """
 
 import json
-import runpy
-from pathlib import Path
 
 import pytest
+from draws import program
 
 from klack.simulation.network_result import IncompleteRunError
 
-ROOT = Path(__file__).parents[2]
-with pytest.MonkeyPatch.context() as patch:
-    patch.syspath_prepend(ROOT / "benchmarks")
-    DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_supplies.py"))
+DRAWS = program("random_supplies")
 
 # 52, 80: a volume that boils at the end of a line; 217: closed behind a check valve; 8, 31, 120: a
 # valve that opens within the step, where an interval that the other volumes had moved the root out

@@ -3,18 +3,17 @@
 The draws are those of ``benchmarks/random_valves.py``, which runs as many as wanted.
 """
 
-import runpy
 from pathlib import Path
 
 import pytest
+from draws import program
 from rigid_valve import RELIEF_VALVE
 
 from klack.case.any_case import read_valve_case
 from klack.errors import AccuracyWarning
 from klack.simulation.network_result import IncompleteRunError
 
-ROOT = Path(__file__).parents[2]
-DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_valves.py"))
+DRAWS = program("random_valves")
 
 # 4, 16: plain ones; 58, 156, 227: no drop at a wide feed when the supply steps; 159: a needle
 # pressed on its seat with far more than what moves it

@@ -3,7 +3,6 @@
 Truth: errors against fine steps alone, extrapolated from three lengths; definition for the pairs.
 """
 
-import runpy
 from dataclasses import fields, replace
 from math import inf, isnan, nan
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from draws import program
 
 import klack
 from klack.analyses.stroke.analysis import STROKE
@@ -28,7 +28,7 @@ from klack.simulation.step_sizes import StepSizes, scaled
 
 ROOT = Path(__file__).parents[2]
 HOW_TO = ROOT / "docs" / "how-to"
-DRAWS = runpy.run_path(str(ROOT / "benchmarks" / "random_valves.py"))
+DRAWS = program("random_valves")
 
 
 def impact(time: float, speed: float = 1.0, lasts: float = 5e-6, **more: float) -> ImpactEvent:

@@ -2,13 +2,11 @@
 
 import re
 from math import hypot, pi, radians, sin, tan
-from pathlib import Path
 
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
+from pages import HOW_TO, numbers, printed, require_parts, run_of
 
-from klack.case.any_case import load_valve_case
 from klack.errors import InputError
 from klack.hydraulics.conical_seat import ConicalSeat
 from klack.hydraulics.fluid_library import library_fluid
@@ -18,9 +16,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
 from klack.network.rows import Ambient
-from klack.simulation.network_run import simulate_network
 
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 PAGE = (HOW_TO / "double-seat.md").read_text(encoding="utf-8")
 OIL = library_fluid("ISO VG 46").at(313.15)
 EDGE = {
@@ -189,51 +185,39 @@ def test_the_acting_area_falls_from_the_seal_to_nothing(keys):
     assert area[-1] < 0.02 * area[0]
 
 
-def told(pattern):
-    found = re.search(pattern, " ".join(PAGE.split()))
-    assert found is not None, pattern
-    return [float(number) for number in found.groups()]
-
-
 @pytest.mark.slow
-def test_the_page_shows_parts_of_its_case_and_its_python_prints_what_it_tells(capsys):
-    whole = YAML(typ="safe").load(HOW_TO / "double_seat.yaml")["network"]["components"]
-    for block in re.findall(r"```yaml-part\n(.*?)```", PAGE, re.DOTALL):
-        for name, part in YAML(typ="safe").load(block).items():
-            assert whole[name] == part
-    code, printed = re.search(r"```python\n(.*?)```\n\n```\n(.*?)```", PAGE, re.DOTALL).groups()
-    exec(compile(code, "page", "exec"), {})
-    assert capsys.readouterr().out == printed
+def test_the_page_shows_parts_of_its_case_and_its_python_prints_what_it_tells():
+    require_parts(PAGE, "double_seat.yaml")
+    code, shown = re.search(r"```python\n(.*?)```\n\n```\n(.*?)```", PAGE, re.DOTALL).groups()
+    assert printed(code, "page") == shown
 
 
 @pytest.mark.slow
 def test_the_double_seat_does_what_its_page_tells():
-    case = load_valve_case(HOW_TO / "double_seat.yaml")
-    network, run = case.network.network(), case.run
-    result = simulate_network(
-        network.rows(), duration=run.duration, step=run.step, record=run.record
-    )
+    result = run_of("double_seat.yaml")
     channels = result.channels
-    seal = told(r"in Python: ([\d.]+) mm here")[0]
+    seal = numbers(PAGE, r"in Python: ([\d.]+) mm here")[0]
     assert channels["upper acting diameter"].values[0] * 1e3 == pytest.approx(seal, abs=5e-5)
-    gap = told(r"([\d.]+) um for a tip of 31")[0]
+    gap = numbers(PAGE, r"([\d.]+) um for a tip of 31")[0]
     assert 350 * (1 / tan(radians(30)) - 1 / tan(radians(31))) == pytest.approx(gap, abs=0.05)
     opened, closed = result.events[0], next(e for e in result.events if e.stop == "closed")
     for event, pattern in (
         (opened, r"meets the stop at ([\d.]+) ms with ([\d.]+) m/s"),
         (closed, r"lands at ([\d.]+) ms with ([\d.]+) m/s"),
     ):
-        time, speed = told(pattern)
+        time, speed = numbers(PAGE, pattern)
         assert event.time * 1e3 == pytest.approx(time, abs=6e-4)
         assert event.approach_speed == pytest.approx(speed, abs=6e-3)
-    groove, sac, flow = told(r"groove has ([\d.]+) bar and the sac ([\d.]+) bar at ([\d.]+) g/s")
+    groove, sac, flow = numbers(
+        PAGE, r"groove has ([\d.]+) bar and the sac ([\d.]+) bar at ([\d.]+) g/s"
+    )
     at = 200  # 1 ms
     assert channels["groove pressure"].values[at] / 1e5 == pytest.approx(groove, abs=0.06)
     assert channels["sac pressure"].values[at] / 1e5 == pytest.approx(sac, abs=0.06)
     assert channels["upper mass flow"].values[at] * 1e3 == pytest.approx(flow, abs=0.06)
-    low, up = told(r"narrower one \(([\d.]+) against ([\d.]+) mm²\)")
+    low, up = numbers(PAGE, r"narrower one \(([\d.]+) against ([\d.]+) mm²\)")
     assert channels["lower area"].values[at] * 1e6 == pytest.approx(low, abs=6e-4)
     assert channels["upper area"].values[at] * 1e6 == pytest.approx(up, abs=6e-4)
     highest = channels["groove pressure"].values.max() / 1e5
-    assert highest == pytest.approx(told(r"groove to ([\d.]+) bar")[0], abs=0.3)
+    assert highest == pytest.approx(numbers(PAGE, r"groove to ([\d.]+) bar")[0], abs=0.3)
     assert result.books.relative_residual <= 1e-11

@@ -1,12 +1,10 @@
 """The example on the page about FMUs runs as the page says."""
 
-import contextlib
-import io
-import re
 from pathlib import Path
 
 import pytest
 from c_compiler import needs_compiler
+from pages import blocks, printed
 
 from klack.case import find_case, load_case
 from klack.exchange.case_models import case_models
@@ -16,7 +14,7 @@ from klack.exchange.fmu.variables import fmu_variables
 pytest.importorskip("fmpy")
 
 PAGE = (Path(__file__).parents[2] / "docs/how-to/export-fmu.md").read_text()
-(EXAMPLE,) = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+(EXAMPLE,) = blocks(PAGE, "python")
 
 
 @pytest.fixture(scope="module")
@@ -29,11 +27,8 @@ def pair():
 def test_example_prints_what_the_page_says(pair, tmp_path, monkeypatch):
     build_fmu(pair, tmp_path / f"{pair.name}.fmu", fmi=2, platforms=("linux64",))
     monkeypatch.chdir(tmp_path)
-    printed = io.StringIO()
-    with contextlib.redirect_stdout(printed):
-        exec(compile(EXAMPLE, "export-fmu.md", "exec"), {})
 
-    assert printed.getvalue().strip() in EXAMPLE
+    assert printed(EXAMPLE, "export-fmu.md").strip() in EXAMPLE
 
 
 def test_page_names_every_variable(pair):

@@ -3,29 +3,25 @@
 Truth of its number: the work of the magnet and of the spring, as the page states it.
 """
 
-import contextlib
-import io
 import re
 from math import sqrt
 from pathlib import Path
 from typing import Any
 
 import pytest
+from pages import blocks, printed
 from quoted_output import compare
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "many-points.md").read_text(encoding="utf-8")
-CODE = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+CODE = blocks(PAGE, "python")
 
 
 def test_the_examples_of_the_page(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(ROOT)
     names: dict[str, Any] = {}
-    out = io.StringIO()
-    with contextlib.redirect_stdout(out):
-        exec(compile(CODE[0], "many-points.md", "exec"), names)
     (quoted,) = re.findall(r"```\n(small_valve, .*?)```", PAGE, re.DOTALL)
-    compare(quoted, out.getvalue(), "many-points.md")
+    compare(quoted, printed(CODE[0], "many-points.md", names), "many-points.md")
 
     speeds = dict(
         zip(names["table"][names["preload"]], names["table"]["opening.approach_speed"], strict=True)

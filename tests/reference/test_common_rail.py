@@ -3,10 +3,10 @@
 import re
 import warnings
 from math import pi
-from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import HOW_TO, blocks, numbers
 from ruamel.yaml import YAML
 
 from klack.analyses.operating_point.analysis import OPERATING_POINT
@@ -14,8 +14,7 @@ from klack.case.any_case import load_valve_case, read_valve_case
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network
 
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
-PAGE = " ".join((HOW_TO / "common-rail.md").read_text(encoding="utf-8").split())
+PAGE = (HOW_TO / "common-rail.md").read_text(encoding="utf-8")
 LINE, DIAMETER, START = 2.0, 3e-3, 150e5
 
 
@@ -30,36 +29,30 @@ def result(case):
     return simulate_network(case.network.network().rows(), duration=run.duration, record=run.record)
 
 
-def told(pattern: str) -> list[float]:
-    found = re.search(pattern, PAGE)
-    assert found is not None, pattern
-    return [float(number) for number in found.groups()]
-
-
 def first_below(time, pressure, drop):
     return float(time[np.argmax(pressure < START - drop)])
 
 
 def test_the_page_shows_the_include_of_the_case():
     whole = YAML(typ="safe").load(HOW_TO / "common_rail.yaml")
-    text = (HOW_TO / "common-rail.md").read_text(encoding="utf-8")
-    (block,) = re.findall(r"```yaml-part\n(.*?)```", text, re.DOTALL)
+    (block,) = blocks(PAGE, "yaml-part")
     assert YAML(typ="safe").load(block) == {"include": whole["include"]}
 
 
 @pytest.mark.slow
 def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result):
     assert result.books.relative_residual <= 1e-11
-    pump, relief, leak = told(
+    pump, relief, leak = numbers(
+        PAGE,
         r"Of the ([\d.]+) J of the pump the relief valve turns ([\d.]+) J into heat and the "
-        r"leakage of the pump ([\d.]+) J"
+        r"leakage of the pump ([\d.]+) J",
     )
     assert result.books.supplies["pump shaft work"] == pytest.approx(pump, abs=0.05)
     assert result.books.losses["relief flow"] == pytest.approx(relief, abs=0.05)
     assert result.books.losses["pump leak flow"] == pytest.approx(leak, abs=0.05)
     for number in range(1, 5):
         assert result.books.supplies[f"injector{number}_coil electric"] == pytest.approx(
-            told(r"the coils take ([\d.]+) J each")[0], abs=5e-3
+            numbers(PAGE, r"the coils take ([\d.]+) J each")[0], abs=5e-3
         )
 
 
@@ -67,9 +60,9 @@ def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result)
 def test_the_first_wave_is_that_of_joukowsky_and_takes_its_time(case, result):
     """Before any echo; the chamber at the seat delays the front by some 0.05 ms."""
     speed = float(case.network.network().fluid.sound_speed(START))
-    assert speed == pytest.approx(told(r"a sound speed of ([\d.]+) m/s")[0], abs=1.0)
+    assert speed == pytest.approx(numbers(PAGE, r"a sound speed of ([\d.]+) m/s")[0], abs=1.0)
     time, way = result.time, LINE / speed
-    assert 1e3 * way == pytest.approx(told(r"The wave needs ([\d.]+) ms")[0], abs=0.005)
+    assert 1e3 * way == pytest.approx(numbers(PAGE, r"The wave needs ([\d.]+) ms")[0], abs=0.005)
     own = result.channels["injector1_body pressure"].values
     flow = result.channels["injector1_holes mass flow"].values
     held = (time > 1.6e-3) & (time < 2.2e-3)  # open, pressure settled
@@ -77,15 +70,17 @@ def test_the_first_wave_is_that_of_joukowsky_and_takes_its_time(case, result):
     assert drop == pytest.approx(
         flow[held].mean() * speed / (pi * DIAMETER**2 / 4), rel=0.02
     )  # first order in dp/K, and the film of Zielke's friction
-    assert drop == pytest.approx(1e5 * told(r"falls by ([\d.]+) bar")[0], abs=0.1e5)
+    assert drop == pytest.approx(1e5 * numbers(PAGE, r"falls by ([\d.]+) bar")[0], abs=0.1e5)
     other = result.channels["injector3_body pressure"].values
     begin = first_below(time, own, 0.5e5)
     assert begin + 2 * way < first_below(time, other, 0.5e5) < begin + 2 * way + 0.3e-3
     assert START - other[time < 7e-3].min() == pytest.approx(
-        1e5 * told(r"at 4.5 ms, with ([\d.]+) bar")[0], abs=0.1e5
+        1e5 * numbers(PAGE, r"at 4.5 ms, with ([\d.]+) bar")[0], abs=0.1e5
     )
     back = own[(time > begin + 2 * way) & (time < 6e-3)]
-    assert back.max() - START == pytest.approx(1e5 * told(r"adds ([\d.]+) bar")[0], abs=0.6e5)
+    assert back.max() - START == pytest.approx(
+        1e5 * numbers(PAGE, r"adds ([\d.]+) bar")[0], abs=0.6e5
+    )
 
 
 def injected(result) -> np.ndarray:
@@ -103,7 +98,7 @@ def injected(result) -> np.ndarray:
 
 @pytest.mark.slow
 def test_each_injector_injects_once_in_each_cycle(result):
-    least, most = told(r"between ([\d.]+) mg and ([\d.]+) mg: the mass")
+    least, most = numbers(PAGE, r"between ([\d.]+) mg and ([\d.]+) mg: the mass")
     masses = injected(result)
     for number in (1, 3, 4, 2):
         stops = [e for e in result.events if e.stop == f"injector{number}_stop"]
@@ -126,7 +121,7 @@ def test_turbulent_friction_changes_the_injected_masses_as_little_as_the_page_sa
             case.network.network().rows(), duration=case.run.duration, record=case.run.record
         )
 
-    least, share = told(r"changes by more than ([\d.]+) mg, or ([\d.]+) %")
+    least, share = numbers(PAGE, r"changes by more than ([\d.]+) mg, or ([\d.]+) %")
     masses = injected(result)
     change = np.abs(injected(turbulent) - masses)
     assert 0.5 * least < change.max() < least + 5e-3

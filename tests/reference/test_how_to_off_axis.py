@@ -1,13 +1,7 @@
 """Pages on what is off-axis; truth: what their examples print."""
 
-import io
-import re
-from contextlib import redirect_stdout
-from pathlib import Path
-
 import pytest
-
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+from pages import HOW_TO, blocks, printed
 
 
 @pytest.mark.parametrize(
@@ -16,10 +10,6 @@ HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 )
 def test_the_example_prints_what_the_page_shows(name):
     text = (HOW_TO / f"{name}.md").read_text(encoding="utf-8")
-    (code,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    (shown,) = re.findall(r"```text\n(.*?)```", text, re.DOTALL)
-    printed = io.StringIO()
-    with redirect_stdout(printed):
-        exec(compile(code, name, "exec"), {})
+    (code,), (shown,) = blocks(text, "python"), blocks(text, "text")
 
-    assert printed.getvalue() == shown
+    assert printed(code, name) == shown

@@ -1,46 +1,27 @@
 """The page of a hydraulic supply says what its case gives; truth: a run, the mean of the pump."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
+from pages import HOW_TO, numbers, require_parts, run_of
 
-from klack.case.any_case import load_valve_case
-from klack.simulation.network_run import simulate_network
-
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 PAGE = (HOW_TO / "hydraulic-supply.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def result():
-    case = load_valve_case(HOW_TO / "hydraulic_supply.yaml")
-    run = case.run
-    return simulate_network(
-        case.network.network().rows(), duration=run.duration, step=run.step, record=run.record
-    )
-
-
-def told(pattern: str) -> list[float]:
-    found = re.search(pattern, " ".join(PAGE.split()))
-    assert found is not None, pattern
-    return [float(number) for number in found.groups()]
+    return run_of("hydraulic_supply.yaml")
 
 
 def test_the_page_shows_parts_of_the_case():
-    whole = YAML(typ="safe").load(HOW_TO / "hydraulic_supply.yaml")["network"]["components"]
-    for block in re.findall(r"```yaml-part\n(.*?)```", PAGE, re.DOTALL):
-        for name, part in YAML(typ="safe").load(block).items():
-            assert whole[name] == part
+    require_parts(PAGE, "hydraulic_supply.yaml")
 
 
 def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result):
     assert result.books.relative_residual <= 1e-12
-    shaft, relief, drain, leak = told(
+    shaft, relief, drain, leak = numbers(
+        PAGE,
         r"of ([\d.]+) J of the shaft the relief valve turns ([\d.]+) J into heat, the drain "
-        r"([\d.]+) J and the leakage of the pump ([\d.]+) J"
+        r"([\d.]+) J and the leakage of the pump ([\d.]+) J",
     )
     losses = result.books.losses
     assert result.books.supplies["pump shaft work"] == pytest.approx(shaft, abs=0.05)
@@ -51,13 +32,16 @@ def test_the_energy_balance_closes_and_its_entries_are_those_of_the_page(result)
 
 def test_pressures_flows_and_the_impact_are_those_of_the_page(result):
     rail = result.channels["rail pressure"].values / 1e5
-    start, lowest = told(r"at ([\d.]+) bar, and the accumulator")[0], told(r"falls to ([\d.]+)")[0]
+    start, lowest = (
+        numbers(PAGE, r"at ([\d.]+) bar, and the accumulator")[0],
+        numbers(PAGE, r"falls to ([\d.]+)")[0],
+    )
     assert rail[0] == pytest.approx(start, abs=0.05)
     assert rail.min() == pytest.approx(lowest, abs=0.05)
     delivered = -result.channels["accumulator mass flow"].values.min() / 855.0 * 6e4
-    assert delivered == pytest.approx(told(r"delivers up to ([\d.]+) l/min")[0], abs=0.1)
+    assert delivered == pytest.approx(numbers(PAGE, r"delivers up to ([\d.]+) l/min")[0], abs=0.1)
     first = result.events[0]
-    time, speed = told(r"meets the stop at ([\d.]+) ms with ([\d.]+) m/s")
+    time, speed = numbers(PAGE, r"meets the stop at ([\d.]+) ms with ([\d.]+) m/s")
     assert (first.stop, first.time) == ("stop", pytest.approx(time * 1e-3, abs=5e-6))
     assert first.approach_speed == pytest.approx(speed, abs=0.05)
 

@@ -5,13 +5,13 @@ the model agrees within the scatter, and the lift as far as the noise allows: th
 strokes with noise s is off by ``1.25 s / sqrt(n)`` (Laplace).  With the nominal values it does not.
 """
 
-import contextlib
 import re
 from io import StringIO
 from math import sqrt
 from pathlib import Path
 
 import pytest
+from pages import blocks, printed
 from ruamel.yaml import YAML
 
 from klack.analyses.comparison.analysis import MEASURED_STROKES
@@ -129,12 +129,8 @@ def test_nominal_values_do_not(hidden):
 def test_the_python_example_of_the_page_runs(hidden, tmp_path, monkeypatch):
     MEASURED_STROKES.save(hidden, tmp_path / "klack-results" / "measured" / "measured")
     monkeypatch.chdir(tmp_path)
-    code = re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)
-    assert code is not None
-    out = StringIO()
-    with contextlib.redirect_stdout(out):
-        exec(compile(code.group(1), "measurements.md", "exec"), {})
-    rms, scatter, over = map(float, out.getvalue().split())
+    told = printed(blocks(PAGE, "python")[0], "measurements.md")
+    rms, scatter, over = map(float, told.split())
     assert rms == hidden.variants["wet"].lift_rms
     assert rms < scatter
     assert abs(over) < 2

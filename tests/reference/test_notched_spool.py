@@ -1,16 +1,15 @@
 """The page of metering notches says what its case gives; truth of the areas: `klack verify`."""
 
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from pages import HOW_TO, blocks
 from ruamel.yaml import YAML
 
 from klack.case.any_case import load_valve_case
 from klack.simulation.network_run import simulate_network
 
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 PAGE = (HOW_TO / "metering-notches.md").read_text(encoding="utf-8")
 CHANNELS = {
     "edge opening": 1e3,
@@ -23,7 +22,7 @@ CHANNELS = {
 
 def test_the_page_shows_the_edge_of_the_case():
     whole = YAML(typ="safe").load(HOW_TO / "notched_spool.yaml")
-    (block,) = re.findall(r"```yaml-part\n(.*?)```", PAGE, re.DOTALL)
+    (block,) = blocks(PAGE, "yaml-part")
 
     assert YAML(typ="safe").load(block)["edge"] == whole["network"]["components"]["edge"]
 

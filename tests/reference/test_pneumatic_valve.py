@@ -1,58 +1,41 @@
 """The page of a pneumatic valve says what its case gives; truth: a run, and mass that adds up."""
 
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
+from pages import HOW_TO, numbers, require_parts, run_of
 
-from klack.case.any_case import load_valve_case
-from klack.simulation.network_run import simulate_network
-
-HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 PAGE = (HOW_TO / "pneumatic-valve.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
 def result():
-    case = load_valve_case(HOW_TO / "pneumatic_valve.yaml")
-    run = case.run
-    return simulate_network(
-        case.network.network().rows(), duration=run.duration, step=run.step, record=run.record
-    )
-
-
-def told(pattern: str) -> list[float]:
-    found = re.search(pattern, " ".join(PAGE.split()))
-    assert found is not None, pattern
-    return [float(number) for number in found.groups()]
+    return run_of("pneumatic_valve.yaml")
 
 
 def test_the_page_shows_parts_of_the_case():
-    whole = YAML(typ="safe").load(HOW_TO / "pneumatic_valve.yaml")["network"]["components"]
-    for block in re.findall(r"```yaml-part\n(.*?)```", PAGE, re.DOTALL):
-        for name, part in YAML(typ="safe").load(block).items():
-            assert whole[name] == part
+    require_parts(PAGE, "pneumatic_valve.yaml")
 
 
 def test_impacts_pressures_and_flows_are_those_of_the_page(result):
     first = {stop: next(e for e in result.events if e.stop == stop) for stop in ("opening", "seat")}
-    open_at, open_speed, shut_at, shut_speed = told(
+    open_at, open_speed, shut_at, shut_speed = numbers(
+        PAGE,
         r"meets the stop at ([\d.]+) ms with ([\d.]+) m/s and the seat at ([\d.]+) ms with "
-        r"([\d.]+) m/s"
+        r"([\d.]+) m/s",
     )
     assert first["opening"].time == pytest.approx(open_at * 1e-3, abs=1e-6)
     assert first["opening"].approach_speed == pytest.approx(open_speed, abs=6e-3)
     assert first["seat"].time == pytest.approx(shut_at * 1e-3, abs=2e-6)
     assert first["seat"].approach_speed == pytest.approx(shut_speed, abs=6e-3)
     channels = result.channels
-    flow, pressure = told(r"up to ([\d.]+) g/s, and the working chamber reaches ([\d.]+) bar")
+    flow, pressure = numbers(
+        PAGE, r"up to ([\d.]+) g/s, and the working chamber reaches ([\d.]+) bar"
+    )
     assert channels["throat mass flow"].values.max() == pytest.approx(flow * 1e-3, rel=3e-3)
     assert channels["working pressure"].values.max() == pytest.approx(pressure * 1e5, rel=1e-3)
-    warm = told(r"heats the gas: here to ([\d.]+) K")[0]
+    warm = numbers(PAGE, r"heats the gas: here to ([\d.]+) K")[0]
     assert channels["working temperature"].values.max() == pytest.approx(warm, abs=0.6)
-    begin = told(r"begins at ([\d.]+) bar")[0]
+    begin = numbers(PAGE, r"begins at ([\d.]+) bar")[0]
     assert channels["inlet pressure"].values[0] == pytest.approx(begin * 1e5, rel=1e-4)
 
 
