@@ -19,7 +19,7 @@ from klack.analyses.impact.run import run_impact
 from klack.case import load_case, shipped_cases
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
-from klack.verification.impacts import needle_over_seat
+from klack.verification.transient import needle_over_seat
 
 __all__ = ["main", "numbers"]
 

@@ -3,7 +3,7 @@
 ``uv run --group dev python benchmarks/stroke.py`` prints all tables; ``--json FILE`` also writes
 ``{name: {value, unit, goal}}``; ``--only speed``, ``steps``, ``cvode`` or ``books`` takes one part.
 
-The valve (:mod:`klack.verification.whole_valve`) has 20 + 40 + 20 modes, two end stops, each a
+The valve (:mod:`klack.verification.network`) has 20 + 40 + 20 modes, two end stops, each a
 contact before a compliance, with films when wet, solenoid with two poles, iron, leakage and one
 eddy term under peak and hold, ball seat, two chambers, a line with frequency-dependent friction.
 The model beside CVODE is :mod:`small_valve`.
@@ -28,7 +28,7 @@ from klack.magnetics.voltage_step import VoltageStep
 from klack.network.network import Network
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.whole_valve import peak_and_hold, whole_valve
+from klack.verification.network import peak_and_hold, whole_valve
 
 __all__ = ["books_rows", "cvode_rows", "main", "numbers", "speed_rows", "step_rows"]
 

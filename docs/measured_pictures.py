@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 
 from klack.report.chart import COLOURS
 from klack.report.printed import STYLE, svg
+from klack.verification.half_space import oblique_spheres
 from klack.verification.measured import SHOTS, struck_bar
-from klack.verification.oblique_spheres import oblique_spheres
 from klack.verification.sphere_in_liquid import (
     GLASS,
     NYLON,

@@ -22,7 +22,7 @@ from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.plasticity.loaded_body import LoadedBody
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding
-from klack.verification.impacts import STEEL
+from klack.verification.transient import STEEL
 
 __all__ = [
     "Pressed",

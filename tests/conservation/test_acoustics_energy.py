@@ -20,7 +20,9 @@ from klack.acoustics.surface_bands import face_band_velocity, radiated_bands, su
 from klack.acoustics.third_octave import band_edges, band_numbers
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
-from klack.verification.vibration import STEEL, pulses, rod_structure
+from klack.verification.lattice import STEEL
+from klack.verification.one_dimension import half_sines
+from klack.verification.vibration import rod_structure
 
 PLATE = Plate(thickness=1.5e-3, area=0.5, material=STEEL)
 MOUNT = Mount(stiffness=5e5, loss_factor=0.1)
@@ -53,7 +55,7 @@ def test_injected_energy_is_in_the_modes_or_lost(damped: Structure) -> None:
 
 def test_injected_energy_over_time_and_over_frequency(damped: Structure) -> None:
     """Int F v dt = int 2 Re(Y) |F|^2 df, also for forces that begin or stay above zero."""
-    pulse = pulses(step=20e-9, count=10_000, times=(2e-5, 1.1e-4), length=1e-5)
+    pulse = half_sines(step=20e-9, count=10_000, times=(2e-5, 1.1e-4), length=1e-5)
     held = replace_values(pulse, 40.0 + pulse.values)
     stays = replace_values(pulse, pulse.values + 25.0 * (pulse.time > 5e-5))
     for forces in ({"tip": pulse}, {"tip": held}, {"tip": stays, "skin": pulse}):
@@ -66,7 +68,7 @@ def test_injected_energy_over_time_and_over_frequency(damped: Structure) -> None
 
 
 def test_density_of_the_injected_energy_is_the_mobility_times_the_force(damped: Structure) -> None:
-    pulse = pulses(step=20e-9, count=10_000, times=(2e-5,), length=1e-5)
+    pulse = half_sines(step=20e-9, count=10_000, times=(2e-5,), length=1e-5)
     density = injected_density(damped, {"tip": pulse}, resolution=500.0)
     below = (density.frequency > 0.0) & (density.frequency < 2e6)
     f = density.frequency[below]
@@ -97,7 +99,7 @@ def test_reciprocity_and_passivity(
 
 def test_all_impulse_reaches_the_hold(damped: Structure) -> None:
     """Blocked force and contact force have the same integral once all is at rest."""
-    pulse = pulses(step=50e-9, count=80_000, times=(2e-5, 3e-5), length=2e-5)
+    pulse = half_sines(step=50e-9, count=80_000, times=(2e-5, 3e-5), length=2e-5)
 
     run = modal_response(damped, {"tip": pulse})
 
@@ -107,7 +109,7 @@ def test_all_impulse_reaches_the_hold(damped: Structure) -> None:
 
 
 def test_blocked_force_over_time_and_over_frequency(damped: Structure) -> None:
-    pulse = pulses(step=20e-9, count=200_000, times=(2e-5,), length=1e-5)
+    pulse = half_sines(step=20e-9, count=200_000, times=(2e-5,), length=1e-5)
     reaction = modal_response(damped, {"tip": pulse}).blocked_force
 
     n = len(reaction.values)
@@ -133,7 +135,7 @@ def test_energy_of_the_force_is_lost_in_the_modes_or_below(
     damped: Structure, mount: Mount | None, plate: Plate | None
 ) -> None:
     """Int 2 Re(Y) |F|^2 df = losses of the modes + what flows into mount and plate."""
-    pulse = pulses(step=20e-9, count=30_000, times=(2e-5, 2e-4), length=1e-5)
+    pulse = half_sines(step=20e-9, count=30_000, times=(2e-5, 2e-4), length=1e-5)
     bands = np.column_stack(band_edges(band_numbers(900.0, 224e3)))
     spectra = surface_spectra(damped, {"tip": pulse}, bands, mount=mount, plate=plate)
     count, at = len(damped.omega), damped.port_index("tip")
@@ -156,7 +158,7 @@ def test_energy_of_the_force_is_lost_in_the_modes_or_below(
 
 def test_bands_add_up_to_the_whole(damped: Structure) -> None:
     """Energies of third octaves against one wide band, and against the power transfer."""
-    pulse = pulses(step=20e-9, count=30_000, times=(2e-5, 2e-4), length=1e-5)
+    pulse = half_sines(step=20e-9, count=30_000, times=(2e-5, 2e-4), length=1e-5)
     bands = np.column_stack(band_edges(band_numbers(900.0, 224e3)))
     whole = np.array([[bands[0, 0], bands[-1, 1]]])
     options = {"mount": MOUNT, "plate": PLATE}
@@ -180,7 +182,7 @@ def test_bands_add_up_to_the_whole(damped: Structure) -> None:
 
 
 def test_rms_of_a_face_over_time_and_over_bands(damped: Structure) -> None:
-    pulse = pulses(step=20e-9, count=200_000, times=(2e-5,), length=1e-5)
+    pulse = half_sines(step=20e-9, count=200_000, times=(2e-5,), length=1e-5)
     alone = replace(damped, face_residual=np.zeros_like(damped.face_residual))
     run = modal_response(damped, {"tip": pulse}, sample=40e-9)
     edges = np.geomspace(1e2, 2e6, 25)
@@ -195,7 +197,7 @@ def test_rms_of_a_face_over_time_and_over_bands(damped: Structure) -> None:
 
 
 def test_forces_of_stops_push_the_ports_with_their_signs(damped: Structure) -> None:
-    pulse = pulses(step=20e-9, count=1000, times=(2e-6,), length=1e-5)
+    pulse = half_sines(step=20e-9, count=1000, times=(2e-6,), length=1e-5)
 
     forces = port_forces(damped, {"seat": pulse, "opening": pulse})
 

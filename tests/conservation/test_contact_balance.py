@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from klack.contact.mortar import contact_space
-from klack.verification.indentation import half_spaces, parabola, sphere_on_cone
+from klack.verification.contact import half_spaces, parabola, sphere_on_cone
 from klack.verification.lattice import lattice_mesh
 
 

@@ -16,8 +16,7 @@ from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.static import static_state
 from klack.magnetics.voltage_step import VoltageStep
 from klack.network.step_function import evaluate
-from klack.verification.drivers import injector, opening
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import injector, opening, run_coil
 
 DRIVER = PeakHold(
     boost_voltage=65.0,

@@ -15,7 +15,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
 from klack.simulation.network_run import simulate_network
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import run_coil
 
 POLE = {"outer_radius": 6e-3, "fringing": "none"}
 IRON = {"material": "X6Cr17", "length": 30e-3, "area": 60e-6}

@@ -15,7 +15,7 @@ from klack.mesh.swept import sweep
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
 from klack.transient.rubbing import OPEN, SLIP, STICK
-from klack.verification.impacts import STEEL, needle_over_seat, sphere_over_cylinder
+from klack.verification.transient import STEEL, needle_over_seat, sphere_over_cylinder
 
 pytestmark = pytest.mark.slow
 

@@ -9,9 +9,15 @@ from klack.simulation.propagator import modal_propagator
 from klack.transient.full_order import simulate_full_order
 from klack.transient.interface_model import InterfaceContact
 from klack.transient.interface_run import simulate_interface
-from klack.verification.impacts import STEEL, needle_over_seat, sphere_over_cylinder
 from klack.verification.interface_bodies import advance, free_rod, reduce_bodies, rod_between_stops
-from klack.verification.interface_impacts import block_between_plates, free_blocks, two_spheres
+from klack.verification.transient import (
+    STEEL,
+    block_between_plates,
+    free_blocks,
+    needle_over_seat,
+    sphere_over_cylinder,
+    two_spheres,
+)
 
 
 def total_energies(run, force):

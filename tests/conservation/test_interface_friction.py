@@ -11,9 +11,8 @@ import pytest
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.transient.interface_run import simulate_interface
-from klack.verification.interface_bodies import lateral_guide, reduce_bodies
-from klack.verification.interface_impacts import block_between_plates, free_blocks
-from klack.verification.rubbing_point import rubbing_faces
+from klack.verification.interface_bodies import lateral_guide, reduce_bodies, rubbing_faces
+from klack.verification.transient import block_between_plates, free_blocks
 
 pytestmark = pytest.mark.slow
 

@@ -18,7 +18,7 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.network import Network
 from klack.simulation.network_run import simulate_network
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import run_coil
 
 CURVE = {"froehlich": {"saturation": 1.9, "permeability": 20000.0}}
 LOOP = {"coercivity": 400.0, "initial_permeability": 300.0}

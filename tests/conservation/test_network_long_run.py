@@ -19,7 +19,7 @@ from klack.network.rows import Rows
 from klack.simulation import network_recorder, network_run
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.whole_valve import peak_and_hold, whole_valve
+from klack.verification.network import peak_and_hold, whole_valve
 
 PERIOD, CYCLES = 1.5e-3, 4
 RECORD = 6.4e-6  # whole macro steps of both valves

@@ -16,7 +16,7 @@ from klack.network.network import Network
 from klack.simulation.bodies import rod_body
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.whole_valve import LIFT, peak_and_hold, whole_valve
+from klack.verification.network import LIFT, peak_and_hold, whole_valve
 
 MODES = (8, 12, 8)
 STEP = 20e-9

@@ -31,7 +31,7 @@ from klack.magnetics.static import static_state
 from klack.magnetics.two_point import TwoPoint
 from klack.magnetics.voltage_step import VoltageStep
 from klack.magnetics.voltage_table import VoltageTable
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import run_coil
 
 
 @st.composite

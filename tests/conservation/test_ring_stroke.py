@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from klack.verification.ring_bodies import NeedleOnRing
-from klack.verification.ring_strokes import RingStroke
+from klack.verification.ring_bodies import NeedleOnRing, RingStroke
 
 pytestmark = pytest.mark.slow
 

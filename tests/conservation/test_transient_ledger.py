@@ -8,7 +8,7 @@ import pytest
 from klack.elasticity.body import ElasticBody
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
-from klack.verification.impacts import sphere_over_cylinder
+from klack.verification.transient import sphere_over_cylinder
 
 SCHEMES = ["contact-stabilised-newmark", "massless"]
 SPEED = 0.5

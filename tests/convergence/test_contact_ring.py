@@ -9,7 +9,7 @@ import pytest
 
 from klack.contact.mortar import contact_space, touching_shift
 from klack.elasticity.body import ElasticBody, elastic_body
-from klack.verification.indentation import STEEL, IndentationProblem
+from klack.verification.contact import STEEL, IndentationProblem
 from klack.verification.lattice import lattice_mesh
 
 RADIUS = 1e-3

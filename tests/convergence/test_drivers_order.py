@@ -3,8 +3,7 @@
 import numpy as np
 
 from klack.magnetics.peak_hold import PeakHold
-from klack.verification.drivers import injector, opening
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import injector, opening, run_coil
 
 DRIVER = PeakHold(
     boost_voltage=65.0,

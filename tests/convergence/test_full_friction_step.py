@@ -7,7 +7,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.mortar import tangent_rows
 from klack.transient.full_order import simulate_full_order
-from klack.verification.impacts import needle_over_seat
+from klack.verification.transient import needle_over_seat
 
 STEPS = np.array([400e-9, 200e-9, 100e-9, 50e-9])
 

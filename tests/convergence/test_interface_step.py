@@ -5,8 +5,7 @@ import pytest
 
 from klack.contact.restitution import find_contacts, measure_impact
 from klack.transient.interface_run import simulate_interface
-from klack.verification.beam_impact import sphere_on_beam
-from klack.verification.interface_bodies import advance, free_rod, rigid_body
+from klack.verification.interface_bodies import advance, free_rod, rigid_body, sphere_on_beam
 
 SPEED = 0.5
 STEPS = np.array([250, 500, 1000, 2000, 4000])

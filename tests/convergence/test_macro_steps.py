@@ -11,7 +11,7 @@ from klack.network.rows import Rows
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.simulation.step_sizes import step_sizes
-from klack.verification.whole_valve import peak_and_hold, whole_valve
+from klack.verification.network import peak_and_hold, whole_valve
 
 MACRO = 1.28e-6
 

@@ -7,7 +7,7 @@ import pytest
 
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult
-from klack.verification.impacts import drop_rod, sphere_over_cylinder
+from klack.verification.transient import drop_rod, sphere_over_cylinder
 
 pytestmark = pytest.mark.slow
 

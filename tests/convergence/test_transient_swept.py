@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from klack.transient.full_order import simulate_full_order
-from klack.verification.impacts import needle_over_seat
+from klack.verification.transient import needle_over_seat
 
 SPEED = 0.5
 

@@ -20,7 +20,7 @@ from klack.contact.statics import (
 )
 from klack.elasticity.statics import Flexibility
 from klack.progress import silent
-from klack.verification.indentation import half_spaces, parabola
+from klack.verification.contact import half_spaces, parabola
 
 BALL = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 

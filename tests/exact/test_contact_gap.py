@@ -5,7 +5,7 @@ import pytest
 
 from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import face_geometry, project_to_surface
-from klack.verification.indentation import sphere_on_cone
+from klack.verification.contact import sphere_on_cone
 
 
 def pointwise(family, layers, xi, **size):

@@ -14,7 +14,7 @@ from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import contact_space
 from klack.errors import InputError
 from klack.mesh.rigid import Pose
-from klack.verification.indentation import sphere_on_cone
+from klack.verification.contact import sphere_on_cone
 
 CENTRE = np.array([0.0, 0.0, 2e-3])
 MOVES = {

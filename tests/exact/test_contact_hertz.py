@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from klack.contact.statics import size_over_half_width
-from klack.verification.indentation import STEEL, half_spaces, parabola
+from klack.verification.contact import STEEL, half_spaces, parabola
 
 pytestmark = pytest.mark.slow
 

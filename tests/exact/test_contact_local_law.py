@@ -5,7 +5,7 @@ import pytest
 
 from klack.contact.local_law import consistent_law
 from klack.errors import AccuracyWarning, InputError
-from klack.verification.indentation import STEEL, half_spaces, parabola
+from klack.verification.contact import STEEL, half_spaces, parabola
 
 RADIUS, WIDTH = 40e-3, 100e-6
 STIFFNESS = 4.0 / 3.0 * STEEL.plane_strain_modulus / 2.0 * np.sqrt(RADIUS)

@@ -7,7 +7,7 @@ quadratic displacements cannot follow linear hats exactly; the resultant is good
 import numpy as np
 import pytest
 
-from klack.verification.indentation import STEEL, uniform_compression
+from klack.verification.contact import STEEL, uniform_compression
 
 PAIRS = [
     ("tet10", "tet10", (4, 3), 0.0),

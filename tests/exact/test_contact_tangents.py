@@ -10,7 +10,7 @@ import klack
 from klack.assembling.problem import place_bodies
 from klack.contact.mortar import contact_space, tangent_rows
 from klack.progress import silent
-from klack.verification.indentation import sphere_on_cone, uniform_compression
+from klack.verification.contact import sphere_on_cone, uniform_compression
 
 FLAT = [("tet10", "tet10", (4, 3)), ("hex20", "tet10", (3, 4)), ("hex8", "hex8", (3, 3))]
 

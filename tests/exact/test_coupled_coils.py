@@ -29,7 +29,7 @@ from klack.magnetics.voltage_table import VoltageTable
 from klack.mechanics.prescribed_motion import PrescribedMotion
 from klack.network.network import Network
 from klack.simulation.network_run import simulate_network
-from klack.verification.coupled_coils import two_coils
+from klack.verification.coils_in_networks import two_coils
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 STILL = PrescribedMotion(time=(0.0, 1.0), displacement=(0.0, 0.0))

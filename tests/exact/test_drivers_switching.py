@@ -17,8 +17,7 @@ from klack.magnetics.two_point import TwoPoint
 from klack.magnetics.voltage_step import VoltageStep
 from klack.magnetics.voltage_table import VoltageTable
 from klack.network.step_function import evaluate
-from klack.verification.drivers import linear_coil
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import linear_coil, run_coil
 
 SHORT = 1e-14  # [ohm]
 TURNS, MAIN, LEAK = 60.0, 2e7, 2e8

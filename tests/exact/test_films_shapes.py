@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from klack.hydraulics.film import ConeFilm, DiscFilm, RingFilm, flow_factor, mean_flow_factor
-from klack.verification.film_reference import squeeze_by_volumes
+from klack.verification.interface_motion import squeeze_by_volumes
 
 
 @pytest.mark.parametrize(

@@ -12,13 +12,13 @@ from klack.contact.restitution import find_contacts, measure_impact
 from klack.simulation.propagator import modal_propagator
 from klack.transient.interface_kernel import safe_flight
 from klack.transient.interface_run import simulate_interface
-from klack.verification.beam_impact import sphere_on_beam
 from klack.verification.interface_bodies import (
     free_rod,
     lateral_guide,
     modal_model,
     rigid_body,
     rod_between_stops,
+    sphere_on_beam,
 )
 
 

@@ -18,9 +18,9 @@ from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_revolved
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_run import simulate_interface
-from klack.verification.impacts import STEEL, needle_over_seat
 from klack.verification.interface_bodies import lateral_guide, modal_model, rigid_body
 from klack.verification.lattice import lattice_mesh
+from klack.verification.transient import STEEL, needle_over_seat
 
 pytestmark = pytest.mark.slow
 

@@ -14,7 +14,7 @@ from klack.contact.restitution import measure_impact
 from klack.transient.interface_model import InterfaceContact
 from klack.transient.interface_run import simulate_interface
 from klack.verification.interface_bodies import modal_model, reduce_bodies, rigid_body
-from klack.verification.interface_impacts import block_on_pad
+from klack.verification.transient import block_on_pad
 
 MASS, INERTIA, STIFFNESS = 2.96e-3, (2.3e-7, 2.3e-7, 5.9e-9), 1e8  # needle D4 x L30 mm
 

@@ -9,9 +9,9 @@ import pytest
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.statics import Flexibility
 from klack.transient.interface_model import InterfaceContact, rigid_motion
-from klack.verification.indentation import STEEL, uniform_compression
+from klack.verification.contact import STEEL, uniform_compression
 from klack.verification.interface_bodies import free_rod, reduce_bodies, rod_between_stops
-from klack.verification.interface_impacts import block_between_plates, free_blocks
+from klack.verification.transient import block_between_plates, free_blocks
 
 pytestmark = pytest.mark.slow
 

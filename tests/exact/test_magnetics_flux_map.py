@@ -6,7 +6,7 @@ import pytest
 from klack.errors import AccuracyWarning, InputError
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.voltage_step import VoltageStep
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import run_coil
 
 CURRENT = np.linspace(0.0, 10.0, 21)
 GAP = np.linspace(20e-6, 120e-6, 21)

@@ -15,7 +15,7 @@ from klack.measurement.set_measures import (
     measure_set,
 )
 from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
-from klack.verification.bouncing_flight import BouncingDrop
+from klack.verification.one_dimension import BouncingDrop
 
 SENSOR = LiftSensor(bandwidth="50 kHz")
 FINE, STEP = 50e-9, 2e-6  # [s]

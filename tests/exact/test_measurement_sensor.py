@@ -9,7 +9,7 @@ from klack.errors import InputError
 from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import differentiator_gain, noise_floor, velocity_of
 from klack.measurement.lift_sensor import sense, sensor_delay, sensor_poles, sensor_polynomial
-from klack.verification.bouncing_flight import BouncingDrop
+from klack.verification.one_dimension import BouncingDrop
 
 BANDWIDTH = 50e3  # [Hz]
 

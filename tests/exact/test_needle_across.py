@@ -14,12 +14,13 @@ from klack.hydraulics.off_axis_seat import SeatFace, flow_area, pressure_load
 from klack.magnetics.off_axis_gap import eccentric_ring, guide_ring, tilted_ring_face
 from klack.magnetics.solenoid_parts import ArmatureBore
 from klack.simulation.network_result import IncompleteRunError
-from klack.verification.pulled_needle import (
+from klack.verification.off_axis import (
+    INERTIA,
+    MASS,
     held_coil,
     pulled_needle,
     seat_off_axis,
 )
-from klack.verification.rigid_needle import INERTIA, MASS
 
 pytestmark = pytest.mark.slow
 

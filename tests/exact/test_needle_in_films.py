@@ -12,8 +12,7 @@ from klack.transient.gap_course import gap_course
 from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.verification.interface_bodies import lateral_guide
-from klack.verification.pulled_needle import held_coil
-from klack.verification.rigid_needle import (
+from klack.verification.off_axis import (
     FACE,
     INERTIA,
     MASS,
@@ -21,6 +20,7 @@ from klack.verification.rigid_needle import (
     fly_in_films,
     fly_in_network,
     guide_of,
+    held_coil,
     needle_on_cone,
     needle_on_ring,
 )

@@ -8,7 +8,8 @@ import pytest
 from klack.errors import InputError
 from klack.hydraulics.notch import Notch, notch_opening
 from klack.hydraulics.spool_edge import SpoolEdge
-from klack.verification.branch_step import RHO, branch_of, branch_step
+from klack.verification.benches import RHO_OIL as RHO
+from klack.verification.benches import branch_of, branch_step
 
 EDGE = {"diameter": 6e-3, "radial_clearance": 4e-6, "overlap": 1e-3, "cavitation": None}
 SIZES = {

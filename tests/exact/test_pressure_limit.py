@@ -17,7 +17,7 @@ from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.interface_run import simulate_interface
 from klack.transient.yielding_points import let_yield, solve_yielding
 from klack.verification.interface_bodies import modal_model, rigid_body
-from klack.verification.yielding_bodies import ball_in_seat
+from klack.verification.plasticity import ball_in_seat
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 AXISYMMETRIC = Path(__file__).parents[2] / "cases" / "demo-valve-axisymmetric" / "case.yaml"

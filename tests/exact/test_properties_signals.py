@@ -23,7 +23,7 @@ from klack.acoustics.third_octave import band_edges, band_energies, band_numbers
 from klack.errors import InputError
 from klack.measurement.impacts import measure_stroke
 from klack.signals import TimeSeries
-from klack.verification.bouncing_flight import BouncingDrop
+from klack.verification.one_dimension import BouncingDrop
 
 
 @st.composite

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from klack.verification.interface import gaps_of_sphere_over_cone
 from klack.verification.ring_bodies import NeedleOnRing
-from klack.verification.ring_impacts import gaps_of_sphere_over_cone
 
 TIP = 2e-3
 

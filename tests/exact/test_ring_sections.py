@@ -13,9 +13,8 @@ from klack.errors import InputError
 from klack.mesh.swept import sweep
 from klack.transient.guide import _section
 from klack.transient.revolved_guide import turned_sections
-from klack.verification.impacts import STEEL
-from klack.verification.ring_bodies import NeedleOnRing
-from klack.verification.ring_strokes import RingStroke
+from klack.verification.ring_bodies import NeedleOnRing, RingStroke
+from klack.verification.transient import STEEL
 
 HEIGHTS = (5e-3, 0.0123, 20e-3)  # on a ring of nodes or between two
 

@@ -17,8 +17,16 @@ from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_arrays import Layer, Pressed
 from klack.transient.interface_run import simulate_interface
 from klack.transient.rough_points import layer_energy, solve_rough
-from klack.verification.interface_bodies import advance, free_rod, modal_model, rigid_body
-from klack.verification.rough_point import LAYER, MassOnLayer, rough_rod, time_above
+from klack.verification.interface_bodies import (
+    LAYER,
+    MassOnLayer,
+    advance,
+    free_rod,
+    modal_model,
+    rigid_body,
+    rough_rod,
+    time_above,
+)
 
 pytestmark = pytest.mark.slow
 

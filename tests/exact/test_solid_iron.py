@@ -10,7 +10,7 @@ from klack.magnetics.solenoid_parts import IronPart
 from klack.magnetics.solid_iron import shells
 from klack.magnetics.static import static_state
 from klack.magnetics.voltage_step import VoltageStep
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import run_coil
 
 MAGNET = {
     "turns": 60,

@@ -20,7 +20,7 @@ from klack.reduction.damping import Damping, LossFactor, ModalDamping, RayleighD
 from klack.transient.body_damping import body_damping
 from klack.transient.full_order import Scheme, simulate_full_order
 from klack.transient.result import FullOrderResult
-from klack.verification.impacts import STEEL, blocked_bar
+from klack.verification.transient import STEEL, blocked_bar
 
 LENGTH, SPEED, KEPT = 0.03, 0.5, 6
 PERIOD = 2 * LENGTH / STEEL.bar_wave_speed

@@ -11,14 +11,15 @@ import numpy as np
 import pytest
 
 from klack.transient.full_order import simulate_full_order
-from klack.verification.impacts import (
+from klack.verification.transient import (
     STEEL,
     bulk_wave_speed,
     drop_blocked_bar,
     drop_rod,
     plateau,
+    rod_body,
+    rod_contact,
 )
-from klack.verification.rod_bodies import rod_body, rod_contact
 
 SPEED = 0.5
 AREA = 1e-4

@@ -28,8 +28,9 @@ from klack.errors import InputError
 from klack.reduction.damping import ModalDamping
 from klack.reduction.structure import Structure, build_structure
 from klack.signals import TimeSeries
+from klack.verification.one_dimension import half_sines
 from klack.verification.reduction import rod
-from klack.verification.vibration import oscillator, pulses, rod_structure
+from klack.verification.vibration import oscillator, rod_structure
 
 
 @pytest.fixture(scope="module")
@@ -176,7 +177,7 @@ def unlike(series: TimeSeries) -> TimeSeries:
     ],
 )
 def test_messages(damped: Structure, call: Callable[..., object], message: str) -> None:
-    force = pulses(step=20e-9, count=1000, times=(1e-6,), length=1e-5)
+    force = half_sines(step=20e-9, count=1000, times=(1e-6,), length=1e-5)
 
     with pytest.raises(InputError, match=message):
         call(damped, force)

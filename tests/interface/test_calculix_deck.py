@@ -31,8 +31,8 @@ from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh, Surface
 from klack.progress import silent
-from klack.verification.impacts import needle_over_seat
 from klack.verification.lattice import lattice_mesh
+from klack.verification.transient import needle_over_seat
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=105e9, poisson=0.34, density=8400.0)

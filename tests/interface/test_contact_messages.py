@@ -10,7 +10,7 @@ from klack.contact.statics import COARSE, size_over_half_width, static_contact
 from klack.contact.submodel import local_stiffness
 from klack.errors import InputError
 from klack.mesh.mesh import Surface
-from klack.verification.indentation import half_spaces, parabola, sphere_on_cone
+from klack.verification.contact import half_spaces, parabola, sphere_on_cone
 
 RADIUS, WIDTH = 40e-3, 100e-6
 

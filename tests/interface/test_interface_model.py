@@ -11,13 +11,13 @@ from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
 from klack.transient.interface_run import simulate_interface
-from klack.verification.impacts import needle_over_seat
 from klack.verification.interface_bodies import (
     free_rod,
     modal_model,
     rigid_body,
     rod_between_stops,
 )
+from klack.verification.transient import needle_over_seat
 
 
 class Distorted(Flexibility):

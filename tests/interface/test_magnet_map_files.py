@@ -9,7 +9,7 @@ from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.force_map_solenoid import ForceMapSolenoid
 from klack.magnetics.map_choice import MapFile
 from klack.magnetics.map_text import LARGEST
-from klack.verification.maps_from_files import force_of, linkage_of, written
+from klack.verification.magnetic_networks import force_of, linkage_of, written
 
 CURRENT, GAP = np.array([0.0, 1.0, 2.5, 4.0]), np.array([20e-6, 60e-6, 100e-6, 160e-6])
 HEAD = "Current [A],gap [mm],FluxLinkage(Coil) [mWb],Force1.Force_z [newton]"

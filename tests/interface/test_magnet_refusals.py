@@ -12,7 +12,7 @@ from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.two_point import TwoPoint
 from klack.mechanics.prescribed_motion import PrescribedMotion
 from klack.network.network import Network
-from klack.verification.coupled_coils import two_coils
+from klack.verification.coils_in_networks import two_coils
 
 STILL = PrescribedMotion(time=(0.0, 1.0), displacement=(0.0, 0.0))
 BANK = BoostCapacitor(capacitance=20e-6, voltage=65.0, recharge_power=10.0)

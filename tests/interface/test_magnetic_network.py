@@ -8,7 +8,7 @@ from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.static import static_state
 from klack.magnetics.two_point import TwoPoint
 from klack.magnetics.voltage_step import VoltageStep
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import run_coil
 
 IRON = {"kind": "iron", "material": "X6Cr17", "length": 3e-2, "area": 2e-5}
 RING = {"kind": "shorted-coil", "resistance": 1e-3}

@@ -23,8 +23,8 @@ from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceTable, Mesh
 from klack.progress import silent
 from klack.unit_systems import unit_system
+from klack.verification.exchange_files import write_matrices
 from klack.verification.lattice import lattice_mesh
-from klack.verification.matrix_files import write_matrices
 
 PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "bring-matrices.md"
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)

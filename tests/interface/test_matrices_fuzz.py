@@ -13,7 +13,7 @@ from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.model_files.node_table import read_node_numbers, read_node_table
 from klack.model_files.system import on_nodes, read_system
 from klack.model_files.system_matrix import read_row_places
-from klack.verification.matrix_files import MATRIX_WRITERS, write_matrices
+from klack.verification.exchange_files import MATRIX_WRITERS, write_matrices
 
 NODES = 7
 FORMS = list(MATRIX_WRITERS)

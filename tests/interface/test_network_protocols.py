@@ -9,7 +9,7 @@ import pytest
 
 from klack.network.protocols import InterfaceLaw, LawNumbers, NetworkFluid
 from klack.simulation.network_run import simulate_network
-from klack.verification.whole_valve import whole_valve
+from klack.verification.network import whole_valve
 
 
 class Only:

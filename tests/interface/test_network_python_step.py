@@ -14,7 +14,7 @@ from klack.network.rows import Book, Rows
 from klack.network.step_function import python_step
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.whole_valve import whole_valve
+from klack.verification.network import whole_valve
 
 STIFFNESS, PRELOAD = 1e4, 12.0
 

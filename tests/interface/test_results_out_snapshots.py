@@ -5,8 +5,7 @@ import pytest
 
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult, MotionOfBody, Snapshots
-from klack.verification.impacts import STEEL
-from klack.verification.rod_bodies import rod_body, rod_contact
+from klack.verification.transient import STEEL, rod_body, rod_contact
 
 AREA, STEP, SPEED, GAP = 1e-4, 0.1e-6, 0.5, 1e-6
 

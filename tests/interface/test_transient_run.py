@@ -19,8 +19,7 @@ from klack.transient.full_body import FullBody
 from klack.transient.full_order import recommended_step, simulate_full_order
 from klack.transient.inertia import InverseMass, massless_nodes, scalar_mass
 from klack.transient.interface_solve import SplitSolve, WholeSolve
-from klack.verification.impacts import STEEL, sphere_over_cylinder
-from klack.verification.rod_bodies import rod_body, rod_contact
+from klack.verification.transient import STEEL, rod_body, rod_contact, sphere_over_cylinder
 
 AREA = 1e-4
 needs_pardiso = pytest.mark.skipif(

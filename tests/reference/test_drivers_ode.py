@@ -5,8 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from klack.magnetics.driver import DriveProgram, DriveState, Switch, When
-from klack.verification.drivers import injector
-from klack.verification.single_coil import run_coil
+from klack.verification.drivers import injector, run_coil
 
 R, GAP, TURNS = 0.8, 100e-6, 60.0
 CIRCUIT = injector()

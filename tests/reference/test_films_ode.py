@@ -5,8 +5,7 @@ import pytest
 
 from klack.network.rows import FilmRow
 from klack.simulation.bodies import fixed_body, rigid_mass_body
-from klack.verification.film_reference import film_by_ode
-from klack.verification.interface_motion import interface_motion
+from klack.verification.interface_motion import film_by_ode, interface_motion
 from klack.verification.one_dimension import steel_rod
 
 pytestmark = pytest.mark.slow

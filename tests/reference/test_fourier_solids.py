@@ -16,8 +16,8 @@ from klack.gauges.fourier_field import field_rows
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
 from klack.mesh.swept import sweep
+from klack.verification.elasticity import free_bar_frequencies
 from klack.verification.lattice import lattice_mesh
-from klack.verification.timoshenko_beam import free_bar_frequencies
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BOTH_WAYS = (0.0, np.pi / 2)

@@ -15,10 +15,14 @@ from klack.materials import Material
 from klack.transient.full_order import simulate_full_order
 from klack.transient.interface_model import InterfaceContact
 from klack.transient.interface_run import simulate_interface
-from klack.verification.beam_impact import sphere_on_beam
-from klack.verification.impacts import STEEL, bulk_wave_speed
-from klack.verification.interface_bodies import free_rod, modal_model, reduce_bodies
-from klack.verification.interface_impacts import blocked_bar_model, hertz_impact, two_spheres
+from klack.verification.interface_bodies import free_rod, modal_model, reduce_bodies, sphere_on_beam
+from klack.verification.transient import (
+    STEEL,
+    blocked_bar_model,
+    bulk_wave_speed,
+    hertz_impact,
+    two_spheres,
+)
 
 pytestmark = pytest.mark.slow
 

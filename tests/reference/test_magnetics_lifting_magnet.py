@@ -6,7 +6,7 @@ from draws import each
 
 from klack.magnetics.lifting_magnet import lifting_magnet
 from klack.magnetics.static import static_state
-from klack.verification import lifting_magnet as published
+from klack.verification import published_magnets as published
 
 
 @pytest.fixture(scope="module")

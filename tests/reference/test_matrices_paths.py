@@ -18,8 +18,8 @@ from klack.elasticity.given_matrices import checked_body
 from klack.materials import Material
 from klack.model_files.system import on_nodes, read_system
 from klack.unit_systems import unit_system
+from klack.verification.exchange_files import MatrixFiles, write_matrices
 from klack.verification.lattice import lattice_mesh
-from klack.verification.matrix_files import MatrixFiles, write_matrices
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 UNITS = unit_system("mm t s")

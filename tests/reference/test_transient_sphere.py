@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.verification.impacts import STEEL, drop_sphere, zener_parameter
+from klack.verification.transient import STEEL, drop_sphere, zener_parameter
 
 pytestmark = pytest.mark.slow
 

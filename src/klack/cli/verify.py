@@ -9,7 +9,7 @@ from klack.cli.verify_text import print_checks, print_groups
 from klack.terminal.output import require_file_target
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import SHOWN, Shown
-from klack.verification.registry import GROUPS
+from klack.verification.check import GROUPS
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import CheckJson, VerificationJson
@@ -63,7 +63,7 @@ def verify(
         print_checks(checks, every=every, to_stderr=wanted.to_stderr)
         if html is not None and not wanted.to_stderr:
             print(f"Page in {html}")
-    wanted.write(lambda: _results(run_conditions().words(), checks))
+    wanted.write(lambda: _results(run_conditions(), checks))
     return 0 if all(check.passed for check in checks) else 1
 
 

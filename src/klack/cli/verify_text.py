@@ -12,7 +12,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from klack.terminal.tables import print_table
-from klack.verification.registry import COVERS
+from klack.verification.check import COVERS
 
 if TYPE_CHECKING:
     from klack.verification import Check
@@ -34,7 +34,7 @@ def print_groups() -> None:
 
 def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:
     """Print the summary per group, then the failed checks and the closest, or all of them."""
-    from klack.verification.wording import summary
+    from klack.verification.check import summary
 
     groups = dict.fromkeys(check.group for check in checks)
     rows = [_row(group, [check for check in checks if check.group == group]) for group in groups]
@@ -45,7 +45,7 @@ def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: b
 
 
 def _row(group: str, checks: Sequence["Check"]) -> tuple[str, ...]:
-    from klack.verification.wording import headroom_text
+    from klack.verification.check import headroom_text
 
     failed = sum(not check.passed for check in checks)
     compared = [check for check in checks if check.tolerance > 0 and check.passed]
@@ -79,7 +79,7 @@ def _worst_lines(checks: Sequence["Check"]) -> Iterator[str]:
 
 
 def _lines(check: "Check") -> Iterator[str]:
-    from klack.verification.wording import (
+    from klack.verification.check import (
         deviation_text,
         headroom_text,
         number_text,

@@ -1,7 +1,15 @@
 """Exact and published cases that klack checks itself against."""
 
-from klack.verification.check import LARGEST_HEADROOM, Check, ComparedCurve, compare
-from klack.verification.registry import COVERS, GROUPS, iterate_checks, run_checks
+from klack.verification.check import (
+    COVERS,
+    GROUPS,
+    LARGEST_HEADROOM,
+    Check,
+    ComparedCurve,
+    compare,
+    iterate_checks,
+    run_checks,
+)
 
 __all__ = [
     "COVERS",

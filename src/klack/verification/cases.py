@@ -1,7 +1,6 @@
 """Case files: quantities in SI, expressions, parameters and included parts of networks."""
 
 from collections.abc import Iterator
-from functools import partial
 from math import pi, sin, sqrt
 from pathlib import Path
 
@@ -10,14 +9,11 @@ import numpy as np
 from klack.case.any_case import read_valve_case
 from klack.case.valve import ValveCase
 from klack.expressions.expression import Expression
-from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.verification.check import Check, compare
+from klack.verification.check import Check, check
 
 __all__ = ["checks"]
 
-GROUP = "cases"
-_check = partial(compare, GROUP)
 
 _SI = "BIPM, The International System of Units, 9th ed. (2019), Table 8"
 _NIST = "Thompson & Taylor, NIST SP 811 (2008), App. B.8"
@@ -25,28 +21,20 @@ _NIST = "Thompson & Taylor, NIST SP 811 (2008), App. B.8"
 
 def checks() -> list[Check]:
     """Units by their definitions, formulas of the trade, copies of a part in closed motions."""
-    return [*_units(), *_formulas(), *_oscillators(), *_written_out()]
+    return [*_expressions(), *_oscillators(), *_written_out()]
 
 
-def _units() -> Iterator[Check]:
+def _expressions() -> Iterator[Check]:
     inch, pound = 0.0254, 4.4482216152605
-    for text, expected, unit, source in (
-        ("1 inch", inch, "m", _NIST),
-        ("1 lbf", pound, "N", _NIST),
-        ("1 psi", pound / inch**2, "Pa", _NIST),
-        ("1 l/min", 1e-3 / 60.0, "m^3/s", _SI),
-        ("1 km/h", 1.0 / 3.6, "m/s", _SI),
-        ("180 deg", pi, "rad", _SI),
-        ("3000 rpm", 50.0, "1/s", _SI),
-        ("20 degC", 293.15, "K", _SI),
-    ):
-        found = Expression.parse(text)
-        computed = found.value({}) if found.unit({}).fits(unit) else float("nan")
-        yield _check(f"{text} [{unit}]", expected, computed, 1e-14, source)
-
-
-def _formulas() -> Iterator[Check]:
     for name, text, expected, unit, source in (
+        ("1 inch", "1 inch", inch, "m", _NIST),
+        ("1 lbf", "1 lbf", pound, "N", _NIST),
+        ("1 psi", "1 psi", pound / inch**2, "Pa", _NIST),
+        ("1 l/min", "1 l/min", 1e-3 / 60.0, "m^3/s", _SI),
+        ("1 km/h", "1 km/h", 1.0 / 3.6, "m/s", _SI),
+        ("180 deg", "180 deg", pi, "rad", _SI),
+        ("3000 rpm", "3000 rpm", 50.0, "1/s", _SI),
+        ("20 degC", "20 degC", 293.15, "K", _SI),
         (
             "rate of a helical spring, 80 GPa, 1.2 mm wire, 8 mm, 6 coils",
             "80 GPa * (1.2 mm)^4 / (8 * (8 mm)^3 * 6)",
@@ -78,7 +66,7 @@ def _formulas() -> Iterator[Check]:
     ):
         found = Expression.parse(text)
         computed = found.value({}) if found.unit({}).fits(unit) else float("nan")
-        yield _check(f"{name} [{unit}]", expected, computed, 1e-14, source)
+        yield check(f"{name} [{unit}]", expected, computed, 1e-14, source)
 
 
 _OSCILLATOR = """klack: 1
@@ -103,15 +91,16 @@ run: {duration: 2 ms, lift: copy1_mass.a}
 def _oscillators() -> Iterator[Check]:
     """Response to a ramp of a force that stays, of three copies with masses of 1, 4 and 9 g."""
     case = _case(_OSCILLATORS, {"oscillator.yaml": _OSCILLATOR})
-    rows = case.network.network().rows()
-    result = simulate_network(rows, duration=2e-3, coarse=1, record=1e-6)
+    result = simulate_network(case.network.network().rows(), duration=2e-3, coarse=1, record=1e-6)
     t, rise, static = result.time, 100e-6, 10.0 / 1e4
     for number in (1, 2, 3):
         omega = sqrt(1e4 / (1e-3 * number**2))
-        late = np.maximum(t - rise, 0.0)
-        ramp = np.minimum(t, rise) - (np.sin(omega * t) - np.sin(omega * late)) / omega
+        ramp = (
+            np.minimum(t, rise)
+            - (np.sin(omega * t) - np.sin(omega * np.maximum(t - rise, 0.0))) / omega
+        )
         found = result.channels[f"copy{number}_mass.a displacement"].values
-        yield _check(
+        yield check(
             f"copy {number} of an included mass on a spring, deviation from its response to a ramp "
             "over 2 ms, relative to the static displacement",
             0.0,
@@ -165,7 +154,7 @@ def _written_out() -> Iterator[Check]:
     """Four included injectors against the same network written out, number by number."""
     included = _RAIL.format(head=_HEAD, components="", inlets="injector*.inlet", connections="")
     runs = [
-        _run(case, 600e-6)
+        simulate_network(case.network.network().rows(), duration=600e-6, record=1e-6)
         for case in (
             _case(included, {"injector.yaml": _INJECTOR}),
             read_valve_case(_by_hand(), Path("rail.yaml")),
@@ -176,7 +165,7 @@ def _written_out() -> Iterator[Check]:
             next(event for event in run.events if event.stop == f"injector{number}_top").peak_force
             for run in runs
         ]
-        yield _check(
+        yield check(
             f"injector {number} of four included ones, peak force at the stop [N]",
             forces[1],
             forces[0],
@@ -212,7 +201,3 @@ def _case(text: str, parts: dict[str, str]) -> ValveCase:
         for name, part in parts.items()
     )
     return read_valve_case(f"{text}parts:\n{kept}", Path("case.yaml"))
-
-
-def _run(case: ValveCase, duration: float) -> NetworkResult:
-    return simulate_network(case.network.network().rows(), duration=duration, record=1e-6)

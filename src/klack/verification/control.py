@@ -1,13 +1,11 @@
 """Controllers in the time loop against recursions that are exact for sampled and held outputs."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from math import exp, sqrt
 from typing import ClassVar
-from warnings import catch_warnings, simplefilter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.control.hysteresis import HysteresisController
 from klack.control.pid import PidController, Setpoint
@@ -17,29 +15,21 @@ from klack.magnetics.controlled_voltage import ControlledVoltage
 from klack.magnetics.driver import driver_of
 from klack.magnetics.flux_step import flux_rows
 from klack.mechanics.controlled_force import ControlledForce
-from klack.mechanics.rigid_mass import RigidMass
-from klack.mechanics.spring import Spring
-from klack.network.checks import LooseBodyWarning
 from klack.network.component import Component
-from klack.network.network import Network
 from klack.network.port import COIL, Port
 from klack.network.rows import GROUND, Rows
 from klack.simulation.network_result import NetworkResult
-from klack.simulation.network_run import simulate_network
-from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.benches import component, run_network
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.drivers import linear_coil
 
 __all__ = ["checks"]
 
-GROUP = "control"
 MASS, SAMPLE = 3e-3, 20e-6  # [kg], [s]
 RECURSION = "recursion of the sampled plant with a held output, exact, written apart"
 
 _RESISTANCE = 1.5
 _INDUCTANCE = 60.0**2 * (1.0 / 2e7 + 1.0 / 2e8)  # of the coil of klack.verification.drivers
-
-Vector = NDArray[np.float64]
-_check = partial(compare, GROUP)
 
 
 class _Coil(Component):
@@ -73,26 +63,33 @@ def checks() -> list[Check]:
 
 
 def _driven(driver: ControlledVoltage, duration: float) -> NetworkResult:
-    parts = {
-        "mass": RigidMass(mass=1.0),
-        "spring": Spring(stiffness=1.0, preload=0.0),
-        "coil": _Coil(),
-        "driver": driver,
-    }
-    ends = [["mass.body", "spring.end"], ["coil.terminals", "driver.terminals"]]
-    rows = Network(parts, ends).rows()
-    return simulate_network(rows, duration=duration, step=100e-9, record=SAMPLE, start="free")
+    return run_network(
+        {
+            "mass": component("rigid-mass", mass=1.0),
+            "spring": component("spring", stiffness=1.0, preload=0.0),
+            "coil": _Coil(),
+            "driver": driver,
+        },
+        [["mass.body", "spring.end"], ["coil.terminals", "driver.terminals"]],
+        duration=duration,
+        step=100e-9,
+        coarse=None,
+        record=SAMPLE,
+    )
 
 
 def _moved(force: ControlledForce, duration: float) -> NetworkResult:
-    parts = {"mass": RigidMass(mass=MASS), "force": force}
-    with catch_warnings():  # it flies freely, on purpose
-        simplefilter("ignore", LooseBodyWarning)
-        rows = Network(parts, [["mass.body", "force.end"]]).rows()
-    return simulate_network(rows, duration=duration, step=100e-9, record=SAMPLE, start="free")
+    return run_network(
+        {"mass": component("rigid-mass", mass=MASS), "force": force},
+        [["mass.body", "force.end"]],
+        duration=duration,
+        step=100e-9,
+        coarse=None,
+        record=SAMPLE,
+    )
 
 
-def _curve(time: Vector, known: Vector, found: Vector, label: str) -> ComparedCurve:
+def _curve(time: np.ndarray, known: np.ndarray, found: np.ndarray, label: str) -> ComparedCurve:
     return ComparedCurve(
         x_label="time [ms]",
         y_label=label,
@@ -133,7 +130,7 @@ def _current() -> list[Check]:
         own.append(own[-1] * decay + voltage / _RESISTANCE * (1.0 - decay))
     balanced = [abs(each.books.relative_residual) for each in (run, delayed)]
     return [
-        _check(
+        check(
             "PI control of a current, step response after 5 samples [A]",
             float(known[5]),
             float(found[5]),
@@ -141,14 +138,14 @@ def _current() -> list[Check]:
             "zero of the controller on the pole of the coil: 1 - 0.7^k",
             _curve(run.time, known, found, "current [A]"),
         ),
-        _check(
+        check(
             "PI control of a current, largest error of 50 samples over the setpoint [-]",
             0.0,
             float(np.abs(found - known).max() / 2.0),
             1e-5,
             "zero of the controller on the pole of the coil: 1 - 0.7^k",
         ),
-        _check(
+        check(
             "the same with a sensor 3 samples late, peak current [A]",
             max(own),
             float(current.max()),
@@ -156,8 +153,8 @@ def _current() -> list[Check]:
             RECURSION,
             _curve(delayed.time, np.array(own), current, "current [A]"),
         ),
-        _check("the same, current after 3 ms [A]", own[-1], float(current[-1]), 5e-13, RECURSION),
-        _check(
+        check("the same, current after 3 ms [A]", own[-1], float(current[-1]), 5e-13, RECURSION),
+        check(
             "energy residual of the controlled coil over throughput [-]",
             0.0,
             max(balanced),
@@ -182,7 +179,7 @@ def _hysteresis() -> list[Check]:
         ControlledVoltage(sample_time=SAMPLE).by(lambda t, s: 14.0 if t < 4e-4 else -60.0), 2e-3
     )
     return [
-        _check(
+        check(
             "hysteresis control of a current, mean over 4 ms [A]",
             float(np.mean(own)),
             float(np.mean(found)),
@@ -190,14 +187,14 @@ def _hysteresis() -> list[Check]:
             RECURSION,
             _curve(run.time, np.array(own), found, "current [A]"),
         ),
-        _check(
+        check(
             "hysteresis control of a current, largest overshoot of the band [A]",
             max(own) - 2.2,
             float(found.max()) - 2.2,
             1e-5,
             RECURSION,
         ),
-        _check(
+        check(
             "half bridge at -60 V, lowest current [A]",
             0.0,
             float(fallen.channels["coil current"].values.min()),
@@ -207,16 +204,14 @@ def _hysteresis() -> list[Check]:
     ]
 
 
-def _position() -> list[Check]:
+def _position() -> Iterator[Check]:
     lift = Sensor(channel="mass.body displacement", unit="um")
-    results = []
     shifted = Setpoint(time=(0.0, 1e-3, 1e-3), value=(0.0, 20.0, 80.0))
-    cases = (
+    for name, keys, tolerance in (
         ("PID control of a displacement", {"upper": 40.0}, 1e-13),
         ("the same at its limits", {"upper": 1.0}, 1e-13),
         ("the same without anti-windup", {"upper": 1.0, "anti_windup": False}, 1e-13),
-    )
-    for name, keys, tolerance in cases:
+    ):
         upper = float(keys["upper"])
         law = PidController(
             kind="pid",
@@ -234,29 +229,24 @@ def _position() -> list[Check]:
         run = _moved(force, 8e-3)
         found = run.channels["mass.body displacement"].values * 1e6
         own = _pid_motion(upper, bool(keys.get("anti_windup", True)), len(found))
-        results.append(
-            _check(
-                f"{name}, largest displacement [um]",
-                float(own.max()),
-                float(found.max()),
-                tolerance,
-                RECURSION,
-                _curve(run.time, own, found, "displacement [um]"),
-            )
+        yield check(
+            f"{name}, largest displacement [um]",
+            float(own.max()),
+            float(found.max()),
+            tolerance,
+            RECURSION,
+            _curve(run.time, own, found, "displacement [um]"),
         )
-        results.append(
-            _check(
-                f"{name}, displacement after 8 ms [um]",
-                float(own[-1]),
-                float(found[-1]),
-                tolerance,
-                RECURSION,
-            )
+        yield check(
+            f"{name}, displacement after 8 ms [um]",
+            float(own[-1]),
+            float(found[-1]),
+            tolerance,
+            RECURSION,
         )
-    return results
 
 
-def _pid_motion(most: float, waits: bool, count: int) -> Vector:
+def _pid_motion(most: float, waits: bool, count: int) -> np.ndarray:
     """Displacement [um] of the controlled mass at the samples, from the equations of the page."""
     place, speed, integral, slope, before = 0.0, 0.0, 0.0, 0.0, 0.0
     out = [0.0]
@@ -312,21 +302,21 @@ def _machine() -> list[Check]:
     by_user = _moved(ControlledForce(sample_time=SAMPLE).by(bang), 2e-3)
     truth = "constant accelerations, closed form"
     return [
-        _check(
+        check(
             "state machine, displacement of a mass pushed, braked and pushed [m]",
             place,
             float(run.channels["mass.body displacement"].values[-1]),
             1e-12,
             truth,
         ),
-        _check(
+        check(
             "state machine, speed of the mass after it [m/s]",
             left / MASS,
             float(run.channels["mass velocity"].values[-1]),
             5e-13,
             truth,
         ),
-        _check(
+        check(
             "a function of the user, the same displacement [m]",
             place,
             float(by_user.channels["mass.body displacement"].values[-1]),
@@ -346,7 +336,7 @@ def _sensors() -> list[Check]:
     late = Sensor(channel="x", unit="um", delay=7.4 * SAMPLE).begin()
     lag = np.array([late(t, 3e4 * t) for t in time[:200]])
     return [
-        _check(
+        check(
             "noise of a sensor, standard deviation of 20 000 samples [um]",
             0.3,
             float(signals.std()),
@@ -354,14 +344,14 @@ def _sensors() -> list[Check]:
             "normal distribution",
             reason="four standard deviations of the estimate are 2 %",
         ),
-        _check(
+        check(
             "quantisation of a sensor, rms error along a ramp [um]",
             0.25 / sqrt(12.0),
             float(np.sqrt(np.mean(error**2))),
             1e-3,
             "uniform distribution, q/sqrt(12)",
         ),
-        _check(
+        check(
             "sensor 7.4 samples late, signal of a ramp after 3 ms [um]",
             3e4 * (150 - 7.4) * SAMPLE,
             float(lag[150]),
@@ -382,20 +372,25 @@ def _in_parts() -> list[Check]:
         derivative_time=SAMPLE, derivative_filter=SAMPLE, lower=-20.0, upper=20.0,
     )  # fmt: skip
     parts = {
-        "mass": RigidMass(mass=MASS),
-        "spring": Spring(stiffness=1e4, preload=0.0),
+        "mass": component("rigid-mass", mass=MASS),
+        "spring": component("spring", stiffness=1e4, preload=0.0),
         "force": ControlledForce(sample_time=SAMPLE, sensors={"lift": sensor}, controller=law),
     }
-    rows = Network(parts, [["mass.body", "force.end", "spring.end"]]).rows()
-    run = partial(simulate_network, rows, start="free", step=100e-9, record=SAMPLE)
-    whole = run(duration=60 * SAMPLE)
+    run = partial(
+        run_network,
+        parts,
+        [["mass.body", "force.end", "spring.end"]],
+        step=100e-9,
+        coarse=None,
+        record=SAMPLE,
+    )
     first = run(duration=25 * SAMPLE)
     second = run(duration=35 * SAMPLE, state=first.state)
     name = "mass.body displacement"
     joined = np.concatenate((first.channels[name].values, second.channels[name].values[1:]))
-    differ = np.count_nonzero(joined != whole.channels[name].values)
+    differ = np.count_nonzero(joined != run(duration=60 * SAMPLE).channels[name].values)
     return [
-        _check(
+        check(
             "run with a PID controller stored and continued, numbers that differ",
             0.0,
             float(differ),

@@ -1,30 +1,168 @@
 """Checks of coils in time: switching, eddy currents, energy, motion, order."""
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from math import exp, log, pi
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import expm
 from scipy.special import jn_zeros
 
+from klack.compiling.jit import njit
+from klack.errors import ConvergenceError
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.eddy import cylinder_ladder
 from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.flux_step import FAILURES, flux_numbers, flux_state, magnet_step
 from klack.magnetics.iron import VACUUM_PERMEABILITY, froehlich
-from klack.magnetics.peak_hold import PeakHold
-from klack.magnetics.pwm import PulseWidth
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.static import static_state
-from klack.magnetics.two_point import TwoPoint
-from klack.magnetics.voltage_step import VoltageStep
-from klack.magnetics.voltage_table import VoltageTable
-from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.coupled_coils import coupled_coils
-from klack.verification.single_coil import run_coil
+from klack.network.step_function import address_of, call, first
+from klack.verification.benches import component
+from klack.verification.check import Check, ComparedCurve, check
+from klack.verification.coils_in_networks import coupled_coils
 
-__all__ = ["checks", "injector", "linear_coil", "opening"]
+__all__ = ["CoilRun", "checks", "injector", "linear_coil", "opening", "run_coil"]
 
-GROUP = "drivers"
+
+_FRONT = 8
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CoilRun:
+    """A run of one coil.
+
+    Parameters
+    ----------
+    time : array, shape (n + 1,) [s]
+        Ends of the steps, from 0.
+    current, flux : array, shape (n + 1,) [A], [Wb]
+        At those ends; flux of the main branch (linkage of a map).
+    voltage, force : array, shape (n,) [V], [N]
+        Means over the steps; the force on the armature along +z.
+    state : array, shape (n + 1,)
+        Number of the driver's state.
+    fluxes : array, shape (n + 1, loops) [Wb]
+    electric, ohmic, eddy, hysteresis, work : float [J]
+        Supply, losses, and work done on the armature.
+    residual : float [-]
+        Energy that does not balance, over the largest amount, that at the end of any step included.
+    """
+
+    time: np.ndarray
+    current: np.ndarray
+    flux: np.ndarray
+    voltage: np.ndarray
+    force: np.ndarray
+    state: np.ndarray
+    fluxes: np.ndarray
+    electric: float
+    ohmic: float
+    eddy: float
+    hysteresis: float
+    work: float
+    residual: float
+
+    def switches(self) -> np.ndarray:
+        """Ends of the steps in which the driver changed its state [s]."""
+        return self.time[1:][np.diff(self.state) != 0]
+
+
+@njit
+def _march(
+    address: int,
+    par: np.ndarray,
+    state: np.ndarray,
+    y: np.ndarray,
+    h: float,
+    log: np.ndarray,
+    sums: np.ndarray,
+) -> int:
+    size, steps = state.size - 1, y.size - 1
+    inp, out = np.zeros(6), np.zeros(2 + state.size + 5)
+    for k in range(-1, steps):
+        inp[0], inp[1] = max(k, 0) * h, h if k >= 0 else 0.0
+        inp[2], inp[3] = y[max(k, 0)], y[k + 1]
+        status = call(address, first(par), first(state), first(inp), first(out))
+        if status != 0:
+            return int(status)
+        for j in range(size):
+            state[j] = out[2 + j]
+        log[k + 1, 0] = out[0]
+        log[k + 1, 1:] = state[:size]
+        if k >= 0:
+            sums[0] += out[2 + size]
+            sums[1] += out[3 + size]
+            sums[2] += out[4 + size]
+            sums[3] += out[0] * (inp[3] - inp[2])
+        else:
+            sums[4] = out[5 + size]
+        sums[5] = out[5 + size]
+        if k >= 0:
+            sums[7] += out[6 + size]
+        sums[6] = max(sums[6], out[5 + size])
+    return 0
+
+
+def run_coil(
+    plant: MagneticCircuit | FluxMap,
+    driver: DriveProgram,
+    *,
+    resistance: float,
+    gap: float,
+    step: float,
+    lift: ArrayLike,
+    fluxes: ArrayLike = (),
+) -> CoilRun:
+    """Run a coil while its armature follows a course.
+
+    Parameters
+    ----------
+    plant : MagneticCircuit or FluxMap
+    driver : DriveProgram
+    resistance : float [ohm]
+    gap : float [m]
+        At lift zero; the lift closes it.
+    step : float [s]
+    lift : array, shape (n + 1,) [m]
+        At the ends of the steps; straight between.
+    fluxes : array [Wb]
+        Loop fluxes at the start.
+
+    Raises
+    ------
+    ConvergenceError
+        If a step fails.
+    """
+    y = np.array(lift, dtype=float)
+    par = flux_numbers(plant, resistance=resistance, driver=driver, gap=gap)
+    start = flux_state(par, fluxes)
+    log, sums = np.zeros((y.size, 1 + start.size)), np.zeros(8)
+    status = _march(address_of(magnet_step), par, np.append(start, 0.0), y, step, log, sums)
+    if status != 0:
+        raise ConvergenceError(f"coil: {FAILURES[status]}.")
+    loops = 1 if isinstance(plant, FluxMap) else plant.loops.shape[1]
+    parts = [sums[0], -sums[1], -sums[2], -sums[3], sums[4], -sums[7], -sums[5]]
+    largest = max(float(sums[6]), *(abs(part) for part in parts))
+    return CoilRun(
+        time=np.asarray(step * np.arange(y.size), dtype=float),
+        current=log[:, 5],
+        flux=log[:, 7],
+        voltage=log[1:, 6],
+        force=log[1:, 0],
+        state=log[:, 1],
+        fluxes=log[:, 1 + _FRONT : 1 + _FRONT + loops],
+        electric=sums[0],
+        ohmic=sums[1],
+        eddy=sums[2],
+        hysteresis=sums[7],
+        work=sums[3],
+        residual=abs(sum(parts)) / largest if largest else 0.0,
+    )
+
+
 IDENTITY = "discrete gradient (Gonzalez 1996): energy identity at every step size"
 
 _MU0 = VACUUM_PERMEABILITY
@@ -33,7 +171,8 @@ _MAIN, _LEAK = 2e7, 2e8  # [A/Wb]
 _GAP = 100e-6
 _INDUCTANCE = _TURNS**2 * (1.0 / _MAIN + 1.0 / _LEAK)
 _SHORT = 1e-14  # [ohm] a coil that only integrates its voltage
-_INJECTOR = PeakHold(
+_INJECTOR = component(
+    "peak-hold",
     boost_voltage=65.0,
     peak_current=10.0,
     supply_voltage=14.0,
@@ -77,12 +216,15 @@ def injector(eddy: float = 1250.0) -> MagneticCircuit:
     area = 12e-6
     gaps = np.linspace(-20e-6 + 1e-7, 300e-6, 41)
     gap = GapReluctance(gaps, 2.0 * (gaps + 20e-6) / (_MU0 * area), np.full(41, 2 / (_MU0 * area)))
-    leak = LinearReluctance(10.0 * 2.0 * _GAP / (_MU0 * area))
     return MagneticCircuit(
         branches=(
             MagneticBranch(name="gap", law=gap, turns=_TURNS, eddy=eddy),
             MagneticBranch(name="iron", law=froehlich(1.5, 1500.0).law(60e-3, area)),
-            MagneticBranch(name="leakage", law=leak, turns=_TURNS),
+            MagneticBranch(
+                name="leakage",
+                law=LinearReluctance(10.0 * 2.0 * _GAP / (_MU0 * area)),
+                turns=_TURNS,
+            ),
         ),
         loops=np.array([[1, 0], [1, 0], [0, 1]]),
         main="gap",
@@ -105,7 +247,7 @@ def _current_curve(time: np.ndarray, exact: np.ndarray, found: np.ndarray) -> Co
 
 
 def _program(voltage: float, **more: float) -> DriveProgram:
-    return VoltageStep(voltage=voltage, **more).program()
+    return component("voltage-step", voltage=voltage, **more).program()
 
 
 def _linear() -> list[Check]:
@@ -124,19 +266,17 @@ def _linear() -> list[Check]:
         lift=np.zeros(15001),
     )
     top = 12.0 * (1.0 - exp(-200e-6 / tau))
-    stop = 200e-6 + tau * log(1.0 + top / 40.0)
     k = int(np.flatnonzero((down.time > 200e-6) & (down.current == 0.0))[0])
     # the last piece of current: a straight line to zero
     slope = (down.current[k - 2] - down.current[k - 1]) / 20e-9
-    found = float(down.time[k - 1] + down.current[k - 1] / slope)
-    pulse = VoltageTable(time=(1e-6, 4e-6, 4e-6, 9.3e-6), voltage=(0.0, 30.0, -6.0, 0.0)).program()
+    pulse = component(
+        "voltage-table", time=(1e-6, 4e-6, 4e-6, 9.3e-6), voltage=(0.0, 30.0, -6.0, 0.0)
+    ).program()
     jumps = run_coil(
         linear_coil(), pulse, resistance=_SHORT, gap=_GAP, step=1.7e-6, lift=np.zeros(8)
     )
-    linkage = float(jumps.fluxes[-1].sum()) * _TURNS
     return [
-        compare(
-            GROUP,
+        check(
             "current of a coil of constant inductance, largest deviation [A]",
             expected=0.0,
             computed=float(np.max(np.abs(rise.current - exact))),
@@ -144,19 +284,17 @@ def _linear() -> list[Check]:
             source="i = u/R (1 - exp(-R t/L)); 12 A, 20 ns",
             curve=_current_curve(rise.time, exact, rise.current),
         ),
-        compare(
-            GROUP,
+        check(
             "end of the current against 40 V, then the diode blocks [s]",
-            expected=stop,
-            computed=found,
+            expected=200e-6 + tau * log(1.0 + top / 40.0),
+            computed=float(down.time[k - 1] + down.current[k - 1] / slope),
             tolerance=1e-7,
             source="t = (L/R) ln(1 + R i/u) after switching off",
         ),
-        compare(
-            GROUP,
+        check(
             "linkage after ramps and jumps of voltage inside steps [Wb]",
             expected=0.5 * 3e-6 * 30.0 - 0.5 * 5.3e-6 * 6.0,
-            computed=linkage,
+            computed=float(jumps.fluxes[-1].sum()) * _TURNS,
             tolerance=5e-14,
             source="Faraday: linkage = integral of the voltage; 1.7 us steps",
         ),
@@ -165,7 +303,7 @@ def _linear() -> list[Check]:
 
 def _switching() -> list[Check]:
     """Without resistance the current is a saw of straight lines, so instants must be exact."""
-    driver = TwoPoint(voltage=12.0, upper=3.0, lower=2.0, freewheel=6.0).program()
+    driver = component("two-point", voltage=12.0, upper=3.0, lower=2.0, freewheel=6.0).program()
     coil = linear_coil()
     saw = run_coil(coil, driver, resistance=_SHORT, gap=_GAP, step=1e-6, lift=np.zeros(2001))
     first, up, down = 3.0 * _INDUCTANCE / 12.0, _INDUCTANCE / 12.0, _INDUCTANCE / 6.0
@@ -180,13 +318,11 @@ def _switching() -> list[Check]:
     settled = (peak.time > fall) & (peak.time < fall + 5e-6)
     line = 10.0 - 0.7 / _INDUCTANCE * (peak.time[settled] - fall)
 
-    pwm = PulseWidth(voltage=12.0, period=50e-6, duty=0.3, freewheel=0.0).program()
+    pwm = component("pwm", voltage=12.0, period=50e-6, duty=0.3, freewheel=0.0).program()
     ripple = run_coil(coil, pwm, resistance=1.0, gap=_GAP, step=0.1e-6, lift=np.zeros(40001))
     tau = _INDUCTANCE / 1.0
-    most = 12.0 * (1.0 - exp(-15e-6 / tau)) / (1.0 - exp(-50e-6 / tau))
     return [
-        compare(
-            GROUP,
+        check(
             "two-point control after 80 switchings, largest deviation [A]",
             expected=0.0,
             computed=float(np.max(np.abs(saw.current - exact))),
@@ -194,18 +330,16 @@ def _switching() -> list[Check]:
             source="R = 0: straight lines between 2 and 3 A; 1 us steps, instants located in them",
             curve=_current_curve(saw.time, exact, saw.current),
         ),
-        compare(
-            GROUP,
+        check(
             "peak and hold: current after the peak, largest deviation [A]",
             expected=0.0,
             computed=float(np.max(np.abs(peak.current[settled] - line))),
             tolerance=5e-13,
             source="R = 0: rise by 65 V to 10 A, then a line by -0.7 V",
         ),
-        compare(
-            GROUP,
+        check(
             "upper current of settled pulse-width modulation [A]",
-            expected=most,
+            expected=12.0 * (1.0 - exp(-15e-6 / tau)) / (1.0 - exp(-50e-6 / tau)),
             computed=float(ripple.current[-600:].max()),
             tolerance=5e-9,
             source="u/R (1 - exp(-d T/tau))/(1 - exp(-T/tau)); 50 us, duty 0.3",
@@ -232,21 +366,18 @@ def _eddy() -> list[Check]:
         lift=np.zeros(3001),
     )
     k = int(np.flatnonzero((after.time > 101e-6) & (after.current == 0.0))[0]) + 1
-    decay = log(after.flux[k] / after.flux[-1]) / (after.time[-1] - after.time[k])
     return [
-        compare(
-            GROUP,
+        check(
             "main flux behind a shorted turn after 0.2 ms [Wb]",
             expected=float(exact[0]),
             computed=float(run.flux[-1]),
             tolerance=1e-8,
             source="matrix exponential of the two fluxes",
         ),
-        compare(
-            GROUP,
+        check(
             "decay of the flux in the open coil [1/s]",
             expected=_MAIN / S,
-            computed=decay,
+            computed=log(after.flux[k] / after.flux[-1]) / (after.time[-1] - after.time[k]),
             tolerance=1e-6,
             source="S dflux/dt + R flux = 0",
         ),
@@ -254,40 +385,31 @@ def _eddy() -> list[Check]:
     ]
 
 
-def _core() -> list[Check]:
+def _core() -> Iterator[Check]:
     """Flux into a solid round core after a step of the mmf."""
     core = {"conductivity": 2e6, "length": 20e-3, "radius": 2e-3, "permeability": 1000.0}
     tau = _MU0 * 1000.0 * 2e6 * 2e-3**2
     reluctance = 20e-3 / (_MU0 * 1000.0 * pi * 2e-3**2)
     b = jn_zeros(0, 400)
-    out = []
     for terms, tolerance in ((3, 1e-2), (4, 1e-3)):
         ladder = cylinder_ladder(**core, terms=terms)
         branches = [MagneticBranch(name="core", law=LinearReluctance(reluctance), turns=1.0)]
-        rows = [[1] + [0] * terms]
+        loops = np.zeros((2 * terms + 1, terms + 1), dtype=np.int64)
+        loops[[0, -1], [0, -1]] = 1
         for k in range(terms):
-            row = [0] * (terms + 1)
-            row[0 if k == 0 else k] = 1
-            if k + 1 < terms:
-                row[k + 1] = -1
             law = LinearReluctance(0.0)
             branches.append(MagneticBranch(name=f"e{k}", law=law, eddy=ladder.conductances[k]))
-            rows.append(row)
+            loops[1 + 2 * k, k] = 1
             if k + 1 < terms:
-                row = [0] * (terms + 1)
-                row[k + 1] = 1
                 law = LinearReluctance(ladder.reluctances[k])
                 branches.append(MagneticBranch(name=f"r{k}", law=law))
-                rows.append(row)
-        row = [0] * (terms + 1)
-        row[-1] = 1
-        leak = LinearReluctance(1e6 * reluctance)
-        branches.append(MagneticBranch(name="leakage", law=leak, turns=1.0))
-        rows.append(row)
-        circuit = MagneticCircuit(branches=tuple(branches), loops=np.array(rows), main="core")
+                loops[[1 + 2 * k, 2 + 2 * k], k + 1] = -1, 1
+        branches.append(
+            MagneticBranch(name="leakage", law=LinearReluctance(1e6 * reluctance), turns=1.0)
+        )
         # a source of current: 1 MV behind 1 Mohm
         run = run_coil(
-            circuit,
+            MagneticCircuit(branches=tuple(branches), loops=loops, main="core"),
             _program(1e6),
             resistance=1e6,
             gap=_GAP,
@@ -298,39 +420,32 @@ def _core() -> list[Check]:
         share = np.interp(time * tau, run.time, run.flux * reluctance)
         exact = 1.0 - 4.0 * np.sum(np.exp(-(b**2) * time[:, None]) / b**2, axis=1)
         axis = np.linspace(0.002, 0.2, 100)
-        curve = ComparedCurve(
-            x_label="time over tau [-]",
-            y_label="flux over final flux [-]",
-            expected=(axis, 1.0 - 4.0 * np.sum(np.exp(-np.outer(axis, b**2)) / b**2, axis=1)),
-            computed=(axis, np.interp(axis * tau, run.time, run.flux * reluctance)),
+        yield check(
+            f"flux into a solid core after a step, ladder of {terms}, largest deviation [-]",
+            expected=0.0,
+            computed=float(np.max(np.abs(share - exact))),
+            tolerance=tolerance,
+            source="1 - 4 sum exp(-b_n^2 t/tau)/b_n^2, J0(b_n) = 0; t = 0.05 to 0.2 tau",
+            curve=ComparedCurve(
+                x_label="time over tau [-]",
+                y_label="flux over final flux [-]",
+                expected=(axis, 1.0 - 4.0 * np.sum(np.exp(-np.outer(axis, b**2)) / b**2, axis=1)),
+                computed=(axis, np.interp(axis * tau, run.time, run.flux * reluctance)),
+            ),
         )
-        out.append(
-            compare(
-                GROUP,
-                f"flux into a solid core after a step, ladder of {terms}, largest deviation [-]",
-                expected=0.0,
-                computed=float(np.max(np.abs(share - exact))),
-                tolerance=tolerance,
-                source="1 - 4 sum exp(-b_n^2 t/tau)/b_n^2, J0(b_n) = 0; t = 0.05 to 0.2 tau",
-                curve=curve,
-            )
-        )
-    return out
 
 
 def _motion() -> list[Check]:
     """A shorted coil without resistance keeps its linkage while the armature moves."""
     circuit = injector(eddy=0.0)
     start = static_state(circuit, current=4.0, gap=_GAP)
-    lift = np.linspace(0.0, 60e-6, 301)
-    short = VoltageTable(time=(0.0,), voltage=(0.0,)).program()
     run = run_coil(
         circuit,
-        short,
+        component("voltage-table", time=(0.0,), voltage=(0.0,)).program(),
         resistance=_SHORT,
         gap=_GAP,
         step=1e-6,
-        lift=lift,
+        lift=np.linspace(0.0, 60e-6, 301),
         fluxes=start.loop_fluxes,
     )
     end = static_state(circuit, current=float(run.current[-1]), gap=_GAP - 60e-6)
@@ -345,16 +460,14 @@ def _motion() -> list[Check]:
     )
     rest = static_state(injector(), current=5.0, gap=_GAP - 40e-6)
     return [
-        compare(
-            GROUP,
+        check(
             "linkage of a shorted coil without resistance after motion [Wb]",
             expected=start.linkage,
             computed=end.linkage,
             tolerance=1e-12,
             source="u = 0 = d(linkage)/dt; end current looked up in the static circuit",
         ),
-        compare(
-            GROUP,
+        check(
             "force of a settled current [N]",
             expected=-rest.force,
             computed=float(held.force[-1]),
@@ -364,14 +477,12 @@ def _motion() -> list[Check]:
     ]
 
 
-def _energy() -> list[Check]:
-    cases = (
+def _energy() -> Iterator[Check]:
+    for name, circuit, step, tolerance in (
         ("peak and hold, opening and closing, 20 ns", injector(), 20e-9, 1e-12),
         ("the same at 1 us", injector(), 1e-6, 1e-13),
         ("the same without eddy currents", injector(0.0), 50e-9, 5e-13),
-    )
-    out = []
-    for name, circuit, step, tolerance in cases:
+    ):
         run = run_coil(
             circuit,
             _INJECTOR.program(),
@@ -380,17 +491,13 @@ def _energy() -> list[Check]:
             step=step,
             lift=opening(1e-3, step),
         )
-        out.append(
-            compare(
-                GROUP,
-                f"energy residual, {name} [-]",
-                expected=0.0,
-                computed=run.residual,
-                tolerance=tolerance,
-                source=IDENTITY,
-            )
+        yield check(
+            f"energy residual, {name} [-]",
+            expected=0.0,
+            computed=run.residual,
+            tolerance=tolerance,
+            source=IDENTITY,
         )
-    return out
 
 
 def _long_steps() -> list[Check]:
@@ -410,8 +517,7 @@ def _long_steps() -> list[Check]:
 
     exact = flux(160000)
     return [
-        compare(
-            GROUP,
+        check(
             f"flux after a pulse in steps of {200e3 / steps:.0f} ns, switchings inside steps [Wb]",
             expected=exact,
             computed=flux(steps),
@@ -440,26 +546,22 @@ def _map() -> list[Check]:
         )
         for plant in (circuit, table)
     ]
-    difference = np.max(np.abs(runs[1].force - runs[0].force)) / np.max(runs[0].force)
     return [
-        compare(
-            GROUP,
+        check(
             "energy residual of a coil known by a map [-]",
             expected=0.0,
             computed=runs[1].residual,
             tolerance=5e-14,
             source=IDENTITY,
         ),
-        compare(
-            GROUP,
+        check(
             "force by map and by circuit, largest difference over the peak [-]",
             expected=0.0,
-            computed=float(difference),
+            computed=float(np.max(np.abs(runs[1].force - runs[0].force)) / np.max(runs[0].force)),
             tolerance=1e-3,
             source="the circuit itself; 57 currents and 45 gaps",
         ),
-        compare(
-            GROUP,
+        check(
             "work of the map over a closed course of the armature [J]",
             expected=runs[0].work,
             computed=runs[1].work,

@@ -1,25 +1,26 @@
-"""Finite elements against exact elasticity: vibration, bending, thick cylinder, rods, beam."""
+"""Finite elements against exact elasticity: vibration, bending, tubes, rods, Fourier orders."""
 
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.sparse import csr_array, eye_array, kron
 
+from klack.elasticity.assembly import assemble, assemble_order
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import eigenmodes, rigid_frequencies
 from klack.elasticity.factorization import available_backends
-from klack.elasticity.loads import traction_load
+from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.elasticity.loads import order_load, traction_load
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 from klack.mesh.mesh import Mesh
-from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.fourier_orders import fourier_checks
-from klack.verification.lattice import lattice_mesh
+from klack.verification.check import Check, ComparedCurve, check
+from klack.verification.lattice import STEEL, lattice_mesh
 
-__all__ = ["checks"]
+__all__ = ["checks", "free_bar_frequencies"]
 
-_GROUP = "elasticity"
-_STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
+
 _BAR = Material(name="bar", young=210e9, poisson=0.0, density=7850.0)
 _RADIUS, _LENGTH = 2e-3, 30e-3
 
@@ -51,8 +52,11 @@ def checks() -> list[Check]:
 
 
 def _axisymmetric_cylinder() -> Iterator[Check]:
-    lines = [np.linspace(0.0, _RADIUS, 7), np.linspace(0.0, _LENGTH, 91)]
-    body = elastic_body("cylinder", lattice_mesh("quad8", lines), {"solid": _STEEL})
+    body = elastic_body(
+        "cylinder",
+        lattice_mesh("quad8", [np.linspace(0.0, _RADIUS, 7), np.linspace(0.0, _LENGTH, 91)]),
+        {"solid": STEEL},
+    )
     frequency = eigenmodes(body, count=max(_AXIAL)).frequency
     numbers = np.array(list(_AXIAL))
     curve = ComparedCurve(
@@ -62,8 +66,7 @@ def _axisymmetric_cylinder() -> Iterator[Check]:
         computed=(numbers, frequency[numbers - 1] / 1e3),
     )
     for number, exact in _AXIAL.items():
-        yield compare(
-            _GROUP,
+        yield check(
             f"free cylinder, axisymmetric mode {number}, quad8 6 x 90 [Hz]",
             expected=exact,
             computed=frequency[number - 1],
@@ -74,20 +77,18 @@ def _axisymmetric_cylinder() -> Iterator[Check]:
 
 
 def _solid_cylinder() -> Iterator[Check]:
-    body = elastic_body("cylinder", _round_bar("hex20"), {"solid": _STEEL})
+    body = elastic_body("cylinder", _round_bar("hex20"), {"solid": STEEL})
     frequency = eigenmodes(body, count=8).frequency
     for number, exact in _BENDING.items():
         pair = np.sort(frequency[np.argsort(np.abs(frequency / exact - 1))[:2]])
-        yield compare(
-            _GROUP,
+        yield check(
             f"free cylinder, bending mode {number}, hex20 4 x 4 x 16 [Hz]",
             expected=exact,
             computed=float(pair.mean()),
             tolerance=1e-3,
             source=_RITZ,
         )
-    yield compare(
-        _GROUP,
+    yield check(
         "free cylinder, highest of the six rigid modes [Hz]",
         expected=0.0,
         computed=float(rigid_frequencies(body).max()),
@@ -99,7 +100,7 @@ def _solid_cylinder() -> Iterator[Check]:
 def _round_bar(family: str) -> Mesh:
     """Square bar 4 x 4 x 16 whose cross section is mapped onto the disc."""
 
-    def rounded(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def rounded(points: np.ndarray) -> np.ndarray:
         x, y, z = points.T
         return np.stack([x * np.sqrt(1 - y**2 / 2), y * np.sqrt(1 - x**2 / 2), z], axis=1) * (
             _RADIUS,
@@ -113,16 +114,15 @@ def _round_bar(family: str) -> Mesh:
 
 def _thick_cylinder() -> Iterator[Check]:
     inner, outer, pressure = 1e-3, 3e-3, 100e6
-    lines = [np.geomspace(inner, outer, 13), np.linspace(0.0, 2e-3, 3)]
-    mesh = lattice_mesh("quad8", lines)
-    body = elastic_body("tube", mesh, {"solid": _STEEL})
+    mesh = lattice_mesh("quad8", [np.geomspace(inner, outer, 13), np.linspace(0.0, 2e-3, 3)])
+    body = elastic_body("tube", mesh, {"solid": STEEL})
     load = traction_load(mesh, mesh.surface("inner"), lambda x, n: -pressure * n)
     with Flexibility(body) as flexibility:
         u = flexibility.solve(load)[0::2]
-    scale = pressure * inner**2 / (_STEEL.young * (outer**2 - inner**2))
+    scale = pressure * inner**2 / (STEEL.young * (outer**2 - inner**2))
 
-    def lame(r: NDArray[np.float64]) -> NDArray[np.float64]:
-        return scale * ((1 - _STEEL.poisson) * r + (1 + _STEEL.poisson) * outer**2 / r)
+    def lame(r: np.ndarray) -> np.ndarray:
+        return scale * ((1 - STEEL.poisson) * r + (1 + STEEL.poisson) * outer**2 / r)
 
     nodes = mesh.surface("bottom").nodes
     nodes = nodes[np.argsort(mesh.points[nodes, 0])]
@@ -134,8 +134,7 @@ def _thick_cylinder() -> Iterator[Check]:
         computed=(wall * 1e3, u[nodes] * 1e6),
     )
     for name, r in (("inner", inner), ("outer", outer)):
-        yield compare(
-            _GROUP,
+        yield check(
             f"open tube under 100 MPa inside, radial displacement of the {name} wall [m]",
             expected=float(lame(np.array(r))),
             computed=float(u[mesh.surface(name).nodes].mean()),
@@ -147,8 +146,7 @@ def _thick_cylinder() -> Iterator[Check]:
 
 def _free_rod() -> Iterator[Check]:
     radius = 0.3e-3
-    lines = [np.array([0.0, radius]), np.linspace(0.0, _LENGTH, 81)]
-    mesh = lattice_mesh("quad8", lines)
+    mesh = lattice_mesh("quad8", [np.array([0.0, radius]), np.linspace(0.0, _LENGTH, 81)])
     body = elastic_body("rod", mesh, {"solid": _BAR})
     area = np.pi * radius**2
     unit = traction_load(mesh, mesh.surface("top"), lambda x, n: n / area)
@@ -156,8 +154,7 @@ def _free_rod() -> Iterator[Check]:
     with Flexibility(body) as flexibility:
         static = float(unit @ flexibility.solve(unit))
         modes = eigenmodes(body, count=max(_RESIDUAL), flexibility=flexibility)
-    yield compare(
-        _GROUP,
+    yield check(
         "free-free rod, elastic static compliance of its end [L/(E A)]",
         expected=1 / 3,
         computed=static * spring,
@@ -174,8 +171,7 @@ def _free_rod() -> Iterator[Check]:
         y_log=True,
     )
     for count, exact in _RESIDUAL.items():
-        yield compare(
-            _GROUP,
+        yield check(
             f"free-free rod, compliance of its end that {count} modes miss [L/(E A)]",
             expected=exact,
             computed=(static - float(carried[count - 1])) * spring,
@@ -199,8 +195,7 @@ def _bent_beam() -> Iterator[Check]:
         with Flexibility(body) as flexibility:
             u = flexibility.solve(load).reshape(-1, 3)
         middle = np.argmin(np.linalg.norm(mesh.points - (0.0, 0.0, length), axis=1))
-        yield compare(
-            _GROUP,
+        yield check(
             f"beam in pure bending, deflection of its end, {family} [m]",
             expected=-curvature * length**2 / 2,
             computed=float(u[middle, 0]),
@@ -213,14 +208,13 @@ def _bent_beam() -> Iterator[Check]:
 def _solvers() -> Iterator[Check]:
     across, along = np.linspace(0.0, 1e-3, 4), np.linspace(0.0, 3e-3, 8)
     mesh = lattice_mesh("tet10", [across, across, along])
-    body = elastic_body("block", mesh, {"solid": _STEEL}, fixed_nodes=mesh.surface("bottom").nodes)
+    body = elastic_body("block", mesh, {"solid": STEEL}, fixed_nodes=mesh.surface("bottom").nodes)
     load = traction_load(mesh, mesh.surface("top"), lambda x, n: 1e6 * n)
     answers = {name: _answer(body, load, name) for name in available_backends()}
     reference = answers["superlu"]
     for name, answer in answers.items():
         if name != "superlu":
-            yield compare(
-                _GROUP,
+            yield check(
                 f"direct solver {name} against superlu, largest difference of displacement",
                 expected=0.0,
                 computed=float(np.abs(answer - reference).max() / np.abs(reference).max()),
@@ -229,6 +223,178 @@ def _solvers() -> Iterator[Check]:
             )
 
 
-def _answer(body: ElasticBody, load: NDArray[np.float64], backend: str) -> NDArray[np.float64]:
+def _answer(body: ElasticBody, load: np.ndarray, backend: str) -> np.ndarray:
     with Flexibility(body, backend=backend) as flexibility:  # type: ignore[arg-type]
         return flexibility.solve(load)
+
+
+_RITZ_ORDER = (
+    "exact 3-D elasticity by Ritz (Legendre in z, regular polynomials in r), converged to 1e-7; "
+    "free steel cylinder D4 x L30 mm, E = 210 GPa, nu = 0.3, rho = 7850 kg/m^3"
+)
+_BENDING_ORDER = {1: 19587.12, 2: 50362.64, 4: 137162.74, 8: 343817.26, 16: 564352.88}
+"""Circumferential order 1: number of the mode -> frequency [Hz]."""
+_BENDING_TOLERANCE = {1: 2e-6, 2: 4e-6, 4: 1e-5, 8: 5e-5, 16: 1e-4}
+"""Error of the mesh."""
+_OVAL = 543997.25
+"""Circumferential order 2, mode 1 [Hz]."""
+
+
+def fourier_checks() -> Iterator[Check]:
+    """Bending, order 2, torsion, statics, and the axisymmetric body as order 0."""
+    mesh = _cylinder(_RADIUS, _LENGTH, 6, 90)
+    yield from _bending(_body(mesh, 1))
+    yield from _other_orders(mesh)
+    yield from _order_zero(mesh)
+    yield from _pure_bending()
+    yield from _slender()
+
+
+def _cylinder(radius: float, length: float, across: int, along: int) -> Mesh:
+    return lattice_mesh(
+        "quad8", [np.linspace(0.0, radius, across + 1), np.linspace(0.0, length, along + 1)]
+    )
+
+
+def _body(mesh: Mesh, order: int) -> FourierBody:
+    return fourier_body("cylinder", mesh, {"solid": STEEL}, order=order)
+
+
+def _bending(body: FourierBody) -> Iterator[Check]:
+    frequency = eigenmodes(body, count=max(_BENDING_ORDER)).frequency
+    numbers = np.array(list(_BENDING_ORDER))
+    curve = ComparedCurve(
+        x_label="number of the bending mode [-]",
+        y_label="frequency [kHz]",
+        expected=(numbers, np.array(list(_BENDING_ORDER.values())) / 1e3),
+        computed=(np.arange(1.0, len(frequency) + 1.0), frequency / 1e3),
+    )
+    for number, exact in _BENDING_ORDER.items():
+        yield check(
+            f"free cylinder in Fourier order 1, bending mode {number}, quad8 6 x 90 [Hz]",
+            expected=exact,
+            computed=float(frequency[number - 1]),
+            tolerance=_BENDING_TOLERANCE[number],
+            source=_RITZ_ORDER,
+            curve=curve,
+        )
+    yield check(
+        "free cylinder in order 1, higher of the two rigid modes [Hz]",
+        expected=0.0,
+        computed=float(rigid_frequencies(body).max()),
+        tolerance=0.1,
+        source="a shift and a rotation have the frequency zero",
+    )
+
+
+def _other_orders(mesh: Mesh) -> Iterator[Check]:
+    yield check(
+        "free cylinder in Fourier order 2, mode 1, quad8 6 x 90 [Hz]",
+        expected=_OVAL,
+        computed=float(eigenmodes(_body(mesh, 2), count=1).frequency[0]),
+        tolerance=1e-4,
+        source=_RITZ_ORDER,
+    )
+    yield check(
+        "free cylinder in order 0, torsion mode 1, quad8 6 x 90 [Hz]",
+        expected=float(np.sqrt(STEEL.shear_modulus / STEEL.density) / (2 * _LENGTH)),
+        computed=float(eigenmodes(_body(mesh, 0), count=1).frequency[0]),
+        tolerance=5e-9,
+        source="sqrt(G / rho) / (2 L)",
+    )
+
+
+def _order_zero(mesh: Mesh) -> Iterator[Check]:
+    materials = {"solid": STEEL}
+    K, M = assemble_order(mesh, materials, 0)
+    # U = a + b and V = b - a = 0
+    node = np.array([[0.5, 0.0], [0.5, 0.0], [0.0, 1.0]])
+    axial = csr_array(kron(eye_array(mesh.node_count), node))
+    for name, found, expected in zip(
+        ("stiffness", "mass"), (K, M), assemble(mesh, materials), strict=True
+    ):
+        yield check(
+            f"order 0 without torsion against the axisymmetric {name}, largest difference",
+            expected=0.0,
+            computed=float(abs(axial.T @ found @ axial - expected).max() / abs(expected).max()),
+            tolerance=1e-14,
+            source="the same integrals",
+        )
+
+
+def _pure_bending() -> Iterator[Check]:
+    """End moments on a free cylinder: quadratic elements have the field."""
+    mesh = _cylinder(_RADIUS, _LENGTH, 2, 6)
+    body = _body(mesh, 1)
+    inertia = np.pi * _RADIUS**4 / 4
+
+    def unit_moment(x: np.ndarray, n: np.ndarray) -> np.ndarray:
+        return x[:, :1] / inertia * n[:, 1:] * [0.0, 0.0, 1.0]
+
+    load = order_load(mesh, mesh.surface("bottom"), unit_moment, 1)
+    load = load + order_load(mesh, mesh.surface("top"), unit_moment, 1)
+    with Flexibility(body) as flexibility:
+        angle = float(load @ flexibility.solve(load))
+    yield check(
+        "free cylinder between end moments, order 1: angle of its ends [L/(E I)]",
+        expected=1.0,
+        computed=angle * STEEL.young * inertia / _LENGTH,
+        tolerance=5e-11,
+        source="Saint-Venant, pure bending of a bar: M L/(E I), for any Poisson's ratio",
+    )
+
+
+def _slender() -> Iterator[Check]:
+    radius, length = 1e-3, 60e-3
+    frequency = eigenmodes(_body(_cylinder(radius, length, 3, 240), 1), count=2).frequency
+    _, timoshenko = free_bar_frequencies(STEEL, radius, length)
+    for number in (1, 2):
+        yield check(
+            f"free bar 30 diameters long, order 1, bending mode {number} [Hz]",
+            expected=float(timoshenko[number - 1]),
+            computed=float(frequency[number - 1]),
+            tolerance=5e-6,
+            source="Timoshenko beam (Huang 1961), shear coefficient of Hutchinson 2001",
+        )
+
+
+_ROOTS = (4.730040744862704, 7.853204624095838, 10.995607838001671)
+"""cos x cosh x = 1: three modes."""
+
+
+def free_bar_frequencies(
+    material: Material, radius: float, length: float
+) -> tuple[np.ndarray, np.ndarray]:
+    r"""Frequencies of the first three modes after Euler-Bernoulli, and after Timoshenko.
+
+    Frequency equation of the free beam with shear and rotary inertia: Huang 1961.  Shear
+    coefficient of the circle: Hutchinson 2001,
+    :math:`6 (1 + \nu)^2 / (7 + 12 \nu + 4 \nu^2)`.
+
+    Parameters
+    ----------
+    material : Material
+    radius, length : float [m]
+        At least 15 radii long: the search for the roots is not made for shorter bars.
+
+    Returns
+    -------
+    euler, timoshenko : array, shape (3,) [Hz]
+    """
+    nu = material.poisson
+    shear = 6.0 * (1.0 + nu) ** 2 / (7.0 + 12.0 * nu + 4.0 * nu**2)
+    r2 = (radius / (2.0 * length)) ** 2
+    s2 = material.young / (shear * material.shear_modulus) * r2
+    unit = np.sqrt(material.young / material.density) * radius / (2.0 * length**2) / (2.0 * np.pi)
+
+    def determinant(b: float) -> float:
+        root = np.sqrt((r2 - s2) ** 2 + 4.0 / b**2)
+        alpha, beta = (b * np.sqrt((root - sign * (r2 + s2)) / 2.0) for sign in (1.0, -1.0))
+        slope = b / np.sqrt(1.0 - b**2 * r2 * s2) * (b**2 * r2 * (r2 - s2) ** 2 + 3.0 * r2 - s2)
+        # divided by cosh, which is large
+        shared = slope * np.tanh(alpha) * np.sin(beta)
+        return float(2.0 / np.cosh(alpha) - 2.0 * np.cos(beta) + shared)
+
+    euler = np.array(_ROOTS) ** 2
+    timoshenko = [brentq(determinant, 0.75 * x, 1.001 * x, xtol=1e-12) for x in euler]
+    return unit * euler, unit * np.array(timoshenko)

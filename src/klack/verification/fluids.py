@@ -1,11 +1,10 @@
 """Fluids: reference equations, mixtures with gas and vapour, and their table."""
 
-from functools import partial
+from collections.abc import Iterator
 from itertools import pairwise
 from math import exp, log
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
 from klack.hydraulics.fluid import Fluid
@@ -13,16 +12,13 @@ from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.liquid import Murnaghan
 from klack.hydraulics.mixture import EntrainedGas, Vapour
-from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.check import Check, ComparedCurve, check
 
 __all__ = ["checks"]
 
-GROUP = "fluids"
 ATMOSPHERE = 101_325.0
 IAPWS = "IAPWS-95 and IAPWS 2008 at 25 degC and 1 atm, between the columns of the library"
 NSRDS = "NSRDS functions (Daubert and Danner; coefficients as in OpenFOAM), 30 degC"
-
-_check = partial(compare, GROUP)
 
 
 def checks() -> list[Check]:
@@ -41,12 +37,12 @@ def checks() -> list[Check]:
 def _water() -> list[Check]:
     water = library_fluid("water").at(298.15)
     return [
-        _check("water, density [kg/m^3]", 997.047, float(water.density(ATMOSPHERE)), 1e-4, IAPWS),
-        _check(
+        check("water, density [kg/m^3]", 997.047, float(water.density(ATMOSPHERE)), 1e-4, IAPWS),
+        check(
             "water, sound speed [m/s]", 1496.7, float(water.sound_speed(ATMOSPHERE)), 5e-5, IAPWS
         ),
-        _check("water, viscosity [Pa s]", 8.90e-4, float(water.viscosity(ATMOSPHERE)), 2e-3, IAPWS),
-        _check("water, vapour pressure [Pa]", 3169.9, water.vapour_pressure, 1e-3, IAPWS),
+        check("water, viscosity [Pa s]", 8.90e-4, float(water.viscosity(ATMOSPHERE)), 2e-3, IAPWS),
+        check("water, vapour pressure [Pa]", 3169.9, water.vapour_pressure, 1e-3, IAPWS),
     ]
 
 
@@ -54,22 +50,29 @@ def _heptane() -> list[Check]:
     """Against functions that share no data with the library; they differ by up to 2 %."""
     T = 303.15
     heptane = library_fluid("n-heptane").at(T)
-    density = 61.38396836 / 0.26211 ** (1.0 + (1.0 - T / 540.2) ** 0.28141)
-    viscosity = exp(-24.451 + 1533.1 / T + 2.0087 * log(T))
-    boiling = exp(87.829 - 6996.4 / T - 9.8802 * log(T) + 7.2099e-6 * T**2)
     return [
-        _check(
-            "n-heptane, density [kg/m^3]", density, float(heptane.density(ATMOSPHERE)), 5e-3, NSRDS
+        check(
+            "n-heptane, density [kg/m^3]",
+            61.38396836 / 0.26211 ** (1.0 + (1.0 - T / 540.2) ** 0.28141),
+            float(heptane.density(ATMOSPHERE)),
+            5e-3,
+            NSRDS,
         ),
-        _check(
+        check(
             "n-heptane, viscosity [Pa s]",
-            viscosity,
+            exp(-24.451 + 1533.1 / T + 2.0087 * log(T)),
             float(heptane.viscosity(ATMOSPHERE)),
             2.5e-2,
             NSRDS,
         ),
-        _check("n-heptane, vapour pressure [Pa]", boiling, heptane.vapour_pressure, 1e-2, NSRDS),
-        _check(
+        check(
+            "n-heptane, vapour pressure [Pa]",
+            exp(87.829 - 6996.4 / T - 9.8802 * log(T) + 7.2099e-6 * T**2),
+            heptane.vapour_pressure,
+            1e-2,
+            NSRDS,
+        ),
+        check(
             "n-heptane, sound speed at 350 bar and 20 degC [m/s]",
             1360.70,
             float(library_fluid("n-heptane").at(293.15).sound_speed(350e5)),
@@ -87,28 +90,38 @@ def _oils() -> list[Check]:
     test = library_fluid("ISO 4113").at(313.15)
     nu = [float(f.viscosity(ATMOSPHERE) / f.density(ATMOSPHERE)) for f in (brake, vg46, test)]
     return [
-        _check(
-            "mineral oil, density at 100 bar [kg/m^3]", 849.970, float(oil.density(1e7)), 1e-6,
+        check(
+            "mineral oil, density at 100 bar [kg/m^3]",
+            849.970,
+            float(oil.density(1e7)),
+            1e-6,
             source,
         ),
-        _check(
-            "mineral oil, bulk modulus at 100 bar [Pa]", 1.4747e9, float(oil.bulk_modulus(1e7)),
-            5e-5, source,
+        check(
+            "mineral oil, bulk modulus at 100 bar [Pa]",
+            1.4747e9,
+            float(oil.bulk_modulus(1e7)),
+            5e-5,
+            source,
         ),
-        _check(
+        check(
             "mineral oil, kinematic viscosity [m^2/s]",
             4.1343e-5,
             float(oil.viscosity(ATMOSPHERE) / oil.density(ATMOSPHERE)),
             2e-5,
             source,
         ),
-        _check("DOT 4, viscosity at -40 degC [m^2/s]", 1.2e-3, nu[0], 5e-3, "data sheet"),
-        _check("ISO VG 46, viscosity at 40 degC [m^2/s]", 46e-6, nu[1], 2e-3, "ISO 3448"),
-        _check(
-            "ISO 4113, viscosity at 40 degC [m^2/s]", 2.6e-6, nu[2], 0.15e-6 / 2.6e-6,
-            "ISO 4113:2010, 2.45 to 2.75 mm^2/s", reason="the band of the standard",
+        check("DOT 4, viscosity at -40 degC [m^2/s]", 1.2e-3, nu[0], 5e-3, "data sheet"),
+        check("ISO VG 46, viscosity at 40 degC [m^2/s]", 46e-6, nu[1], 2e-3, "ISO 3448"),
+        check(
+            "ISO 4113, viscosity at 40 degC [m^2/s]",
+            2.6e-6,
+            nu[2],
+            0.15e-6 / 2.6e-6,
+            "ISO 4113:2010, 2.45 to 2.75 mm^2/s",
+            reason="the band of the standard",
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _bubbly(fraction: float) -> Fluid:
@@ -127,7 +140,7 @@ def _bubbly(fraction: float) -> Fluid:
     )
 
 
-def _wood(fraction: float, p: NDArray[np.float64]) -> NDArray[np.float64]:
+def _wood(fraction: float, p: np.ndarray) -> np.ndarray:
     """Wood's law, with the volumes of both phases written out [m/s]."""
     n, above = 1.4, p - 1e5
     K_l = 1.4e9 + 10.0 * above
@@ -139,10 +152,9 @@ def _wood(fraction: float, p: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.sqrt(K / rho))
 
 
-def _bubbles() -> list[Check]:
+def _bubbles() -> Iterator[Check]:
     p = 6e5
     pressures = np.geomspace(1e5, 300e5, 150)
-    out = []
     for fraction in (0.0, 1e-4, 1e-3, 1e-2):
         curve = ComparedCurve(
             x_label="pressure [bar]",
@@ -151,41 +163,37 @@ def _bubbles() -> list[Check]:
             computed=(pressures / 1e5, np.asarray(_bubbly(fraction).sound_speed(pressures))),
             x_log=True,
         )
-        out.append(
-            _check(
-                f"sound speed of oil with {100 * fraction:g} % air at 6 bar [m/s]",
-                float(_wood(fraction, np.array(p))),
-                float(_bubbly(fraction).sound_speed(p)),
-                5e-14,
-                "Wood, A Textbook of Sound, 1930",
-                curve if fraction > 0.0 else None,
-            )
+        yield check(
+            f"sound speed of oil with {100 * fraction:g} % air at 6 bar [m/s]",
+            float(_wood(fraction, np.array(p))),
+            float(_bubbly(fraction).sound_speed(p)),
+            5e-14,
+            "Wood, A Textbook of Sound, 1930",
+            curve if fraction > 0.0 else None,
         )
         if fraction == 1e-3:
-            bulk = float(_bubbly(fraction).bulk_modulus(p))
-            out.append(
-                _check(
-                    "bulk modulus of oil with 0.1 % air at 6 bar [Pa]", 9.59e8, bulk, 5e-4,
-                    "polytropic gas and Murnaghan's liquid by hand, three digits",
-                )
-            )  # fmt: skip
-    return out
+            yield check(
+                "bulk modulus of oil with 0.1 % air at 6 bar [Pa]",
+                9.59e8,
+                float(_bubbly(fraction).bulk_modulus(p)),
+                5e-4,
+                "polytropic gas and Murnaghan's liquid by hand, three digits",
+            )
 
 
 def _boiling() -> list[Check]:
     heptane = library_fluid("n-heptane").at(293.15)
     p_v = heptane.vapour_pressure
-    rho_l = float(heptane.liquid.density(p_v))
     ideal = 0.100202 / (8.314462618 * 293.15)
     return [
-        _check(
+        check(
             "n-heptane, half liquid and half vapour at the vapour pressure [kg/m^3]",
-            0.5 * (rho_l + ideal * p_v),
+            0.5 * (float(heptane.liquid.density(p_v)) + ideal * p_v),
             float(heptane.density(p_v)),
             5e-14,
             "homogeneous equilibrium, middle of the band",
         ),
-        _check(
+        check(
             "n-heptane vapour at 100 Pa [kg/m^3]",
             ideal * 100.0,
             float(heptane.density(100.0)),
@@ -209,19 +217,18 @@ def _conservation() -> list[Check]:
         )[0]
         for a, b in pairwise(places)
     )
-    p = np.geomspace(1.0, 3e8, 200_001)
     return [
-        _check(
+        check(
             "mass of a volume expanded from 350 bar to 1 Pa, ln of the densities [-]",
             log(float(fluid.density(350e5)) / float(fluid.density(1.0))),
             strain,
             5e-14,
             "int dp/K by quadrature",
         ),
-        _check(
+        check(
             "steps from 1 Pa to 3000 bar in which the density does not rise [-]",
             0.0,
-            float(np.count_nonzero(np.diff(fluid.density(p)) <= 0.0)),
+            float(np.count_nonzero(np.diff(fluid.density(np.geomspace(1.0, 3e8, 200_001))) <= 0.0)),
             0.0,
             "stability; 200 000 steps",
         ),
@@ -235,14 +242,6 @@ def _table() -> list[Check]:
     rho, slope = np.array([fluid_at(table, x, 0)[:2] for x in p]).T
     v, tangent = fluid.specific_volume(p)
     few = slice(None, None, 30)
-    density = ComparedCurve(
-        x_label="pressure [Pa]",
-        y_label="density [kg/m^3]",
-        expected=(p[few], 1.0 / v[few]),
-        computed=(p[few], rho[few]),
-        x_log=True,
-        y_log=True,
-    )
     worst = 0.0
     places = [100.0, 1e3, *fluid.kinks, 2e4, ATMOSPHERE, 6e5, 1e7, 3e8]
     for a, b in pairwise(places):
@@ -250,29 +249,36 @@ def _table() -> list[Check]:
         ours = fluid_at(table, b, 0)[2] - fluid_at(table, a, 0)[2]
         worst = max(worst, abs(ours / exact - 1.0))
     return [
-        _check(
+        check(
             "table: largest relative error of the density [-]",
             0.0,
             float(np.max(np.abs(rho * v - 1.0))),
             1e-9,
             "the fluid itself, 1 Pa to 3000 bar",
-            density,
+            ComparedCurve(
+                x_label="pressure [Pa]",
+                y_label="density [kg/m^3]",
+                expected=(p[few], 1.0 / v[few]),
+                computed=(p[few], rho[few]),
+                x_log=True,
+                y_log=True,
+            ),
         ),
-        _check(
+        check(
             "table: largest relative error of the compressibility [-]",
             0.0,
             float(np.max(np.abs(slope * rho**-2 / -tangent - 1.0))),
             1e-5,
             "the fluid itself, 1 Pa to 3000 bar",
         ),
-        _check(
+        check(
             "table: largest relative error of the pressure energy [-]",
             0.0,
             worst,
             1e-10,
             "int dp/rho by quadrature, 100 Pa to 3000 bar",
         ),
-        _check(
+        check(
             "table: least loss of an implicit step over its energy [-]",
             0.0,
             min(0.0, _least_loss(table)),

@@ -1,4 +1,4 @@
-r"""A rigid sphere on contact points of an elastic half-space: the classical oblique impact.
+r"""A rigid sphere on contact points of an elastic half-space: oblique impacts, also measured.
 
 A square cell of side *h* with the mean traction 1/h^2 at the origin moves the surface at (x, y)
 (Boussinesq and Cerruti; Johnson 1985, section 3.2 and 3.6; Love 1929 for the integral of 1/r): with
@@ -14,26 +14,33 @@ a pressure moves it in by :math:`(1-\nu^2) I / (\pi E)` and towards the cell by
 bodies.
 """
 
-from dataclasses import dataclass, replace
-from math import gamma, inf, pi, sqrt
+from dataclasses import dataclass
+from math import cos, gamma, inf, pi, radians, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.contact.friction import Friction
 from klack.materials import Material
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.interface_bodies import modal_model
 
-__all__ = ["ObliqueImpact", "SphereImpact", "half_space_compliance"]
+__all__ = [
+    "ObliqueImpact",
+    "SphereImpact",
+    "alumina_on_glass",
+    "half_space_compliance",
+    "oblique_spheres",
+]
 
-Array = NDArray[np.float64]
 
 _BEYOND = 1.3  # radii of contact that the points reach
 
 
-def half_space_compliance(points: Array, size: float, lower: Material, upper: Material) -> Array:
+def half_space_compliance(
+    points: np.ndarray, size: float, lower: Material, upper: Material
+) -> np.ndarray:
     """Compliance of two half-spaces at square cells of one grid, (3 n, 3 n) [m/N].
 
     Gaps of all cells first, then their tangential offsets (upper past lower) along x and along y.
@@ -170,8 +177,11 @@ class SphereImpact:
                 [nothing, one, nothing, R * one, nothing, x],
             ]
         )
-        about = self.inertia / (self.mass * R**2)
-        unit = np.sqrt(np.concatenate([np.full(3, 1.0 / self.mass), np.full(3, about)]))
+        unit = np.sqrt(
+            np.concatenate(
+                [np.full(3, 1.0 / self.mass), np.full(3, self.inertia / (self.mass * R**2))]
+            )
+        )
         rows = motion.transpose(0, 2, 1).reshape(3 * n, 6) * unit
         c, s, eye = np.cos(turn), np.sin(turn), np.eye(n)
         T = np.block(
@@ -179,7 +189,7 @@ class SphereImpact:
         )
         rows = T @ rows
         C = T @ half_space_compliance(points, size, self.ground, self.sphere) @ T.T
-        model = modal_model(
+        return modal_model(
             masses=(self.mass, inf),
             omega=np.zeros(6),
             traces=rows[:n],
@@ -187,9 +197,6 @@ class SphereImpact:
             gap=(x**2 + y**2) / (2.0 * R),
             rigid=np.diag(unit),
             points=np.column_stack([points, nothing]),
-        )
-        return replace(
-            model,
             tangents=np.ascontiguousarray(rows[n:]),
             axial_across=np.zeros(2 * n),
             friction=(friction,),
@@ -208,8 +215,9 @@ class SphereImpact:
             velocity=np.array([tangential, 0.0, 0.0, 0.0, 0.0, 0.0]),
         )
         after = run.motion.velocity[-1]
-        across = run.impacts[0].friction_force.reshape(-1, 2, model.count).sum(axis=2)
-        size = np.linalg.norm(across, axis=1).max()
+        size = np.linalg.norm(
+            run.impacts[0].friction_force.reshape(-1, 2, model.count).sum(axis=2), axis=1
+        ).max()
         return ObliqueImpact(
             centre=float(after[0]),
             spin=float(after[4]),
@@ -218,3 +226,97 @@ class SphereImpact:
             lost=run.energy.friction,
             peak=float(size / (friction.kinetic * run.history.force.max())),
         )
+
+
+# Kharaz, Gorham & Salman 2001: alumina sphere of 5 mm on soda-lime glass, 3.9 m/s, mu 0.092, as
+# digitised by the makers of two programs: incidence in degrees, measured value
+_TANGENTIAL = (
+    (1.84, 0.79344), (3.703, 0.74533), (9.496, 0.67257), (20.012, 0.59691), (30.127, 0.68756),
+    (39.382, 0.77148), (49.694, 0.84761), (60.02, 0.90142), (71.0693, 0.93657), (79.2277, 0.96952),
+)  # fmt: skip
+_SPIN = (
+    (21.251, 577.65), (31.157, 612.88), (39.143, 595.49), (50.348, 453.21), (60.328, 382.09),
+    (69.9606, 242.966), (78.5602, 142.355),
+)  # fmt: skip
+_ANGLE = ((20.567, 12.208), (30.29, 21.67), (39.535, 32.613), (49.747, 45.125), (60.208, 57.474))
+_KHARAZ = "Kharaz, Gorham & Salman 2001, Powder Technol. 120:281 (measured; no free parameter)"
+_STEEP = 15.0  # degrees; nearer to the normal the measurement is not that of linear elasticity
+
+
+def alumina_on_glass(normal: float, cells: float = 6.0) -> SphereImpact:
+    """Sphere of 5 mm on a thick plate, with a speed normal to it [m/s]."""
+    alumina = Material(name="alumina", young=380e9, poisson=0.23, density=4000.0)
+    return SphereImpact(
+        radius=2.5e-3,
+        sphere=alumina,
+        ground=Material(name="glass", young=70e9, poisson=0.25, density=2500.0),
+        speed=normal,
+        cells=cells,
+    )
+
+
+def oblique_spheres() -> list[Check]:
+    """Return the checks of alumina on glass.
+
+    Linear elasticity with one coefficient of friction does not hold near the normal.
+    """
+    friction, speed = Friction.coulomb(0.092), 3.9
+
+    def hit(degrees: float) -> tuple[float, float, float]:
+        angle = radians(degrees)
+        after = alumina_on_glass(speed * cos(angle)).hit(speed * sin(angle), friction, steps=200)
+        return (
+            after.centre / (speed * sin(angle)),
+            after.spin,
+            float(np.degrees(np.arctan2(after.centre, after.normal))),
+        )
+
+    tangential = np.array([hit(angle)[0] for angle, _ in _TANGENTIAL])
+    spin = np.array([hit(angle)[1] for angle, _ in _SPIN])
+    rebound = np.array([hit(angle)[2] for angle, _ in _ANGLE])
+    angles, values = (np.array(column) for column in zip(*_TANGENTIAL, strict=True))
+    steep = angles > _STEEP
+    curve = ComparedCurve(
+        x_label="angle of incidence [deg]",
+        y_label="tangential restitution [-]",
+        expected=(angles, values),
+        computed=(angles, tangential),
+    )
+    return [
+        check(
+            "alumina on glass above 15 degrees: tangential restitution, rms deviation [-]",
+            expected=0.0,
+            computed=_rms(tangential[steep] - values[steep]),
+            tolerance=0.02,
+            source=_KHARAZ,
+            curve=curve,
+        ),
+        check(
+            "alumina on glass below 15 degrees: tangential restitution, rms deviation [-]",
+            expected=0.0,
+            computed=_rms(tangential[~steep] - values[~steep]),
+            tolerance=0.12,
+            source=_KHARAZ,
+            curve=curve,
+            reason="unlike bodies: linear elasticity with one coefficient gives 0.66 where 0.79 "
+            "was measured; the difference is shown, not explained",
+        ),
+        check(
+            "alumina on glass above 15 degrees: spin after, rms deviation [rad/s]",
+            expected=0.0,
+            computed=_rms(spin - np.array([row[1] for row in _SPIN])),
+            tolerance=25.0,
+            source=_KHARAZ,
+        ),
+        check(
+            "alumina on glass above 15 degrees: rebound angle of the centre, rms deviation [deg]",
+            expected=0.0,
+            computed=_rms(rebound - np.array([row[1] for row in _ANGLE])),
+            tolerance=0.4,
+            source=_KHARAZ,
+        ),
+    ]
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))

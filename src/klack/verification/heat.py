@@ -1,13 +1,12 @@
 """Heat networks against closed solutions, and an averaged warm-up against all of its strokes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from math import exp, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
@@ -19,26 +18,20 @@ from klack.case.valve_roles import find_roles
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import Ambient
-from klack.thermal.conductance import Conductance
-from klack.thermal.heat_capacity import HeatCapacity
 from klack.thermal.heat_network import HeatNetwork, heat_network
 from klack.thermal.heat_source import HeatSource, HeatTable
 from klack.thermal.heat_step import HeatStep, heat_step, steady_temperature
 from klack.thermal.radiation import STEFAN_BOLTZMANN, Radiation
 from klack.thermal.slow_warm_up import SlowSettings, warm_up
-from klack.verification.check import Check, compare
+from klack.verification.benches import component
+from klack.verification.check import Check, check
 
 __all__ = ["checks"]
 
-GROUP = "heat"
 AMBIENT = 293.15  # [K]
 ALPHA = 3.93e-3  # [1/K] of copper, IEC 60028
 CLOSED = "closed form"
 MODELICA = "Modelica Standard Library 4.0.0, Thermal.HeatTransfer.Examples"
-
-Array = NDArray[np.float64]
-
-_check = partial(compare, GROUP)
 
 
 def checks() -> list[Check]:
@@ -67,14 +60,16 @@ def _network(
 
 
 def _node(capacity: float, conductance: float) -> HeatNetwork:
-    parts = {
-        "part": HeatCapacity(capacity=capacity),
-        "path": Conductance(conductance=conductance),
-    }
-    return _network(parts, [["part.node", "path.a"], ["path.b", "ambient"]])
+    return _network(
+        {
+            "part": component("heat-capacity", capacity=capacity),
+            "path": component("thermal-conductance", conductance=conductance),
+        },
+        [["part.node", "path.a"], ["path.b", "ambient"]],
+    )
 
 
-def _step(network: HeatNetwork, start: Array, power: float, length: float) -> HeatStep:
+def _step(network: HeatNetwork, start: np.ndarray, power: float, length: float) -> HeatStep:
     flow = np.zeros(network.count)
     flow[0] = power
     return heat_step(network, network.links(start), start, (flow, flow), length)
@@ -86,29 +81,27 @@ def _one_node() -> list[Check]:
     network = _node(C, G)
     step = _step(network, network.start, P, t)
     rise = P / G * (1.0 - exp(-t * G / C))
-    off = P * t - C * rise
     zero = np.zeros(1)
     ramp = heat_step(network, network.links(network.start), network.start, (zero, zero + P), t)
     slope, tau = P / t, C / G
-    ramped = slope / G * (t - tau * (1.0 - exp(-t / tau)))
     return [
-        _check(
+        check(
             "one node under constant heat, rise after 1.5 time constants [K]",
             rise,
             float(step.temperature[0] - AMBIENT),
             1e-13,
             CLOSED,
         ),
-        _check(
+        check(
             "the same, heat given off until then [J]",
-            off,
+            P * t - C * rise,
             float(step.given_off[0]),
             1e-13,
             CLOSED,
         ),
-        _check(
+        check(
             "one node under heat that grows with time, rise [K]",
-            ramped,
+            slope / G * (t - tau * (1.0 - exp(-t / tau))),
             float(ramp.temperature[0] - AMBIENT),
             1e-13,
             CLOSED,
@@ -127,14 +120,14 @@ def _pulses() -> list[Check]:
     top = P / G * (1.0 - exp(-on / tau)) / (1.0 - exp(-period / tau))
     source = "geometric sum of the decays of all pulses before"
     return [
-        _check(
+        check(
             "pulsed heat, highest rise of the steady period [K]",
             top,
             float(high[0] - AMBIENT),
             1e-13,
             source,
         ),
-        _check(
+        check(
             "pulsed heat, lowest rise of the steady period [K]",
             top * exp(-(period - on) / tau),
             float(T[0] - AMBIENT),
@@ -146,20 +139,26 @@ def _pulses() -> list[Check]:
 
 def _two_masses() -> list[Check]:
     """Two bodies of 15 J/K at 100 and 0 degC, joined by 10 W/K."""
-    parts = {
-        "mass1": HeatCapacity(capacity=15.0, temperature=373.15),
-        "mass2": HeatCapacity(capacity=15.0, temperature=273.15),
-        "conduction": Conductance(conductance=10.0),
-    }
     network = _network(
-        parts, [["mass1.node", "conduction.a"], ["conduction.b", "mass2.node"]], 293.15
+        {
+            "mass1": component("heat-capacity", capacity=15.0, temperature=373.15),
+            "mass2": component("heat-capacity", capacity=15.0, temperature=273.15),
+            "conduction": component("thermal-conductance", conductance=10.0),
+        },
+        [["mass1.node", "conduction.a"], ["conduction.b", "mass2.node"]],
+        293.15,
     )
     early = _step(network, network.start, 0.0, 0.5).temperature
     late = _step(network, network.start, 0.0, 1e6).temperature
-    source = f"{MODELICA}.TwoMasses: T_final_K"
     return [
-        _check("TwoMasses, final temperature [K]", 323.15, float(late[0]), 1e-13, source),
-        _check(
+        check(
+            "TwoMasses, final temperature [K]",
+            323.15,
+            float(late[0]),
+            1e-13,
+            f"{MODELICA}.TwoMasses: T_final_K",
+        ),
+        check(
             "TwoMasses, difference after 0.5 s [K]",
             100.0 * exp(-0.5 * 10.0 * 2.0 / 15.0),
             float(early[0] - early[1]),
@@ -171,16 +170,15 @@ def _two_masses() -> list[Check]:
 
 def _far_apart() -> list[Check]:
     """Conductances of 1 GW/K and 1 mW/K, capacities of 1 mJ/K, 10 J/K and none."""
-    parts = {
-        "a": HeatCapacity(capacity=10.0),
-        "b": HeatCapacity(capacity=1e-3),
-        "none": HeatCapacity(capacity=0.0),
-        "huge": Conductance(conductance=1e9),
-        "middle": Conductance(conductance=2.0),
-        "tiny": Conductance(conductance=1e-3),
-    }
     network = _network(
-        parts,
+        {
+            "a": component("heat-capacity", capacity=10.0),
+            "b": component("heat-capacity", capacity=1e-3),
+            "none": component("heat-capacity", capacity=0.0),
+            "huge": component("thermal-conductance", conductance=1e9),
+            "middle": component("thermal-conductance", conductance=2.0),
+            "tiny": component("thermal-conductance", conductance=1e-3),
+        },
         [
             ["a.node", "huge.a"],
             ["huge.b", "b.node", "middle.a"],
@@ -193,14 +191,13 @@ def _far_apart() -> list[Check]:
     # one capacity of 10.001 J/K behind both resistances; 1e-9 K/W of the link apart
     C, R = 10.001, 1.0 / 2.0 + 1.0 / 1e-3
     rise = P * R * (1.0 - exp(-t / (R * C)))
-    none = rise * 1e3 / R
     steady = steady_temperature(
         network, network.links(network.start), network.start, np.array([P, 0.0, 0.0])
     )
     assert steady is not None
     reason = "the links of 1 GW/K are taken as ideal in the closed form"
     return [
-        _check(
+        check(
             "conductances 12 decades apart, rise after 2 time constants [K]",
             rise,
             float(step.temperature[0] - AMBIENT),
@@ -208,15 +205,15 @@ def _far_apart() -> list[Check]:
             CLOSED,
             reason=reason,
         ),
-        _check(
+        check(
             "the same, node without capacity [K]",
-            none,
+            rise * 1e3 / R,
             float(step.temperature[2] - AMBIENT),
             1e-10,
             CLOSED,
             reason=reason,
         ),
-        _check(
+        check(
             "the same, steady rise [K]", P * (R + 1e-9), float(steady[0] - AMBIENT), 1e-13, CLOSED
         ),
     ]
@@ -225,27 +222,31 @@ def _far_apart() -> list[Check]:
 def _sources() -> list[Check]:
     """Heat from a table that warms a radiating body; and one that has no way out."""
     eps, A, P = 0.9, 1e-3, 1.0
-    parts = {
-        "part": HeatCapacity(capacity=10.0),
-        "skin": Radiation(emissivity=eps, area=A),
-        "heater": HeatSource(table=HeatTable(time=(0.0, 100.0), power=(0.0, P))),
-    }
-    network = _network(parts, [["part.node", "skin.surface", "heater.node"]])
+    network = _network(
+        {
+            "part": component("heat-capacity", capacity=10.0),
+            "skin": Radiation(emissivity=eps, area=A),
+            "heater": HeatSource(table=HeatTable(time=(0.0, 100.0), power=(0.0, P))),
+        },
+        [["part.node", "skin.surface", "heater.node"]],
+    )
     nothing = np.zeros(1)
     found = warm_up(network, lambda T: nothing, SlowSettings(tolerance=1e-3))
-    radiating = (P / (eps * STEFAN_BOLTZMANN * A) + AMBIENT**4) ** 0.25
-    alone = _network({"part": HeatCapacity(capacity=10.0)}, [])
-    kept = warm_up(alone, lambda T: nothing + 3.0, SlowSettings(duration=50.0))
+    kept = warm_up(
+        _network({"part": component("heat-capacity", capacity=10.0)}, []),
+        lambda T: nothing + 3.0,
+        SlowSettings(duration=50.0),
+    )
     return [
-        _check(
+        check(
             "radiating body, steady temperature [K]",
-            radiating,
+            (P / (eps * STEFAN_BOLTZMANN * A) + AMBIENT**4) ** 0.25,
             float(found.points[-1].temperature[0]),
             1e-6,
             "Stefan and Boltzmann",
             reason="steady states are found to a tenth of 1 mK",
         ),
-        _check(
+        check(
             "heat without a way out, rise in 50 s [K]",
             15.0,
             float(kept.points[-1].temperature[0] - AMBIENT),
@@ -255,7 +256,7 @@ def _sources() -> list[Check]:
     ]
 
 
-def _copper(loss: Callable[[float], float]) -> Callable[[Array], Array]:
+def _copper(loss: Callable[[float], float]) -> Callable[[np.ndarray], np.ndarray]:
     """Mean heat of one node of copper, over the factor of its resistance from 20 degC."""
     return lambda T: np.array([loss(1.0 + ALPHA * (float(T[0]) - AMBIENT))])
 
@@ -270,44 +271,43 @@ def _self_heating() -> list[Check]:
     timed = warm_up(network, _copper(lambda r: P * r), SlowSettings(tolerance=0.02, duration=300.0))
     away = warm_up(network, _copper(lambda r: 13.0 * r))
     left = G - ALPHA * P
-    root = sqrt(1.0 + 4.0 * ALPHA * P / G)
     return [
-        _check(
+        check(
             "copper at constant current, steady rise [K]",
             P / left,
             float(current.points[-1].temperature[0] - AMBIENT),
             1e-4,
             CLOSED,
         ),
-        _check(
+        check(
             "copper at constant voltage, steady rise [K]",
-            (root - 1.0) / (2.0 * ALPHA),
+            (sqrt(1.0 + 4.0 * ALPHA * P / G) - 1.0) / (2.0 * ALPHA),
             float(voltage.points[-1].temperature[0] - AMBIENT),
             1e-5,
             CLOSED,
         ),
-        _check(
+        check(
             "copper at constant current, rise after 300 s [K]",
             P / left * (1.0 - exp(-300.0 * left / C)),
             float(timed.points[-1].temperature[0] - AMBIENT),
             2e-4,
             CLOSED,
         ),
-        _check(
+        check(
             "thermal runaway, gain of the heat over what is given off",
             ALPHA * 13.0 / G,
             away.gain,
             1e-3,
             CLOSED,
         ),
-        _check(
+        check(
             "thermal runaway is reported as such",
             1.0,
             float(away.end == "runaway"),
             0.0,
             "gain above 1",
         ),
-        _check(
+        check(
             "no runaway is reported at a gain of 0.63",
             1.0,
             float(current.end == "steady"),
@@ -320,10 +320,10 @@ def _self_heating() -> list[Check]:
 def _motor() -> list[Check]:
     """Modelica's motor: winding losses of 100 W, from 360 s on 1000 W, that grow with heat."""
     parts = {
-        "winding": HeatCapacity(capacity=2500.0),
-        "core": HeatCapacity(capacity=25000.0),
-        "winding2core": Conductance(conductance=10.0),
-        "convection": Conductance(conductance=25.0),
+        "winding": component("heat-capacity", capacity=2500.0),
+        "core": component("heat-capacity", capacity=25000.0),
+        "winding2core": component("thermal-conductance", conductance=10.0),
+        "convection": component("thermal-conductance", conductance=25.0),
         "coreLosses": HeatSource(power=500.0),
     }
     joined = [
@@ -336,20 +336,21 @@ def _motor() -> list[Check]:
     for P, length in ((100.0, 360.0), (1000.0, 240.0)):
         exact = _exact_motor(exact, P, alpha, reference, length)
         warm = {
-            "winding": HeatCapacity(capacity=2500.0, temperature=float(computed[0])),
-            "core": HeatCapacity(capacity=25000.0, temperature=float(computed[1])),
+            "winding": component("heat-capacity", capacity=2500.0, temperature=float(computed[0])),
+            "core": component("heat-capacity", capacity=25000.0, temperature=float(computed[1])),
         }
 
-        def loss(T: Array, P: float = P) -> Array:
+        def loss(T: np.ndarray, P: float = P) -> np.ndarray:
             return np.array([P * (1.0 + alpha * (T[0] - reference)), 0.0])
 
-        settings = SlowSettings(tolerance=0.01, duration=length)
-        found = warm_up(_network({**parts, **warm}, joined), loss, settings)
+        found = warm_up(
+            _network({**parts, **warm}, joined), loss, SlowSettings(tolerance=0.01, duration=length)
+        )
         computed = found.points[-1].temperature
     source = f"{MODELICA}.Motor: its numbers, solved by the matrix exponential of SciPy"
     reason = "steps to 10 mK"
     return [
-        _check(
+        check(
             "Motor, winding after 600 s [K]",
             float(exact[0]),
             float(computed[0]),
@@ -357,7 +358,7 @@ def _motor() -> list[Check]:
             source,
             reason=reason,
         ),
-        _check(
+        check(
             "Motor, core after 600 s [K]",
             float(exact[1]),
             float(computed[1]),
@@ -368,7 +369,9 @@ def _motor() -> list[Check]:
     ]
 
 
-def _exact_motor(start: Array, P: float, alpha: float, reference: float, t: float) -> Array:
+def _exact_motor(
+    start: np.ndarray, P: float, alpha: float, reference: float, t: float
+) -> np.ndarray:
     C, g, h = (2500.0, 25000.0), 10.0, 25.0
     A = np.array(
         [
@@ -377,8 +380,7 @@ def _exact_motor(start: Array, P: float, alpha: float, reference: float, t: floa
             [0.0, 0.0, 0.0],
         ]
     )
-    found: Array = (expm(A * t) @ np.append(start, 1.0))[:2]
-    return found
+    return (expm(A * t) @ np.append(start, 1.0))[:2]
 
 
 SMALL = """
@@ -441,7 +443,7 @@ def _all_strokes() -> list[Check]:
     copper = study.temperature[0].values
     source = "each of the 50 strokes computed at its own temperature"
     return [
-        _check(
+        check(
             "averaged warm-up of 1 s, rise of the copper [K]",
             rise,
             float(copper[-1] - AMBIENT),
@@ -449,7 +451,7 @@ def _all_strokes() -> list[Check]:
             source,
             reason="a period of 20 ms is 2.5 % of the time constant of 0.8 s",
         ),
-        _check(
+        check(
             "the same, heat of all strokes [J]",
             heat,
             study.supplied["copper"],
@@ -457,14 +459,14 @@ def _all_strokes() -> list[Check]:
             source,
             reason="as above",
         ),
-        _check(
+        check(
             "the same, residual of the energy balance over all heat",
             0.0,
             study.energy_residual,
             1e-13,
             "heat in = stored + given off",
         ),
-        _check(
+        check(
             "copper resistance of the last stroke [ohm]",
             2.0 * (1.0 + ALPHA * (float(copper[-1]) - AMBIENT)),
             float(study.values[0].values[-1]),
@@ -481,7 +483,7 @@ def _growth() -> list[Check]:
     hot = {"copper": 393.15, "ambient": AMBIENT}
     warm = warm_valve(build_valve(case), {aspect: hot for aspect in aspects_of(case)})
     return [
-        _check(
+        check(
             "gap of 100 um grown by 20 mm of copper at 120 degC [m]",
             100e-6 + 20e-3 * 16.5e-6 * 100.0,
             warm.values["stop.gap"][0],

@@ -1,38 +1,30 @@
 """Valves by characteristic, accumulators, pumps: closed formulas, and networks written apart."""
 
-from functools import partial
+from collections.abc import Iterator
 from math import exp, pi, sqrt, tan
 
 import numpy as np
 from scipy.integrate import quad
 
-from klack.hydraulics.accumulator import Accumulator
-from klack.hydraulics.check_valve import CheckValve
 from klack.hydraulics.fluid_store import gas_store
 from klack.hydraulics.opening import opening_flow
 from klack.hydraulics.pulsating_flow import FlowHarmonic, PulsatingFlow
-from klack.hydraulics.pump import Pump
-from klack.hydraulics.relief_valve import ReliefValve
-from klack.hydraulics.variable_orifice import VariableOrifice
-from klack.network.rows import Ambient
-from klack.verification.acting_areas import acting_areas
-from klack.verification.branch_step import branch_of, branch_step
-from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.conical_seats import conical_seats
-from klack.verification.gas_release import gas_release
-from klack.verification.hydraulic_edges import edges
-from klack.verification.notched_edges import notched_edges
-from klack.verification.supply_networks import OIL, supply_networks
+from klack.verification.benches import (
+    AMBIENT,
+    BAR,
+    MU_OIL,
+    OIL,
+    RHO_OIL,
+    branch_of,
+    branch_step,
+    component,
+)
+from klack.verification.check import Check, ComparedCurve, check
+from klack.verification.conical_seats import acting_areas, conical_seats
+from klack.verification.spool_edges import edges, notched_edges
+from klack.verification.supply_networks import gas_release, supply_networks
 
 __all__ = ["checks"]
-
-GROUP = "hydraulic-parts"
-AMBIENT = Ambient()
-RHO = float(OIL.density(AMBIENT.pressure))
-MU = float(OIL.viscosity(AMBIENT.pressure))
-BAR = 1e5
-
-_check = partial(compare, GROUP)
 
 
 def checks() -> list[Check]:
@@ -54,58 +46,59 @@ def checks() -> list[Check]:
 
 
 def _check_valve() -> list[Check]:
-    part = CheckValve(
-        cracking_pressure=0.5 * BAR, open_pressure=2.5 * BAR, diameter=6e-3, cavitation=None
+    part = component(
+        "check-valve",
+        cracking_pressure=0.5 * BAR,
+        open_pressure=2.5 * BAR,
+        diameter=6e-3,
+        cavitation=None,
     )
     row, whole = branch_of(part), pi / 4 * 36e-6
     drops = np.linspace(0.0, 4.0, 81) * BAR
     s = np.clip((drops - 0.5 * BAR) / (2.0 * BAR), 0.0, 1.0)
-    known = 0.7 * whole * s * np.sqrt(2.0 * drops / RHO) * 6e4
-    found = np.array([branch_step(row, 50e5 + drop, 50e5)[0] for drop in drops]) / RHO * 6e4
-    curve = ComparedCurve(
-        x_label="pressure drop [bar]",
-        y_label="flow [l/min]",
-        expected=(drops / BAR, known),
-        computed=(drops / BAR, found),
-    )
+    found = np.array([branch_step(row, 50e5 + drop, 50e5)[0] for drop in drops]) / RHO_OIL * 6e4
     law = "Merritt 1967, sec. 3-3: C_q A sqrt(2 rho dp)"
     reverse = branch_step(row, 1e5, 300e5)
     up, down = (branch_step(row, 50e5 + x, 50e5)[0] for x in (1.2e5 + 20.0, 1.2e5 - 20.0))
     choked = branch_step(branch_of(part.model_copy(update={"cavitation": 0.6})), 3e5, 1e3)
-    throat = 0.6 * whole * sqrt(2 * RHO * (3e5 - OIL.vapour_pressure))
     return [
-        _check(
+        check(
             "check valve half open at 1.5 bar, mass flow [kg/s]",
-            0.7 * 0.5 * whole * sqrt(2 * RHO * 1.5 * BAR),
+            0.7 * 0.5 * whole * sqrt(2 * RHO_OIL * 1.5 * BAR),
             float(branch_step(row, 50e5 + 1.5 * BAR, 50e5)[0]),
             5e-14,
             law + "; half of the area",
-            curve,
+            ComparedCurve(
+                x_label="pressure drop [bar]",
+                y_label="flow [l/min]",
+                expected=(drops / BAR, 0.7 * whole * s * np.sqrt(2.0 * drops / RHO_OIL) * 6e4),
+                computed=(drops / BAR, found),
+            ),
         ),
-        _check(
+        check(
             "check valve fully open at 4 bar, mass flow [kg/s]",
-            0.7 * whole * sqrt(2 * RHO * 4 * BAR),
+            0.7 * whole * sqrt(2 * RHO_OIL * 4 * BAR),
             float(branch_step(row, 54e5, 50e5)[0]),
             5e-14,
             law,
         ),
-        _check(
+        check(
             "check valve at 299 bar in reverse, mass flow [kg/s]",
             0.0,
             float(reverse[0]),
             0.0,
             "closed",
         ),
-        _check(
+        check(
             "check valve opening, slope of its flow [kg/(s Pa)]",
             float(up - down) / 40.0,
             float(branch_step(row, 50e5 + 1.2e5, 50e5)[1]),
             1e-7,
             "central difference over 40 Pa",
         ),
-        _check(
+        check(
             "check valve that cavitates, mass flow [kg/s]",
-            throat,
+            0.6 * whole * sqrt(2 * RHO_OIL * (3e5 - OIL.vapour_pressure)),
             float(choked[0]),
             5e-14,
             "Nurick 1976: C_c A sqrt(2 rho (p - p_v))",
@@ -114,19 +107,15 @@ def _check_valve() -> list[Check]:
 
 
 def _relief_valve() -> list[Check]:
-    rated = {"set_pressure": 100 * BAR, "rated_pressure": 110 * BAR, "rated_flow": 40 / 6e4}
-    part = ReliefValve(**rated, diameter=3e-3, cavitation=None)
+    part = component(
+        "relief-valve",
+        **{"set_pressure": 100 * BAR, "rated_pressure": 110 * BAR, "rated_flow": 40 / 6e4},
+        diameter=3e-3,
+        cavitation=None,
+    )
     row, tau = branch_of(part), 2e-3
     drops = np.linspace(95.0, 130.0, 71) * BAR
-    line = 40.0 * np.maximum(drops / BAR - 100.0, 0.0) / 10.0
-    hole = 0.7 * pi / 4 * 9e-6 * np.sqrt(2.0 * drops / RHO) * 6e4
-    found = np.array([branch_step(row, BAR + drop, BAR)[0] for drop in drops]) / RHO * 6e4
-    curve = ComparedCurve(
-        x_label="pressure drop [bar]",
-        y_label="flow [l/min]",
-        expected=(drops / BAR, np.minimum(line, hole)),
-        computed=(drops / BAR, found),
-    )
+    found = np.array([branch_step(row, BAR + drop, BAR)[0] for drop in drops]) / RHO_OIL * 6e4
     sticky = branch_of(part.model_copy(update={"hysteresis": 3 * BAR}))
     state = branch_step(sticky, BAR + 108 * BAR, BAR)[3:6]
     held = branch_step(sticky, BAR + 106 * BAR, BAR, state=state)
@@ -136,46 +125,57 @@ def _relief_valve() -> list[Check]:
     first = float(late[1])
     for _ in range(10):
         late = branch_step(slow, BAR + 108 * BAR, BAR, h=0.2 * tau, state=late)[3:6]
-    k = 40 / 6e4 / (10 * BAR) * sqrt(0.5 * RHO) / 0.7
+    k = 40 / 6e4 / (10 * BAR) * sqrt(0.5 * RHO_OIL) / 0.7
     area = {drop: k * (drop - 100) * BAR / sqrt(drop * BAR) for drop in (106, 108)}
     return [
-        _check(
+        check(
             "relief valve 7.5 bar above its set pressure, flow [m^3/s]",
             30 / 6e4,
-            float(branch_step(row, BAR + 107.5 * BAR, BAR)[0]) / RHO,
+            float(branch_step(row, BAR + 107.5 * BAR, BAR)[0]) / RHO_OIL,
             5e-14,
             "characteristic: straight through the rated point",
-            curve,
+            ComparedCurve(
+                x_label="pressure drop [bar]",
+                y_label="flow [l/min]",
+                expected=(
+                    drops / BAR,
+                    np.minimum(
+                        40.0 * np.maximum(drops / BAR - 100.0, 0.0) / 10.0,
+                        0.7 * pi / 4 * 9e-6 * np.sqrt(2.0 * drops / RHO_OIL) * 6e4,
+                    ),
+                ),
+                computed=(drops / BAR, found),
+            ),
         ),
-        _check(
+        check(
             "relief valve 0.5 bar below its set pressure, flow [m^3/s]",
             0.0,
             float(branch_step(row, BAR + 99.5 * BAR, BAR)[0]),
             0.0,
             "closed",
         ),
-        _check(
+        check(
             "relief valve fully open at 130 bar, flow [m^3/s]",
-            0.7 * pi / 4 * 9e-6 * sqrt(2 * 130 * BAR / RHO),
-            float(branch_step(row, BAR + 130 * BAR, BAR)[0]) / RHO,
+            0.7 * pi / 4 * 9e-6 * sqrt(2 * 130 * BAR / RHO_OIL),
+            float(branch_step(row, BAR + 130 * BAR, BAR)[0]) / RHO_OIL,
             5e-14,
             "Merritt 1967, sec. 3-3: orifice of the largest area",
         ),
-        _check(
+        check(
             "relief valve back from 108 to 106 bar, hysteresis 3 bar, area [m^2]",
             area[108],
             float(held[4]),
             5e-14,
             "play: the area stays",
         ),
-        _check(
+        check(
             "relief valve back from 108 to 103 bar, hysteresis 3 bar, area [m^2]",
             area[106],
             float(closing[4]),
             5e-14,
             "play: the area of 106 bar",
         ),
-        _check(
+        check(
             "relief valve after two time constants, area [m^2]",
             area[108] + (first - area[108]) * exp(-2.0),
             float(late[1]),
@@ -191,63 +191,62 @@ def _accumulator() -> list[Check]:
     def held(p: float, n: float) -> tuple[float, float, float]:
         return gas_store(p, AMBIENT.pressure, p0, whole, n, least)
 
-    def gas_pressure(volume: float) -> float:
-        return p0 * (whole / volume) ** 1.4 - AMBIENT.pressure
-
     gas = whole - held(200 * BAR, 1.4)[0]
-    work = -quad(gas_pressure, whole, gas, epsrel=1e-13)[0]
-    isothermal = p0 * whole * np.log(200 / 60) - AMBIENT.pressure * whole * (1 - 60 / 200)
-    part = Accumulator(volume=whole, precharge=p0)
-    row, p = branch_of(part), np.geomspace(60.0, 400.0, 60) * BAR
-    volumes = np.array([held(x, 1.4)[0] for x in p])
-    curve = ComparedCurve(
-        x_label="fluid inside [l]",
-        y_label="pressure [bar]",
-        expected=(volumes * 1e3, p0 * (whole / (whole - volumes)) ** 1.4 / BAR),
-        computed=(volumes * 1e3, p / BAR),
+    work = -quad(
+        lambda volume: p0 * (whole / volume) ** 1.4 - AMBIENT.pressure, whole, gas, epsrel=1e-13
+    )[0]
+    row, p = (
+        branch_of(component("accumulator", volume=whole, precharge=p0)),
+        np.geomspace(60.0, 400.0, 60) * BAR,
     )
+    volumes = np.array([held(x, 1.4)[0] for x in p])
     in_100 = branch_step(row, 100 * BAR, BAR, h=1e-3, state=[90 * BAR, 0.0, 0.0, 1.0])
     mass = [float(OIL.density(x)) * held(x, 1.4)[0] for x in (90 * BAR, 100 * BAR)]
     empty = branch_step(row, 40 * BAR, BAR, state=[50 * BAR, 0.0, 0.0, 1.0])
     full = held(p0 * 10**1.4 * 1.5, 1.4)
     return [
-        _check(
+        check(
             "accumulator at 200 bar, volume of its gas [m^3]",
             whole * (60 / 200) ** (1 / 1.4),
             gas,
             5e-14,
             "p V^n = const, n = 1.4",
-            curve,
+            ComparedCurve(
+                x_label="fluid inside [l]",
+                y_label="pressure [bar]",
+                expected=(volumes * 1e3, p0 * (whole / (whole - volumes)) ** 1.4 / BAR),
+                computed=(volumes * 1e3, p / BAR),
+            ),
         ),
-        _check(
+        check(
             "accumulator filled to 200 bar, n = 1.4, energy [J]",
             work,
             held(200 * BAR, 1.4)[2],
             2e-14,
             "quadrature of the pressure over the volume",
         ),
-        _check(
+        check(
             "accumulator filled to 200 bar, n = 1, energy [J]",
-            float(isothermal),
+            float(p0 * whole * np.log(200 / 60) - AMBIENT.pressure * whole * (1 - 60 / 200)),
             held(200 * BAR, 1.0)[2],
             1e-13,
             "p V ln(V_0/V), less the work of the surroundings",
         ),
-        _check(
+        check(
             "accumulator from 90 to 100 bar, mass that flows in [kg]",
             mass[1] - mass[0],
             float(in_100[0]) * 1e-3,
             1e-11,
             "density times volume of the fluid at both pressures",
         ),
-        _check(
+        check(
             "empty accumulator at 40 bar, flow [kg/s]",
             0.0,
             float(empty[0]),
             0.0,
             "below the precharge it holds nothing",
         ),
-        _check(
+        check(
             "full accumulator, volume of its fluid [m^3]",
             whole - least,
             full[0],
@@ -259,30 +258,35 @@ def _accumulator() -> list[Check]:
 
 def _variable_orifice() -> list[Check]:
     areas = (0.0, 1e-6, 3e-6)
-    by_lift = branch_of(VariableOrifice(lift=(0.0, 1e-4, 2e-4), area=areas, cavitation=None))
-    by_time = branch_of(VariableOrifice(time=(0.0, 1e-3, 2e-3), area=areas, cavitation=None))
+    by_lift = branch_of(
+        component("variable-orifice", lift=(0.0, 1e-4, 2e-4), area=areas, cavitation=None)
+    )
+    by_time = branch_of(
+        component("variable-orifice", time=(0.0, 1e-3, 2e-3), area=areas, cavitation=None)
+    )
     at_lift = branch_step(by_lift, 50e5, 20e5, ports=(1.4e-4, 1.6e-4, 0.0, 0.0))
     at_time = branch_step(by_time, 50e5, 20e5, t=0.5e-3 - 5e-7)
-    number = 2.0 / (MU * 100.0)
-    forward = opening_flow(50e5, 20e5, RHO, RHO, 2e-6, 0.7, number, 0.0, 0.0)
+    forward = opening_flow(
+        50e5, 20e5, RHO_OIL, RHO_OIL, 2e-6, 0.7, 2.0 / (MU_OIL * 100.0), 0.0, 0.0
+    )
     return [
-        _check(
+        check(
             "table of areas at a mean lift of 150 um, mass flow [kg/s]",
-            0.7 * 2e-6 * sqrt(2 * RHO * 30e5),
+            0.7 * 2e-6 * sqrt(2 * RHO_OIL * 30e5),
             float(at_lift[0]),
             5e-14,
             "Merritt 1967, sec. 3-3: C_q A sqrt(2 rho dp)",
         ),
-        _check(
+        check(
             "table of areas at 0.5 ms, area [m^2]",
             0.5e-6,
             float(at_time[-1]),
             5e-14,
             "straight line between its points",
         ),
-        _check(
+        check(
             "turbulent opening, slope of its flow with the area [kg/(s m^2)]",
-            0.7 * sqrt(2 * RHO * 30e5),
+            0.7 * sqrt(2 * RHO_OIL * 30e5),
             forward[3],
             1e-13,
             "C_q sqrt(2 rho dp)",
@@ -290,44 +294,41 @@ def _variable_orifice() -> list[Check]:
     ]
 
 
-def _pump() -> list[Check]:
-    out = []
+def _pump() -> Iterator[Check]:
     turns, n = 25.0, 5040
     for z in (7, 10):
-        row = branch_of(Pump(displacement=10e-6, speed=turns, pistons=z))
+        row = branch_of(component("pump", displacement=10e-6, speed=turns, pistons=z))
         times = np.arange(n) / (turns * n)
         h = 1.0 / (turns * n)
         flow = np.array([branch_step(row, BAR, BAR, t=t, h=h)[5] for t in times])
         now = np.array([branch_step(row, BAR, BAR, t=t, h=0.0)[5] for t in times])
-        order = 2 * z if z % 2 else z
         share = pi / (2 * z) * tan(pi / (4 * z)) if z % 2 else pi / z * tan(pi / (2 * z))
         whole = np.sum(
             np.maximum(np.sin(2 * pi * turns * times + 2 * pi * np.arange(z)[:, None] / z), 0.0),
             axis=0,
         )
-        curve = ComparedCurve(
-            x_label="angle of the shaft [deg]",
-            y_label="flow [l/min]",
-            expected=(360 * turns * times[:720], whole[:720] * pi / z * 250e-6 * 6e4),
-            computed=(360 * turns * times[:720], now[:720] * 6e4),
-        )
-        out += [
-            _check(
+        yield from [
+            check(
                 f"pump of {z} pistons, mean flow of one turn [m^3/s]",
                 250e-6,
                 float(flow.mean()),
                 1e-13,
                 "displacement times speed",
-                curve,
+                ComparedCurve(
+                    x_label="angle of the shaft [deg]",
+                    y_label="flow [l/min]",
+                    expected=(360 * turns * times[:720], whole[:720] * pi / z * 250e-6 * 6e4),
+                    computed=(360 * turns * times[:720], now[:720] * 6e4),
+                ),
             ),
-            _check(
+            check(
                 f"pump of {z} pistons, strongest order of its ripple [-]",
-                float(order),
+                float(2 * z if z % 2 else z),
                 float(1 + np.argmax(np.abs(np.fft.rfft(flow))[1:])),
                 0.0,
                 "Ivantysyn & Ivantysynova 2001: 2 z for odd, z for even numbers",
             ),
-            _check(
+            check(
                 f"pump of {z} pistons, non-uniformity of its flow [-]",
                 share,
                 float(np.ptp(now) / now.mean()),
@@ -335,31 +336,42 @@ def _pump() -> list[Check]:
                 "Ivantysyn & Ivantysynova 2001: pi/(2z) tan(pi/(4z)) odd, pi/z tan(pi/(2z)) even",
             ),
         ]
-    leaking = Pump(displacement=10e-6, speed=25.0, volumetric_efficiency=0.9, rated_pressure=2e7)
-    leak = branch_step(branch_of(leaking, 1), BAR, BAR + 1e7)
-    out.append(
-        _check(
-            "pump of 90 % volumetric efficiency at 200 bar, leakage at 100 bar [m^3/s]",
-            0.5 * 0.1 * 250e-6,
-            -float(leak[0]) / RHO,
-            5e-14,
-            "laminar: half the pressure, half the leakage",
-        )
+    leaking = component(
+        "pump", displacement=10e-6, speed=25.0, volumetric_efficiency=0.9, rated_pressure=2e7
     )
-    return out
+    leak = branch_step(branch_of(leaking, 1), BAR, BAR + 1e7)
+    yield check(
+        "pump of 90 % volumetric efficiency at 200 bar, leakage at 100 bar [m^3/s]",
+        0.5 * 0.1 * 250e-6,
+        -float(leak[0]) / RHO_OIL,
+        5e-14,
+        "laminar: half the pressure, half the leakage",
+    )
 
 
 def _pulsation() -> Check:
-    sine = FlowHarmonic(frequency=1750.0, amplitude=1e-5, phase=0.3)
-    row = branch_of(PulsatingFlow(mean=3e-4, harmonics=(sine,)))
 
     def flow(t: float) -> float:
         return 3e-4 + 1e-5 * float(np.sin(2 * pi * 1750.0 * t + 0.3))
 
-    return _check(
+    return check(
         "pulsation of 1.75 kHz over a step of 0.4 ms, mean flow [m^3/s]",
         quad(flow, 1e-3, 1.4e-3, epsrel=1e-13)[0] / 0.4e-3,
-        float(branch_step(row, BAR, 90 * BAR, t=1e-3, h=0.4e-3)[0]) / RHO,
+        float(
+            branch_step(
+                branch_of(
+                    PulsatingFlow(
+                        mean=3e-4,
+                        harmonics=(FlowHarmonic(frequency=1750.0, amplitude=1e-5, phase=0.3),),
+                    )
+                ),
+                BAR,
+                90 * BAR,
+                t=1e-3,
+                h=0.4e-3,
+            )[0]
+        )
+        / RHO_OIL,
         1e-13,
         "quadrature of the sine",
     )

@@ -1,17 +1,18 @@
 """Reduced impacts against closed and tabulated solutions."""
 
+from collections.abc import Iterator
 from math import gamma, pi, sqrt
 
 import numpy as np
 
 from klack.contact.laws import HertzLaw, HuntCrossley, gonthier_coefficient
 from klack.contact.restitution import measure_impact
-from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.hertz_pulse import hertz_force
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.one_dimension import (
     BAR_SPEED,
     DENSITY,
     NEEDLE_AREA,
+    hertz_force,
     mass_on_law,
     needle_on_spring,
     sphere_on_rod,
@@ -20,7 +21,6 @@ from klack.verification.one_dimension import (
 
 __all__ = ["checks"]
 
-GROUP = "impact"
 
 # kappa, restitution, peak force over Z v, first separation [L/c]
 NEEDLE_ON_SPRING = (
@@ -72,8 +72,7 @@ def _hertz() -> list[Check]:
     )
     where = "Johnson 1985, section 11.4, sphere of 1 g and R = 2 mm on a plane at 0.5 m/s"
     return [
-        compare(
-            GROUP,
+        check(
             "Hertz contact time [s]",
             expected=duration,
             computed=m.contact_time,
@@ -81,8 +80,7 @@ def _hertz() -> list[Check]:
             source=where,
             curve=curve,
         ),
-        compare(
-            GROUP,
+        check(
             "Hertz peak force [N]",
             expected=K * depth**1.5,
             computed=m.peak_force,
@@ -90,8 +88,7 @@ def _hertz() -> list[Check]:
             source=where,
             curve=curve,
         ),
-        compare(
-            GROUP,
+        check(
             "Hertz restitution [-]",
             expected=1.0,
             computed=m.restitution,
@@ -101,22 +98,24 @@ def _hertz() -> list[Check]:
     ]
 
 
-def _gonthier() -> list[Check]:
-    out = []
+def _gonthier() -> Iterator[Check]:
     for e in (0.3, 0.9):
-        law = HuntCrossley(HertzLaw(7e9), gonthier_coefficient(e))
-        m = measure_impact(mass_on_law(1e-3, law, speed=0.5, step=10e-9, duration=1e-3))
-        out.append(
-            compare(
-                GROUP,
-                f"restitution {e:g} prescribed for rigid bodies [-]",
-                expected=e,
-                computed=m.restitution,
-                tolerance=1e-6,
-                source="Gonthier et al. 2004, eq. 29",
+        m = measure_impact(
+            mass_on_law(
+                1e-3,
+                HuntCrossley(HertzLaw(7e9), gonthier_coefficient(e)),
+                speed=0.5,
+                step=10e-9,
+                duration=1e-3,
             )
         )
-    return out
+        yield check(
+            f"restitution {e:g} prescribed for rigid bodies [-]",
+            expected=e,
+            computed=m.restitution,
+            tolerance=1e-6,
+            source="Gonthier et al. 2004, eq. 29",
+        )
 
 
 def _st_venant() -> list[Check]:
@@ -128,16 +127,14 @@ def _st_venant() -> list[Check]:
     coarse = measure_impact(st_venant_rods(1e9, 20, step=10e-9))
     touch = 0.1e-6  # [s] its gap of 0.1 um at 1 m/s
     along = (soft.time - touch) * 1e6
-    on = (along > 0.0) & (along < 0.08 / BAR_SPEED * 1e6)
     curve = ComparedCurve(
         x_label="time since first touch [us]",
         y_label="force [N]",
-        expected=(along, np.where(on, 0.5 * Z, 0.0)),
+        expected=(along, np.where((along > 0.0) & (along < 0.08 / BAR_SPEED * 1e6), 0.5 * Z, 0.0)),
         computed=(along, soft.force),
     )
     return [
-        compare(
-            GROUP,
+        check(
             "force plateau of two rods, Z v/2 [N]",
             expected=0.5 * Z,
             computed=float(np.mean(soft.force[inside])),
@@ -145,24 +142,21 @@ def _st_venant() -> list[Check]:
             source=source,
             curve=curve,
         ),
-        compare(
-            GROUP,
+        check(
             "restitution of two rods, L1/L2 [-]",
             expected=0.5,
             computed=m.restitution,
             tolerance=2e-3,
             source=source,
         ),
-        compare(
-            GROUP,
+        check(
             "contact time of two rods, 2 L1/c [s]",
             expected=0.08 / BAR_SPEED,
             computed=m.contact_time,
             tolerance=2e-3,
             source=source,
         ),
-        compare(
-            GROUP,
+        check(
             "restitution of two rods joined by 1e9 N/m, 20 + 40 modes [-]",
             expected=measure_impact(soft).restitution,
             computed=coarse.restitution,
@@ -173,8 +167,7 @@ def _st_venant() -> list[Check]:
     ]
 
 
-def _needle_on_spring() -> list[Check]:
-    out = []
+def _needle_on_spring() -> Iterator[Check]:
     for kappa, restitution, peak, separation in NEEDLE_ON_SPRING:
         m = measure_impact(needle_on_spring(kappa, 200, static_spring=True))
         for what, expected, computed, tolerance, absolute in (
@@ -182,53 +175,40 @@ def _needle_on_spring() -> list[Check]:
             ("peak force [Z v]", peak, m.peak_force, 2e-4, False),
             ("contact time [L/c]", separation, m.contact_time, 5e-5, False),
         ):
-            out.append(
-                compare(
-                    GROUP,
-                    f"needle on a spring, kL/EA = {kappa:g}: {what}",
-                    expected=expected,
-                    computed=computed,
-                    tolerance=tolerance,
-                    source=NEEDLE_SOURCE,
-                    absolute=absolute,
-                    reason="stiffer springs need more of the 200 modes; one tolerance for all",
-                )
+            yield check(
+                f"needle on a spring, kL/EA = {kappa:g}: {what}",
+                expected=expected,
+                computed=computed,
+                tolerance=tolerance,
+                source=NEEDLE_SOURCE,
+                absolute=absolute,
+                reason="stiffer springs need more of the 200 modes; one tolerance for all",
             )
-    return out
 
 
-def _modal_convergence() -> list[Check]:
-    out = []
+def _modal_convergence() -> Iterator[Check]:
     for kappa, modes, static_spring, peak, restitution in TRUNCATED:
         history = needle_on_spring(kappa, modes, static_spring=static_spring, step=1e-3)
         kind = "with static spring" if static_spring else "truncated"
         name = f"needle on a spring, kL/EA = {kappa:g}, {modes} modes {kind}"
-        out.append(
-            compare(
-                GROUP,
-                f"{name}: peak force [Z v]",
-                expected=peak,
-                computed=measure_impact(history).peak_force,
-                tolerance=1e-4,
-                source=TRUNCATED_SOURCE,
-            )
+        yield check(
+            f"{name}: peak force [Z v]",
+            expected=peak,
+            computed=measure_impact(history).peak_force,
+            tolerance=1e-4,
+            source=TRUNCATED_SOURCE,
         )
-        out.append(
-            compare(
-                GROUP,
-                f"{name}: restitution [-]",
-                expected=restitution,
-                computed=abs(float(history.velocity_a[-1])),
-                tolerance=1e-5,
-                source=TRUNCATED_SOURCE,
-                absolute=True,
-            )
+        yield check(
+            f"{name}: restitution [-]",
+            expected=restitution,
+            computed=abs(float(history.velocity_a[-1])),
+            tolerance=1e-5,
+            source=TRUNCATED_SOURCE,
+            absolute=True,
         )
-    return out
 
 
-def _zener() -> list[Check]:
-    out = []
+def _zener() -> Iterator[Check]:
     runs = [measure_impact(sphere_on_rod(row[0])) for row in ZENER]
     table = np.array(ZENER).T
     rebound, force = (
@@ -244,27 +224,20 @@ def _zener() -> list[Check]:
         )
     )
     for (inelasticity, restitution, peak), m in zip(ZENER, runs, strict=True):
-        out.append(
-            compare(
-                GROUP,
-                f"sphere on a long rod, lambda = {inelasticity:g}: restitution [-]",
-                expected=restitution,
-                computed=m.restitution,
-                tolerance=2e-6,
-                source=ZENER_SOURCE,
-                absolute=True,
-                curve=rebound,
-            )
+        yield check(
+            f"sphere on a long rod, lambda = {inelasticity:g}: restitution [-]",
+            expected=restitution,
+            computed=m.restitution,
+            tolerance=2e-6,
+            source=ZENER_SOURCE,
+            absolute=True,
+            curve=rebound,
         )
-        out.append(
-            compare(
-                GROUP,
-                f"sphere on a long rod, lambda = {inelasticity:g}: peak force [m v/T0]",
-                expected=peak,
-                computed=m.peak_force,
-                tolerance=2e-6,
-                source=ZENER_SOURCE,
-                curve=force,
-            )
+        yield check(
+            f"sphere on a long rod, lambda = {inelasticity:g}: peak force [m v/T0]",
+            expected=peak,
+            computed=m.peak_force,
+            tolerance=2e-6,
+            source=ZENER_SOURCE,
+            curve=force,
         )
-    return out

@@ -1,5 +1,6 @@
 """The time integration: exact modes, energy, momentum, order."""
 
+from collections.abc import Iterator
 from math import pi, sqrt
 
 import numpy as np
@@ -9,12 +10,11 @@ from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.contact.restitution import measure_impact
 from klack.simulation.impact import simulate, simulate_impact
 from klack.simulation.propagator import modal_propagator
-from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.one_dimension import mass_on_law, one_contact, steel_rod
 
 __all__ = ["checks"]
 
-GROUP = "integrator"
 IDENTITY = "discrete gradient (Gonzalez 1996): energy identity at every step size"
 
 
@@ -36,8 +36,7 @@ def _propagator() -> list[Check]:
                 scale = np.array([1.0, min(1.0, x), 1.0, min(1.0, x) ** 2])
                 worst = max(worst, float(np.max(np.abs(ours - theirs) / scale)))
     return [
-        compare(
-            GROUP,
+        check(
             "modal step against the matrix exponential, largest difference [-]",
             expected=0.0,
             computed=worst,
@@ -55,16 +54,14 @@ def _half_sine() -> list[Check]:
     )
     source = "half sine: T = pi sqrt(m/k), F = v sqrt(k m)"
     return [
-        compare(
-            GROUP,
+        check(
             "mass on a spring, contact time [s]",
             expected=duration,
             computed=m.contact_time,
             tolerance=1e-8,
             source=source,
         ),
-        compare(
-            GROUP,
+        check(
             "mass on a spring, peak force [N]",
             expected=speed * sqrt(k * mass),
             computed=m.peak_force,
@@ -89,31 +86,28 @@ def _order() -> list[Check]:
     fine = end(48000)
     counts = np.array([150, 300, 600, 1200])
     errors = np.array([np.linalg.norm(end(int(n)) - fine) for n in counts])
-    order = -np.polyfit(np.log(counts), np.log(errors), 1)[0]
     steps = 12e-6 / counts[::-1] * 1e9
-    curve = ComparedCurve(
-        x_label="step [ns]",
-        y_label="error [m/s kg^0.5]",
-        expected=(steps, errors[-1] * (steps / steps[0]) ** 2),
-        computed=(steps, errors[::-1]),
-        x_log=True,
-        y_log=True,
-    )
     return [
-        compare(
-            GROUP,
+        check(
             "order of convergence of two rods in contact [-]",
             expected=2.0,
-            computed=float(order),
+            computed=float(-np.polyfit(np.log(counts), np.log(errors), 1)[0]),
             tolerance=1e-2,
             source="against a step 40 times finer",
             absolute=True,
-            curve=curve,
+            curve=ComparedCurve(
+                x_label="step [ns]",
+                y_label="error [m/s kg^0.5]",
+                expected=(steps, errors[-1] * (steps / steps[0]) ** 2),
+                computed=(steps, errors[::-1]),
+                x_log=True,
+                y_log=True,
+            ),
         )
     ]
 
 
-def _energy() -> list[Check]:
+def _energy() -> Iterator[Check]:
     d = 6e-6 * np.linspace(0.0, 1.0, 30)[1:]
     needle, seat = steel_rod("needle", 0.04, 19), steel_rod("seat", 0.1, 40, clamped=True)
     damped = (
@@ -128,35 +122,28 @@ def _energy() -> list[Check]:
         ("steps of 1 us that skip contacts", needle, seat, LinearLaw(1e9), 1e-6, 20e-3, 1e-11),
         ("modal damping", *damped, LinearLaw(1e9), 20e-9, 2e-3, 2e-11),
     )
-    out = []
     for name, a, b, law, step, duration, tolerance in cases:
         system = one_contact(a, b, law, gap=1e-6, press=200.0)
         history = simulate_impact(
             system, speed=1.0, step=step, duration=duration, steps_per_record=10
         )
-        out.append(
-            compare(
-                GROUP,
-                f"energy residual, {name} [-]",
-                expected=0.0,
-                computed=history.ledger.residual,
-                tolerance=tolerance,
-                source=IDENTITY,
-            )
-        )
-    lossy = HuntCrossley(HertzLaw(7e9), 0.3)
-    ledger = mass_on_law(1e-3, lossy, speed=0.5, step=20e-9, duration=60e-6).ledger
-    out.append(
-        compare(
-            GROUP,
-            "energy residual with Hunt-Crossley loss [-]",
+        yield check(
+            f"energy residual, {name} [-]",
             expected=0.0,
-            computed=ledger.residual,
-            tolerance=1e-13,
+            computed=history.ledger.residual,
+            tolerance=tolerance,
             source=IDENTITY,
         )
+    ledger = mass_on_law(
+        1e-3, HuntCrossley(HertzLaw(7e9), 0.3), speed=0.5, step=20e-9, duration=60e-6
+    ).ledger
+    yield check(
+        "energy residual with Hunt-Crossley loss [-]",
+        expected=0.0,
+        computed=ledger.residual,
+        tolerance=1e-13,
+        source=IDENTITY,
     )
-    return out
 
 
 def _momentum() -> list[Check]:
@@ -165,16 +152,14 @@ def _momentum() -> list[Check]:
     )
     m = measure_impact(simulate_impact(system, speed=1.0, step=20e-9, duration=60e-6))
     return [
-        compare(
-            GROUP,
+        check(
             "impulse against change of momentum [-]",
             expected=0.0,
             computed=m.impulse_residual,
             tolerance=5e-14,
             source="momentum of the upper rod",
         ),
-        compare(
-            GROUP,
+        check(
             "restitution from velocities against that from the impulse [-]",
             expected=m.restitution_from_impulse,
             computed=m.restitution,

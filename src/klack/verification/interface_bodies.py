@@ -1,27 +1,28 @@
-"""Interface-level models whose motion is known: rigid bodies, rods, a sphere on a beam.
+"""Interface-level models whose motion is known: rigid bodies, rods, points, a sphere on a beam.
 
 A model is nothing but arrays, so simple bodies are written down by hand; others are reduced from
 finite elements here.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import inf, pi
+from dataclasses import dataclass, replace
+from math import asin, inf, pi, sqrt
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
+from klack.contact.asperity_layer import AsperityLayer
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
+from klack.contact.mortar import ContactSpace
+from klack.contact.restitution import measure_impact
 from klack.elasticity import eigen
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
 from klack.transient.guide import Guide
-from klack.transient.interface_arrays import (
-    Modes,
-    Outside,
-    Record,
-    State,
-)
+from klack.transient.interface_arrays import Modes, Outside, Record, State
 from klack.transient.interface_kernel import march
 from klack.transient.interface_model import (
     InterfaceBody,
@@ -30,9 +31,16 @@ from klack.transient.interface_model import (
     StaticChecks,
     interface_model,
 )
-from klack.transient.interface_run import contact_points
+from klack.transient.interface_run import contact_points, simulate_interface
+from klack.verification.check import Check, check
 
 __all__ = [
+    "LAYER",
+    "BeamImpact",
+    "MassOnLayer",
+    "PointImpact",
+    "PointRebound",
+    "Touch",
     "advance",
     "free_rod",
     "lateral_guide",
@@ -41,27 +49,28 @@ __all__ = [
     "reduce_bodies",
     "rigid_body",
     "rod_between_stops",
+    "rough_checks",
+    "rough_rod",
+    "rubbing_faces",
+    "seat_restitution",
+    "sphere_on_beam",
+    "time_above",
 ]
 
-Array = NDArray[np.float64]
 
-_YOUNG, _DENSITY = 210e9, 7850.0
+_YOUNG, _POISSON, _DENSITY = 210e9, 0.3, 7850.0
 _ROD_LENGTH, _ROD_AREA = 30e-3, pi * 2e-3**2
 
 
 def modal_model(
     *,
     masses: Sequence[float],
-    omega: Array,
-    traces: Array,
-    compliance: Array,
-    gap: Array,
-    rigid: Array | None = None,
-    owner: NDArray[np.int64] | None = None,
-    axial: Array | None = None,
-    contacts: tuple[tuple[str, int, int], ...] | None = None,
-    points: Array | None = None,
-    damping: Array | None = None,
+    omega: np.ndarray,
+    traces: np.ndarray,
+    compliance: np.ndarray,
+    gap: np.ndarray,
+    rigid: np.ndarray | None = None,
+    **more: Any,
 ) -> InterfaceModel:
     """Model from its arrays; coordinate 0 is the flight of the moving body along z.
 
@@ -74,11 +83,9 @@ def modal_model(
     compliance : array, shape (nc, nc) [m/N]
     gap : array, shape (nc,) [m]
     rigid : array, shape (6, M), optional [1/sqrt(kg)]
-    owner : int array, shape (M,), optional
-        Without it all coordinates belong to the moving body.
-    axial, contacts, points : optional
-        Without them: one contact below the moving body, on its axis.
-    damping : array, shape (M,), optional [-]
+    more
+        Other fields of the model.  Without them all coordinates belong to the moving body and are
+        undamped, and one contact on 1 m^2 for each point lies below that body, on its axis.
     """
     nc, modes = traces.shape
     if rigid is None:
@@ -86,19 +93,21 @@ def modal_model(
         rigid[2, 0] = masses[0] ** -0.5
     drift = np.zeros((len(masses), modes))
     drift[0] = rigid[2]
+    plain: dict[str, Any] = {
+        "damping": np.zeros(modes),
+        "owner": np.zeros(modes, dtype=np.int64),
+        "axial": np.ones(nc),
+        "area": np.ones(nc),
+        "points": np.zeros((nc, 3)),
+        "contacts": (("contact", 0, nc),),
+    }
     return InterfaceModel(
         bodies=("moving", "other")[: len(masses)],
         masses=tuple(masses),
         omega=np.asarray(omega, dtype=float),
-        damping=np.zeros(modes) if damping is None else damping,
-        owner=np.zeros(modes, dtype=np.int64) if owner is None else owner,
         traces=np.ascontiguousarray(traces, dtype=float),
         compliance=np.ascontiguousarray(compliance, dtype=float),
         gap=np.asarray(gap, dtype=float),
-        axial=np.ones(nc) if axial is None else axial,
-        area=np.ones(nc),
-        points=np.zeros((nc, 3)) if points is None else points,
-        contacts=contacts or (("contact", 0, nc),),
         rim=np.zeros(nc, dtype=bool),
         beyond=np.full(nc, inf),
         rigid=rigid,
@@ -106,11 +115,18 @@ def modal_model(
         centre=np.zeros(3),
         longest_period=0.0,
         checks=StaticChecks(lowest_pivot=1.0, reciprocity=0.0, static_limit=0.0, modal_share=0.0),
+        **(plain | more),
     )
 
 
 def rigid_body(
-    *, mass: float, inertia: Sequence[float], points: Array, stiffness: float, gap: float = 0.0
+    *,
+    mass: float,
+    inertia: Sequence[float],
+    points: np.ndarray,
+    stiffness: float,
+    gap: float = 0.0,
+    **more: Any,
 ) -> InterfaceModel:
     """Rigid body above a floor with one spring under each contact point.
 
@@ -137,6 +153,7 @@ def rigid_body(
         gap=np.full(len(points), gap),
         rigid=np.diag(np.concatenate([np.full(3, mass**-0.5), J**-0.5])),
         points=points,
+        **more,
     )
 
 
@@ -250,7 +267,7 @@ def reduce_bodies(
     return interface_model(items, contacts), tuple(items)
 
 
-def momenta(items: Sequence[InterfaceBody], v: Array) -> tuple[Array, Array]:
+def momenta(items: Sequence[InterfaceBody], v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Momentum and its moment about the origin, of all bodies."""
     linear, angular, start = np.zeros(3), np.zeros(3), 0
     for item in items:
@@ -267,24 +284,35 @@ def momenta(items: Sequence[InterfaceBody], v: Array) -> tuple[Array, Array]:
 class ModalState:
     """Where a model is: coordinates, velocities and point forces."""
 
-    q: Array
-    v: Array
-    force: Array
+    q: np.ndarray
+    v: np.ndarray
+    force: np.ndarray
 
 
-def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: int) -> ModalState:
+def advance(
+    model: InterfaceModel, q: np.ndarray, v: np.ndarray, *, step: float, steps: int
+) -> ModalState:
     """Take ``steps`` steps of the compiled loop from an open contact, without outside forces."""
     n, M = model.count, model.mode_count
     P = modal_propagator(model.omega, model.damping, step)
-    push = np.ascontiguousarray(model.rigid[2])
-    none = np.zeros((0, M))
     yields, rough = model.limit is not None, model.layer is not None
     state = State.still(M, n, 0, model.ways, yields=yields, rough=rough)
     state.q[:], state.v[:] = q, v
     march(
         steps,
         0,
-        Modes(P.A11, P.A12, P.A21, P.A22, P.B1, P.B2, none, push, model.drift, step),
+        Modes(
+            P.A11,
+            P.A12,
+            P.A21,
+            P.A22,
+            P.B1,
+            P.B2,
+            np.zeros((0, M)),
+            np.ascontiguousarray(model.rigid[2]),
+            model.drift,
+            step,
+        ),
         Outside(0.0, 0.0),
         contact_points(model, P.B1, step),
         None,
@@ -293,3 +321,394 @@ def advance(model: InterfaceModel, q: Array, v: Array, *, step: float, steps: in
         Record.empty(steps, len(model.bodies), n, model.ways, keep_points=False),
     )
     return ModalState(q=state.q, v=state.v, force=state.lam)
+
+
+_LARGEST_DEPTH = 80e-6  # [m]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Touch:
+    """One sub-impact: first touch and separation [s], impulse [N s]."""
+
+    start: float
+    end: float
+    impulse: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BeamImpact:
+    r"""Sphere that falls on a simply supported beam and meets it several times.
+
+    Euler-Bernoulli beam with modes
+
+    .. math:: \omega_n = \left(\frac{n \pi}{L}\right)^2 \sqrt{\frac{E I}{\rho A}}, \qquad
+        \varphi_n(L/2) = \sqrt{2 / m_b} \, \sin(n \pi / 2), \quad n \text{ odd},
+
+    rigid sphere, Hertz contact in pieces: parallel springs with gaps :math:`a_i` and stiffnesses
+    :math:`k_i` that meet :math:`K \delta^{3/2}` at :math:`\delta = a_i`.  Each spring is one
+    contact point of the interface level.  The other solution here knows nothing of klack: the
+    equations of motion in the hands of an explicit Runge-Kutta method of order 8.
+
+    Parameters
+    ----------
+    mass : float [kg]
+        Of the sphere.
+    omega, shapes : array, shape (m,) [rad/s], [1/sqrt(kg)]
+        Frequencies of the beam and its modes at the middle.
+    gaps, stiffness : array, shape (n,) [m], [N/m]
+    hertz : float [N/m^1.5]
+        K of the law that the springs follow.
+    """
+
+    mass: float
+    omega: np.ndarray
+    shapes: np.ndarray
+    gaps: np.ndarray
+    stiffness: np.ndarray
+    hertz: float
+
+    def model(self) -> InterfaceModel:
+        """Model of the interface level."""
+        row = np.concatenate([[self.mass**-0.5], -self.shapes])
+        return modal_model(
+            masses=(self.mass, inf),
+            omega=np.concatenate([[0.0], self.omega]),
+            traces=np.repeat(row[None], len(self.gaps), axis=0),
+            compliance=np.diag(1.0 / self.stiffness),
+            gap=self.gaps,
+            owner=np.minimum(np.arange(len(row)), 1),
+        )
+
+    def force(self, depth: np.ndarray) -> np.ndarray:
+        """Contact force [N] at depths [m] below first touch."""
+        return np.maximum(depth[..., None] - self.gaps, 0.0) @ self.stiffness
+
+    def touches(
+        self, *, speed: float, duration: float, smooth: bool = False, samples: int = 100_001
+    ) -> tuple[Touch, ...]:
+        """Sub-impacts by the Runge-Kutta method DOP853 with tight tolerances.
+
+        Parameters
+        ----------
+        speed, duration : float [m/s], [s]
+        smooth : bool
+            Take Hertz' law itself instead of the springs.
+        samples : int
+            Instants at which the force is looked at.
+        """
+        m = len(self.omega)
+
+        def law(y: np.ndarray) -> np.ndarray:
+            depth = self.shapes @ y[1 : 1 + m] - y[0]
+            return self.hertz * np.maximum(depth, 0.0) ** 1.5 if smooth else self.force(depth)
+
+        def rate(_: float, y: np.ndarray) -> np.ndarray:
+            P = law(y)
+            return np.concatenate(
+                [y[1 + m :], [P / self.mass], -(self.omega**2) * y[1 : 1 + m] - self.shapes * P]
+            )
+
+        start = np.zeros(2 * m + 2)
+        start[1 + m] = -speed
+        t = np.linspace(0.0, duration, samples)
+        solution = solve_ivp(
+            rate,
+            (0.0, duration),
+            start,
+            method="DOP853",
+            t_eval=t,
+            rtol=1e-9,
+            atol=1e-13,
+            max_step=5e-6,
+        )
+        return _touches(t, law(solution.y))
+
+
+def _touches(t: np.ndarray, force: np.ndarray) -> tuple[Touch, ...]:
+    on = np.concatenate([[False], force > 0.0, [False]])
+    first, last = np.flatnonzero(on[1:] & ~on[:-1]), np.flatnonzero(~on[1:] & on[:-1])
+    return tuple(
+        Touch(
+            start=float(t[a]),
+            end=float(t[b - 1]),
+            impulse=float(np.trapezoid(force[a:b], t[a:b])),
+        )
+        for a, b in zip(first, last, strict=True)
+    )
+
+
+def sphere_on_beam(*, modes: int = 20, springs: int = 30) -> BeamImpact:
+    """Sphere R70 mm above the middle of a beam of 60 x 27.8 x 780 mm, both of steel.
+
+    Several sub-impacts were measured on this arrangement (Adv. Mech. Eng. 2016, 8(9),
+    10.1177/1687814016668089).
+
+    Parameters
+    ----------
+    modes : int
+        Symmetric ones of the beam.
+    springs : int
+        Pieces of Hertz' law, up to a depth of 80 um.
+    """
+    radius, length, width, height = 70e-3, 780e-3, 60e-3, 27.8e-3
+    beam_mass = _DENSITY * length * width * height
+    n = 2 * np.arange(modes) + 1
+    K = 4.0 / 3.0 * 0.5 * _YOUNG / (1.0 - _POISSON**2) * sqrt(radius)
+    depth = _LARGEST_DEPTH * (np.arange(springs + 1) / springs) ** 2
+    return BeamImpact(
+        mass=_DENSITY * 4.0 / 3.0 * pi * radius**3,
+        omega=np.asarray((n * pi / length) ** 2 * sqrt(_YOUNG * height**2 / 12.0 / _DENSITY)),
+        shapes=np.sqrt(2.0 / beam_mass) * np.sin(n * pi / 2.0),
+        gaps=depth[:-1],
+        stiffness=np.diff(np.diff(K * depth**1.5) / np.diff(depth), prepend=0.0),
+        hertz=K,
+    )
+
+
+LAYER = AsperityLayer.of_summits(rms=0.2e-6, radius=50e-6, density=0.05, modulus=115e9)
+"""Steel on steel, ground."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class MassOnLayer:
+    r"""A rigid mass on one point with a layer of asperities, and its impact in closed form.
+
+    The pressure is straight between points of the curve, so the mass moves on arcs of oscillators:
+    from the closure :math:`c_j` with the pressure :math:`p_j`, its slope :math:`s_j` and the speed
+    :math:`v_j` on
+
+    .. math:: R_j = \sqrt{p_j^2 + s_j \tfrac{m}{A} v_j^2}, \qquad
+        t = \sqrt{\frac{m}{A s_j}} \left(\arcsin\frac{p}{R_j} - \arcsin\frac{p_j}{R_j}\right) .
+
+    Parameters
+    ----------
+    layer : AsperityLayer
+    mass : float [kg]
+    area : float [m^2]
+    stiffness : float [N/m]
+        Of the bodies behind the layer, in series.
+    """
+
+    layer: AsperityLayer = LAYER
+    mass: float = 3e-3
+    area: float = 4e-6
+    stiffness: float = 1e15
+
+    @property
+    def model(self) -> InterfaceModel:
+        """Model of the interface level."""
+        return rigid_body(
+            mass=self.mass,
+            inertia=(1.0, 1.0, 1.0),
+            points=np.zeros((1, 3)),
+            stiffness=self.stiffness,
+            area=np.array([self.area]),
+            layer=self.layer,
+        )
+
+    def peak(self, speed: float) -> float:
+        """Highest force [N] on rigid bodies: all energy is in the layer."""
+        return self.area * self._arcs(speed)[1]
+
+    def time_above(self, force: float, speed: float) -> float:
+        """Time [s] for which rigid bodies press harder than a force, in and out."""
+        return 2.0 * self._arcs(speed, force / self.area)[0]
+
+    def _arcs(self, speed: float, above: float = 0.0) -> tuple[float, float]:
+        """Time [s] from a pressure to the highest one, and the latter [Pa]."""
+        curve, per_area = self.layer, self.mass / self.area
+        slope = np.diff(curve.pressure) / np.diff(curve.closure)
+        energy = curve.state(curve.closure)[2]
+        time = 0.0
+        for j in range(len(slope)):
+            squared = speed**2 - 2.0 * energy[j] / per_area
+            radius = sqrt(curve.pressure[j] ** 2 + slope[j] * per_area * squared)
+            last = j + 1 == len(slope) or radius <= curve.pressure[j + 1]
+            begin = max(float(curve.pressure[j]), above)
+            end = radius if last else float(curve.pressure[j + 1])
+            if end > begin:
+                arc = asin(min(end / radius, 1.0)) - asin(begin / radius)
+                time += sqrt(per_area / slope[j]) * arc
+            if last:
+                return time, radius
+        raise AssertionError
+
+
+def time_above(force: float, history: np.ndarray, step: float) -> float:
+    """Time [s] for which mean forces of steps, straight between their middles, exceed a force."""
+    is_above = np.flatnonzero(history > force)
+    first, last = is_above[0], is_above[-1]
+    before = (history[first] - force) / (history[first] - history[first - 1])
+    after = (history[last] - force) / (history[last] - history[last + 1])
+    return float(step * (last - first + before + after))
+
+
+def rough_rod(modes: int = 10) -> InterfaceModel:
+    """Steel rod D4 x L30 mm whose end is rough, over a rigid wall with a spring of 1e9 N/m."""
+    return replace(free_rod(modes, stiffness=1e9, gap=0.1e-6), area=np.array([1e-6]), layer=LAYER)
+
+
+def rough_checks() -> list[Check]:
+    """Return the checks of contact points with a layer of asperities."""
+    return [*_mass_on_layer(), *_rod()]
+
+
+def _mass_on_layer() -> list[Check]:
+    mass, speed, step = MassOnLayer(), 0.05, 10e-9
+    peak = mass.peak(speed)
+    run = simulate_interface(mass.model, speed=speed, duration=30e-6, step=step)
+    force = run.history.force
+    source = "arcs of oscillators on the pieces of the curve of Greenwood and Williamson"
+    return [
+        check(
+            "rigid mass on a layer of asperities: peak force [N]",
+            expected=peak,
+            computed=float(force.max()),
+            tolerance=1e-5,
+            source=source,
+        ),
+        check(
+            "rigid mass on a layer of asperities: time above half of the peak [s]",
+            expected=mass.time_above(0.5 * peak, speed),
+            computed=time_above(0.5 * peak, force, step),
+            tolerance=5e-6,
+            source=source,
+        ),
+        check(
+            "rigid mass on a layer of asperities: restitution [-]",
+            expected=1.0,
+            computed=float(run.motion.velocity[-1, 2]) / speed,
+            tolerance=1e-13,
+            source="an elastic layer gives all energy back",
+        ),
+    ]
+
+
+def _rod() -> list[Check]:
+    model, speed = rough_rod(), 0.5
+    q, v = np.zeros((2, model.mode_count))
+    v[0] = -speed * sqrt(model.mass)
+
+    def end(steps: int) -> np.ndarray:
+        return advance(model, q, v, step=20e-6 / steps, steps=steps).v
+
+    exact = end(64_000)
+    errors = [float(np.linalg.norm(end(n) - exact)) for n in (1000, 2000, 4000)]
+    cut = simulate_interface(model, speed=speed, duration=5e-6, step=40e-9)
+    return [
+        check(
+            "rough rod with 10 modes through an impact: order of convergence of the step [-]",
+            expected=2.0,
+            computed=float(np.log2(errors[0] / errors[2]) / 2.0),
+            tolerance=5e-2,
+            source="forces of both ends weighed by energy, exact modes",
+        ),
+        check(
+            "rough rod, run ended while it is pressed: energy residual [-]",
+            expected=0.0,
+            computed=cut.energy.residual,
+            tolerance=1e-13,
+            source="the work of each step is the change of the energy of bodies and layer",
+        ),
+    ]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointRebound:
+    """Velocities of the point after an impact, tangential and normal [m/s], and the loss [J]."""
+
+    tangential: float
+    normal: float
+    lost: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PointImpact:
+    """Planar rigid body that hits with one point.
+
+    Parameters
+    ----------
+    along, coupling, normal : float [1/kg]
+        Inverse mass at the point: tangential, tangential per normal force, normal.
+    friction : float [-]
+    tangential, approach : float [m/s]
+        Velocity of the point before, along the face and into it.
+    spring, stiffer : float [N/m], [-]
+        Normal spring, and the tangential one over it.
+    """
+
+    along: float
+    coupling: float
+    normal: float
+    friction: float
+    tangential: float
+    approach: float = 1.0
+    spring: float = 1.0
+    stiffer: float = 0.8235294
+
+    def hit(self, time: float, *, steps: int = 400) -> PointRebound:
+        """Impact that lasts about ``time`` [s], in so many steps."""
+        root = np.asarray(
+            np.linalg.cholesky([[self.normal, self.coupling], [self.coupling, self.along]]),
+            dtype=float,
+        )  # normal motion is the first coordinate
+        rigid = np.zeros((6, 2))
+        rigid[2], rigid[0] = root
+        model = modal_model(
+            masses=(1.0 / self.normal, inf),
+            omega=np.zeros(2),
+            traces=root[:1],
+            compliance=np.diag([1.0, 1.0 / self.stiffer]) / self.spring,
+            gap=np.zeros(1),
+            rigid=rigid,
+            tangents=root[1:],
+            axial_across=np.zeros(1),
+            friction=(Friction.coulomb(self.friction),),
+        )
+        run = simulate_interface(
+            model,
+            speed=self.approach,
+            duration=1.02 * time,
+            step=time / steps,
+            velocity=np.array([self.tangential, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        )
+        after = run.motion.velocity[-1]
+        return PointRebound(
+            tangential=float(after[0]), normal=float(after[2]), lost=run.energy.friction
+        )
+
+
+def seat_restitution(half_angle: float, friction: float, stiffer: float, steps: int = 800) -> float:
+    """Restitution of a rigid needle on a frictional cone, compliance at the ring alone."""
+    s, c = np.sin(half_angle), np.cos(half_angle)
+    model = modal_model(
+        masses=(1.0, inf),
+        omega=np.zeros(1),
+        traces=np.array([[s]]),
+        compliance=np.diag([1.0, 1.0 / stiffer]),
+        gap=np.zeros(1),
+        tangents=np.array([[c]]),
+        axial_across=np.array([c]),
+        friction=(Friction.coulomb(friction),),
+    )
+    time = np.pi / s
+    run = simulate_interface(model, speed=1.0, duration=1.2 * time, step=time / steps)
+    return measure_impact(run.history).restitution
+
+
+def rubbing_faces(
+    upper: ElasticBody,
+    lower: ElasticBody,
+    space: ContactSpace,
+    faces: tuple[str, str],
+    friction: float,
+) -> InterfaceContact:
+    """Contact of two meshed bodies with tangential directions."""
+    meshes = (upper.mesh, upper.mesh.surface(faces[0]), lower.mesh, lower.mesh.surface(faces[1]))
+    return InterfaceContact(
+        name="face",
+        upper=upper.name,
+        lower=lower.name,
+        space=space,
+        faces=FaceFriction.on(Friction.coulomb(friction), space, *meshes),
+    )

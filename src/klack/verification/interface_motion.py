@@ -1,9 +1,11 @@
-"""Two bodies and one interface, stepped without a network: the smallest loop around the solver."""
+"""Two bodies and one interface without a network: the smallest loop, and an ODE solver."""
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+from scipy.linalg import solve_banded
 
 from klack.compiling.jit import njit
 from klack.contact.laws import ContactLaw, FlatLaw, HuntCrossley
@@ -13,9 +15,9 @@ from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.interface_step import interface_store, solve_interface
 from klack.simulation.propagator import modal_propagator
 
-__all__ = ["InterfaceMotion", "interface_motion"]
+__all__ = ["InterfaceMotion", "film_by_ode", "interface_motion", "squeeze_by_volumes"]
 
-Vector = NDArray[np.float64]
+
 NO_FILM = FilmRow(cubic=0.0, linear=0.0, cut_off=1e-6, suction=0.0)
 
 
@@ -26,13 +28,12 @@ class InterfaceMotion:
     Parameters
     ----------
     step : float [s]
-    gap, compression : array (n + 1,) [m]
-        Of the bodies and of the series compliance, at the ends of the steps.
+    gap, law_gap : array (n + 1,) [m]
+        Of the bodies, and what contact and film feel behind the series compliance, at the ends
+        of the steps.
     contact_force, film_force : array (n,) [N]
         Means over the steps.
     contact_loss, film_loss : array (n,) [J]
-    stored : float [J]
-        In law and series compliance at the end.
     kinetic : float [J]
         Modal energy of both bodies at the start.
     residual : float [-]
@@ -45,22 +46,16 @@ class InterfaceMotion:
     """
 
     step: float
-    gap: Vector
-    compression: Vector
-    contact_force: Vector
-    film_force: Vector
-    contact_loss: Vector
-    film_loss: Vector
-    stored: float
+    gap: np.ndarray
+    law_gap: np.ndarray
+    contact_force: np.ndarray
+    film_force: np.ndarray
+    contact_loss: np.ndarray
+    film_loss: np.ndarray
     kinetic: float
     residual: float
     upper_speed: float
-    state: Vector
-
-    @property
-    def law_gap(self) -> Vector:
-        """Gap [m] that contact and film feel."""
-        return self.gap + self.compression
+    state: np.ndarray
 
     @property
     def peak_force(self) -> float:
@@ -139,12 +134,11 @@ def interface_motion(
     return InterfaceMotion(
         step=step,
         gap=gaps,
-        compression=compressions,
+        law_gap=gaps + compressions,
         contact_force=forces[0],
         film_force=forces[1],
         contact_loss=losses[0],
         film_loss=losses[1],
-        stored=float(stored),
         kinetic=kinetic,
         residual=missing / max(kinetic, abs(work)),
         upper_speed=float(v @ rigid) / upper.mass,
@@ -154,19 +148,19 @@ def interface_motion(
 
 @njit
 def _run(
-    q: Vector,
-    v: Vector,
-    A: NDArray[np.float64],
-    c: Vector,
-    push: Vector,
+    q: np.ndarray,
+    v: np.ndarray,
+    A: np.ndarray,
+    c: np.ndarray,
+    push: np.ndarray,
     kind: int,
-    law: Vector,
+    law: np.ndarray,
     alpha: float,
-    numbers: Vector,
-    gaps: Vector,
-    compressions: Vector,
-    forces: NDArray[np.float64],
-    losses: NDArray[np.float64],
+    numbers: np.ndarray,
+    gaps: np.ndarray,
+    compressions: np.ndarray,
+    forces: np.ndarray,
+    losses: np.ndarray,
 ) -> None:
     cubic, linear, cut_off, suction, series, h = numbers
     G = np.sum(c * c * A[4])
@@ -212,3 +206,102 @@ def _run(
         gaps[n + 1], compressions[n + 1] = g, e
         forces[0, n], forces[1, n] = contact, film
         losses[0, n], losses[1, n] = lost_contact, lost_film
+
+
+def squeeze_by_volumes(inner: float, outer: float, cells: int) -> float:
+    r"""Squeeze coefficient ``B/mu`` [m^4] of a flat ring or disc by finite volumes, second order.
+
+    .. math:: \frac1r \frac{\mathrm d}{\mathrm dr}\Bigl(\frac{r h^3}{12 \mu}
+              \frac{\mathrm dp}{\mathrm dr}\Bigr) = -V
+
+    Parameters
+    ----------
+    inner, outer : float [m]
+        Radii; an inner one of 0 makes a disc.
+    cells : int
+    """
+    edges = np.linspace(inner, outer, cells + 1)
+    r, dr = 0.5 * (edges[1:] + edges[:-1]), edges[1] - edges[0]
+    conductance = edges / (12.0 * dr)
+    conductance[[0, -1]] *= 2.0  # p = 0 at the edges, half a cell away
+    bands = np.zeros((3, cells))
+    bands[0, 1:] = bands[2, :-1] = -conductance[1:-1]
+    bands[1] = conductance[:-1] + conductance[1:]
+    return float(np.sum(2.0 * pi * r * dr * solve_banded((1, 1), bands, r * dr)))
+
+
+def film_by_ode(
+    upper: ReducedBody,
+    lower: ReducedBody,
+    film: FilmRow,
+    *,
+    series: float,
+    gap: float,
+    speed: float,
+    duration: float,
+    relative: float,
+) -> tuple[float, np.ndarray]:
+    r"""Peak force [N] and final state of two undamped bodies that only a film and ``D`` part.
+
+    .. math:: \dot e = -\dot g - \frac{e/D}{B/x^3 + C/x}, \qquad x = g + e + h_r
+
+    Implicit Runge-Kutta (Radau IIA, order 5) with an analytic Jacobian.  Holds while the film
+    keeps the faces apart (``g + e > 0``) and does not cavitate.
+
+    Parameters
+    ----------
+    upper, lower : ReducedBody
+        Ports ``bottom`` and ``top`` meet.
+    film : FilmRow
+    series, gap, speed, duration : float [m/N], [m], [m/s], [s]
+    relative : float [-]
+        Tolerance.
+    """
+    omega = np.concatenate([upper.omega, lower.omega])
+    c = np.concatenate(
+        [
+            upper.port_shapes[:, upper.port_names.index("bottom")],
+            -lower.port_shapes[:, lower.port_names.index("top")],
+        ]
+    )
+    m = omega.size
+
+    def mobility(x: float) -> tuple[float, float]:
+        """``V/F`` of the film and its slope over ``x``."""
+        below = film.cubic + film.linear * x * x
+        return x**3 / below, (3.0 * film.cubic * x**2 + film.linear * x**4) / below**2
+
+    def rate(t: float, y: np.ndarray) -> np.ndarray:
+        q, v, e = y[:m], y[m:-1], y[-1]
+        flow, _ = mobility(gap + c @ q + e + film.cut_off)
+        force = e / series
+        return np.concatenate([v, c * force - omega**2 * q, [-(c @ v) - flow * force]])
+
+    def jacobian(t: float, y: np.ndarray) -> np.ndarray:
+        q, e = y[:m], y[-1]
+        flow, slope = mobility(gap + c @ q + e + film.cut_off)
+        J = np.zeros((2 * m + 1, 2 * m + 1))
+        J[:m, m:-1] = np.eye(m)
+        J[m:-1, :m] = np.diag(-(omega**2))
+        J[m:-1, -1] = c / series
+        J[-1, :m] = -slope * e / series * c
+        J[-1, m:-1] = -c
+        J[-1, -1] = -slope * e / series - flow / series
+        return J
+
+    start = np.zeros(2 * m + 1)
+    start[m : m + upper.rigid_count] = -speed * upper.rigid_axial
+    scale = np.concatenate([np.full(m, 1e-7), np.full(m, 1e-1), [1e-8]])
+    solution = solve_ivp(
+        rate,
+        (0.0, duration),
+        start,
+        method="Radau",
+        jac=jacobian,
+        rtol=relative,
+        atol=relative * scale,
+        dense_output=True,
+    )
+    assert solution.sol is not None  # dense_output was asked for
+    fine = solution.sol(np.linspace(0.0, duration, 20001))
+    return float(np.max(fine[-1]) / series), solution.y[:-1, -1]

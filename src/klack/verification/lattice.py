@@ -6,17 +6,17 @@ onto curved surfaces exactly.
 
 from collections.abc import Callable, Sequence
 from itertools import permutations, product
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.materials import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 
-__all__ = ["lattice_mesh"]
+__all__ = ["STEEL", "lattice_mesh"]
 
-Coordinates: TypeAlias = NDArray[np.float64]
+
+STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 
 _SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 _SPLITS: dict[str, list[list[tuple[int, ...]]]] = {
@@ -54,8 +54,8 @@ _SPLITS["tet"] = _kuhn()
 
 def lattice_mesh(
     family: str,
-    lines: Sequence[Coordinates],
-    shape: Callable[[Coordinates], Coordinates] = lambda x: x,
+    lines: Sequence[np.ndarray],
+    shape: Callable[[np.ndarray], np.ndarray] = lambda x: x,
     *,
     solid: str = "solid",
 ) -> Mesh:
@@ -108,8 +108,8 @@ def lattice_mesh(
     )
 
 
-def _side(name: str, faces: tuple, connectivity: NDArray[np.int64], on_side: NDArray) -> Surface:
-    found: dict[str, list[NDArray[np.int64]]] = {}
+def _side(name: str, faces: tuple, connectivity: np.ndarray, on_side: np.ndarray) -> Surface:
+    found: dict[str, list[np.ndarray]] = {}
     for face in faces:
         nodes = connectivity[:, list(face.nodes)]
         found.setdefault(face.family, []).append(nodes[on_side[nodes].all(axis=1)])

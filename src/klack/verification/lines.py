@@ -3,7 +3,6 @@
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import jn_zeros
 
 from klack.hydraulics.line_friction import (
@@ -15,10 +14,9 @@ from klack.hydraulics.line_friction import (
     zielke_weight,
 )
 from klack.network.rows import LineRow
-from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.line_junctions import line_junctions
-from klack.verification.local_line_cells import local_line_cells
-from klack.verification.local_lines import local_lines
+from klack.verification.check import Check, ComparedCurve, check
+from klack.verification.line_junctions import line_junctions, turbulent_line
+from klack.verification.local_lines import local_line_cells, local_lines
 from klack.verification.single_line import (
     End,
     exponential_decay,
@@ -27,11 +25,9 @@ from klack.verification.single_line import (
     ringing,
     run_line,
 )
-from klack.verification.turbulent_line import turbulent_line
 
 __all__ = ["checks"]
 
-GROUP = "lines"
 RHO, SPEED, VISCOSITY = 685.8, 1152.0, 4.05e-4  # n-heptane, 20 degC [kg/m^3], [m/s], [Pa s]
 LENGTH, RADIUS = 0.06, 1.25e-3  # [m]
 AREA = pi * RADIUS**2
@@ -63,7 +59,7 @@ def checks() -> list[Check]:
 def heptane_line(segments: int, weights: ExponentialWeights | None = KAGAWA) -> LineRow:
     """Bore of 60 x 2.5 mm in n-heptane with laminar friction; steady without ``weights``."""
     resistance = laminar_resistance(LENGTH, 2.0 * RADIUS, VISCOSITY)
-    terms: tuple[NDArray[np.float64], NDArray[np.float64]] = (np.zeros(0), np.zeros(0))
+    terms: tuple[np.ndarray, np.ndarray] = (np.zeros(0), np.zeros(0))
     if weights is not None:
         terms = unsteady_terms(
             weights,
@@ -80,7 +76,7 @@ def heptane_line(segments: int, weights: ExponentialWeights | None = KAGAWA) -> 
     )
 
 
-def _microseconds(count: int) -> NDArray[np.float64]:
+def _microseconds(count: int) -> np.ndarray:
     return np.asarray(np.arange(count) * (STEP * 1e6), dtype=np.float64)
 
 
@@ -88,37 +84,38 @@ def _closure() -> list[Check]:
     """Reservoir at a, valve at b that shuts at once; 50 periods."""
     speed, periods = 0.4, 50
     n = 4 * STEPS * periods
-    row = plain_line(delay=DELAY, impedance=IMPEDANCE)
     run = run_line(
-        row, End(pressure=0.0), End(flow=0.0), step=STEP, lengths=np.ones(n), flow=AREA * speed
+        plain_line(delay=DELAY, impedance=IMPEDANCE),
+        End(pressure=0.0),
+        End(flow=0.0),
+        step=STEP,
+        lengths=np.ones(n),
+        flow=AREA * speed,
     )
     jump = RHO * SPEED * speed
     square = np.where((np.arange(n) // (2 * STEPS)) % 2 == 0, jump, -jump)
     first = slice(0, 16 * STEPS, 10)  # four periods
     time = _microseconds(n)[first]
-    curve = ComparedCurve(
-        x_label="time since closure [us]",
-        y_label="pressure [bar]",
-        expected=(time, square[first] / 1e5),
-        computed=(time, run.pressure[first, 1] / 1e5),
-    )
     return [
-        compare(
-            GROUP,
+        check(
             "instant closure, pressure rise [Pa]",
             expected=jump,
             computed=run.pressure[0, 1],
             tolerance=5e-14,
             source="Joukowsky: rho a v; Wylie & Streeter 1993, ch. 1",
         ),
-        compare(
-            GROUP,
+        check(
             "50 periods of 4 L/a after it, largest difference from a square wave [-]",
             expected=0.0,
             computed=float(np.max(np.abs(run.pressure[:, 1] - square))) / jump,
             tolerance=5e-14,
             source="d'Alembert; no friction, no decay",
-            curve=curve,
+            curve=ComparedCurve(
+                x_label="time since closure [us]",
+                y_label="pressure [bar]",
+                expected=(time, square[first] / 1e5),
+                computed=(time, run.pressure[first, 1] / 1e5),
+            ),
         ),
     ]
 
@@ -128,9 +125,13 @@ def _slow_closure() -> list[Check]:
     speed, closing, n = 0.4, 6 * STEPS, 12 * STEPS
     edges = np.clip(1.0 - np.arange(n + 1) / closing, 0.0, 1.0) * AREA * speed
     flow = 0.5 * (edges[:-1] + edges[1:])
-    row = plain_line(delay=DELAY, impedance=IMPEDANCE)
     run = run_line(
-        row, End(pressure=0.0), End(flow=-flow), step=STEP, lengths=np.ones(n), flow=AREA * speed
+        plain_line(delay=DELAY, impedance=IMPEDANCE),
+        End(pressure=0.0),
+        End(flow=-flow),
+        step=STEP,
+        lengths=np.ones(n),
+        flow=AREA * speed,
     )
     missing = AREA * speed - flow
     exact = IMPEDANCE * missing
@@ -146,8 +147,7 @@ def _slow_closure() -> list[Check]:
         computed=(time, run.pressure[:, 1] / 1e5),
     )
     return [
-        compare(
-            GROUP,
+        check(
             "linear closure in 6 L/a, largest difference from the sum of echoes [-]",
             expected=0.0,
             computed=float(np.max(np.abs(run.pressure[:, 1] - exact))) / bound,
@@ -155,8 +155,7 @@ def _slow_closure() -> list[Check]:
             source="Wylie & Streeter 1993, ch. 3: characteristics without friction",
             curve=curve,
         ),
-        compare(
-            GROUP,
+        check(
             "linear closure in 6 L/a, peak of the pressure [Pa]",
             expected=bound,
             computed=float(np.max(run.pressure[:, 1])),
@@ -170,23 +169,25 @@ def _slow_closure() -> list[Check]:
 def _piston() -> list[Check]:
     """Needle face of 1.5 mm that moves into a line of 2.5 mm."""
     face, speed = 0.25 * pi * 1.5e-3**2, 0.5
-    n = 3 * STEPS
-    row = plain_line(delay=DELAY, impedance=IMPEDANCE)
-    run = run_line(row, End(pressure=0.0), End(flow=face * speed), step=STEP, lengths=np.ones(n))
+    run = run_line(
+        plain_line(delay=DELAY, impedance=IMPEDANCE),
+        End(pressure=0.0),
+        End(flow=face * speed),
+        step=STEP,
+        lengths=np.ones(3 * STEPS),
+    )
     force = face * run.pressure[:, 1]
     exact = RHO * SPEED * face**2 / AREA * speed
     until = int(np.argmax(np.abs(force - exact) > 1e-9 * exact))
     return [
-        compare(
-            GROUP,
+        check(
             "moving face in front of a line, force until the echo [N]",
             expected=exact,
             computed=float(np.mean(force[: 2 * STEPS])),
             tolerance=5e-14,
             source="rho a A_n^2 / A v: a dashpot",
         ),
-        compare(
-            GROUP,
+        check(
             "moving face in front of a line, time of the echo [s]",
             expected=2.0 * LENGTH / SPEED,
             computed=until * STEP,
@@ -202,28 +203,28 @@ def _pulse() -> list[Check]:
     lengths = np.where((np.arange(400) // 8) % 2 == 0, 1, coarse)
     time = step * (np.cumsum(lengths) - lengths)
     flow = np.where(time < 0.1e-6, 1e-6, 0.0)
-    Z = IMPEDANCE
-    row = plain_line(delay=steps * step, impedance=Z)
-    run = run_line(row, End(flow=flow), End(pressure=0.0), step=step, lengths=lengths)
+    run = run_line(
+        plain_line(delay=steps * step, impedance=IMPEDANCE),
+        End(flow=flow),
+        End(pressure=0.0),
+        step=step,
+        lengths=lengths,
+    )
     first = (time > 0.5 * steps * step) & (time < 2.5 * steps * step)
     # an open end doubles the flow of the wave
     arrived = -float(np.sum(run.flow[first, 1] * lengths[first] * step)) / 2.0
-    sent = float(np.sum(flow * lengths * step))
-    middle = (time + 0.5 * step * lengths)[first]
     weight = run.flow[first, 1] * lengths[first]
-    centre = float(np.sum(weight * middle) / np.sum(weight))
+    centre = float(np.sum(weight * (time + 0.5 * step * lengths)[first]) / np.sum(weight))
     start = float(np.sum(flow * lengths * (time + 0.5 * step * lengths)) / np.sum(flow * lengths))
     return [
-        compare(
-            GROUP,
+        check(
             "pulse through 130.37 steps of both lengths, volume that arrives [m^3]",
-            expected=sent,
+            expected=float(np.sum(flow * lengths * step)),
             computed=arrived,
             tolerance=5e-14,
             source="means with weights that add up to one",
         ),
-        compare(
-            GROUP,
+        check(
             "pulse through 130.37 steps of both lengths, travel time [s]",
             expected=steps * step,
             computed=centre - start,
@@ -248,8 +249,7 @@ def _weights() -> list[Check]:
         for tau, weight in ((zielke, zielke_weight), (kagawa, KAGAWA))
     ]
     return [
-        compare(
-            GROUP,
+        check(
             "Zielke's weights from tau = 1e-6, largest relative error [-]",
             expected=0.0,
             computed=float(np.max(np.abs(zielke_weight(zielke) / laminar_weight(zielke) - 1.0))),
@@ -257,8 +257,7 @@ def _weights() -> list[Check]:
             source=source,
             curve=curves[0],
         ),
-        compare(
-            GROUP,
+        check(
             "Kagawa's ten terms from tau = 1e-5, largest relative error [-]",
             expected=0.0,
             computed=float(np.max(np.abs(KAGAWA(kagawa) / laminar_weight(kagawa) - 1.0))),
@@ -286,24 +285,21 @@ def _first_mode() -> list[Check]:
     tone = ringing(run.time, run.pressure[:, 1], viscous.imag / (2.0 * pi), apart=5e-3)
     where = "first mode of 60 x 2.5 mm in heptane"
     return [
-        compare(
-            GROUP,
+        check(
             f"{where}, decay [1/s]",
             expected=viscous.real,
             computed=tone.real,
             tolerance=0.02,
             source="Zielke 1968: root of cosh Gamma = 0; Kagawa's terms are 1.1 % off",
         ),
-        compare(
-            GROUP,
+        check(
             f"{where}, frequency [Hz]",
             expected=viscous.imag / (2.0 * pi),
             computed=tone.imag / (2.0 * pi),
             tolerance=2e-3,
             source="Zielke 1968: root of cosh Gamma = 0",
         ),
-        compare(
-            GROUP,
+        check(
             f"{where}, decay with Kagawa's terms spread along it [1/s]",
             expected=terms.real,
             computed=tone.real,
@@ -329,13 +325,12 @@ def _start_up() -> list[Check]:
         unsteady=(gain, rate),
     )
     step, drop = length / speed / 200, 1e5
-    n = round(0.6 * radius**2 / nu / step)
     run = run_line(
         row,
         End(pressure=drop),
         End(pressure=0.0),
         step=step,
-        lengths=np.ones(n),
+        lengths=np.ones(round(0.6 * radius**2 / nu / step)),
         pressure=[drop, 0.0],
     )
     tau = nu * (run.time + 0.5 * step) / radius**2
@@ -344,8 +339,7 @@ def _start_up() -> list[Check]:
     share = 0.5 * (run.flow[:, 0] - run.flow[:, 1]) * resistance / drop
     late = tau > 0.01
     return [
-        compare(
-            GROUP,
+        check(
             "start of laminar flow, largest difference from tau = 0.01 [-]",
             expected=0.0,
             computed=float(np.max(np.abs(share - exact)[late])),
@@ -370,29 +364,24 @@ def _cavity() -> list[Check]:
     row = plain_line(delay=2 * half * STEP, impedance=Z, segments=2, vapour_pressure=vapour)
     run = run_line(row, End(flow=flow), End(flow=flow), step=STEP, lengths=np.ones(n), pressure=p)
     growth = 2.0 * (vapour - p + 2.0 * Z * out) / Z
-    largest = growth * 2 * half * STEP
-    closing = 2 * half * growth / (growth + 4.0 * into)
-    seen = 4 * half + int(closing) + 2
+    seen = 4 * half + int(2 * half * growth / (growth + 4.0 * into)) + 2
     wave = 2.0 * vapour - p + 2.0 * Z * (out + into)
     return [
-        compare(
-            GROUP,
+        check(
             "column separation, largest cavity [m^3]",
-            expected=largest,
+            expected=growth * 2 * half * STEP,
             computed=float(np.max(run.cavity)),
             tolerance=5e-13,
             source="characteristics: 2 (p_v - p + 2 Z q) / Z over L/a",
         ),
-        compare(
-            GROUP,
+        check(
             "column separation, pressure after the collapse [Pa]",
             expected=wave + Z * into,
             computed=float(run.pressure[seen, 1]),
             tolerance=1e-12,
             source="characteristics: the columns meet, the wave returns as from a wall",
         ),
-        compare(
-            GROUP,
+        check(
             "column separation, volume that does not balance [-]",
             expected=0.0,
             computed=run.volume_residual,
@@ -421,24 +410,21 @@ def _books() -> list[Check]:
     ends = 5e5 * rng.standard_normal((2, len(lengths)))
     run = run_line(row, End(pressure=ends[0]), End(pressure=ends[1]), step=20e-9, lengths=lengths)
     return [
-        compare(
-            GROUP,
+        check(
             "energy residual, friction, interpolation and cavities [-]",
             expected=0.0,
             computed=run.energy_residual,
             tolerance=5e-14,
             source="work at both ends = change of store + losses",
         ),
-        compare(
-            GROUP,
+        check(
             "smallest of the three losses is above zero [-]",
             expected=1.0,
             computed=float(np.min(run.losses) > 0.0),
             tolerance=0.0,
             source="second law",
         ),
-        compare(
-            GROUP,
+        check(
             "volume that does not balance, the same run [-]",
             expected=0.0,
             computed=run.volume_residual,

@@ -1,5 +1,6 @@
 """Checks of magnetic circuits at rest, magnetisation curves, edge fields and eddy ladders."""
 
+from collections.abc import Iterator
 from math import pi
 
 import numpy as np
@@ -14,13 +15,12 @@ from klack.magnetics.iron_library import IRON_LIBRARY, iron_curve
 from klack.magnetics.lifting_magnet import lifting_magnet
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
 from klack.magnetics.static import static_state
-from klack.verification import lifting_magnet as published
-from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification import published_magnets as published
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.off_axis_gaps import off_axis_air_gaps
 
 __all__ = ["checks"]
 
-GROUP = "magnetics"
 _MU0 = VACUUM_PERMEABILITY
 _CORE = {"conductivity": 2e6, "length": 20e-3, "radius": 2e-3, "permeability": 1000.0}
 
@@ -43,11 +43,10 @@ def _saturating_pair() -> MagneticCircuit:
     """Two equal poles of 12 mm^2, a saturating core, and a leakage of 5 nH."""
     area = 12e-6
     gap = GapReluctance([0.0, 1e-3], [1e-9, 2e-3 / (_MU0 * area)], [2.0 / (_MU0 * area)] * 2)
-    iron = froehlich(1.5, 1500.0).law(60e-3, area)
     return MagneticCircuit(
         branches=(
             MagneticBranch(name="gap", law=gap, turns=60.0),
-            MagneticBranch(name="iron", law=iron),
+            MagneticBranch(name="iron", law=froehlich(1.5, 1500.0).law(60e-3, area)),
             MagneticBranch(name="leakage", law=LinearReluctance(1.0 / 5e-9), turns=60.0),
         ),
         loops=np.array([[1, 0], [1, 0], [0, 1]]),
@@ -56,15 +55,12 @@ def _saturating_pair() -> MagneticCircuit:
 
 
 def _two_poles() -> list[Check]:
-    circuit = _saturating_pair()
     source = "F = -phi^2/(mu0 A): two equal poles in series; Woodson and Melcher 1968, ch. 3"
-    force = circuit.force(np.array([15e-6, 15e-6, 0.0]), 80e-6)
     return [
-        compare(
-            GROUP,
+        check(
             "force of two equal poles at 15 uWb, 12 mm^2 [N]",
             expected=-((15e-6) ** 2) / (_MU0 * 12e-6),
-            computed=force,
+            computed=_saturating_pair().force(np.array([15e-6, 15e-6, 0.0]), 80e-6),
             tolerance=5e-14,
             source=source,
         )
@@ -82,16 +78,14 @@ def _energy() -> list[Check]:
         for z, w in zip(*currents, strict=True)
     )
     return [
-        compare(
-            GROUP,
+        check(
             "force from the flux against dW'/dx at constant current, saturated [N]",
             expected=(beside[1] - beside[0]) / (2.0 * step),
             computed=state.force,
             tolerance=1e-6,
             source="-dW/dx at constant flux = dW'/dx at constant current; difference over 0.2 um",
         ),
-        compare(
-            GROUP,
+        check(
             "co-energy psi i - W against the integral of psi di, saturated [J]",
             expected=float(coenergy),
             computed=state.coenergy,
@@ -119,32 +113,28 @@ def _iron() -> list[Check]:
     # int B dH in closed form, and W = B H - W'
     coenergy = 0.5 * _MU0 * H**2 + (H - a / b * np.log1p(b / a * H)) / b
     return [
-        compare(
-            GROUP,
+        check(
             "B-H curves of three materials, largest deviation [-]",
             expected=0.0,
             computed=worst,
             tolerance=5e-5,
             source="Modelica Standard Library, mu_rApprox; numbers given to 5 digits",
         ),
-        compare(
-            GROUP,
+        check(
             "17 B-H curves rise everywhere: sign of the smallest slope dH/dB [-]",
             expected=1.0,
             computed=float(np.sign(least)),
             tolerance=0.0,
             source="monotone H(B), needed for one solution",
         ),
-        compare(
-            GROUP,
+        check(
             "Froehlich curve, largest deviation of H(B) [-]",
             expected=0.0,
             computed=float(np.max(np.abs(curve.field(B) / H - 1.0))),
             tolerance=1e-6,
             source="B = mu0 H + H/(a + b H), 1 A/m to 200 kA/m",
         ),
-        compare(
-            GROUP,
+        check(
             "Froehlich curve, largest deviation of the energy density [-]",
             expected=0.0,
             computed=float(np.max(np.abs(curve.energy_density(B) / (B * H - coenergy) - 1.0))),
@@ -157,34 +147,29 @@ def _iron() -> list[Check]:
 def _edges() -> list[Check]:
     wall, gap, shoulder = 5e-3, 20e-6, 2e-3
     narrow = 1e-6 * wall
-    roters = 0.26 + np.log(1.0 + 2.0 * shoulder / gap) / pi
     return [
-        compare(
-            GROUP,
+        check(
             "edges beside a wall, narrow gap [-]",
             expected=(1.0 - np.log(2.0) + np.log(wall / narrow)) / pi,
             computed=float(edges_beside_wall(narrow, wall)[0]),
             tolerance=2e-6,
             source="limit g << D of the conformal map",
         ),
-        compare(
-            GROUP,
+        check(
             "edges of two equal poles against Roters' arcs, shoulder 100 gaps [-]",
-            expected=float(roters),
+            expected=float(0.26 + np.log(1.0 + 2.0 * shoulder / gap) / pi),
             computed=float(equal_edges(gap, shoulder)[0]),
             tolerance=0.02,
             source="Roters 1941, ch. 5: 0.26 + ln(1 + 2 t/g)/pi (an estimate)",
         ),
-        compare(
-            GROUP,
+        check(
             "step of a duct, small step [-]",
             expected=(2.0 / pi) * (1.0 - np.log(4e-3)),
             computed=step_excess(1e-6, 1e-3),
             tolerance=2e-6,
             source="limit g << D of Marcuvitz 1951, 5.34",
         ),
-        compare(
-            GROUP,
+        check(
             "roundness of a wide core, edge number [-]",
             expected=0.0,
             computed=float(round_excess(1e-4, 1.0, 1.001)[0]),
@@ -215,14 +200,6 @@ def _eddy() -> list[Check]:
 
     ratios = np.geomspace(0.1, 1000.0, 80)
     driven = np.array([abs(1.0 + four.mmf_per_flux(1j * w / tau) / R) for w in ratios])
-    over_frequency = ComparedCurve(
-        x_label="omega mu sigma a^2 [-]",
-        y_label="mmf over flux [reluctance]",
-        expected=(ratios, impedance(ratios)),
-        computed=(ratios, driven),
-        x_log=True,
-        y_log=True,
-    )
     times = np.linspace(0.01, 0.5, 99)
     steps = {
         name: ComparedCurve(
@@ -237,25 +214,29 @@ def _eddy() -> list[Check]:
         )
     }
     return [
-        compare(
-            GROUP,
+        check(
             "one eddy term: resistance of the shorted turn [ohm]",
             expected=8.0 * pi / (_CORE["conductivity"] * _CORE["length"]),
             computed=1.0 / one.conductances[0],
             tolerance=1e-14,
             source="Stoll 1974; R_e = 8 pi/(sigma l)",
         ),
-        compare(
-            GROUP,
+        check(
             "four terms at omega tau = 10, |mmf/flux| of a cylinder [-]",
             expected=float(impedance(np.array(10.0))),
             computed=abs(1.0 + four.mmf_per_flux(10j / tau) / R),
             tolerance=1e-6,
             source="z I0(z)/(2 I1(z)), z^2 = j omega mu sigma a^2",
-            curve=over_frequency,
+            curve=ComparedCurve(
+                x_label="omega mu sigma a^2 [-]",
+                y_label="mmf over flux [reluctance]",
+                expected=(ratios, impedance(ratios)),
+                computed=(ratios, driven),
+                x_log=True,
+                y_log=True,
+            ),
         ),
-        compare(
-            GROUP,
+        check(
             "four terms, slowest time constant of a cylinder over mu sigma a^2 [-]",
             expected=1.0 / float(jn_zeros(0, 1)[0]) ** 2,
             computed=float(1.0 / _rates(four, R)[0]) / tau,
@@ -263,8 +244,7 @@ def _eddy() -> list[Check]:
             source="1/2.40483^2; Stoll 1974",
         ),
         *(
-            compare(
-                GROUP,
+            check(
                 f"four terms, mean flux of a {name} at t = {t:g} mu sigma a^2 [-]",
                 expected=expected,
                 computed=_step(ladder, R0, t * tau),
@@ -328,8 +308,7 @@ def _map() -> list[Check]:
     tabulated = FluxMap.of(current=current, gap=gap, linkage=table, force=None)
     state = static_state(circuit, current=7.3, gap=87e-6)
     return [
-        compare(
-            GROUP,
+        check(
             "flux map of 33 currents and 13 gaps, force between the points [N]",
             expected=state.force,
             computed=tabulated.force_at(state.linkage, 87e-6),
@@ -339,7 +318,7 @@ def _map() -> list[Check]:
     ]
 
 
-def _lifting_magnet() -> list[Check]:
+def _lifting_magnet() -> Iterator[Check]:
     circuit = lifting_magnet()
     source = "finite elements; Modelica Standard Library, ComparisonQuasiStatic"
     states = [static_state(circuit, current=published.CURRENT, gap=float(x)) for x in published.GAP]
@@ -360,7 +339,6 @@ def _lifting_magnet() -> list[Check]:
             ),
         )
     }
-    out = []
     for x, force, inductance, state in zip(
         published.GAP, published.FORCE, published.INDUCTANCE, states, strict=True
     ):
@@ -368,15 +346,11 @@ def _lifting_magnet() -> list[Check]:
             ("force", "N", force, state.force),
             ("inductance", "H", inductance, state.inductance),
         ):
-            out.append(
-                compare(
-                    GROUP,
-                    f"lifting magnet, {what} at a gap of {x * 1e3:.2f} mm [{unit}]",
-                    expected=float(expected),
-                    computed=computed,
-                    tolerance=0.1,
-                    source=source,
-                    curve=curves[what],
-                )
+            yield check(
+                f"lifting magnet, {what} at a gap of {x * 1e3:.2f} mm [{unit}]",
+                expected=float(expected),
+                computed=computed,
+                tolerance=0.1,
+                source=source,
+                curve=curves[what],
             )
-    return out

@@ -3,7 +3,6 @@
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.measurement.channels import LiftSensor
 from klack.measurement.differentiation import velocity_of
@@ -11,12 +10,11 @@ from klack.measurement.impacts import measure_stroke
 from klack.measurement.lift_sensor import sense
 from klack.measurement.set_measures import expected_maximum, measure_set
 from klack.measurement.stroke_measures import MeasuredStroke, StrokeSet
-from klack.verification.bouncing_flight import BouncingDrop
-from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.check import Check, ComparedCurve, check
+from klack.verification.one_dimension import BouncingDrop
 
 __all__ = ["checks"]
 
-GROUP = "measurement"
 BANDWIDTH = 50e3  # [Hz]
 SENSOR = LiftSensor(bandwidth=BANDWIDTH)
 DROP = BouncingDrop(speed=0.5, acceleration=1250.0, restitution=(0.6, 0.6, 0.6), contact=10e-6)
@@ -28,27 +26,26 @@ def checks() -> list[Check]:
     return [*_sensor(), *_velocity(), *_flights(), *_noisy(), *_maximum()]
 
 
-def _grid(step: float, count: int) -> NDArray[np.float64]:
+def _grid(step: float, count: int) -> np.ndarray:
     return np.asarray(step * np.arange(count), dtype=np.float64)
 
 
 def _sensor() -> list[Check]:
     t = _grid(1e-6, 1001)
     late = t - sense(t, t, SENSOR)
-    shown = sense(t, np.sin(2.0 * pi * BANDWIDTH * t), SENSOR)[500:]
     A = np.column_stack([f(2.0 * pi * BANDWIDTH * t[500:]) for f in (np.sin, np.cos)])
-    a, b = np.linalg.lstsq(A, shown, rcond=None)[0]
+    a, b = np.linalg.lstsq(A, sense(t, np.sin(2.0 * pi * BANDWIDTH * t), SENSOR)[500:], rcond=None)[
+        0
+    ]
     return [
-        compare(
-            GROUP,
+        check(
             "delay of a ramp behind a sensor of 50 kHz [s]",
             expected=1.0 / (2.0 * pi * BANDWIDTH),
             computed=float(late[-1]),
             tolerance=5e-14,
             source="1 / (2 pi f)",
         ),
-        compare(
-            GROUP,
+        check(
             "amplitude of a sine of 50 kHz behind it, sampled at 1 MHz [-]",
             expected=sqrt(0.5) * float(np.sinc(BANDWIDTH * 1e-6)) ** 2,
             computed=float(np.hypot(a, b)),
@@ -85,8 +82,7 @@ def _velocity() -> list[Check]:
         )
     )
     return [
-        compare(
-            GROUP,
+        check(
             "largest error of the velocity of a cubic [m/s]",
             expected=0.0,
             computed=float(np.max(np.abs(cubic - exact))),
@@ -95,8 +91,7 @@ def _velocity() -> list[Check]:
             absolute=True,
             curve=polynomial,
         ),
-        compare(
-            GROUP,
+        check(
             "amplitude of the velocity of a sine of 15 kHz over the true one [-]",
             expected=1.0 + float(sine.amplitude_error(15e3)),
             computed=float(rate @ sine.velocity[inside] / (rate @ rate)),
@@ -107,7 +102,7 @@ def _velocity() -> list[Check]:
     ]
 
 
-def _record(noise: float, seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _record(noise: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
     fine = _grid(FINE, round(DROP.duration / FINE))
     every = round(STEP / FINE)
     shown = sense(fine, DROP.lift(fine), SENSOR)[::every]
@@ -121,8 +116,7 @@ def _flights() -> list[Check]:
     source = "parabolas, in closed form, behind a sensor of 50 kHz, 500 kS/s"
     w = DROP.speeds[1]
     return [
-        compare(
-            GROUP,
+        check(
             name,
             expected=expected,
             computed=computed,
@@ -157,8 +151,7 @@ def _noisy() -> list[Check]:
     column = measures.column("seat", "restitution")
     source = f"{RECORDS} exact drops with 1 um of noise behind 50 kHz, 500 kS/s"
     return [
-        compare(
-            GROUP,
+        check(
             "restitution from noisy records, mean [-]",
             expected=0.6,
             computed=float(np.mean(column.values)),
@@ -166,8 +159,7 @@ def _noisy() -> list[Check]:
             source=source,
             absolute=True,
         ),
-        compare(
-            GROUP,
+        check(
             "restitution from noisy records, median error of one [-]",
             expected=0.0,
             computed=float(np.median(np.abs(column.values - 0.6))),
@@ -180,8 +172,7 @@ def _noisy() -> list[Check]:
 
 def _maximum() -> list[Check]:
     return [
-        compare(
-            GROUP,
+        check(
             f"expected largest of {n} normal draws [standard deviations]",
             expected=exact,
             computed=expected_maximum(n),

@@ -1,10 +1,16 @@
-"""Impacts along one axis that have exact answers, run through the reduced kernel."""
+"""Impacts along one axis with exact answers, by the reduced kernel; pulses; a bouncing drop."""
 
+from dataclasses import dataclass
 from math import pi
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import betaincinv
 
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import ContactLaw, HertzLaw, LinearLaw
 from klack.reduction.reduced_body import ReducedBody
+from klack.signals import TimeSeries
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem
@@ -13,6 +19,9 @@ __all__ = [
     "BAR_SPEED",
     "DENSITY",
     "NEEDLE_AREA",
+    "BouncingDrop",
+    "half_sines",
+    "hertz_force",
     "mass_on_law",
     "needle_on_spring",
     "one_contact",
@@ -20,6 +29,7 @@ __all__ = [
     "st_venant_rods",
     "steel_rod",
 ]
+
 
 BAR_SPEED, DENSITY = 5000.0, 7850.0  # [m/s], [kg/m^3]
 NEEDLE_AREA = pi * 2e-3**2  # [m^2]
@@ -51,8 +61,11 @@ def one_contact(
         gap=gap,
         series_compliance=series,
     )
-    forces = (AxialForce(body=a.name, force=-press),) if press else ()
-    return ReducedSystem(bodies=(a, b), contacts=(pair,), forces=forces)
+    return ReducedSystem(
+        bodies=(a, b),
+        contacts=(pair,),
+        forces=(AxialForce(body=a.name, force=-press),) if press else (),
+    )
 
 
 def steel_rod(
@@ -90,16 +103,22 @@ def needle_on_spring(
     """Free rod with ``L = c = Z = m = v = 1`` on a wall through a spring ``kappa = k L/(EA)``."""
     rod = rod_body("rod", length=1.0, area=1.0, young=1.0, density=1.0, elastic_modes=modes)
     missing = float(rod.residual_compliance[0, 0]) if static_spring else 0.0
-    law = LinearLaw(1.0 / (1.0 / kappa + missing))
-    system = one_contact(rod, fixed_body("wall", port="top"), law, gap=0.1)
+    system = one_contact(
+        rod, fixed_body("wall", port="top"), LinearLaw(1.0 / (1.0 / kappa + missing)), gap=0.1
+    )
     return simulate_impact(system, speed=1.0, step=step, duration=duration)
 
 
 def st_venant_rods(stiffness: float, modes: int, *, step: float) -> ImpactHistory:
     """Two free rods of equal section, 40 and 80 mm, at 1 m/s, with static correction."""
     a, b = steel_rod("a", 0.04, modes), steel_rod("b", 0.08, 2 * modes)
-    missing = float(a.residual_compliance[0, 0] + b.residual_compliance[1, 1])
-    system = one_contact(a, b, LinearLaw(stiffness), gap=0.1e-6, series=missing)
+    system = one_contact(
+        a,
+        b,
+        LinearLaw(stiffness),
+        gap=0.1e-6,
+        series=float(a.residual_compliance[0, 0] + b.residual_compliance[1, 1]),
+    )
     return simulate_impact(system, speed=1.0, step=step, duration=60e-6)
 
 
@@ -125,3 +144,99 @@ def sphere_on_rod(inelasticity: float) -> ImpactHistory:
         series=float(rod.residual_compliance[1, 1]),
     )
     return simulate_impact(system, speed=1.0, step=1e-3, duration=5.5)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BouncingDrop:
+    """Closed form: rest, free fall, contacts of a given time, parabolas, rest.
+
+    During a contact the lift is the cubic that joins both speeds below the level 0, so that
+    approach and rebound speed are exact at first touch and release.
+
+    Parameters
+    ----------
+    speed : float [m/s]
+        At first touch.
+    acceleration : float [m/s^2]
+    restitution : tuple of float
+        Per impact; the needle rests after the flight that follows the last.
+    contact : float [s]
+    before, after : float [s]
+        Rest at the top, and on the seat.
+    """
+
+    speed: float
+    acceleration: float
+    restitution: tuple[float, ...]
+    contact: float = 0.0
+    before: float = 200e-6
+    after: float = 300e-6
+
+    @property
+    def height(self) -> float:
+        """From which it drops [m]."""
+        return self.speed**2 / (2.0 * self.acceleration)
+
+    @property
+    def speeds(self) -> tuple[float, ...]:
+        """Approach speed of each impact, and of the touch after which it rests [m/s]."""
+        return tuple((self.speed * np.cumprod([1.0, *self.restitution])).tolist())
+
+    @property
+    def touches(self) -> tuple[float, ...]:
+        """First touch of each impact, and of the last landing [s]."""
+        times = [self.before + self.speed / self.acceleration]
+        for w in self.speeds[1:]:
+            times.append(times[-1] + self.contact + 2.0 * w / self.acceleration)
+        return tuple(times)
+
+    @property
+    def duration(self) -> float:
+        """Of the whole record [s]."""
+        return self.touches[-1] + self.after
+
+    def lift(self, time: np.ndarray) -> np.ndarray:
+        """Height of the needle above its seat [m]."""
+        a, v = self.acceleration, self.speeds
+        fall = np.clip(time - self.before, 0.0, v[0] / a)
+        x = np.where(time < self.touches[0], self.height - 0.5 * a * fall**2, 0.0)
+        for k, touch in enumerate(self.touches[:-1]):
+            release = touch + self.contact
+            if self.contact > 0.0:
+                u = np.clip((time - touch) / self.contact, 0.0, 1.0)
+                dip = -self.contact * u * (1.0 - u) * (v[k] * (1.0 - u) + v[k + 1] * u)
+                x = np.where((time >= touch) & (time < release), dip, x)
+            s = time - release
+            flies = (s >= 0.0) & (s < 2.0 * v[k + 1] / a)
+            x = np.where(flies, v[k + 1] * s - 0.5 * a * s**2, x)
+        return np.asarray(x)
+
+
+def hertz_force(time: ArrayLike, *, duration: float, peak: float) -> np.ndarray:
+    r"""Force [N] of an elastic Hertz impact at times [s] after first touch, in closed form.
+
+    It is zero before it and after ``duration`` [s].  Energy gives the time at a depth
+    :math:`\delta` below first touch (Johnson 1985, section 11.4):
+
+    .. math:: t = \frac{2 \delta_m}{5 v} B_u(2/5, 1/2), \qquad u = (\delta/\delta_m)^{5/2},
+
+    with the incomplete beta function, whose inverse gives :math:`F = F_m u^{3/5}`.
+    """
+    t = np.asarray(time, dtype=float)
+    return np.asarray(
+        peak
+        * betaincinv(0.4, 0.5, np.clip(np.minimum(t, duration - t) / (0.5 * duration), 0.0, 1.0))
+        ** 0.6
+    )
+
+
+def half_sines(
+    *, step: float, count: int, times: tuple[float, ...], length: float, peak: float = 100.0
+) -> TimeSeries:
+    """Half sines of a peak [N] that begin at some times [s], as means over ``count`` steps."""
+    edges = step * np.arange(count + 1)
+    impulse = np.zeros(count + 1)
+    for start in times:
+        phase = np.clip((edges - start) / length, 0.0, 1.0)
+        impulse += peak * length / np.pi * (1.0 - np.cos(np.pi * phase))
+    return TimeSeries(step=step, values=np.diff(impulse) / step, unit="N", start=0.5 * step)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import atan2, exp, log, sqrt
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -17,14 +17,12 @@ from klack.magnetics.peak_hold import PeakHold
 from klack.magnetics.stage_step import STAGE_BOOKS, stage_step
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.step_function import evaluate
-from klack.verification.check import Check, compare
-from klack.verification.drivers import injector, linear_coil
-from klack.verification.shared_capacitor import shared_capacitor
-from klack.verification.single_coil import run_coil
+from klack.verification.check import Check, check
+from klack.verification.coils_in_networks import shared_capacitor
+from klack.verification.drivers import injector, linear_coil, run_coil
 
 __all__ = ["StageRun", "checks", "random_driver", "run_stage"]
 
-GROUP = "output-stage"
 
 _INDUCTANCE = 60.0**2 * (1.0 / 2e7 + 1.0 / 2e8)  # of linear_coil()
 _RESISTANCE = 0.5
@@ -61,11 +59,11 @@ class StageRun:
         Supplies, losses and changes of stores over the run, by their entries; and ``work``.
     """
 
-    time: NDArray[np.float64]
-    current: NDArray[np.float64]
-    capacitor: NDArray[np.float64]
-    state: NDArray[np.float64]
-    entered: NDArray[np.float64]
+    time: np.ndarray
+    current: np.ndarray
+    capacitor: np.ndarray
+    state: np.ndarray
+    entered: np.ndarray
     energies: dict[str, float]
 
     @property
@@ -112,8 +110,9 @@ def run_stage(
     log_of = np.zeros((steps + 1, 4))
     log_of[0] = state[4], state[-2], state[0], state[1]
     for k in range(steps):
-        inputs = [k * step, step, y[k], y[k + 1], 0.0, 0.0]
-        status, out = evaluate(stage_step, par, state, inputs, 2 + size + books)
+        status, out = evaluate(
+            stage_step, par, state, [k * step, step, y[k], y[k + 1], 0.0, 0.0], 2 + size + books
+        )
         if status != 0:
             raise ConvergenceError(f"stage: status {status} at {k * step:g} s.")
         state = out[2 : 2 + size].copy()
@@ -192,14 +191,10 @@ class _Series:
     still: float = 0.0
     sign: float = 1.0  # -1: the current charges the capacitor
 
-    def at(self, time: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, time: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Current and capacitor voltage; underdamped."""
         t = np.asarray(time, dtype=float)
-        decay = self.resistance / (2.0 * _INDUCTANCE)
-        omega = sqrt(1.0 / (_INDUCTANCE * self.capacitance) - decay * decay)
-        drive = self.sign * self.u0 - self.still
-        slope = (drive - self.resistance * self.i0) / _INDUCTANCE
-        b = (slope + decay * self.i0) / omega
+        decay, omega, b = self._numbers()
         current = np.exp(-decay * t) * (self.i0 * np.cos(omega * t) + b * np.sin(omega * t))
         # L i' = sign u - still - R i
         rate = np.exp(-decay * t) * (
@@ -211,11 +206,16 @@ class _Series:
 
     def zero(self) -> float:
         """First time at which the current is zero, i0 above it."""
+        _, omega, b = self._numbers()
+        return atan2(self.i0, -b) / omega
+
+    def _numbers(self) -> tuple[float, float, float]:
+        """Decay and angular frequency [1/s], amplitude of the sine [A]."""
         decay = self.resistance / (2.0 * _INDUCTANCE)
         omega = sqrt(1.0 / (_INDUCTANCE * self.capacitance) - decay * decay)
         drive = self.sign * self.u0 - self.still
-        b = ((drive - self.resistance * self.i0) / _INDUCTANCE + decay * self.i0) / omega
-        return atan2(self.i0, -b) / omega
+        slope = (drive - self.resistance * self.i0) / _INDUCTANCE
+        return decay, omega, (slope + decay * self.i0) / omega
 
 
 def _discharge() -> list[Check]:
@@ -233,38 +233,39 @@ def _discharge() -> list[Check]:
     rise = float(brentq(lambda t: float(circuit.at(t)[0]) - 12.0, 1e-6, 80e-6, xtol=1e-16))
     run = run_stage(linear_coil(), driver, step=0.2e-6, duration=0.4e-3)
     empty = float(brentq(lambda t: float(circuit.at(t)[1]) - 13.3, 1e-6, 120e-6, xtol=1e-16))
-    at_empty = float(circuit.at(empty)[0])
     total = _RESISTANCE + 0.1
     settled = 13.3 / total
-    later = settled + (at_empty - settled) * exp(-(0.4e-3 - empty) * total / _INDUCTANCE)
+    later = settled + (float(circuit.at(empty)[0]) - settled) * exp(
+        -(0.4e-3 - empty) * total / _INDUCTANCE
+    )
     return [
-        compare(
-            GROUP, "capacitor discharged into a coil, largest error of the current in 0.5 us steps "
+        check(
+            "capacitor discharged into a coil, largest error of the current in 0.5 us steps "
             "over its largest [-]", 0.0, errors[1] / float(np.max(current)), 5e-6,
             source=_RLC,
         ),
-        compare(
-            GROUP, "the same, largest error of the capacitor voltage over that at the start [-]",
+        check(
+            "the same, largest error of the capacitor voltage over that at the start [-]",
             0.0, falls / 65.0, 1e-6, source=_RLC,
         ),
-        compare(
-            GROUP, "the same, order of the error in the step [-]", 2.0,
+        check(
+            "the same, order of the error in the step [-]", 2.0,
             log(errors[2] / errors[3], 4.0), 5e-2, source="trapezoidal rule: second order",
         ),
-        compare(
-            GROUP, "the same, time at which the boost ends at 12 A [s]", rise,
+        check(
+            "the same, time at which the boost ends at 12 A [s]", rise,
             peaked.leaves([1])[0], 1e-5, source=_RLC,
         ),
-        compare(
-            GROUP, "the same, capacitor voltage left at 12 A [V]", float(circuit.at(rise)[1]),
+        check(
+            "the same, capacitor voltage left at 12 A [V]", float(circuit.at(rise)[1]),
             float(peaked.capacitor[-1]), 1e-5, source=_RLC,
         ),
-        compare(
-            GROUP, "capacitor falls to the battery, time at which that takes over [s]", empty,
+        check(
+            "capacitor falls to the battery, time at which that takes over [s]", empty,
             run.leaves([1])[0], 1e-6, source=_RLC,
         ),
-        compare(
-            GROUP, "the same, current from the battery after 0.4 ms [A]", later,
+        check(
+            "the same, current from the battery after 0.4 ms [A]", later,
             float(run.current[-1]), 1e-6, source="R and L at 14 V less a diode, closed form",
         ),
     ]  # fmt: skip
@@ -284,18 +285,18 @@ def _recharge() -> list[Check]:
     full = run_stage(linear_coil(), limited, step=50e-6, duration=45e-3)
     held = 0.5 * 200e-6 * (65.0**2 - 10.0**2)
     return [
-        compare(
-            GROUP, "recharge at constant power, capacitor voltage after 20 ms [V]",
+        check(
+            "recharge at constant power, capacitor voltage after 20 ms [V]",
             sqrt(30.0**2 + 2.0 * 12.0 * 20e-3 / 200e-6), float(run.capacitor[-1]), 3e-14,
             source="C U dU/dt = P: U = sqrt(U0^2 + 2 P t/C)",
         ),
-        compare(
-            GROUP, "recharge at constant current up to 40 V, then at constant power: 25 ms [V]",
+        check(
+            "recharge at constant current up to 40 V, then at constant power: 25 ms [V]",
             sqrt(level**2 + 2.0 * 12.0 * (25e-3 - first) / 200e-6), float(slow.capacitor[-1]),
             1e-13, source="U = U0 + I t/C, then U = sqrt(U1^2 + 2 P t/C)",
         ),
-        compare(
-            GROUP, "energy from the battery for a full recharge at 80 % [J]", held / 0.8,
+        check(
+            "energy from the battery for a full recharge at 80 % [J]", held / 0.8,
             full.energies["battery"], 1e-13, source="C (U1^2 - U0^2)/2 over the efficiency",
         ),
     ]  # fmt: skip
@@ -308,15 +309,14 @@ def _recuperation() -> list[Check]:
     )  # fmt: skip
     run = run_stage(linear_coil(), driver, step=0.5e-6, duration=60e-6, current=8.0)
     circuit = _Series(_RESISTANCE + 0.08, 50e-6, 8.0, 65.0, still=1.6, sign=-1.0)
-    end = circuit.zero()
-    voltage = float(circuit.at(end)[1])
+    voltage = float(circuit.at(circuit.zero())[1])
     return [
-        compare(
-            GROUP, "coil of 8 A back into the capacitor, its voltage then [V]", voltage,
+        check(
+            "coil of 8 A back into the capacitor, its voltage then [V]", voltage,
             float(run.capacitor[-1]), 1e-6, source=_RLC + ", with two diodes",
         ),
-        compare(
-            GROUP, "the same, energy taken back [J]", 25e-6 * (voltage**2 - 65.0**2),
+        check(
+            "the same, energy taken back [J]", 25e-6 * (voltage**2 - 65.0**2),
             run.energies["capacitor"], 1e-5, source=_RLC + ", with two diodes",
         ),
     ]  # fmt: skip
@@ -331,17 +331,17 @@ def _losses() -> list[Check]:
     total, still = _RESISTANCE + 0.6, 40.7
     end, charge, square = _decay(8.0, still, total)
     return [
-        compare(
-            GROUP, "coil of 8 A into a clamp of 40 V, energy lost in the clamp [J]",
+        check(
+            "coil of 8 A into a clamp of 40 V, energy lost in the clamp [J]",
             40.0 * charge + 0.5 * square, run.energies["clamp"], 1e-5,
             source="i = (i0 + u/R) exp(-R t/L) - u/R, integrals of i and i^2",
         ),
-        compare(
-            GROUP, "the same, energy lost in the diode [J]", 0.7 * charge + 0.1 * square,
+        check(
+            "the same, energy lost in the diode [J]", 0.7 * charge + 0.1 * square,
             run.energies["diodes"], 1e-5, source="the same integrals",
         ),
-        compare(
-            GROUP, "the same, without current after so many steps of 0.2 us", np.ceil(end / 0.2e-6),
+        check(
+            "the same, without current after so many steps of 0.2 us", np.ceil(end / 0.2e-6),
             float(np.argmax(run.current == 0.0)), 0.0, source="t = (L/R) ln(1 + R i0/u)",
         ),
     ]  # fmt: skip
@@ -352,9 +352,8 @@ def _decay(current: float, still: float, resistance: float) -> tuple[float, floa
     rate, level = resistance / _INDUCTANCE, still / resistance
     end = log(1.0 + current / level) / rate
     a, x = current + level, exp(-rate * end)
-    charge = a * (1.0 - x) / rate - level * end
     square = a * a * (1.0 - x * x) / (2.0 * rate) - 2.0 * a * level * (1.0 - x) / rate
-    return end, charge, square + level * level * end
+    return end, a * (1.0 - x) / rate - level * end, square + level * level * end
 
 
 def _second_shot() -> list[Check]:
@@ -373,27 +372,25 @@ def _second_shot() -> list[Check]:
     )  # fmt: skip
     first = _Series(_RESISTANCE, capacitance, 0.0, 65.0)
     rise = float(brentq(lambda t: float(first.at(t)[0]) - 10.0, 1e-6, 60e-6, xtol=1e-16))
-    left = float(first.at(rise)[1])
-    again = _Series(_RESISTANCE, capacitance, 0.0, left)
+    again = _Series(_RESISTANCE, capacitance, 0.0, float(first.at(rise)[1]))
     slow = float(brentq(lambda t: float(again.at(t)[0]) - 10.0, 1e-6, 90e-6, xtol=1e-16))
     late = early.leaves([1, 7])
     quick, kept = _boost_recharged(65.0, 10.0, power, capacitance)
     charged = sqrt(kept**2 + 2.0 * power * (second - quick) / capacitance)
     again_quick, _ = _boost_recharged(charged, 10.0, power, capacitance)
-    start = float(run.capacitor[round(second / 0.2e-6)])
     return [
-        compare(
-            GROUP, "second shot without recharge, its delay to 10 A behind that of the first [s]",
+        check(
+            "second shot without recharge, its delay to 10 A behind that of the first [s]",
             slow - rise, (late[1] - second) - late[0], 1e-5,
             source=_RLC + ", from the voltage left",
         ),
-        compare(
-            GROUP, "recharged at 10 W, capacitor voltage at the second shot [V]", charged,
-            start, 1e-5,
+        check(
+            "recharged at 10 W, capacitor voltage at the second shot [V]", charged,
+            float(run.capacitor[round(second / 0.2e-6)]), 1e-5,
             source="R, L, C and P/U in SciPy (DOP853), then U = sqrt(U0^2 + 2 P t/C)",
         ),
-        compare(
-            GROUP, "the same, delay of the second shot to 10 A behind that of the first [s]",
+        check(
+            "the same, delay of the second shot to 10 A behind that of the first [s]",
             again_quick - quick, (ends[1] - second) - ends[0], 1e-4,
             source="R, L, C and P/U in SciPy (DOP853)",
         ),
@@ -410,10 +407,10 @@ def _boost_recharged(
         first = power / voltage
         begin = -log(1.0 - _RESISTANCE * first / voltage) * _INDUCTANCE / _RESISTANCE
 
-    def rates(_: float, y: NDArray[np.float64]) -> list[float]:
+    def rates(_: float, y: np.ndarray) -> list[float]:
         return [(y[1] - _RESISTANCE * y[0]) / _INDUCTANCE, (power / y[1] - y[0]) / capacitance]
 
-    def reached(_: float, y: NDArray[np.float64]) -> float:
+    def reached(_: float, y: np.ndarray) -> float:
         return float(y[0]) - current
 
     reached.terminal = True  # type: ignore[attr-defined]
@@ -438,8 +435,8 @@ def _limits() -> list[Check]:
         lift=np.zeros(steps + 1),
     )  # fmt: skip
     return [
-        compare(
-            GROUP, "capacitor of 1000 F against peak-hold, largest difference of the current [A]",
+        check(
+            "capacitor of 1000 F against peak-hold, largest difference of the current [A]",
             0.0, float(np.max(np.abs(run.current - other.current))), 1e-7,
             source="ideal sources of the same voltages: the other step function",
         ),
@@ -453,17 +450,22 @@ def _energy() -> list[Check]:
     lift -= 60e-6 * np.clip((time - 1.2e-3) / 0.2e-3, 0.0, 1.0)
     worst = least = 0.0
     for seed in range(12):
-        plant = injector() if seed % 3 else linear_coil()
-        run = run_stage(plant, random_driver(seed), step=step, duration=duration, lift=lift)
+        run = run_stage(
+            injector() if seed % 3 else linear_coil(),
+            random_driver(seed),
+            step=step,
+            duration=duration,
+            lift=lift,
+        )
         worst = max(worst, run.residual)
         least = min(least, *(run.energies[b.label] for b in STAGE_BOOKS if b.kind == "loss"))
     return [
-        compare(
-            GROUP, "12 random stages with moving armatures: largest energy residual [-]", 0.0,
+        check(
+            "12 random stages with moving armatures: largest energy residual [-]", 0.0,
             worst, 1e-11, source=_IDENTITY,
         ),
-        compare(
-            GROUP, "the same, least of all losses [J]", 0.0, least, 1e-15,
+        check(
+            "the same, least of all losses [J]", 0.0, least, 1e-15,
             source="second law: no loss may be negative",
         ),
     ]  # fmt: skip

@@ -1,46 +1,286 @@
 """Checks of bodies that yield: at one point, in the contact, and in time."""
 
-from dataclasses import replace
-from functools import partial
-from math import exp, log, sqrt
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import exp, log, pi, sqrt
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
+from scipy.sparse import csr_array
 
+from klack.assembling.yielding import loops_with_yield
 from klack.contact.history import ImpactHistory
+from klack.contact.mortar import ContactSpace, contact_space, touching_shift
 from klack.contact.pressure_limit import PressureLimit
+from klack.contact.statics import ReachError, StaticContact, contact_compliance, static_contact
 from klack.contact.yielding_law import YieldingLaw
+from klack.elasticity.body import elastic_body
+from klack.elasticity.statics import Flexibility
 from klack.hardening import Hardening
-from klack.mechanics.end_stop import EndStop
-from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.stop_law import LinearStopLaw
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import Mesh
+from klack.mesh.profile import Arc, Line, Profile
+from klack.mesh.sizing import MeshSizing, Refinement
 from klack.network.network import Network
+from klack.plasticity.ladder import YieldingContact
+from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
 from klack.plasticity.radial_return import PlasticState, radial_return
+from klack.plasticity.yielding_body import YieldingBody
 from klack.plasticity.yielding_fit import yielding_law
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.network_run import simulate_network
 from klack.simulation.system import ContactPair, ReducedSystem
 from klack.transient.interface_run import simulate_interface
-from klack.verification.check import Check, ComparedCurve, compare
-from klack.verification.impacts import STEEL
+from klack.verification.benches import component
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.interface_bodies import modal_model
-from klack.verification.yielding_bodies import (
-    RADIUS,
-    FirstYield,
-    SoftPair,
-    ball_in_seat,
-    pressed_again,
-    sphere_on_sphere,
-)
+from klack.verification.transient import STEEL
 
-__all__ = ["checks"]
+__all__ = ["SOFT", "ball_in_seat", "checks"]
 
-_check = partial(compare, "plasticity")
 
-Floats = NDArray[np.float64]
+RADIUS = 1.25e-3
+"""Of all balls [m]."""
+
+_REACH = 2e-6  # [m], of the first candidate points
+
+SOFT = replace(STEEL, hardening=Hardening(yield_stress=280e6, isotropic=1e9))
+"""Soft steel, 280 MPa."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FirstYield:
+    """First yield of two equal spheres, or of one on a rigid plane.
+
+    Johnson, Contact Mechanics, 1985, 4.2 and 6.2; Jackson & Green, J. Tribol. 127 (2005) 343.
+
+    Parameters
+    ----------
+    modulus : float [Pa]
+        E* of the contact.
+    radius : float [m]
+    yield_stress : float [Pa]
+    poisson : float [-]
+    """
+
+    modulus: float
+    radius: float
+    yield_stress: float
+    poisson: float
+
+    @property
+    def pressure(self) -> float:
+        """Highest one [Pa]."""
+        return 1.295 * exp(0.736 * self.poisson) * self.yield_stress
+
+    @property
+    def contact(self) -> float:
+        """Radius of the contact [m]."""
+        return pi * self.pressure * self.radius / (2.0 * self.modulus)
+
+    @property
+    def force(self) -> float:
+        """Force [N]."""
+        return 2.0 / 3.0 * pi * self.contact**2 * self.pressure
+
+    @property
+    def approach(self) -> float:
+        """Approach [m]."""
+        return self.contact**2 / self.radius
+
+    def speed(self, mass: float) -> float:
+        """Speed [m/s] of a rigid mass [kg] whose impact just reaches it."""
+        return sqrt(0.8 * self.force * self.approach / mass)
+
+
+class SoftPair(NamedTuple):
+    """Two soft bodies: their static loops, contact points and elastic compliance (nc, nc) [m/N]."""
+
+    loops: YieldingLoops
+    space: ContactSpace
+    C: np.ndarray
+
+
+def sphere_on_sphere(*, size: float, extent: float, energy: float) -> YieldingLoops:
+    """Loops of two equal hemispheres, each held at its equator.
+
+    Parameters
+    ----------
+    size, extent : float [m]
+        Of the elements at the contact, and how far these reach.
+    energy : float [J]
+        Up to which.
+    """
+    return _loops(*_spheres(size, extent), energy).loops
+
+
+def pressed_again(*, size: float, extent: float, energy: float) -> tuple[float, float]:
+    """Plastic work [J] of two spheres pressed once, and of two more cycles to the same approach.
+
+    The finite elements yield as they like on the way back; see :func:`sphere_on_sphere`.
+    """
+    with _pressed(*_spheres(size, extent), energy, _REACH) as (static, C, upper, lower):
+        radius = 6.0 * float(static.half_width[-1])
+        bodies = [
+            YieldingBody(one, csr_array(G), np.zeros(2), radius)
+            for one, G in ((upper, static.space.G_a), (lower, static.space.G_b))
+        ]
+        contact = YieldingContact(static.space, C, bodies)
+        deepest = float(static.approach[-1])
+        for share in np.linspace(0.1, 1.0, 12):
+            first = contact.load(share * deepest)
+        again = first
+        for share in (0.8, 0.65, 1.0, 0.65, 1.0):
+            again = contact.load(share * deepest)
+    return first.plastic_work, again.plastic_work - first.plastic_work
+
+
+def _spheres(size: float, extent: float) -> tuple["_Part", "_Part"]:
+    upper = Profile(
+        (0.0, 0.0),
+        (
+            Arc((RADIUS, RADIUS), (0.0, RADIUS), "tip"),
+            Line((0.0, RADIUS), "top"),
+            Line((0.0, 0.0), "axis"),
+        ),
+    )
+    lower = Profile(
+        (0.0, -RADIUS),
+        (
+            Line((RADIUS, -RADIUS), "base"),
+            Arc((0.0, 0.0), (0.0, -RADIUS), "tip"),
+            Line((0.0, -RADIUS), "axis"),
+        ),
+    )
+    sizing = MeshSizing(
+        size=0.1e-3,
+        refinements=(Refinement(position=(0.0, 0.0), size=size, radius=extent),),
+        grading=0.4,
+    )
+    return (
+        _Part(mesh_meridian({"upper": upper}, sizing), "upper", "tip", "top"),
+        _Part(mesh_meridian({"lower": lower}, sizing), "lower", "tip", "base"),
+    )
+
+
+def ball_in_seat(*, size: float, extent: float, energy: float) -> SoftPair:
+    """A hemisphere held at its equator, in a cone of 90 degrees held at its base."""
+    ring = RADIUS / sqrt(2.0)
+    ball = Profile(
+        (0.0, -RADIUS),
+        (
+            Arc((RADIUS, 0.0), (0.0, 0.0), "tip"),
+            Line((0.0, 0.0), "top"),
+            Line((0.0, -RADIUS), "axis"),
+        ),
+    )
+    inner, outer, bottom = 0.4e-3, 4.0e-3, -6.0e-3
+    seat = Profile(
+        (inner, bottom),
+        (
+            Line((outer, bottom), "base"),
+            Line((outer, ring + 0.5e-3 - 2.0 * ring), "side"),
+            Line((ring + 0.5e-3, 0.5e-3 - ring), "top"),
+            Line((inner, inner - 2.0 * ring), "cone"),
+            Line((inner, bottom), "bore"),
+        ),
+    )
+    fine = (Refinement(position=(ring, -ring), size=size, radius=extent),)
+    return _loops(
+        _Part(
+            mesh_meridian({"ball": ball}, MeshSizing(size=0.1e-3, refinements=fine, grading=0.4)),
+            "ball",
+            "tip",
+            "top",
+        ),
+        _Part(
+            mesh_meridian({"seat": seat}, MeshSizing(size=0.4e-3, refinements=fine, grading=0.4)),
+            "seat",
+            "cone",
+            "base",
+        ),
+        energy,
+    )
+
+
+class _Part(NamedTuple):
+    mesh: Mesh
+    solid: str
+    face: str  # that touches
+    held: str
+
+
+class _Pair(NamedTuple):
+    static: StaticContact  # of elastic bodies, beyond the energy
+    C: np.ndarray
+    upper: LoadedBody
+    lower: LoadedBody
+
+
+def _loops(above: _Part, below: _Part, energy: float) -> SoftPair:
+    """Loops of two soft bodies up to an energy [J]."""
+    reach = _REACH
+    while True:
+        with _pressed(above, below, energy, reach) as (static, C, upper, lower):
+            try:
+                loops = loops_with_yield(
+                    static, static.space, C, upper, lower, energy=energy, closing=0.0
+                )
+                return SoftPair(loops, static.space, C)
+            except ReachError:
+                reach = 1.5 * static.space.reach
+
+
+@contextmanager
+def _pressed(above: _Part, below: _Part, energy: float, reach: float) -> Iterator[_Pair]:
+    """Two soft bodies that touch, on as many contact points as elastic bodies need."""
+    faces = [part.mesh.surface(part.face) for part in (above, below)]
+    lift = touching_shift(above.mesh, faces[0], below.mesh, faces[1])
+    above = above._replace(mesh=above.mesh.moved(np.array([0.0, lift])))
+    upper, lower = _held(above), _held(below)
+    try:
+        while True:
+            space = contact_space(
+                above.mesh,
+                above.mesh.surface(above.face),
+                below.mesh,
+                below.mesh.surface(below.face),
+                reach=reach,
+            )
+            C = contact_compliance(space, upper.flexibility, lower.flexibility)
+            try:
+                static = _beyond(space, C, 1.15 * energy)
+                break
+            except ReachError:
+                reach *= 1.5
+        yield _Pair(static, C, upper, lower)
+    finally:
+        upper.flexibility.close()
+        lower.flexibility.close()
+
+
+def _beyond(space: ContactSpace, C: np.ndarray, energy: float) -> StaticContact:
+    """Static contact of elastic bodies that stores more than an energy [J]."""
+    force = 1e-3
+    while True:
+        static = static_contact(space, C, force)
+        stored = np.trapezoid(np.append(0.0, static.force), np.append(0.0, static.approach))
+        if stored > energy:
+            return static
+        force *= 1.05 * (energy / stored) ** 0.6  # a sphere; a line needs a round more
+
+
+def _held(part: _Part) -> LoadedBody:
+    body = elastic_body(
+        part.solid, part.mesh, {part.solid: SOFT}, fixed_nodes=part.mesh.surface(part.held).nodes
+    )
+    return LoadedBody(body=body, flexibility=Flexibility(body), materials={part.solid: SOFT})
+
 
 _SHEAR, _SLOPE = STEEL.young / 2.6, 2e9  # [Pa]
 _YIELD = 280e6  # [Pa]
@@ -91,12 +331,12 @@ def checks() -> list[Check]:
     return [*_sheared(), *_law(), *_one_point(), *_sphere(), *_again(), *_seat()]
 
 
-def _sheared() -> list[Check]:
+def _sheared() -> Iterator[Check]:
     """Shear of one point: there are closed forms for whatever steps."""
     tau = (_YIELD / sqrt(3.0) + _SLOPE / 3.0 * 0.01) / (1.0 + _SLOPE / (3.0 * _SHEAR))
     there = np.linspace(0.0, 0.01, 40)
-    found = [
-        _check(
+    yield from [
+        check(
             f"simple shear of 1 % in 40 steps, {name} hardening: stress [Pa]",
             expected=tau,
             computed=_stresses(there, **{name: _SLOPE})[-1],
@@ -110,25 +350,23 @@ def _sheared() -> list[Check]:
         # all of what is beyond the elastic range hardens at the plastic slope
         plastic = _SLOPE / 3.0 / (1.0 + _SLOPE / (3.0 * _SHEAR))
         beyond = (there[-1] - back[-1]) - range_ / _SHEAR
-        found.append(
-            _check(
-                f"the same, sheared back, {name} hardening: stress [Pa]",
-                expected=tau - range_ - plastic * beyond,
-                computed=_stresses(back, **{name: _SLOPE})[-1],
-                tolerance=1e-13,
-                source="elastic range of twice the first (kinematic) or the last stress",
-            )
+        yield check(
+            f"the same, sheared back, {name} hardening: stress [Pa]",
+            expected=tau - range_ - plastic * beyond,
+            computed=_stresses(back, **{name: _SLOPE})[-1],
+            tolerance=1e-13,
+            source="elastic range of twice the first (kinematic) or the last stress",
         )
-    return found
 
 
-def _stresses(shears: Floats, **kind: float) -> Floats:
+def _stresses(shears: np.ndarray, **kind: float) -> np.ndarray:
     """Shear stress [Pa] after each engineering shear."""
     hardening = Hardening(yield_stress=_YIELD, **kind)
     state, stresses = PlasticState.none(1), []
     for shear in shears:
-        strain = np.array([[0.0, 0.0, 0.0, shear / 2.0]])
-        state = radial_return(strain, state, hardening, _SHEAR).state
+        state = radial_return(
+            np.array([[0.0, 0.0, 0.0, shear / 2.0]]), state, hardening, _SHEAR
+        ).state
         stresses.append(2.0 * _SHEAR * (shear / 2.0 - float(state.strain[0, 3])))
     return np.array(stresses)
 
@@ -147,24 +385,23 @@ def _two_lines() -> YieldingLaw:
     )
 
 
-def _law() -> list[Check]:
+def _law() -> Iterator[Check]:
     """Impacts of a rigid mass on two straight lines, in both time loops."""
     law, ratio, speed, before = _two_lines(), _CLOSING / _OPENING, 0.3, 0.0
     alone = speed * sqrt(_NEEDLE * _CLOSING)
-    found = []
     source = "Walton & Braun 1986, J. Rheol. 30:949: F_n^2 = F_1^2 + (1-r) F_(n-1)^2, r = k1/k2"
     for n in range(1, 4):
         history = _impact(law, _NEEDLE, speed)
         force = sqrt(alone**2 + (1.0 - ratio) * before**2)
-        found += [
-            _check(
+        yield from [
+            check(
                 f"two lines, impact {n}: force [N]",
                 expected=force,
                 computed=float(np.max(history.peak_force)),
                 tolerance=1e-5,
                 source=source,
             ),
-            _check(
+            check(
                 f"two lines, impact {n}: restitution [-]",
                 expected=sqrt(ratio) * force / alone,
                 computed=float(history.velocity_a[-1]) / speed,
@@ -174,19 +411,24 @@ def _law() -> list[Check]:
             ),
         ]
         law, before = law.after(history.pressed), force
-    stop = EndStop(gap=5e-6, law=LinearStopLaw(kind="linear", stiffness=_OPENING))
-    parts = {"mass": RigidMass(mass=_NEEDLE, speed=-speed), "stop": stop.with_law(_two_lines())}
-    rows = Network(parts, [["mass.body", "stop.upper"], ["stop.lower", "ground"]]).rows()
+    stop = component("end-stop", gap=5e-6, law=LinearStopLaw(kind="linear", stiffness=_OPENING))
+    rows = Network(
+        {
+            "mass": component("rigid-mass", mass=_NEEDLE, speed=-speed),
+            "stop": stop.with_law(_two_lines()),
+        },
+        [["mass.body", "stop.upper"], ["stop.lower", "ground"]],
+    ).rows()
     result = simulate_network(rows, duration=80e-6, step=20e-9, record=1e-6, start="free")
-    found += [
-        _check(
+    yield from [
+        check(
             "two lines, end stop of a network: restitution [-]",
             expected=sqrt(ratio),
             computed=result.events[0].restitution,
             tolerance=1e-4,
             source="e = sqrt(k1/k2)",
         ),
-        _check(
+        check(
             "two lines, end stop of a network: residual of the energy [relative]",
             expected=0.0,
             computed=result.books.relative_residual,
@@ -194,7 +436,6 @@ def _law() -> list[Check]:
             source="conservation of energy",
         ),
     ]
-    return found
 
 
 def _impact(law: YieldingLaw, mass: float, speed: float) -> ImpactHistory:
@@ -204,8 +445,9 @@ def _impact(law: YieldingLaw, mass: float, speed: float) -> ImpactHistory:
     contact = ContactPair(
         body_a="needle", port_a="contact", body_b="seat", port_b="contact", law=law, gap=0.0
     )
-    bodies = (rigid_mass_body("needle", mass), fixed_body("seat"))
-    system = ReducedSystem(bodies=bodies, contacts=(contact,))
+    system = ReducedSystem(
+        bodies=(rigid_mass_body("needle", mass), fixed_body("seat")), contacts=(contact,)
+    )
     return simulate_impact(system, speed=speed, duration=3.0 * time, step=time / 2000.0)
 
 
@@ -223,8 +465,8 @@ def _one_point() -> list[Check]:
         traces=np.full((1, 1), _NEEDLE**-0.5),
         compliance=np.full((1, 1), 1.0 / _OPENING),
         gap=np.zeros(1),
+        limit=limit,
     )
-    model = replace(model, limit=limit)
     speed, soft = 0.3, 1.0 / _OPENING + 1.0 / _RISE
     energy = 0.5 * _NEEDLE * speed**2
     time = np.pi * sqrt(_NEEDLE * soft)
@@ -238,14 +480,14 @@ def _one_point() -> list[Check]:
         worn = run.worn
         yielded = sqrt(yielded**2 + 2.0 * (energy - 0.5 * yielded**2 / _OPENING) / soft)
         found += [
-            _check(
+            check(
                 f"rigid mass on a point with a pressure limit, impact {n}: force [N]",
                 expected=yielded,
                 computed=float(run.history.force.max()),
                 tolerance=5e-6,
                 source=source,
             ),
-            _check(
+            check(
                 f"the same, impact {n}: restitution [-]",
                 expected=sqrt(0.5 * yielded**2 / _OPENING / energy),
                 computed=float(run.history.velocity_a[-1]) / speed,
@@ -254,7 +496,7 @@ def _one_point() -> list[Check]:
             ),
         ]
     found.append(
-        _check(
+        check(
             "the same: residual of the energy [relative]",
             expected=0.0,
             computed=abs(run.energy.residual),
@@ -265,7 +507,7 @@ def _one_point() -> list[Check]:
     return found
 
 
-def _sphere() -> list[Check]:
+def _sphere() -> Iterator[Check]:
     """Two equal spheres, up to 20 times the speed of first yield."""
     size = 2.5e-6
     loops = sphere_on_sphere(
@@ -283,8 +525,8 @@ def _sphere() -> list[Check]:
         y_log=True,
     )
     at = PchipInterpolator(depth, force)
-    found = [
-        _check(
+    yield from [
+        check(
             f"two spheres pressed to {w:g} times the approach of first yield: "
             "force over that of first yield [-]",
             expected=_jackson_green(w),
@@ -296,8 +538,8 @@ def _sphere() -> list[Check]:
         for w in (3.0, 6.0, 12.0)
     ]
     left = PchipInterpolator(depth, [one.set / _FIRST.approach for one in loops.openings])
-    found += [
-        _check(
+    yield from [
+        check(
             f"the same at {w:g} times: set over the approach [-]",
             expected=(1.0 - w**-0.28) * (1.0 - w**-0.69),
             computed=float(left(w)) / w,
@@ -309,8 +551,8 @@ def _sphere() -> list[Check]:
     ]
     work = PchipInterpolator(force, [state.plastic_work for state in loops.states])
     unit = _FIRST.force * _FIRST.approach
-    found += [
-        _check(
+    yield from [
+        check(
             f"the same at {ratio:g} times the force: plastic work over force and approach of "
             "first yield [-]",
             expected=expected,
@@ -321,8 +563,8 @@ def _sphere() -> list[Check]:
         for ratio, expected in _POINT_WORK
     ]
     approach = PchipInterpolator(force, depth)
-    found += [
-        _check(
+    yield from [
+        check(
             f"the same at {ratio:g} times the force of first yield: approach over its own [-]",
             expected=expected,
             computed=float(approach(ratio)),
@@ -332,30 +574,25 @@ def _sphere() -> list[Check]:
         for ratio, expected in _POINT_APPROACH
     ]
     law, one = yielding_law(loops, 0.0), _FIRST.speed(_BALL)
-    found += _ball_impacts(law, one)
+    yield from _ball_impacts(law, one)
     for speed in (2.0, 5.0, 10.0, 20.0):
         history = _impact(law, _BALL, speed * one)
-        found.append(
-            _check(
-                f"spheres that meet at {speed:g} times the speed of first yield: restitution [-]",
-                expected=1.0 - 0.1 * log(speed) * ((speed - 1.0) / 59.0) ** 0.156,
-                computed=float(history.velocity_a[-1]) / (speed * one),
-                tolerance=0.02,
-                source=_MARGHITU,
-                absolute=True,
-            )
+        yield check(
+            f"spheres that meet at {speed:g} times the speed of first yield: restitution [-]",
+            expected=1.0 - 0.1 * log(speed) * ((speed - 1.0) / 59.0) ** 0.156,
+            computed=float(history.velocity_a[-1]) / (speed * one),
+            tolerance=0.02,
+            source=_MARGHITU,
+            absolute=True,
         )
-    found.append(
-        _check(
-            "spheres at 20 times: residual of the energy [relative]",
-            expected=0.0,
-            computed=abs(history.ledger.residual),
-            tolerance=1e-10,
-            source="conservation of energy",
-            reason="round-off: the loss is the difference of what the tables store",
-        )
+    yield check(
+        "spheres at 20 times: residual of the energy [relative]",
+        expected=0.0,
+        computed=abs(history.ledger.residual),
+        tolerance=1e-10,
+        source="conservation of energy",
+        reason="round-off: the loss is the difference of what the tables store",
     )
-    return found
 
 
 def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
@@ -366,21 +603,21 @@ def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
         after = law.after(history.pressed)
         where = f"first impact at {speed:g} times the speed of first yield"
         found += [
-            _check(
+            check(
                 f"{where}: force over that of first yield [-]",
                 expected=force,
                 computed=float(history.peak_force.max()) / _FIRST.force,
                 tolerance=0.02,
                 source=_HALF_SPACE,
             ),
-            _check(
+            check(
                 f"{where}: set over the approach of first yield [-]",
                 expected=left,
                 computed=after.set_after(after.reached) / _FIRST.approach,
                 tolerance=0.07,
                 source=_HALF_SPACE,
             ),
-            _check(
+            check(
                 f"{where}: restitution [-]",
                 expected=restitution,
                 computed=float(history.velocity_a[-1]) / (speed * one),
@@ -394,7 +631,7 @@ def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
         histories.append(_impact(law, _BALL, speed))
         law = law.after(histories[-1].pressed)
     found += [
-        _check(
+        check(
             f"impact {n} on the same faces at 10 times the speed of first yield: restitution [-]",
             expected=expected,
             computed=float(histories[n - 1].velocity_a[-1]) / speed,
@@ -406,7 +643,7 @@ def _ball_impacts(law: YieldingLaw, one: float) -> list[Check]:
         for n, expected in _POINT_LATER
     ]
     found.append(
-        _check(
+        check(
             "the same, run in: force over that of first yield [-]",
             expected=_POINT_RUN_IN,
             computed=float(histories[-1].peak_force.max()) / _FIRST.force,
@@ -433,7 +670,7 @@ def _again() -> list[Check]:
         size=size, extent=16 * size, energy=20.0 * 0.4 * _FIRST.force * _FIRST.approach
     )
     return [
-        _check(
+        check(
             "two spheres pressed to the same approach three times: plastic work of the second and "
             "third over that of the first [relative]",
             expected=0.0,
@@ -454,7 +691,7 @@ def _seat() -> list[Check]:
     source = _OTHER + "; another housing"
     for force, depth, lost in _SEAT_EXCESS:
         found += [
-            _check(
+            check(
                 f"ball of 1.25 mm in a 45 degree seat, {force:.3g} N: approach beyond the elastic "
                 "one [um]",
                 expected=depth,
@@ -462,7 +699,7 @@ def _seat() -> list[Check]:
                 tolerance=0.07,
                 source=source,
             ),
-            _check(
+            check(
                 f"the same, {force:.3g} N: plastic work [uJ]",
                 expected=lost,
                 computed=1e6 * float(work(force)),
@@ -474,7 +711,7 @@ def _seat() -> list[Check]:
     for n, expected in enumerate(_SEAT_IMPACTS, 1):
         history = _impact(law, _NEEDLE, 0.3)
         found.append(
-            _check(
+            check(
                 f"rigid needle of 3.05 g on that seat at 0.3 m/s, impact {n}: restitution [-]",
                 expected=expected,
                 computed=float(history.velocity_a[-1]) / 0.3,
@@ -496,14 +733,15 @@ def _points_of_seat(pair: SoftPair) -> list[Check]:
         compliance=pair.C,
         gap=pair.space.gap - pair.space.touch * pair.space.axial,
         axial=pair.space.axial,
+        limit=pair.loops.pressure_limit,
+        area=pair.space.area,
     )
-    model = replace(model, limit=pair.loops.pressure_limit, area=pair.space.area)
     worn, found = np.zeros(model.count), []
     for n, expected in enumerate(_SEAT_IMPACTS, 1):
         run = simulate_interface(model, speed=0.3, duration=60e-6, step=20e-9, worn=worn)
         worn = run.worn
         found.append(
-            _check(
+            check(
                 f"needle of 3.05 g on the points of a ball in a seat, 0.3 m/s, impact {n}: "
                 "restitution [-]",
                 expected=expected,
@@ -516,7 +754,7 @@ def _points_of_seat(pair: SoftPair) -> list[Check]:
     return found
 
 
-def _excess(loops: YieldingLoops) -> Floats:
+def _excess(loops: YieldingLoops) -> np.ndarray:
     """Approach of each state beyond that of elastic bodies at its force [m]."""
     elastic = PchipInterpolator(loops.elastic.force, loops.elastic.approach)
     return np.array([state.approach - float(elastic(state.force)) for state in loops.states])

@@ -1,9 +1,8 @@
 """Reduction against the exact rod: residual flexibility, receptance, attachment modes."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import Modes, eigenmodes
@@ -17,7 +16,7 @@ from klack.reduction.receptance import reduced_receptance
 from klack.reduction.reduce import reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount
-from klack.verification.check import Check, ComparedCurve, compare
+from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.lattice import lattice_mesh
 
 __all__ = ["LENGTH", "RADIUS", "STEEL_WITHOUT_POISSON", "checks", "rod"]
@@ -25,7 +24,6 @@ __all__ = ["LENGTH", "RADIUS", "STEEL_WITHOUT_POISSON", "checks", "rod"]
 LENGTH, RADIUS = 30e-3, 0.2e-3
 """So slender that all modes below 5 MHz are longitudinal [m]."""
 STEEL_WITHOUT_POISSON = Material(name="bar", young=210e9, poisson=0.0, density=7850.0)
-_GROUP = "reduction"
 _LOSS = 1e-2
 _DAMPING = LossFactor(eta=_LOSS)
 _SPRING = STEEL_WITHOUT_POISSON.young * np.pi * RADIUS**2 / LENGTH  # EA / L
@@ -47,10 +45,15 @@ def rod(*, elements: int, clamped: bool) -> tuple[ElasticBody, Port, Port]:
     lower, upper : Port
         Axial, uniform over the end faces.
     """
-    lines = [np.array([0.0, RADIUS]), np.linspace(0.0, LENGTH, elements + 1)]
-    mesh = lattice_mesh("quad8", lines, solid="rod")
-    held = mesh.surface("top").nodes if clamped else ()
-    body = elastic_body("rod", mesh, {"rod": STEEL_WITHOUT_POISSON}, fixed_nodes=held)
+    mesh = lattice_mesh(
+        "quad8", [np.array([0.0, RADIUS]), np.linspace(0.0, LENGTH, elements + 1)], solid="rod"
+    )
+    body = elastic_body(
+        "rod",
+        mesh,
+        {"rod": STEEL_WITHOUT_POISSON},
+        fixed_nodes=mesh.surface("top").nodes if clamped else (),
+    )
     lower, upper = (surface_port(mesh, end, "z", name=end) for end in ("bottom", "top"))
     return body, lower, upper
 
@@ -92,46 +95,38 @@ def checks() -> list[Check]:
 
 
 def _static_checks(plain: ReducedBody, corrected: ReducedBody, held: ReducedBody) -> list[Check]:
-    n = np.arange(1, 6)
     odd = 2 * np.arange(1, 11) - 1
-    missing_free = 1 / 3 - 2 / np.pi**2 * np.sum(1 / n**2)
-    missing_held = 1 - 8 / np.pi**2 * np.sum(1 / odd**2)
     series = "series over the modes of a rod, Craig & Kurdila 2006, ch. 17"
     return [
-        compare(
-            _GROUP,
+        check(
             "free rod: elastic compliance at the end, inertia relief (L/EA)",
             expected=1 / 3,
             computed=plain.static_compliance[0, 0] * _SPRING,
             tolerance=1e-11,
             source="L / (3 E A), free-free rod",
         ),
-        compare(
-            _GROUP,
+        check(
             "free rod: compliance that 5 modes miss (L/EA)",
-            expected=missing_free,
+            expected=1 / 3 - 2 / np.pi**2 * np.sum(1 / np.arange(1, 6) ** 2),
             computed=plain.residual_compliance[0, 0] * _SPRING,
             tolerance=5e-5,
             source=series,
         ),
-        compare(
-            _GROUP,
+        check(
             "clamped rod: compliance that 10 modes miss (L/EA)",
-            expected=missing_held,
+            expected=1 - 8 / np.pi**2 * np.sum(1 / odd**2),
             computed=held.residual_compliance[0, 0] * _SPRING,
             tolerance=1e-3,
             source=series,
         ),
-        compare(
-            _GROUP,
+        check(
             "free rod: compliance that 5 modes and attachment modes miss (L/EA)",
             expected=0.0,
             computed=corrected.residual_compliance[0, 0] * _SPRING,
             tolerance=2e-12,
             source="MacNeal 1971: residual modes make the static response exact",
         ),
-        compare(
-            _GROUP,
+        check(
             "free rod: mass seen by a unit axial velocity (kg)",
             expected=STEEL_WITHOUT_POISSON.density * np.pi * RADIUS**2 * LENGTH,
             computed=float(plain.rigid_axial @ plain.rigid_axial),
@@ -141,7 +136,7 @@ def _static_checks(plain: ReducedBody, corrected: ReducedBody, held: ReducedBody
     ]
 
 
-def exact_receptance(frequencies: NDArray[np.float64]) -> NDArray[np.complex128]:
+def exact_receptance(frequencies: np.ndarray) -> np.ndarray:
     """Free-free rod with ``E (1 + i eta)``: drive-point and end-to-end, shape (n, 2) [m/N]."""
     E = STEEL_WITHOUT_POISSON.young * (1 + 1j * _LOSS)
     k = 2 * np.pi * frequencies / np.sqrt(E / STEEL_WITHOUT_POISSON.density)
@@ -151,7 +146,7 @@ def exact_receptance(frequencies: NDArray[np.float64]) -> NDArray[np.complex128]
 
 def _receptance_checks(
     body: ElasticBody, lower: Port, upper: Port, flexibility: Flexibility, pool: Modes
-) -> list[Check]:
+) -> Iterator[Check]:
     axis = np.geomspace(1e3, 800e3, 400)
     full = full_order_receptance(
         body, [lower, upper], axis, loss_factor=_LOSS, flexibility=flexibility, checks=2
@@ -162,9 +157,8 @@ def _receptance_checks(
     names = ("drive-point", "end-to-end")
     worst = np.max(np.abs(computed / exact - 1), axis=0)
     curves = [_receptance_curve(axis, exact[:, i], computed[:, i]) for i in range(2)]
-    checks = [
-        compare(
-            _GROUP,
+    yield from [
+        check(
             f"free rod, 1 to 800 kHz: largest relative deviation, {name}",
             expected=0.0,
             computed=float(deviation),
@@ -174,47 +168,38 @@ def _receptance_checks(
         )
         for name, deviation, curve in zip(names, worst, curves, strict=True)
     ]
-    checks.append(
-        compare(
-            _GROUP,
-            "Krylov receptance against direct solutions, largest relative deviation",
-            expected=0.0,
-            computed=float(full.checked_deviations.max()),
-            tolerance=2e-10,
-            source="K - w^2 M factorised at two frequencies",
-        )
+    yield check(
+        "Krylov receptance against direct solutions, largest relative deviation",
+        expected=0.0,
+        computed=float(full.checked_deviations.max()),
+        tolerance=2e-10,
+        source="K - w^2 M factorised at two frequencies",
     )
     direct = direct_receptance(body, [lower, upper], np.array([20e3, 300e3])).values
-    checks.append(
-        compare(
-            _GROUP,
-            "reciprocity: end-to-end receptance there and back, largest relative difference",
-            expected=0.0,
-            computed=float(np.max(np.abs(direct[:, 0, 1] / direct[:, 1, 0] - 1))),
-            tolerance=5e-14,
-            source="Maxwell-Betti; each direction has its own direct solution",
-        )
+    yield check(
+        "reciprocity: end-to-end receptance there and back, largest relative difference",
+        expected=0.0,
+        computed=float(np.max(np.abs(direct[:, 0, 1] / direct[:, 1, 0] - 1))),
+        tolerance=5e-14,
+        source="Maxwell-Betti; each direction has its own direct solution",
     )
-    return checks
 
 
 def _correction_check(reduced: ReducedBody) -> Check:
     axis = np.linspace(5e3, 400e3, 400)
     computed = reduced_receptance(reduced, axis, with_residual=False, loss_factor=_LOSS)
     exact = exact_receptance(axis)[:, 0]
-    deviation = np.max(np.abs(computed.values[:, 0, 0] / exact - 1))
-    return compare(
-        _GROUP,
+    return check(
         "10 modes and attachment modes, 5 to 400 kHz: largest relative deviation",
         expected=0.0,
-        computed=float(deviation),
+        computed=float(np.max(np.abs(computed.values[:, 0, 0] / exact - 1))),
         tolerance=2e-2,
         source="-cot(kL)/(EAk)",
         curve=_receptance_curve(axis, exact, computed.values[:, 0, 0]),
     )
 
 
-def undamped_receptance(frequency: float) -> NDArray[np.float64]:
+def undamped_receptance(frequency: float) -> np.ndarray:
     """Free-free rod at a frequency [Hz], or below zero at ``i`` times it, as the columns above."""
     E, rho = STEEL_WITHOUT_POISSON.young, STEEL_WITHOUT_POISSON.density
     k = 2 * np.pi * abs(frequency) * np.sqrt(complex(np.sign(frequency)) * rho / E)
@@ -257,8 +242,6 @@ def _shift_checks(
         computed = (reduced.port_shapes[:, 0] / (reduced.omega**2 - shift)) @ read
         deviations.append(np.abs(computed / undamped_receptance(frequency) - 1))
     V = np.zeros((body.dof_count, 0)) if reduced.recovery is None else reduced.recovery.shapes
-    unit = V.T @ (body.M @ V) - np.eye(reduced.mode_count)
-    squares = V.T @ (body.K @ V) - np.diag(reduced.omega**2)
     low = (-100e3, -200e3)
     static = reduce_body(
         body,
@@ -273,8 +256,7 @@ def _shift_checks(
     source = "-cot(kL)/(EAk), -1/(sin(kL) EAk), undamped; imaginary k for the shift below zero"
     return [
         *(
-            compare(
-                _GROUP,
+            check(
                 f"1 mode and attachment modes shifted to 190 and -40 kHz: largest relative "
                 f"deviation there, {name}",
                 expected=0.0,
@@ -284,26 +266,27 @@ def _shift_checks(
             )
             for i, name in enumerate(("drive-point", "end-to-end (no port there)"))
         ),
-        compare(
-            _GROUP,
+        check(
             "free rod, 1 mode and two shifts of one port: number of modes, the rigid one included",
             expected=4.0,
             computed=float(reduced.mode_count),
             tolerance=0.0,
             source="1 + 1 + 2",
         ),
-        compare(
-            _GROUP,
+        check(
             "the same: largest deviation from orthonormality, of mass and of stiffness/omega_max^2",
             expected=0.0,
             computed=float(
-                max(np.abs(unit).max(), np.abs(squares).max() / reduced.omega.max() ** 2)
+                max(
+                    np.abs(V.T @ (body.M @ V) - np.eye(reduced.mode_count)).max(),
+                    np.abs(V.T @ (body.K @ V) - np.diag(reduced.omega**2)).max()
+                    / reduced.omega.max() ** 2,
+                )
             ),
             tolerance=1e-12,
             source="V^T M V = 1, V^T K V = diag(omega^2)",
         ),
-        compare(
-            _GROUP,
+        check(
             "free rod, 1 mode and shifts of -100 and -200 kHz: compliance that is missing (L/EA)",
             expected=missing_with_shifts(low, kept=1),
             computed=static.residual_compliance[0, 0] * _SPRING,
@@ -314,9 +297,9 @@ def _shift_checks(
 
 
 def _receptance_curve(
-    frequency: NDArray[np.float64],
-    exact: NDArray[np.complex128],
-    computed: NDArray[np.complex128],
+    frequency: np.ndarray,
+    exact: np.ndarray,
+    computed: np.ndarray,
 ) -> ComparedCurve:
     return ComparedCurve(
         x_label="frequency [kHz]",

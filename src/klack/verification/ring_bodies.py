@@ -1,14 +1,14 @@
-"""A needle with a spherical tip on a conical seat, at points on rings and as solids."""
+"""A needle on a conical seat as half sections: at points on rings, as solids, in a network."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from klack.assembling.spatial_rings import in_all_orders
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.ring_gaps import RingGaps
@@ -16,23 +16,43 @@ from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.ring_points import RingRows
+from klack.elasticity.ring_points import RingRows, RingSections
 from klack.elasticity.statics import Flexibility
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.stop_law import LinearStopLaw
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.swept import sweep
+from klack.network.network import Network
+from klack.reduction.damping import ModalDamping
+from klack.reduction.ports import surface_port
+from klack.reduction.reduce import reduce_body
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.selection import ByCount
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.transient.guide import Guide, guide_at_sections
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
-from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
-from klack.verification.impacts import STEEL, needle_over_seat
+from klack.transient.revolved_guide import shaft_sections, turned_sections
+from klack.transient.revolved_model import (
+    RevolvedBody,
+    RingContact,
+    model_of_reduced,
+    reduced_bodies,
+    revolved_model,
+)
+from klack.transient.revolved_points import RevolvedPoints
+from klack.transient.spatial_run import SpatialValve
+from klack.verification.transient import STEEL, needle_over_seat
 
 __all__ = [
     "NeedleOnRing",
+    "RingStroke",
     "impulse_on_needle",
     "momentum_of_needle",
     "solid_over_ring_compliance",
 ]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,11 +92,14 @@ class NeedleOnRing:
 
     def gaps(self, count: int) -> RingGaps:
         """Gaps at so many angles at a placement of the needle."""
-        z = float(self.bodies[0].centre_of_mass[1])
-        angle = 2.0 * np.pi * np.arange(count) / count
-        return RingGaps.of(self.section, *self.sides, angle=angle, centre=np.array([0.0, 0.0, z]))
+        return RingGaps.of(
+            self.section,
+            *self.sides,
+            angle=2.0 * np.pi * np.arange(count) / count,
+            centre=np.array([0.0, 0.0, float(self.bodies[0].centre_of_mass[1])]),
+        )
 
-    def placed(self, count: int, placement: Floats) -> tuple[RingSpace, Floats]:
+    def placed(self, count: int, placement: np.ndarray) -> tuple[RingSpace, np.ndarray]:
         """Contact points after a placement, shape (6,), and a shift along z to first touch.
 
         Returns the placement with that shift as well.
@@ -125,7 +148,7 @@ class NeedleOnRing:
 
 def impulse_on_needle(
     pair: NeedleOnRing, space: RingSpace, result: InterfaceResult, step: float
-) -> Floats:
+) -> np.ndarray:
     """Impulse and its moment about the centre of mass, shape (6,), from forces at the hats.
 
     Without Fourier orders: the forces of the half section on a needle that is rigid.
@@ -145,7 +168,7 @@ def impulse_on_needle(
     return np.array([away @ c, away @ s, up.sum(), -(turn @ s), turn @ c, 0.0])
 
 
-def momentum_of_needle(pair: NeedleOnRing, velocity: Floats) -> Floats:
+def momentum_of_needle(pair: NeedleOnRing, velocity: np.ndarray) -> np.ndarray:
     """Momentum and angular momentum, shape (6,), of a needle of this rigid velocity."""
     needle = pair.bodies[0]
     return np.concatenate([needle.mass * velocity[:3], needle.inertia @ velocity[3:]])
@@ -184,8 +207,9 @@ def solid_over_ring_compliance(
     wave = np.cos(order * np.arctan2(solid.points[:, 1], solid.points[:, 0])) * solid.area
     mesh, G = ((upper, solid.G_a), (lower, solid.G_b))[number]
     (name,) = mesh.solids
-    held = mesh.surface("base").nodes if number else ()
-    body = elastic_body(name, mesh, {name: STEEL}, fixed_nodes=held)
+    body = elastic_body(
+        name, mesh, {name: STEEL}, fixed_nodes=mesh.surface("base").nodes if number else ()
+    )
     with Flexibility(body) as flexibility:
         found = float(wave @ (G @ flexibility.solve(G.T @ wave)))
     rows = RingRows.in_plane((pair.section.G_a, pair.section.G_b)[number]).of_order(order)[kept]
@@ -196,3 +220,127 @@ def solid_over_ring_compliance(
     hat = np.sinc(order / (2.0 * layers)) ** 2
     force = pair.section.area[kept].sum()
     return found / force**2, float(hat**2 * load @ c @ load) / force**2
+
+
+_HEIGHTS = (5e-3, 20e-3)  # of the guide, in the drawing of the needle [m]
+_STIFFNESS = 1e9  # [N/m] of a law that never acts
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RingStroke:
+    """Needle over a seat, as half sections with modes of all orders.
+
+    Parameters
+    ----------
+    pair : NeedleOnRing
+    placement : array, shape (6,) [m], [rad]
+        Of the needle; it is moved along z to ``gap``.
+    count : int
+        Angles of every ring.
+    axial, others : int
+        Modes of each body of order 0, and of the orders above.
+    gap : float [m]
+        Along z, to the first touch.
+    """
+
+    pair: NeedleOnRing
+    placement: np.ndarray
+    count: int = 24
+    axial: int = 6
+    others: int = 8
+    gap: float = 1e-6
+
+    @cached_property
+    def sections(self) -> RingSections:
+        """Sections of the shaft in its guide."""
+        return turned_sections("needle", self.pair.bodies[0].mesh, "guide", _HEIGHTS)
+
+    @cached_property
+    def _reduced(self) -> tuple[InterfaceModel, list[RevolvedPoints]]:
+        space, _ = self.pair.placed(self.count, self.placement)
+        needle, seat = self.pair.revolved(self.axial, self.others)
+        contacts = [self.pair.contact(space)]
+        points, loads = reduced_bodies([replace(needle, sections=self.sections), seat], contacts)
+        model = model_of_reduced(points, loads, contacts)
+        return replace(model, gap=model.gap + self.gap * model.axial), points
+
+    @property
+    def model(self) -> InterfaceModel:
+        """Interface model, the needle first."""
+        return self._reduced[0]
+
+    @property
+    def bodies(self) -> list[ReducedBody]:
+        """Both bodies with a port on their contact surface and the modes of all orders."""
+        return [
+            in_all_orders(self.along_axis(number), points)
+            for number, points in enumerate(self._reduced[1])
+        ]
+
+    def along_axis(self, number: int) -> ReducedBody:
+        """Needle (0) or seat (1) in its motion along the axis."""
+        body = self.pair.bodies[number]
+        return reduce_body(
+            body,
+            [surface_port(body.mesh, "cone" if number else "tip", "z", name="contact")],
+            modes=ByCount(self.axial),
+            correction="consistent",
+            damping=ModalDamping(ratio=0.0),
+        )
+
+    def guide(self, *, clearance: float, friction: float = 0.0) -> Guide:
+        """Guide of the shaft at two heights."""
+        return guide_at_sections(
+            self.model,
+            "needle",
+            shaft_sections(self.sections, self._reduced[1][0]),
+            clearance=clearance,
+            stiffness=None,
+            friction=friction,
+            viscous=0.0,
+        )
+
+    def fly(
+        self,
+        *,
+        speed: float,
+        duration: float,
+        step: float = 40e-9,
+        velocity: np.ndarray | None = None,
+        guide: Guide | None = None,
+    ) -> NetworkResult:
+        """Drop the needle in a network without any other force.
+
+        Parameters
+        ----------
+        speed : float [m/s]
+            Downwards.
+        duration, step : float [s]
+        velocity : array, shape (6,), optional [m/s], [rad/s]
+            Beside it.
+        guide : Guide, optional
+        """
+        needle, seat = self.bodies
+        network = Network(
+            {
+                "needle": FlexibleBody.of(needle, speed=-speed),
+                "seat": FlexibleBody.of(seat),
+                "stop": EndStop(
+                    gap=self.gap, law=LinearStopLaw(kind="linear", stiffness=_STIFFNESS)
+                ),
+            },
+            [["needle.contact", "stop.upper"], ["seat.contact", "stop.lower"]],
+        )
+        model = self.model
+        arm = model.points.mean(axis=0) - model.centre
+        valve = SpatialValve(
+            model=model,
+            components=("needle", "seat"),
+            stops=("stop",),
+            arms=arm[None],
+            guide=guide,
+            velocity=np.zeros(6) if velocity is None else velocity,
+        )
+        return simulate_network(
+            network.rows(), duration=duration, step=step, record=1e-6, start="free", spatial=valve
+        )

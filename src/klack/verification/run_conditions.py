@@ -2,7 +2,6 @@
 
 import os
 import platform
-from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 
@@ -10,49 +9,20 @@ from klack import __version__
 from klack.cores import available_cores
 from klack.elasticity.factorization import available_backends
 
-__all__ = ["RunConditions", "run_conditions"]
+__all__ = ["run_conditions"]
 
 _LIBRARIES = ("numpy", "scipy", "numba")
 _THREAD_LIMITS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunConditions:
-    """All that can change the last digits of a check.
+def run_conditions() -> dict[str, str]:
+    """All that can change the last digits of a check: versions, platform, solvers and cores.
 
-    Parameters
-    ----------
-    klack, python, numpy, scipy, numba : str
-        Versions.
-    date : str
-        UTC, ISO 8601.
-    platform : str
-        Operating system and processor family.
-    solvers : str
-        Direct solvers that can be loaded; the first is used.
-    threads : str
-        Usable processor cores, and limits set in the environment.
+    ``solvers`` are the direct ones that can be loaded, of which the first is used; ``threads``
+    names the usable cores and the limits set in the environment.
     """
-
-    klack: str
-    date: str
-    python: str
-    numpy: str
-    scipy: str
-    numba: str
-    platform: str
-    solvers: str
-    threads: str
-
-    def words(self) -> dict[str, str]:
-        """Name -> text, in the order of this class."""
-        return asdict(self)
-
-
-def run_conditions() -> RunConditions:
-    """Conditions of this process: versions, platform and cores."""
     numpy, scipy, numba = (version(name) for name in _LIBRARIES)
-    return RunConditions(
+    return dict(
         klack=__version__,
         date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         python=platform.python_version(),

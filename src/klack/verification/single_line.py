@@ -1,13 +1,22 @@
-"""Lines between prescribed pressures or flows: in the smallest set-up of a delay line."""
+"""Lines between prescribed pressures or flows, as delays and in cells: the smallest set-ups."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from klack.compiling.jit import njit
+from klack.hydraulics.fluid_table import fluid_at
+from klack.hydraulics.line_cells import (
+    SCALARS,
+    TERMS,
+    line_cells_step,
+    look_up_cells,
+    rates_of_cells,
+)
 from klack.hydraulics.line_friction import ExponentialWeights
-from klack.network.rows import LineRow
+from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE, LineRow
+from klack.network.step_function import address_of, call, first
 from klack.simulation.delay_line import (
     Lines,
     LineState,
@@ -21,32 +30,39 @@ from klack.simulation.delay_line import (
 )
 
 __all__ = [
+    "CellRun",
     "End",
     "LineRun",
+    "cell_rates",
+    "cell_state",
     "exponential_decay",
     "laminar_decay",
     "plain_line",
     "ringing",
+    "run_cells",
     "run_line",
 ]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class End:
-    """Condition at one end: ``pressure`` [Pa, about ambient] or ``flow`` into the line [m^3/s].
+    """Condition at one end: a level, or the ``flow`` into the line.
 
-    Means over the steps, or one number for all of them.
+    The level is a ``pressure`` [Pa, about ambient] with a flow [m^3/s] for lines as delays, and
+    ``total``, ``g + u^2/2`` [J/kg], with a flow [kg/s] for lines in cells.  Means over the steps,
+    or one number for all of them.
     """
 
     pressure: ArrayLike | None = None
+    total: ArrayLike | None = None
     flow: ArrayLike | None = None
 
-    def values(self, steps: int) -> tuple[bool, Vector]:
+    def values(self, steps: int) -> tuple[bool, np.ndarray]:
         """Whether a flow is given, and its values."""
-        given = self.pressure if self.flow is None else self.flow
-        return self.flow is not None, np.broadcast_to(np.asarray(given, float), (steps,)).copy()
+        level = self.pressure if self.total is None else self.total
+        return self.flow is not None, np.broadcast_to(
+            np.asarray(level if self.flow is None else self.flow, float), (steps,)
+        ).copy()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -63,37 +79,17 @@ class LineRun:
         Vapour in the line after each step.
     losses : array, shape (3,) [J]
         See ``LINE_LOSSES``.
-    work, throughput : float [J]
-        What came in through the ends, and the sum of its magnitudes.
-    store_change : float [J]
-    inflow, volume_throughput : float [m^3]
-        What came in through the ends, and the sum of its magnitudes.
-    volume_change : float [m^3]
-        Of the compressed fluid.
+    energy_residual, volume_residual : float [-]
+        What does not balance, over what passed the ends; none where nothing did.
     """
 
-    time: Vector
-    pressure: Vector
-    flow: Vector
-    cavity: Vector
-    losses: Vector
-    work: float
-    throughput: float
-    store_change: float
-    inflow: float
-    volume_throughput: float
-    volume_change: float
-
-    @property
-    def energy_residual(self) -> float:
-        """Energy that does not balance, over what passed the ends [-]."""
-        return (self.work - self.store_change - float(self.losses.sum())) / self.throughput
-
-    @property
-    def volume_residual(self) -> float:
-        """Volume that does not balance, over what passed the ends [-]."""
-        opened = self.cavity[-1]
-        return (self.inflow + opened - self.volume_change) / self.volume_throughput
+    time: np.ndarray
+    pressure: np.ndarray
+    flow: np.ndarray
+    cavity: np.ndarray
+    losses: np.ndarray
+    energy_residual: float
+    volume_residual: float
 
 
 def plain_line(
@@ -151,34 +147,40 @@ def run_line(
     cavity = np.zeros(len(m))
     _march(lines, state, m, flow_a, value_a, flow_b, value_b, P, q, cavity, books)
     work, inflow = P * q * (m * step)[:, None], q * (m * step)[:, None]
+    stored = line_store(lines, state, 0) - store
+    opened = float(inflow.sum()) + cavity[-1]
     return LineRun(
         time=np.asarray(step * (np.cumsum(m) - m), dtype=np.float64),
         pressure=P,
         flow=q,
         cavity=cavity,
         losses=books[0],
-        work=float(work.sum()),
-        throughput=float(np.abs(work).sum()),
-        store_change=line_store(lines, state, 0) - store,
-        inflow=float(inflow.sum()),
-        volume_throughput=float(np.abs(inflow).sum()),
-        volume_change=line_volume(lines, state, 0) - volume,
+        energy_residual=_share(
+            float(work.sum()) - stored - float(books[0].sum()), float(np.abs(work).sum())
+        ),
+        volume_residual=_share(
+            opened - (line_volume(lines, state, 0) - volume), float(np.abs(inflow).sum())
+        ),
     )
+
+
+def _share(missing: float, passed: float) -> float:
+    return missing / passed if passed else 0.0
 
 
 @njit(error_model="numpy")
 def _march(
     lines: Lines,
     state: LineState,
-    m: Vector,
+    m: np.ndarray,
     flow_a: bool,
-    value_a: Vector,
+    value_a: np.ndarray,
     flow_b: bool,
-    value_b: Vector,
-    P: Vector,
-    q: Vector,
-    cavity: Vector,
-    books: Vector,
+    value_b: np.ndarray,
+    P: np.ndarray,
+    q: np.ndarray,
+    cavity: np.ndarray,
+    books: np.ndarray,
 ) -> None:
     c, Z, into = np.zeros(2), np.zeros(2), np.zeros(2)
     for n in range(m.size):
@@ -222,7 +224,7 @@ def exponential_decay(
     return complex(s)
 
 
-def ringing(time: Vector, values: Vector, frequency: float, *, apart: float) -> complex:
+def ringing(time: np.ndarray, values: np.ndarray, frequency: float, *, apart: float) -> complex:
     """Decay [1/s] and angular frequency [rad/s] of one tone, from two windows of 16 periods.
 
     Parameters
@@ -241,3 +243,140 @@ def ringing(time: Vector, values: Vector, frequency: float, *, apart: float) -> 
     early, late = (tone @ values[i : i + size] for i in (first, first + shift))
     turned = np.log(late / early * np.exp(-2j * np.pi * frequency * shift * step))
     return complex(turned / (shift * step) + 2j * np.pi * frequency)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class CellRun:
+    """A run of one line.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Middle of each step.
+    total, flow : array, shape (n, 2) [J/kg], [kg/s]
+        At both ends, means over each step; flow into the line.
+    losses : array, shape (n, 3) [J]
+        Of each step: friction, waves, outflow.
+    pressure, velocity : array, shape (cells,) [Pa], [m/s]
+        At the end.
+    energy_residual, mass_residual : float [-]
+        What does not balance, over what passed the ends and over what is held.
+    """
+
+    time: np.ndarray
+    total: np.ndarray
+    flow: np.ndarray
+    losses: np.ndarray
+    pressure: np.ndarray
+    velocity: np.ndarray
+    energy_residual: float
+    mass_residual: float
+
+
+def cell_state(
+    parameters: np.ndarray, pressure: ArrayLike, velocity: ArrayLike = 0.0
+) -> np.ndarray:
+    """State of a line with these pressures [Pa] and velocities [m/s] in its cells."""
+    n, area, stretch, ambient, place = (float(parameters[k]) for k in (0, 2, 3, 4, 9))
+    count = int(n)
+    p = np.broadcast_to(np.asarray(pressure, float), (count,))
+    u = np.broadcast_to(np.asarray(velocity, float), (count,))
+    table = parameters[int(place) :]
+    mass = np.array([fluid_at(table, x, 0)[0] for x in p])
+    mass *= area * (1.0 + stretch * (p - ambient))
+    head, scratch = np.zeros(SCALARS), np.zeros(8 * count)
+    return np.concatenate(
+        [head, mass, mass * u, p, np.zeros(count), np.repeat(np.sqrt(mass) * u, TERMS), scratch]
+    )
+
+
+def run_cells(
+    parameters: np.ndarray, state: np.ndarray, a: End, b: End, h: float, steps: int
+) -> CellRun:
+    """Run one line from a state, which is left as it ends."""
+    (flow_a, value_a), (flow_b, value_b) = a.values(steps), b.values(steps)
+    total, flow, losses = np.zeros((steps, 2)), np.zeros((steps, 2)), np.zeros((steps, 3))
+    held = np.zeros((2, 2))
+    status = _run(
+        address_of(line_cells_step), parameters, state, h, flow_a, value_a, flow_b, value_b,
+        total, flow, losses, held,
+    )  # fmt: skip
+    assert status == 0
+    n = int(parameters[0])
+    cells = state[SCALARS : SCALARS + 3 * n].reshape(3, n)
+    power = h * total * flow
+    change = held[1] - held[0]
+    return CellRun(
+        time=np.asarray(h * (np.arange(steps) + 0.5), dtype=np.float64),
+        total=total,
+        flow=flow,
+        losses=losses,
+        pressure=cells[2].copy(),
+        velocity=cells[1] / cells[0],
+        energy_residual=float((change[0] + losses.sum() - power.sum()) / np.abs(power).sum()),
+        mass_residual=float((change[1] - h * flow.sum()) / held[0, 1]),
+    )
+
+
+def cell_rates(parameters: np.ndarray, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Wave speed [m/s] and rate of the mass per length [kg/(m s)] of each cell, ends closed."""
+    n = int(parameters[0])
+    cells = state[SCALARS : SCALARS + 4 * n].copy()
+    speed, rate = np.zeros(n), np.zeros(n)
+    assert _rates(parameters, cells, speed, rate)
+    return speed, rate
+
+
+@njit
+def _rates(par: np.ndarray, cells: np.ndarray, speed: np.ndarray, rate: np.ndarray) -> bool:
+    n = speed.size
+    M, J, p, hint = cells[:n], cells[n : 2 * n], cells[2 * n : 3 * n], cells[3 * n :]
+    work, ends, force = np.zeros(8 * n), np.zeros(4), np.zeros(n)
+    at = first(par)
+    if not look_up_cells(at, first(M), first(J), first(p), first(hint), first(work)):
+        return False
+    speed[:] = work[3 * n : 4 * n]
+    rates_of_cells(n, par[1], first(M), first(work), first(ends), first(rate), first(force))
+    return True
+
+
+@njit
+def _run(
+    function: int,
+    par: np.ndarray,
+    state: np.ndarray,
+    h: float,
+    flow_a: bool,
+    value_a: np.ndarray,
+    flow_b: bool,
+    value_b: np.ndarray,
+    total: np.ndarray,
+    flow: np.ndarray,
+    losses: np.ndarray,
+    held: np.ndarray,
+) -> int:
+    inp, out = np.zeros(6), np.zeros(6)
+    numbers, cells, into, back = first(par), first(state), first(inp), first(out)
+    for step in range(total.shape[0] + 1):
+        if step in (0, total.shape[0]):
+            inp[0] = WAVE_STORE
+            status = call(function, numbers, cells, into, back)
+            held[min(step, 1)] = out[:2]
+            if status != 0 or step == total.shape[0]:
+                return int(status)
+        inp[0], inp[1] = WAVE_BEGIN, h
+        status = call(function, numbers, cells, into, back)
+        for side in range(2):
+            B, m, slope = out[3 * side], out[3 * side + 1], out[3 * side + 2]
+            given = value_a[step] if side == 0 else value_b[step]
+            if flow_a if side == 0 else flow_b:
+                total[step, side], flow[step, side] = B + (given - m) / slope, given
+            else:
+                total[step, side], flow[step, side] = given, m + slope * (given - B)
+            inp[2 + 2 * side], inp[3 + 2 * side] = total[step, side], flow[step, side]
+        inp[0] = WAVE_END
+        status = max(status, call(function, numbers, cells, into, back))
+        if status != 0:
+            return int(status)
+        losses[step] = out[:3]
+    return 0

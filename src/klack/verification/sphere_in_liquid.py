@@ -12,8 +12,6 @@ from klack.hydraulics.film import SphereFilm
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import Murnaghan
 from klack.hydraulics.mixture import Vapour
-from klack.mechanics.end_stop import EndStop
-from klack.mechanics.rigid_mass import RigidMass
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.port import ELEMENT
@@ -21,6 +19,7 @@ from klack.network.rows import Book, Rows
 from klack.network.step_function import step_function
 from klack.simulation.network_run import simulate_network
 from klack.units import Density, DynamicViscosity, Length
+from klack.verification.benches import component
 
 __all__ = [
     "GLASS",
@@ -94,8 +93,9 @@ def elastohydrodynamic_height(sphere: Sphere, stokes: float) -> float:
 
     (Davis, Serayssol & Hinch 1986, in the form of Davis, Rager & Good 2002.)
     """
-    mu = sphere.viscosity(stokes)
-    return float((3.0 * mu * SPEED * RADIUS**1.5 / (sqrt(2.0) * sphere.modulus)) ** 0.4)
+    return float(
+        (3.0 * sphere.viscosity(stokes) * SPEED * RADIUS**1.5 / (sqrt(2.0) * sphere.modulus)) ** 0.4
+    )
 
 
 @step_function
@@ -151,8 +151,14 @@ def restitution(
     drag : bool
         With steady drag.
     """
-    K = 4.0 / 3.0 * sphere.modulus * sqrt(RADIUS)
-    return _bounce(sphere, stokes, HertzLaw(K), cut_off=cut_off, pull=pull, drag=drag)
+    return _bounce(
+        sphere,
+        stokes,
+        HertzLaw(4.0 / 3.0 * sphere.modulus * sqrt(RADIUS)),
+        cut_off=cut_off,
+        pull=pull,
+        drag=drag,
+    )
 
 
 def on_compliance(sphere: Sphere, stokes: float, *, cut_off: float, pull: bool) -> float:
@@ -163,8 +169,9 @@ def on_compliance(sphere: Sphere, stokes: float, *, cut_off: float, pull: bool) 
     """
     a = sqrt(RADIUS * elastohydrodynamic_height(sphere, stokes))
     series = 1.0 / (2.0 * sphere.modulus * a)
-    law = LinearLaw(100.0 / series)
-    return _bounce(sphere, stokes, law, cut_off=cut_off, pull=pull, series=series)
+    return _bounce(
+        sphere, stokes, LinearLaw(100.0 / series), cut_off=cut_off, pull=pull, series=series
+    )
 
 
 def _bounce(
@@ -191,9 +198,9 @@ def _bounce(
         cut_off=cut_off,
         cavitation_pressure=None if pull else 101325.0,
     )
-    stop = EndStop(gap=READ_AT, film=film).with_law(law, series)
+    stop = component("end-stop", gap=READ_AT, film=film).with_law(law, series)
     parts: dict[str, Component] = {
-        "sphere": RigidMass(mass=sphere.mass, speed=-SPEED),
+        "sphere": component("rigid-mass", mass=sphere.mass, speed=-SPEED),
         "wall": stop,
     }
     if drag:

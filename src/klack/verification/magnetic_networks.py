@@ -4,23 +4,28 @@ klack solves loop fluxes; here node potentials are solved: a tube of iron carrie
 :math:`A\,B(\Delta/l)` at the potential difference :math:`\Delta`, by Froehlich's formula itself.
 """
 
-from collections.abc import Mapping
-from functools import cache, partial
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
-from scipy.integrate import solve_ivp
+from scipy.integrate import simpson, solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq, fsolve
 
+from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.magnetic_network import MagneticNetwork
+from klack.magnetics.map_choice import MapFile
 from klack.magnetics.static import static_state
 from klack.magnetics.voltage_step import VoltageStep
-from klack.verification.check import Check, compare
-from klack.verification.single_coil import run_coil
+from klack.verification import published_magnets as published
+from klack.verification.check import Check, check
+from klack.verification.drivers import run_coil
 
-__all__ = ["networks_of_tubes"]
+__all__ = ["force_of", "linkage_of", "maps_from_files", "networks_of_tubes", "written"]
 
-_check = partial(compare, "magnetic-parts")
+
 _MU0 = 4e-7 * np.pi
 _SATURATION, _INITIAL = 1.5, 1500.0  # Froehlich: [T], relative
 _GAP, _RESIDUAL = 100e-6, 40e-6
@@ -67,20 +72,21 @@ def _nodal(current: float, gap: float) -> tuple[float, float]:
 
     def fluxes(v: np.ndarray) -> tuple[float, ...]:
         top, m, r = 100.0 * v  # bottom is 0; n is m plus the mmf of the coil
-        middle = _iron_flux(top - m, 20e-3, 30e-6)
-        through = (m + 80.0 * current) * gap_permeance
-        left = _iron_flux(-top, 50e-3, 12e-6)
-        right = _iron_flux(-r, 50e-3, 18e-6)
-        of_magnet = (r - top + 0.4 * magnet) * 18e-6 / magnet
-        return middle, through, left, right, of_magnet, m * 30e-9
+        return (
+            _iron_flux(top - m, 20e-3, 30e-6),
+            (m + 80.0 * current) * gap_permeance,
+            _iron_flux(-top, 50e-3, 12e-6),
+            _iron_flux(-r, 50e-3, 18e-6),
+            (r - top + 0.4 * magnet) * 18e-6 / magnet,
+            m * 30e-9,
+        )
 
     def rest(v: np.ndarray) -> list[float]:
         middle, through, left, right, of_magnet, leak = fluxes(v)
         return [1e5 * (middle - left - of_magnet), 1e5 * (middle - through - leak),
                 1e5 * (right - of_magnet)]  # fmt: skip
 
-    found = fsolve(rest, np.zeros(3), xtol=1e-11)
-    through = fluxes(found)[1]
+    through = fluxes(fsolve(rest, np.zeros(3), xtol=1e-11))[1]
     return 80.0 * through, through
 
 
@@ -92,7 +98,7 @@ def _at_rest() -> list[Check]:
         linkage, through = _nodal(current, gap)
         place = f"E core with a magnet, {current:g} A, {1e6 * gap:.0f} um"
         out.append(
-            _check(
+            check(
                 f"{place}: linkage [mWb]",
                 expected=1e3 * linkage,
                 computed=1e3 * state.linkage,
@@ -100,11 +106,10 @@ def _at_rest() -> list[Check]:
                 source=source,
             )
         )
-        force = -0.5 * through**2 / (1.1 * _MU0 * 30e-6)
         out.append(
-            _check(
+            check(
                 f"{place}: force [N]",
-                expected=force,
+                expected=-0.5 * through**2 / (1.1 * _MU0 * 30e-6),
                 computed=state.force,
                 tolerance=1e-7,
                 source=f"Maxwell's pull of the flux of that solution; {source}",
@@ -117,12 +122,11 @@ def _at_rest() -> list[Check]:
         currents = 0.5 * current * (nodes + 1.0)
         return float(0.5 * current * weights @ [_nodal(i, gap)[0] for i in currents])
 
-    rise = (coenergy(50e-6 + step) - coenergy(50e-6 - step)) / (2.0 * step)
     forces = [static_state(circuit, current=i, gap=50e-6).force for i in (current, 0.0)]
     out.append(
-        _check(
+        check(
             "E core with a magnet, 6 A, 50 um: force above that of the magnet [N]",
-            expected=rise,
+            expected=(coenergy(50e-6 + step) - coenergy(50e-6 - step)) / (2.0 * step),
             computed=forces[0] - forces[1],
             tolerance=1e-5,
             source="slope of the co-energy, the integral of psi di of the nodal solutions",
@@ -146,8 +150,7 @@ def _transformer() -> list[Check]:
     )
     both = main + _MU0 * 1e-7 / (1e-3 + _GAP)  # passes both windings, each leakage its own only
     L1, M, L2 = N1**2 * (leak1 + both), N1 * N2 * both, N2**2 * (leak2 + both)
-    L = np.array([[L1, M], [M, L2]])
-    A = -np.linalg.solve(L, np.diag([R1, R2]))
+    A = -np.linalg.solve(np.array([[L1, M], [M, L2]]), np.diag([R1, R2]))
     t = 300e-6
     final = np.array([12.0 / R1, 0.0])
     current = final - expm(A * t) @ final
@@ -160,14 +163,14 @@ def _transformer() -> list[Check]:
         lift=np.zeros(601),
     )
     return [
-        _check(
+        check(
             "two coupled windings, 12 V on one, the other closed: current after 300 us [A]",
             expected=float(current[0]),
             computed=float(run.current[-1]),
             tolerance=2e-6,
             source="L di/dt + R i = u with self and mutual inductances; matrix exponential",
         ),
-        _check(
+        check(
             "two coupled windings: heat in the closed one after 300 us [mJ]",
             expected=1e3 * _secondary_heat(A, final, R2, t),
             computed=1e3 * run.eddy,
@@ -209,12 +212,11 @@ def _polarised() -> list[Check]:
         # two loops: magnet - upper - coil up, magnet - lower - coil down
         R = np.array([[upper + inner, inner], [inner, lower + inner]])
         up, down = np.linalg.solve(R, [mmf + 0.5 * turns * current, mmf - 0.5 * turns * current])
-        force = -0.5 * reluctance * (up**2 - down**2)
         state = static_state(network.circuit(), current=current, gap=x)
         out.append(
-            _check(
+            check(
                 f"polarised magnet with two gaps, 2 A, {1e6 * x:.0f} um: force [N]",
-                expected=float(force),
+                expected=float(-0.5 * reluctance * (up**2 - down**2)),
                 computed=state.force,
                 tolerance=1e-13,
                 source="two linear loops by hand, pull phi^2/(2 mu0 A) at each gap",
@@ -250,7 +252,6 @@ def _voltage_step() -> list[Check]:
 
     exact = solve_ivp(rates, (0.0, end), [0.0, 0.0], rtol=1e-9, atol=1e-14, method="LSODA")
     current = float(exact.y[1, -1]) / (leak * turns)
-    force = 0.5 * float(exact.y[0, -1]) ** 2 / (_MU0 * area)
     run = run_coil(
         network.circuit(),
         VoltageStep(voltage=24.0).program(),
@@ -261,22 +262,22 @@ def _voltage_step() -> list[Check]:
     )
     source = "two equations of flux, SciPy LSODA, written apart"
     return [
-        _check(
+        check(
             "24 V on iron with a damping ring and a moving gap: current after 400 us [A]",
             expected=current,
             computed=float(run.current[-1]),
             tolerance=2e-7,
             source=source,
         ),
-        _check(
+        check(
             "24 V on iron with a damping ring and a moving gap: force after 400 us [N]",
-            expected=force,
+            expected=0.5 * float(exact.y[0, -1]) ** 2 / (_MU0 * area),
             computed=float(run.force[-1]),
             tolerance=1e-3,
             source=source,
             reason="the mean of the last step of 0.1 us",
         ),
-        _check(
+        check(
             "24 V on iron with a damping ring and a moving gap: energy balance [-]",
             expected=0.0,
             computed=run.residual,
@@ -289,3 +290,210 @@ def _voltage_step() -> list[Check]:
 def networks_of_tubes() -> list[Check]:
     """Return the checks."""
     return [*_at_rest(), *_transformer(), *_polarised(), *_voltage_step()]
+
+
+_C, _X0, _IS, _L0 = 3e-8, 60e-6, 8.0, 5e-6  # [Wb m], [m], [A], [H]
+_CURRENT = np.linspace(0.0, 12.0, 25)
+_GAP_FILE = np.linspace(20e-6, 160e-6, 15)
+_AT = 7.3, 87e-6  # [A], [m] between the points
+_SOURCE = "slope of the co-energy c i_s/(x + x_0) ln cosh(i/i_s)"
+
+Rows = Iterable[tuple[float, float, float, float]]
+
+
+def linkage_of(i: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
+    r"""Linkage of the coil [Wb].
+
+    The coil :math:`\psi = L_0 i + \frac{c}{x + x_0}\tanh\frac{i}{i_s}` has the co-energy
+    :math:`\tfrac12L_0i^2 + \frac{c\,i_s}{x + x_0}\ln\cosh\frac{i}{i_s}`, whose slopes are its
+    linkage and its force.
+    """
+    return np.asarray(_L0 * i + _C / (x + _X0) * np.tanh(i / _IS))
+
+
+def force_of(i: np.ndarray | float, x: np.ndarray | float) -> np.ndarray:
+    """Force of the coil along the gap [N]."""
+    return np.asarray(-_C * _IS / (x + _X0) ** 2 * np.log(np.cosh(i / _IS)))
+
+
+def _points() -> Rows:
+    for x in _GAP_FILE:
+        for i in _CURRENT:
+            yield i, x, float(linkage_of(i, x)), float(force_of(i, x))
+
+
+def _maxwell(rows: Rows) -> str:
+    head = '"Current [A]","gap [mm]","FluxLinkage(Coil) [mWb]","Force1.Force_z [newton]"'
+    return "\n".join(
+        [head, *(f"{i:.17g},{1e3 * x:.17g},{1e3 * p:.17g},{F:.17g}" for i, x, p, F in rows)]
+    )
+
+
+def _femm(rows: Rows) -> str:
+    return "\n".join(f"{1e3 * x:.15g} {i:.15g} {F:.15g} {p:.15g}" for i, x, p, F in rows)
+
+
+def _jmag(rows: Rows) -> str:
+    lines = ["Parametric study;;;", "Current (A);Gap (mm);Force (N);Flux linkage (Wb)"]
+    lines += [f"{i:.15g};{1e3 * x:.15g};{-0.5 * F:.15g};{0.5 * p:.15g}" for i, x, p, F in rows]
+    return "\n".join(lines).replace(".", ",")
+
+
+def _families(rows: Rows) -> str:
+    del rows
+    head = ['"Current [A]"']
+    for x in _GAP_FILE:
+        head += [f"\"FluxLinkage(Coil) [mWb] - gap='{1e3 * x:.12g}mm'\""]
+        head += [f"\"Force1.Force_z [newton] - gap='{1e3 * x:.12g}mm'\""]
+    lines = [",".join(head)]
+    for i in _CURRENT:
+        cells = [repr(float(i))]
+        for x in _GAP_FILE:
+            cells += [repr(float(1e3 * linkage_of(i, x))), repr(float(force_of(i, x)))]
+        lines.append(",".join(cells))
+    return "\n".join(lines)
+
+
+def _matrix(value: Callable[..., np.ndarray], head: str) -> str:
+    lines = [";".join([head, *(f"{i:.15g}" for i in _CURRENT)])]
+    lines += [
+        ";".join([f"{1e3 * x:.15g}", *(f"{value(i, x):.15g}" for i in _CURRENT)])
+        for x in _GAP_FILE[::-1]
+    ]
+    return "\n".join(lines)
+
+
+def written(folder: Path) -> dict[str, MapFile]:
+    """Write the coil in each layout below a folder and read it again."""
+    layouts = {
+        "Ansys Maxwell, one row per point": (_maxwell(_points()), {}),
+        "FEMM, no head": (
+            _femm(_points()),
+            {
+                "columns": {"gap": 1, "current": 2, "force": 3, "linkage": 4},
+                "units": {"gap": "mm", "current": "A", "force": "N", "linkage": "Wb"},
+            },
+        ),
+        "JMAG, half a model, decimal comma": (
+            _jmag(_points()),
+            {"linkage_factor": 2.0, "force_factor": 2.0, "force_closing": "positive"},
+        ),
+        "Ansys Maxwell, a column per gap": (_families(_points()), {}),
+    }
+    out = {}
+    for k, (name, (text, keys)) in enumerate(layouts.items()):
+        file = folder / f"map{k}.csv"
+        file.write_text(text, encoding="utf-8")
+        out[name] = MapFile.model_validate({"file": file.name, **keys}, context={"folder": folder})
+    matrices = {
+        "psi.csv": _matrix(linkage_of, "gap [mm] / current [A] / linkage [Wb]"),
+        "force.csv": _matrix(force_of, "gap [mm] / current [A] / force [N]"),
+    }
+    for name, text in matrices.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    keys = {"file": "psi.csv", "force_file": "force.csv", "layout": "matrix"}
+    out["two matrices"] = MapFile.model_validate(keys, context={"folder": folder})
+    return out
+
+
+def _layouts() -> Iterator[Check]:
+    with TemporaryDirectory() as folder:
+        for name, choice in written(Path(folder)).items():
+            table = choice.table()
+            yield check(
+                f"map from a file ({name}): force between the points [N]",
+                expected=float(force_of(*_AT)),
+                computed=FluxMap.of(
+                    current=table.current, gap=table.gap, linkage=table.linkage, force=None
+                ).force_at(float(linkage_of(*_AT)), _AT[1]),
+                tolerance=1e-4,
+                source=_SOURCE,
+            )
+            assert table.force is not None
+            yield check(
+                f"map from a file ({name}): force of the file at 12 A, 20 um [N]",
+                expected=float(force_of(12.0, 20e-6)),
+                computed=float(table.force[-1, 0]),
+                tolerance=1e-13,
+                source=_SOURCE,
+            )
+
+
+def _virtual_work() -> list[Check]:
+    gap = np.linspace(20e-6, 160e-6, 29)
+    i, x = _CURRENT[:, None], gap[None, :]
+    psi, force = linkage_of(i, x), force_of(i, x)
+    made = FluxMap.of(current=_CURRENT, gap=gap, linkage=psi, force=None)
+    wrong = force.copy()
+    wrong[14, 8] *= 1.6  # 7 A, 60 um
+    planted = made.compare_force(_CURRENT, psi, wrong)
+    half = made.compare_force(_CURRENT, psi, 0.5 * force)
+    words = "dF/di = dpsi/dx at constant current; a wrong point planted in the exact table"
+    return [
+        check(
+            "virtual work: exact force against exact linkage, share of the peak [-]",
+            expected=0.0,
+            computed=made.compare_force(_CURRENT, psi, force).share,
+            tolerance=1e-2,
+            source=_SOURCE,
+            reason="at the narrowest gap and largest current, whose linkage no wider gap reaches",
+        ),
+        check(
+            "virtual work: one force 60 % too large, share of the peak [-]",
+            expected=0.6 * float(-force[14, 8]) / float(np.max(np.abs(force))),
+            computed=planted.share,
+            tolerance=1e-4,
+            source=words,
+        ),
+        check(
+            "virtual work: current of that point [A]",
+            expected=7.0,
+            computed=planted.current,
+            tolerance=1e-13,
+            source=words,
+        ),
+        check(
+            "virtual work: gap of that point [um]",
+            expected=60.0,
+            computed=1e6 * planted.gap,
+            tolerance=1e-13,
+            source=words,
+        ),
+        check(
+            "virtual work: ratio of the force of half a model [-]",
+            expected=0.5,
+            computed=half.ratio,
+            tolerance=5e-4,
+            source="least squares over the table",
+        ),
+    ]
+
+
+def _lifting_magnet() -> Iterator[Check]:
+    """Published linkages and forces of finite elements, at one current and wide gaps."""
+    made = FluxMap.of(
+        current=[0.0, published.CURRENT],
+        gap=published.GAP,
+        linkage=[0.0 * published.GAP, published.CURRENT * published.INDUCTANCE],
+        force=None,
+    )
+    source = "finite elements; Modelica Standard Library, ComparisonQuasiStatic"
+    for first, last in ((7, 13), (13, 19)):
+        part = slice(first, last + 1)
+        x = published.GAP[part]
+        psi = published.CURRENT * published.INDUCTANCE[part]
+        derived = [made.force_at(float(p), float(g)) for p, g in zip(psi, x, strict=True)]
+        yield check(
+            f"lifting magnet as a map: work from {1e3 * x[0]:.1f} to {1e3 * x[-1]:.1f} mm at "
+            "1.2 A, from its inductances [mJ]",
+            expected=1e3 * float(simpson(published.FORCE[part], x=x)),
+            computed=1e3 * float(simpson(derived, x=x)),
+            tolerance=0.05,
+            source=source,
+            reason="linear between 0 and 1.2 A, though the iron saturates a little",
+        )
+
+
+def maps_from_files() -> list[Check]:
+    """Return the checks."""
+    return [*_layouts(), *_virtual_work(), *_lifting_magnet()]
