@@ -25,8 +25,8 @@ from pathlib import Path
 
 from klack.analyses.calibration.analysis import CALIBRATION
 from klack.analyses.calibration.content import stroke_chart as calibration_chart
-from klack.analyses.heat.analysis import HEAT
-from klack.analyses.heat.figures import heat_charts
+from klack.analyses.heat.content import heat_charts
+from klack.analyses.heat.summary import HEAT
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.figures import force_chart
 from klack.analyses.impact.pressure_figure import draw_pressure

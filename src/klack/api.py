@@ -385,8 +385,8 @@ def run_heat(
 
     See :func:`klack.analyses.heat.run.run_heat`.
     """
-    from klack.analyses.heat.analysis import HEAT
     from klack.analyses.heat.run import run_heat as run
+    from klack.analyses.heat.summary import HEAT
 
     checked = _of_kind(case, ValveCase, "a whole valve")
     record = run(checked, variant=variant, soak=soak, progress=progress, threads=threads)
@@ -572,7 +572,7 @@ def sensitivities(
     InputError
         For a parameter or a measure that has no derivative.
     """
-    from klack.analyses.sensitivities.any_case import sensitivities_of
+    from klack.analyses.sensitivities.differences import sensitivities_of
     from klack.case.study_source import study_if_any
 
     given = case if isinstance(case, CaseOnHand) else load_case(case)
@@ -731,14 +731,12 @@ def compare(
     level, output : str
         Of an impact; its output may be left out where there is one.
     """
-    from klack.analyses.comparison.analysis import (
-        MEASURED_IMPACT,
-        MEASURED_SHOTS,
-        MEASURED_STROKES,
-    )
     from klack.analyses.comparison.impacts import compare_impact
+    from klack.analyses.comparison.impacts_summary import MEASURED_IMPACT
     from klack.analyses.comparison.shots import compare_shots
+    from klack.analyses.comparison.shots_summary import MEASURED_SHOTS
     from klack.analyses.comparison.strokes import compare_strokes
+    from klack.analyses.comparison.strokes_summary import MEASURED_STROKES
     from klack.analyses.impact.record import ImpactStudy
     from klack.analyses.shots.record import ShotsStudy
     from klack.analyses.stroke.record import StrokeStudy

@@ -7,7 +7,7 @@ from math import isfinite
 import pytest
 
 import klack
-from klack.analyses.heat.analysis import HEAT
+from klack.analyses.heat.summary import HEAT
 from klack.cli.main import main
 from klack.verification.heat import SMALL
 

@@ -15,7 +15,7 @@ from quoted_output import compare
 from scipy.io import loadmat
 
 from klack.analyses.linearisation.analysis import LINEARISATION
-from klack.analyses.linearisation.controllers import plain_name
+from klack.analyses.linearisation.loops import plain_name
 from klack.case.any_case import read_case_tree
 from klack.cli.main import main
 from klack.simulation.network_run import simulate_network

@@ -16,7 +16,6 @@ import pytest
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
-from klack.analyses.noise.summary import noise_told
 from klack.cli.main import main
 
 ROOT = Path(__file__).parents[2]
@@ -120,7 +119,7 @@ def test_sounds_have_the_stated_level(heard, numbers):
 def test_the_table_says_how_levels_are_weighted(heard):
     """A-weighting takes from what is radiated below 1 kHz and adds a decibel at 2 to 4 kHz."""
     study = NOISE.load(heard)
-    (table,) = noise_told(study)
+    (table,) = NOISE.told(study)
     (row,) = table.rows
     shown = dict(zip(table.columns, row, strict=True))
     levels = study.designs[0].sound.statistics
@@ -192,7 +191,7 @@ def test_differences_of_two_designs_are_levels(heard):
     bodies = tuple(replace(body, injected=2.0 * body.injected) for body in design.bodies)
     loud = replace(design, name="loud", net_share=4.0 * design.net_share, bodies=bodies)
 
-    (table,) = noise_told(replace(study, designs=(design, loud)))
+    (table,) = NOISE.told(replace(study, designs=(design, loud)))
 
     shown = dict(zip(table.columns, table.rows[-1], strict=True))
     assert shown["design"] == f"loud - {design.name}"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from klack.acoustics.force_bands import force_bands
-from klack.analyses.noise.balance import net_share, share_at
+from klack.analyses.noise.body import net_share, share_at
 from klack.signals import TimeSeries
 
 STEP, PERIOD, BLOW, BOUNCES = 1e-7, 1e-3, 40e-6, 20

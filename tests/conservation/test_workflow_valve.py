@@ -11,11 +11,11 @@ import pytest
 
 from klack.analyses.impact.contact_check import check_contact
 from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.figures import stop_law_chart
 from klack.analyses.stroke.record import StrokeStudy
 from klack.analyses.stroke.run import run_stroke
-from klack.analyses.stroke.summary import stroke_to_json
 from klack.assembling import rubbing as rubbing_module
 from klack.assembling.valve import Valve, build_valve
 from klack.case import read_case
@@ -95,7 +95,7 @@ def test_the_stroke_opens_and_closes(study: StrokeStudy):
 
 
 def test_stops_keep_what_was_found_about_their_contact(study: StrokeStudy, valve: Valve):
-    said = stroke_to_json(study)["stops"]
+    said = STROKE.to_json(study)["stops"]
     for stop in study.stops:
         contact = valve.contacts[stop.name]
         found = check_contact(valve.case, contact.pair, contact.static, contact.pattern_force, "")

@@ -15,9 +15,14 @@ import pytest
 from klack.analyses.advice.advice import Advice, Counsel, settle
 from klack.analyses.advice.impact import advise_impact
 from klack.analyses.advice.ladder import score
-from klack.analyses.advice.modes import counted, interface_history
+from klack.analyses.advice.modes import (
+    HISTORY,
+    counted,
+    impact_errors,
+    impact_measures,
+    interface_history,
+)
 from klack.analyses.advice.settings import applied
-from klack.analyses.advice.target import HISTORY, impact_errors, impact_measures
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair

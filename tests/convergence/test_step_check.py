@@ -19,7 +19,6 @@ from klack.analyses.stroke.measures import steps_told
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact_changes, told
-from klack.analyses.stroke.summary import stroke_to_json
 from klack.case.any_case import load_valve_case, read_valve_case
 from klack.errors import InputError
 from klack.network.accuracy import PROMISED
@@ -304,13 +303,13 @@ def test_a_stroke_tells_its_changes_after_storing(tmp_path):
     assert loaded.reference.changes == made.reference.changes
     assert loaded.reference.halvings == made.reference.halvings == 6
     assert "50 ns; all of them halved 6 times" in steps_told(loaded.reference)
-    (event,) = stroke_to_json(loaded)["events"]
+    (event,) = STROKE.to_json(loaded)["events"]
     assert event["doubled_steps"]["peak_force_change"] == change.peak_force
     assert event["doubled_steps"]["promised"]
     assert any("impact 1 on 'opening' changes by" in line for line in made.warnings)
     without = replace(loaded.reference, changes=())
     plain = replace(loaded, variants={"dry": without})
-    assert stroke_to_json(plain)["events"][0]["doubled_steps"] is None
+    assert STROKE.to_json(plain)["events"][0]["doubled_steps"] is None
 
 
 def test_an_exchange_that_would_no_longer_hold_whole_steps_is_refused():

@@ -208,7 +208,7 @@ def readable(out: Path) -> bool:
 
 def can_be_read(out: Path) -> bool:
     from klack.analyses.catalogue import load_result
-    from klack.analyses.result_folder import is_result
+    from klack.analyses.ending import is_result
     from klack.errors import InputError
 
     if not is_result(out):
@@ -277,7 +277,7 @@ def warm() -> None:
     modules = [
         "scipy.sparse.linalg",
         "zarr",
-        "klack.analyses.result_folder",
+        "klack.analyses.ending",
         "klack.case.any_case",
     ]
     stored = ("impact", "stroke", "shots", "noise")

@@ -101,8 +101,8 @@ def contents(folder: Path) -> dict[str, bytes]:
 def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
     """Which of the two results stands in a folder: a, b, none or mixed."""
     from klack.analyses.catalogue import load_result
-    from klack.analyses.noise.summary import noise_to_json
-    from klack.analyses.result_folder import is_result
+    from klack.analyses.ending import is_result
+    from klack.analyses.noise.analysis import NOISE
     from klack.errors import InputError
     from klack.whole_file import completed
 
@@ -129,7 +129,7 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
             same = study.seed == {"a": 1, "b": 2}[name]
         else:
             reference = load_result(Path(f"{command}-{name}"))
-            same = noise_to_json(study) == noise_to_json(reference)
+            same = NOISE.to_json(study) == NOISE.to_json(reference)
         if same and (command == "calibrate" or beside == of_it):
             return name
     return "mixed"

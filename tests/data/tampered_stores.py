@@ -120,9 +120,9 @@ def in_a_child(act: Any) -> tuple[str, str]:
 
 
 def digest(study: Any) -> str:
-    from klack.analyses.impact.summary import study_to_json
+    from klack.analyses.impact.analysis import IMPACT
 
-    return json.dumps(study_to_json(study), sort_keys=True)
+    return json.dumps(IMPACT.to_json(study), sort_keys=True)
 
 
 def look(result: Path, whole: str) -> str:

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from klack.analyses.advice.advice import Advice, Measured, settle
-from klack.analyses.advice.cost import added
+from klack.analyses.advice.affordable import added
 from klack.analyses.advice.ladder import REACH, Ladder, Measure, allotment, coarsest_within, score
 from klack.analyses.advice.settings import Setting, SettingValue, rounded_down, rounded_up
 

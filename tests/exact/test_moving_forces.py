@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.sensitivities.moving_forces import moved_forces, transported
 from klack.analyses.sensitivities.parameters import slope_space
-from klack.analyses.sensitivities.slopes import SlopeRunner
+from klack.analyses.sensitivities.slopes import SlopeRunner, moved_forces, transported
 from klack.case.study_source import study_of
 from klack.progress import silent
 

@@ -14,8 +14,7 @@ from klack.acoustics.force_bands import averaged, force_bands
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import band_edges
 from klack.analyses.noise import source as noise_source
-from klack.analyses.noise.force import before_impact, interrupted_impact, stop_force
-from klack.analyses.noise.window import first_part
+from klack.analyses.noise.force import before_impact, first_part, interrupted_impact, stop_force
 from klack.errors import InputError
 from klack.signals import TimeSeries
 from klack.simulation.network_result import (

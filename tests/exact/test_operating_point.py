@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from klack.analyses.operating_point.conditions import Conditions, asked_sweeps, stated_drive
-from klack.analyses.operating_point.figures import sweep_charts
+from klack.analyses.operating_point.content import sweep_charts, write_csv
 from klack.analyses.operating_point.record import OperatingPoints
 from klack.analyses.operating_point.run import find_point, run_operating_points
-from klack.analyses.operating_point.table import write_csv
 from klack.assembling.valve import build_valve
 from klack.case.any_case import CaseTree, read_case_tree, tree_of
 from klack.case.valve_roles import find_roles

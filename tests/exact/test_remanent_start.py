@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.analyses.stroke.loop_figure import loop_chart
+from klack.analyses.stroke.figures import loop_chart
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import load_valve_case
 from klack.magnetics.constant_drive import driven, hysteretic_coils

@@ -9,7 +9,7 @@ import pytest
 
 from klack.analyses.impact.command import run_case
 from klack.analyses.impact.run import run_impact
-from klack.analyses.impact.worn_case import worn_text
+from klack.analyses.impact.running_in import worn_text
 from klack.assembling.problem import build_problem
 from klack.case.reader import load_case, read_case
 from klack.contact.worn_faces import WornFaces, opened_by

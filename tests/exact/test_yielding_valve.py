@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.analysis import STROKE, yield_told
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
-from klack.analyses.stroke.summary import stroke_to_json, yield_told
 from klack.assembling import yielding
 from klack.case.any_case import read_valve_case
 from klack.case.reader import read_case
@@ -83,7 +83,7 @@ def test_what_yield_has_left_is_told():
     assert "the faces of 'seat' have yielded: a set of" in line
     assert faces.force == pytest.approx(variant.result.events[0].peak_force, rel=0.01)
     assert faces.force < faces.known_force
-    assert stroke_to_json(study)["faces"]["seat"]["set_m"] == faces.set
+    assert STROKE.to_json(study)["faces"]["seat"]["set_m"] == faces.set
     assert any(row[0] == "set left on seat" for row in stroke_content(study).numbers.rows)
     assert variant.result.books.losses["seat contact"] > 0.1 * 0.5 * 3.21e-5 * 0.1**2
     assert not any("yields before" in text for text in study.warnings)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from quoted_output import compare
 
+from klack.analyses.reduction.analysis import REDUCTION, reduction_told
 from klack.analyses.reduction.run import run_reduce
-from klack.analyses.reduction.summary import reduction_to_json, reduction_told
 from klack.assembling.bending import bending_body
 from klack.assembling.bodies import mesh_body
 from klack.case import load_case
@@ -87,7 +87,7 @@ def test_table_stands_beside_the_axial_modes(study):
 
 
 def test_json_has_every_frequency(tmp_path, study):
-    parts = reduction_to_json(study)["bending"]
+    parts = REDUCTION.to_json(study)["bending"]
     assert parts["long"]["bending_frequencies_Hz"] == [float(f) for f in study.bending[1].bending]
     assert parts["long"]["axial_frequencies_Hz"][0] == pytest.approx(86117.56, rel=1e-4)
     assert parts["short"]["rigid_modes_of_order_1"] == 2

@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 
 from klack.analyses.comparison.calculix import (
+    CALCULIX,
     COMPARISON_COLUMNS,
     compare_with,
     comparison_rows,
-    comparison_to_json,
     energy_balance,
     with_other,
 )
@@ -220,7 +220,7 @@ def test_comparison_in_a_table_and_in_numbers(bars, impact_study):
     run = replace(other_run(bars, reference()), wall_time=1066.0)
 
     comparison = compare_with(study, "full", run)
-    rows, numbers = comparison_rows(comparison), comparison_to_json(comparison)
+    rows, numbers = comparison_rows(comparison), CALCULIX.to_json(comparison)
 
     assert all(len(row) == len(COMPARISON_COLUMNS) for row in rows)
     assert [row[0] for row in rows] == ["CalculiX", "klack, full", "klack from it"]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.comparison.analysis import MEASURED_IMPACT
+from klack.analyses.comparison.impacts_summary import MEASURED_IMPACT
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.run import run_impact
 from klack.case.reader import read_case

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 from doubts import doubts
 
-from klack.analyses.stroke.axis_place import guide_of
+from klack.analyses.stroke.axis import guide_of
 from klack.assembling.valve import build_valve
 from klack.case.any_case import read_valve_case
 from klack.errors import InputError

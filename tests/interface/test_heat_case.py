@@ -6,11 +6,16 @@ import numpy as np
 import pytest
 
 import klack
-from klack.analyses.heat.heated_stroke import _since, _uncommanded, heated_stroke, sent_heat
-from klack.analyses.heat.log import HEAT_LOG
-from klack.analyses.heat.run import run_heat
+from klack.analyses.heat.heated_stroke import (
+    _since,
+    _uncommanded,
+    aspects_of,
+    heated_stroke,
+    sent_heat,
+    warm_valve,
+)
+from klack.analyses.heat.run import HEAT_LOG, run_heat
 from klack.analyses.heat.summary import answer
-from klack.analyses.heat.warm_valve import aspects_of, warm_valve
 from klack.analyses.stroke.run import one_variant
 from klack.assembling.valve import Valve, build_valve
 from klack.case.any_case import read_valve_case

@@ -18,7 +18,7 @@ from rigid_valve import write_bench
 
 from klack.analyses.calibration.motion import TRIAL_LOG, Motion, TrialKey, trial_log
 from klack.analyses.catalogue import load_result
-from klack.analyses.result_folder import is_result
+from klack.analyses.ending import is_result
 from klack.errors import CacheWarning, InputError
 from klack.folder_lock import locked
 from klack.held_folder import HeldFolder

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.analyses.comparison.analysis import MEASURED_SHOTS
 from klack.analyses.comparison.shots import compare_shots, mean_of_highest
-from klack.analyses.comparison.shots_summary import bias_sentence, drop_verdict
+from klack.analyses.comparison.shots_summary import MEASURED_SHOTS, bias_sentence, drop_verdict
 from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
 from klack.case.measurement import CaseMeasurement

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from klack.analyses.reduction.node_figure import node_chart
+from klack.analyses.reduction.analysis import REDUCTION, reduction_told
+from klack.analyses.reduction.one_node import node_chart
 from klack.analyses.reduction.run import ReductionStudy, run_reduce
-from klack.analyses.reduction.summary import reduction_to_json, reduction_told
 from klack.case import load_case
 from klack.cli.main import main
 from klack.errors import InputError
@@ -109,7 +109,7 @@ def test_without_a_node_nothing_is_added(tmp_path):
     study = study_of(tmp_path, "")
 
     assert (study.nodes, study.impacts) == ((), ())
-    assert reduction_to_json(study)["one_node"] == {}
+    assert REDUCTION.to_json(study)["one_node"] == {}
     assert [t.title[:13] for t in reduction_told(study)] == ["Two short rod", "Bending modes"]
 
 

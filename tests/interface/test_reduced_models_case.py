@@ -12,7 +12,6 @@ import scipy.io
 from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.run import run_impact
-from klack.analyses.impact.summary import study_to_json
 from klack.analyses.reduction.analysis import REDUCTION
 from klack.analyses.reduction.run import run_reduce
 from klack.assembling.given_pair import build_given_pair
@@ -111,7 +110,7 @@ def test_study_is_stored_reported_and_exported(tmp_path):
     IMPACT.save(study, tmp_path / "out")
     again = IMPACT.load(tmp_path / "out")
     np.testing.assert_array_equal(again.contact.approach, study.contact.approach)
-    numbers = study_to_json(study)
+    numbers = IMPACT.to_json(study)
     assert numbers["levels"]["reduced"]["peak_force_N"] > 50
     assert numbers["estimated_error"] == {}
     facts = str(report_content(study))

@@ -4,15 +4,15 @@ from dataclasses import replace
 
 import pytest
 
+from klack.analyses.impact.analysis import estimate_lines
 from klack.analyses.impact.content import report_content
-from klack.analyses.impact.estimate_wording import (
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.wording import (
     ESTIMATE_COLUMNS,
+    answer,
     estimate_rows,
     estimate_sentence,
 )
-from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.impact.summary import estimate_lines
-from klack.analyses.impact.wording import answer
 from klack.contact.restitution import Deviation
 
 

@@ -20,10 +20,10 @@ from klack.analyses.impact.pressure_view import (
     common_cells,
     line_load,
     peak_pressure,
+    pressure_rows,
     pressure_view,
     study_views,
 )
-from klack.analyses.impact.pressure_wording import pressure_rows
 from klack.analyses.impact.record import ImpactStudy, PressureRecord
 from klack.report.html import render_html
 from klack.report.pdf import render_pdf

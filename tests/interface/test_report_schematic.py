@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from schematic_rules import random_network
 
-from klack.analyses.schematic_section import schematic_section
+from klack.analyses.page import schematic_section
 from klack.report.html import render_html
 from klack.report.page import Content, Section, Table
 from klack.report.pdf import render_pdf

@@ -14,8 +14,8 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from klack.analyses.stroke.analysis import STROKE
-from klack.analyses.stroke.axis_place import guide_of
+from klack.analyses.stroke.analysis import STROKE, first_impact, stroke_answer
+from klack.analyses.stroke.axis import guide_of
 from klack.analyses.stroke.content import stroke_charts, stroke_content
 from klack.analyses.stroke.film_frames import film_charts
 from klack.analyses.stroke.record import (
@@ -27,14 +27,11 @@ from klack.analyses.stroke.record import (
     StrokeVariant,
 )
 from klack.analyses.stroke.ring_figure import line_load_picture
-from klack.analyses.stroke.summary import first_impact, stroke_to_json
-from klack.analyses.stroke.wording import stroke_answer
 from klack.assembling.body_summary import BodySummary
-from klack.report.chart import BarChart, Chart
+from klack.report.chart import BarChart, Chart, RingFrames, frame_text, squeezed, ticks_of
 from klack.report.html import render_html, write_report
+from klack.report.looks import thinned
 from klack.report.pdf import render_pdf
-from klack.report.ring_frames import RingFrames, frame_text, squeezed, ticks_of
-from klack.report.thinning import thinned
 from klack.report.wording import quantity
 from klack.simulation.film_sectors import sector_pressure
 from klack.simulation.network_result import (
@@ -458,7 +455,7 @@ def test_a_doubtful_contact_is_said_with_its_stop(study: StrokeStudy, tmp_path: 
     seat = replace(study.stops[1], points_across=2, doubts=doubts)
     doubtful = replace(study, stops=(study.stops[0], seat))
     STROKE.save(doubtful, tmp_path)
-    said = stroke_to_json(STROKE.load(tmp_path))["stops"]
+    said = STROKE.to_json(STROKE.load(tmp_path))["stops"]
 
     assert said[seat.name]["doubts"] == list(doubts)
     assert said[seat.name]["points_across"] == 2
@@ -470,9 +467,9 @@ def test_a_doubtful_contact_is_said_with_its_stop(study: StrokeStudy, tmp_path: 
 
 
 def test_numbers_of_a_study_are_pure_json(study: StrokeStudy):
-    text = json.dumps(stroke_to_json(lonely(study)), allow_nan=False)
+    text = json.dumps(STROKE.to_json(lonely(study)), allow_nan=False)
     assert json.loads(text)["opening_time_s"] is None
-    whole = stroke_to_json(study)
+    whole = STROKE.to_json(study)
     assert whole["variant"] == "wet"
     assert whole["opening_time_s"] == TOUCH["opening"] + 10e-6
     assert whole["steps"] == 5000

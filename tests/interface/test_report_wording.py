@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import pytest
 
-from klack.analyses.impact.content import report_content
-from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.impact.summary import (
+from klack.analyses.impact.analysis import (
+    IMPACT,
     answer_line,
     contact_doubt,
-    study_to_json,
     study_told,
 )
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.wording import answer
 from klack.report.wording import listed, quantity, share, signed, signed_share
 
@@ -57,7 +57,7 @@ def test_signs_and_shares() -> None:
 
 
 def test_summary_in_plain_numbers(impact_study: ImpactStudy, lonely_study: ImpactStudy) -> None:
-    summary = json.loads(json.dumps(study_to_json(impact_study), allow_nan=False))
+    summary = json.loads(json.dumps(IMPACT.to_json(impact_study), allow_nan=False))
 
     assert summary["case"] == "demo"
     assert summary["levels"]["full"]["peak_force_N"] == pytest.approx(250.0, rel=1e-3)  # records
@@ -67,19 +67,19 @@ def test_summary_in_plain_numbers(impact_study: ImpactStudy, lonely_study: Impac
         *("peak_force", "contact_time", "impulse", "restitution", "history_l2"),
         *("third_octave_max_dB", "third_octave_up_to_Hz"),
     }
-    assert study_to_json(lonely_study)["deviation"] is None
+    assert IMPACT.to_json(lonely_study)["deviation"] is None
     assert (summary["complete"], summary["failures"]) == (True, {})
 
 
 def test_a_doubtful_contact_goes_with_every_number(impact_study: ImpactStudy) -> None:
-    assert study_to_json(impact_study)["contact"]["doubts"] == []
+    assert IMPACT.to_json(impact_study)["contact"]["doubts"] == []
     assert contact_doubt(impact_study.contact) == ""
     doubts = ("its mesh is too coarse", "2 contact points across are too few")
     contact = replace(impact_study.contact, points_across=2, doubts=doubts)
     study = replace(impact_study, contact=contact)
     words = "cannot be relied on: its mesh is too coarse and 2 contact points across are too"
 
-    said = study_to_json(study)["contact"]
+    said = IMPACT.to_json(study)["contact"]
     assert (said["doubts"], said["points_across"]) == (list(doubts), 2)
     assert said["half_width_m"] == contact.half_width
     assert words in contact_doubt(contact)
@@ -115,7 +115,7 @@ def test_a_run_that_ends_in_the_contact_says_so_everywhere(lonely_study: ImpactS
     assert "cut off in contact" in answer_line(study)
     assert "still in contact when the record ends" in answer(study)
 
-    numbers = json.loads(json.dumps(study_to_json(study), allow_nan=False))["levels"]["reduced"]
+    numbers = json.loads(json.dumps(IMPACT.to_json(study), allow_nan=False))["levels"]["reduced"]
     assert numbers["cut_off"] is True
     cut = ("peak_force_N", "contact_time_s", "impulse_Ns", "restitution", "total_contact_time_s")
     assert all(numbers[key] is None for key in cut)
@@ -136,7 +136,7 @@ def test_peak_and_contact_time_of_several_contacts_are_told_apart(
     row = next(iter(study_told(study))).rows[0]
     assert row[1].endswith("(contact 2 of 3)")
     assert row[2].endswith("(contact 1 of 3)")
-    assert study_to_json(study)["levels"]["reduced"]["strongest_contact"] == 2
+    assert IMPACT.to_json(study)["levels"]["reduced"]["strongest_contact"] == 2
     assert "(contact 2 of 3 in quick succession)" in answer(study)
     assert "(contact 1 of 3 in quick succession)" in answer(study)
 
@@ -149,4 +149,4 @@ def test_restitution_refers_to_the_speed_at_first_touch(lonely_study: ImpactStud
     assert "0.8 m/s at first touch" in answer_line(study)
     assert "0.8 m/s at first touch, 0.5 m/s at the start" in answer(study)
     assert "at the start" not in answer(lonely_study)
-    assert study_to_json(study)["levels"]["reduced"]["approach_speed_m_s"] == 0.8
+    assert IMPACT.to_json(study)["levels"]["reduced"]["approach_speed_m_s"] == 0.8

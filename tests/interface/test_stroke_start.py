@@ -2,9 +2,8 @@
 
 from pathlib import Path
 
-from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.analysis import STROKE, start_text
 from klack.analyses.stroke.run import run_stroke
-from klack.analyses.stroke.summary import start_text, stroke_to_json
 from klack.case.any_case import read_valve_case
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
@@ -32,7 +31,7 @@ def test_displacements_and_pressures_are_told_after_storing(tmp_path):
     # 2 bar above ambient on 10 mm: 16 N hold it closed
     assert wet.startswith("start at rest: needle -")
     assert "chamber 3 bar (stated); forces balance to " in wet
-    start = stroke_to_json(made)["variants"]["dry"]["start"]
+    start = STROKE.to_json(made)["variants"]["dry"]["start"]
     assert start["displacement_m"]["needle.tip"] > 99e-6
     assert abs(start["residual_force_N"]["needle"]) < 1e-9
     assert start["notes"] == []
@@ -45,4 +44,4 @@ def test_a_run_that_goes_on_has_no_start_of_its_own(tmp_path):
     after = run_stroke(read_valve_case(text, tmp_path / "valve.yaml"), after=first)
 
     assert start_text(after.variants["dry"]) == ""
-    assert stroke_to_json(after)["start"] is None
+    assert STROKE.to_json(after)["start"] is None

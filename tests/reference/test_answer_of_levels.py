@@ -13,9 +13,9 @@ from threadpoolctl import threadpool_limits
 
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact import run as impact
+from klack.analyses.impact.analysis import IMPACT, answer_line, estimate_lines
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
-from klack.analyses.impact.summary import answer_line, estimate_lines, study_to_json
 from klack.case import find_case
 from klack.case.impact_sections import LinearLocalLaw, Spring, TransferSweep
 from klack.case.reader import load_case, read_case
@@ -138,7 +138,7 @@ def test_a_full_order_in_coarse_steps_is_no_reference():
     assert "reduced" not in study.deviations
     assert any("steps of 1 us in a contact" in note for note in study.warnings)
     assert "Answer (level 'reduced')" in answer_line(study)
-    data = study_to_json(study)
+    data = IMPACT.to_json(study)
     assert data["answer"] == "reduced"
     assert data["deviation"] is None
     assert data["levels"]["full"]["doubts"]

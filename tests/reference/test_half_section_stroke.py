@@ -14,7 +14,6 @@ import pytest
 from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.run import run_stroke, variant_network
-from klack.analyses.stroke.summary import stroke_to_json
 from klack.analyses.stroke_shots.run import run_stroke_shots
 from klack.assembling.valve import build_valve
 from klack.case.any_case import read_valve_case
@@ -175,7 +174,7 @@ def test_a_stored_stroke_goes_on_and_one_of_many_is_the_same(tmp_path):
     loaded = STROKE.load(tmp_path)
     after = stroke(coarse.replace("400 us, v", "300.8 us, v"), after=loaded)
 
-    assert stroke_to_json(loaded) == stroke_to_json(first)
+    assert STROKE.to_json(loaded) == STROKE.to_json(first)
     result, begin = after.reference.result, len(first.reference.result.time) - 1
     for name, channel in whole.reference.result.channels.items():
         scale = float(np.abs(channel.values).max())

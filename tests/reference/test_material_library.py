@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from doubts import doubts
 
-from klack.analyses.impact.yield_check import check_yield
+from klack.analyses.impact.contact_check import check_yield
 from klack.assembling.problem import build_problem
 from klack.case.reader import case_schema, read_case
 from klack.errors import InputError

@@ -14,10 +14,9 @@ import pytest
 from pages import blocks, printed
 from ruamel.yaml import YAML
 
-from klack.analyses.comparison.analysis import MEASURED_STROKES
+from klack.analyses.comparison.record import MeasuredStrokeStudy
 from klack.analyses.comparison.strokes import compare_strokes
-from klack.analyses.comparison.strokes_record import MeasuredStrokeStudy
-from klack.analyses.comparison.strokes_summary import agreement
+from klack.analyses.comparison.strokes_summary import MEASURED_STROKES, agreement
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import load_valve_case, read_valve_case
 from klack.case.key_path import quantity_at, split_path

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from klack.analyses.stroke.axis_figures import axis_over_time_chart
+from klack.analyses.stroke.axis import axis_over_time_chart
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import read_valve_case

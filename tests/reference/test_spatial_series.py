@@ -14,7 +14,7 @@ import pytest
 from shots_valve import FILE, valve_text
 
 from klack.analyses.stroke.analysis import STROKE
-from klack.analyses.stroke.impact_order import recorded_impacts
+from klack.analyses.stroke.film_frames import recorded_impacts
 from klack.analyses.stroke.run import run_stroke
 from klack.case.any_case import read_valve_case
 from klack.cli.main import main

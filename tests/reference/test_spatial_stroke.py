@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from klack.analyses.stroke.analysis import STROKE
-from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
+from klack.analyses.stroke.axis import axis_over_time_chart, axis_path_chart
 from klack.analyses.stroke.run import run_stroke
-from klack.analyses.stroke.summary import stroke_to_json
 from klack.assembling.valve import build_valve
 from klack.case.any_case import read_valve_case
 from klack.errors import InputError
@@ -109,7 +108,7 @@ def test_a_stored_stroke_is_the_same_and_goes_on(tmp_path):
     loaded = STROKE.load(tmp_path)
     after = stroke(SPACE.replace("400 us, v", "300.8 us, v"), after=loaded)
 
-    assert stroke_to_json(loaded) == stroke_to_json(first)
+    assert STROKE.to_json(loaded) == STROKE.to_json(first)
     result = after.reference.result
     begin = len(first.reference.result.time) - 1
     for name, channel in whole.reference.result.channels.items():
@@ -118,7 +117,7 @@ def test_a_stored_stroke_is_the_same_and_goes_on(tmp_path):
         np.testing.assert_allclose(
             result.channels[name].values[:40], expected, rtol=1e-9, atol=1e-12 * scale
         )
-    told = stroke_to_json(whole)
+    told = STROKE.to_json(whole)
     assert told["motion"] == "three-dimensional"
     for event in told["events"]:
         assert abs(event["axis"]["tilt_x_rad"]) < 8e-6 / 9e-3 * 1.3  # bore, and what it gives

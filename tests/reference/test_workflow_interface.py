@@ -9,9 +9,9 @@ from dataclasses import fields
 
 import pytest
 
+from klack.analyses.impact.analysis import IMPACT, estimate_lines
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
-from klack.analyses.impact.summary import estimate_lines, study_to_json
 from klack.case import load_case, shipped_cases
 from klack.case.guide import Placement
 from klack.case.schema import Case
@@ -87,7 +87,7 @@ def test_scalar_law_is_wrong_there_and_its_estimate_says_so(eccentric: ImpactStu
     assert of_steps.startswith("Estimated error of the steps of 'full'")
     assert "peak force" in line
     assert "restitution" in line
-    numbers = study_to_json(eccentric)["estimated_error"]["reduced"]
+    numbers = IMPACT.to_json(eccentric)["estimated_error"]["reduced"]
     assert set(numbers) >= {f.name for f in fields(Deviation)} - {"third_octave_up_to_Hz"}
 
 
@@ -96,4 +96,4 @@ def test_no_estimate_where_the_interface_level_itself_does_not_settle():
     study = run_impact(shipped("two-rods"), levels=("reduced",))
     assert not study.estimates_settled
     assert estimate_lines(study)[0].startswith("No error estimate")
-    assert study_to_json(study)["estimated_error"] == {"reduced": None}
+    assert IMPACT.to_json(study)["estimated_error"] == {"reduced": None}

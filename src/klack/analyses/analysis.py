@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
+from klack.analyses.catalogue import named
 from klack.analyses.measures import Measure
-from klack.analyses.named import named
 from klack.analyses.store import RecordFormat, load_record, save_record
 from klack.report.page import Content
 from klack.terminal.tables import Notes, TextTable
@@ -77,7 +77,6 @@ class StoredAnalysis(Analysis[Kept]):
 
         Parameters
         ----------
-        record : record of the analysis
         result, case : str
             Folder of the result, and what it was computed from, as typed at a terminal: for the
             commands that the report names.

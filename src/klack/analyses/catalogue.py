@@ -2,16 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from klack.analyses.named import named
 from klack.errors import InputError
 
 if TYPE_CHECKING:
     from klack.analyses.analysis import Analysis, StoredAnalysis
 
-__all__ = ["ANALYSES", "Entry", "analyses", "analysis_in", "commands", "load_result"]
+__all__ = ["ANALYSES", "Entry", "analyses", "analysis_in", "commands", "load_result", "named"]
+
+
+def named(place: str) -> Any:
+    """What a module below :mod:`klack.analyses` calls so: ``"noise.content:noise_content"``."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(f"klack.analyses.{module}"), name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +62,7 @@ ANALYSES: tuple[Entry, ...] = (
         "klack stroke demo-stroke --variant wet,dry",
     ),
     Entry("operating_point.analysis:OPERATING_POINT", "klack operating points"),
-    Entry("heat.analysis:HEAT", "klack heat", "klack heat warm-valve"),
+    Entry("heat.summary:HEAT", "klack heat", "klack heat warm-valve"),
     Entry(
         "linearisation.analysis:LINEARISATION",
         "klack linear model",
@@ -80,10 +86,10 @@ ANALYSES: tuple[Entry, ...] = (
         example="klack reduce demo-valve-axisymmetric --json reduced.json",
     ),
     Entry("advice.analysis:ADVICE", example="klack advise demo-valve-axisymmetric --error '2 %'"),
-    Entry("comparison.analysis:MEASURED_STROKES", "klack measured strokes"),
-    Entry("comparison.analysis:MEASURED_SHOTS", "klack measured shots"),
-    Entry("comparison.analysis:MEASURED_IMPACT", "klack measured impact"),
-    Entry("comparison.analysis:CALCULIX"),
+    Entry("comparison.strokes_summary:MEASURED_STROKES", "klack measured strokes"),
+    Entry("comparison.shots_summary:MEASURED_SHOTS", "klack measured shots"),
+    Entry("comparison.impacts_summary:MEASURED_IMPACT", "klack measured impact"),
+    Entry("comparison.calculix:CALCULIX"),
     Entry(
         "calibration.analysis:CALIBRATION",
         "klack calibration",

@@ -3,11 +3,10 @@
 from math import isfinite
 from typing import Protocol
 
-from klack.analyses.json_parts import ContactJson
-from klack.analyses.measures import number_or_none
+from klack.analyses.json_parts import JsonForm, Key, Real
 from klack.units import format_si
 
-__all__ = ["MeshedContact", "contact_doubt", "contact_to_json", "elastic_above"]
+__all__ = ["CONTACT", "MeshedContact", "contact_doubt", "elastic_above"]
 
 
 _HARDEST = 2.5e9  # [Pa]; bearing and high-speed steel of 64 HRC has 2.0 to 2.4 GPa
@@ -41,16 +40,31 @@ class MeshedContact(Protocol):
         """Yield stress from which on both bodies stay elastic [Pa]; nan if unknown."""
 
 
-def contact_to_json(contact: MeshedContact) -> ContactJson:
-    """Mesh of a contact in plain numbers, SI, the unit in the key."""
-    return {
-        "surfaces": contact.surfaces,
-        "half_width_m": number_or_none(contact.half_width),
-        "size_over_half_width": number_or_none(contact.size_ratio),
-        "points_across": contact.points_across or None,
-        "doubts": list(contact.doubts),
-        "needed_yield_Pa": number_or_none(contact.needed_yield),
-    }
+CONTACT = JsonForm(
+    "ContactJson",
+    "Mesh of a contact at the force of the impact; null without a mesh.",
+    Key("surfaces", str, "Empty for a stop without surfaces."),
+    Key("half_width_m", Real, of="half_width"),
+    Key("size_over_half_width", Real, "Good up to 1, doubtful above 1.5.", "size_ratio"),
+    Key(
+        "points_across",
+        int | None,
+        "Too few below 5.",
+        lambda contact: contact.points_across or None,
+    ),
+    Key(
+        "doubts",
+        list[str],
+        "Reasons why no error of impacts there can be estimated; empty if none.",
+    ),
+    Key(
+        "needed_yield_Pa",
+        Real,
+        "Yield stress from which on both bodies stay elastic, about.",
+        "needed_yield",
+    ),
+)
+"""Of a :class:`MeshedContact`."""
 
 
 def contact_doubt(contact: MeshedContact) -> str:

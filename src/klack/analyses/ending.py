@@ -7,21 +7,114 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
-from klack.analyses.result_folder import REPORTS, add_report, write_result
+from klack.errors import InputError
+from klack.held_folder import Mark
 from klack.progress import Progress
-from klack.terminal.output import require_folder
+from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
 from klack.terminal.wanted import Shown, WantedResult
+from klack.uninterrupted import uninterrupted
+from klack.whole_file import completed, mark_of, outdated
 
 if TYPE_CHECKING:
     from klack.analyses.analysis import StoredAnalysis
-    from klack.analyses.record import AnyRecord
+    from klack.analyses.record import Record
     from klack.analyses.unfinished import LogForm
     from klack.report.page import Content
 
-__all__ = ["Ending"]
+__all__ = ["REPORTS", "Ending", "beside_result", "is_result", "write_reports"]
 
-Stored = TypeVar("Stored", bound="AnyRecord")
+
+REPORTS = ("report.html", "report.pdf")
+_RESULT = "result.zarr"
+
+
+def is_result(path: Path) -> bool:
+    """Whether a path is a folder with a result or a store, rather than a case."""
+    return (completed(path) / _RESULT).is_dir() or (path / "zarr.json").is_file()
+
+
+def write_reports(content: "Content", folder: Path) -> None:
+    """Write a report as HTML and as PDF."""
+    from klack.report.html import write_report
+    from klack.report.pdf import write_pdf
+
+    page, print_ = (folder / name for name in REPORTS)
+    write_report(content, page)
+    write_pdf(content, print_)
+
+
+def write_result(
+    folder: Path,
+    save: Callable[[Path], None],
+    *,
+    progress: "Progress",
+    unfinished: "LogForm[Any, Any] | None" = None,
+) -> Mark | None:
+    """Write a result to a folder, with no report of an earlier one beside it.
+
+    Parameters
+    ----------
+    save : callable
+        Writes the result into a folder.
+    unfinished : LogForm, optional
+        Finished parts that are not needed any more once the result stands.
+
+    Returns
+    -------
+    mark
+        For :func:`add_report`.
+    """
+    progress("result", 0.0)
+    with uninterrupted():
+        with staged_folder(folder) as stage:
+            save(stage)
+            outdated(stage, REPORTS)
+            mark = mark_of(stage / _RESULT)
+        if unfinished is not None:
+            unfinished.remove(folder)
+    return mark
+
+
+def add_report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -> Exception | None:
+    """Write the report of a result, if the folder still has this one at the end.
+
+    Whatever happens to the report costs no calculation: an internal error in a picture is returned.
+
+    Parameters
+    ----------
+    page : callable
+        Makes the report.
+    mark : mark
+        Of the result, from :func:`write_result`.
+    """
+    try:
+        with staged_folder(folder, {} if mark is None else {_RESULT: mark}) as stage:
+            write_reports(page(), stage)
+    except InputError as error:
+        cause = error.__cause__
+        return _no_report(folder, cause) if isinstance(cause, OSError) else error
+    except Exception as error:  # of whatever kind: the result stands, the command ends with it
+        return error
+    return None
+
+
+def beside_result(folder: Path) -> dict[str, Mark]:
+    """Result in a folder, to which its report may be added while it is unchanged."""
+    mark = mark_of(folder / _RESULT)
+    return {} if mark is None else {_RESULT: mark}
+
+
+def _no_report(folder: Path, error: OSError) -> InputError:
+    return InputError(
+        f"report in {folder}",
+        got=f"an error: {error.strerror or error}",
+        expected="a writable folder, and one for temporary files",
+        hint="the result itself is kept: free space, then run klack report on it.",
+    )
+
+
+Stored = TypeVar("Stored", bound="Record")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +123,6 @@ class Ending(Shown):
 
     Parameters
     ----------
-    folder : Path
     report : bool
         Whether pages are written.
     case : str
@@ -81,8 +173,6 @@ class Ending(Shown):
 
         Parameters
         ----------
-        analysis : StoredAnalysis
-        record : Record
         beside : callable, optional
             Writes further files into a folder, and returns their names.
         unfinished : LogForm, optional

@@ -6,14 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
-from klack.analyses.expanded_rows import Row, expanded_rows
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.given_bodies import reduced_from_file
 from klack.case.bodies import CaseFile
 from klack.case.geometry import ProfileGeometry
+from klack.case.key_path import kind_at, node_at, written_at
+from klack.case.origin import ExpandedCase
+from klack.case.parameters import ParameterValue
 from klack.case.surface_names import require_surface_names
+from klack.case.valve import ValveCase
 from klack.errors import InputError
+from klack.input.computed import Computed
 from klack.input.existing_file import refuse_lfs_pointer
+from klack.input.problem import CaseProblem, Key, key_text
 from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
 from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS, format_of
 from klack.mesh.files.mesh_file import read_mesh_file
@@ -24,8 +29,72 @@ from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
 from klack.model_files.system_matrix import SystemMatrix, WhichMatrixError
 from klack.reduction.reduced_body import ReducedBody
+from klack.units import format_si, parse_quantity
 
 __all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]
+
+
+Row = tuple[str, str, str]
+"""What, its name, its numbers in words."""
+
+
+def expanded_rows(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
+    """Parameters of a case, values that follow from expressions, components with included parts.
+
+    Yields a title and its rows; nothing for a case without any of them.
+    """
+    found = case.expanded
+    if found is None:
+        return
+    if case.parameters:
+        yield "case: parameters", tuple(_parameters(case.parameters))
+    if found.expressions:
+        rows = (("value", key_text(key), _value(case, found, key)) for key in found.expressions)
+        yield "case: values of expressions", tuple(rows)
+    if isinstance(case, ValveCase) and case.include:
+        yield "case: components", tuple(_components(case, found))
+        nodes = (
+            ("connection", str(i), ", ".join(ports))
+            for i, ports in enumerate(case.network.connections)
+        )
+        yield "case: connections", tuple(nodes)
+
+
+def _parameters(parameters: object) -> Iterator[Row]:
+    assert isinstance(parameters, dict)
+    for name, item in parameters.items():
+        assert isinstance(item, ParameterValue)
+        kind = "" if item.kind.bare else f", {item.kind.name}"
+        yield "parameter", name, f"{item}{kind}{_source(item)}"
+
+
+def _source(item: ParameterValue) -> str:
+    """Expression that a value comes from; empty for a quantity."""
+    try:
+        parse_quantity(item.text, item.kind)
+    except InputError:
+        return f", from '{item.text}'"
+    return ""
+
+
+def _value(case: CaseFile, found: ExpandedCase, key: Key) -> str:
+    try:
+        node, field = node_at(case, key)
+    except CaseProblem:  # a short form that the case spells out
+        node, field = written_at(found.data, key), None
+    kind = kind_at(node, field)
+    if isinstance(node, float | int) and kind is not None:
+        node = format_si(float(node), kind.unit, 7)
+    elif isinstance(node, Computed):
+        return str(node)
+    return f"{node}, from '{found.expressions[key].text}'"
+
+
+def _components(case: ValveCase, found: ExpandedCase) -> Iterator[Row]:
+    for name, part in case.network.components.items():
+        origin = found.origin(("network", "components", name))
+        of = f", {'.'.join(map(str, origin.key))} of {origin.path.name}" if origin.copy else ""
+        yield "component", name, f"{part.type}{of}"
 
 
 INSPECTED = (*STEP_ENDINGS, *MESH_FORMATS, *MATRIX_FORMATS, ".fmu")
@@ -75,7 +144,7 @@ def inspect_file(
 def inspect_case(case: CaseFile) -> Iterator[tuple[str, tuple[Row, ...]]]:
     """Parameters, parts and bodies of a case, their files checked as in a run.
 
-    Yields the rows of :func:`klack.analyses.expanded_rows.expanded_rows`, then the name of each
+    Yields the rows of :func:`klack.analyses.inspection.expanded_rows`, then the name of each
     body and its rows.
 
     Raises

@@ -1,11 +1,34 @@
-"""Parts that the JSON of several commands has; numbers are SI, the unit in the key."""
+"""Objects of JSON, each described once: its keys with their types and meanings, and its values.
 
-from typing import Annotated
+Numbers are SI, the unit in the key; what does not exist (nan, infinite) is null.
+"""
 
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property
+from math import isfinite
+from operator import attrgetter
+from types import GenericAlias
+from typing import Annotated, Any, Literal, NamedTuple, Optional
+
+import numpy as np
 from pydantic import Field
 from typing_extensions import TypedDict
 
-__all__ = ["ContactJson", "OwnComponents", "Real", "RejectedJson", "Version"]
+from klack.analyses.measures import JSON_TYPES, Measure
+
+__all__ = [
+    "CASE",
+    "OWN_COMPONENTS",
+    "REJECTED",
+    "JsonForm",
+    "Key",
+    "OwnComponents",
+    "Real",
+    "Version",
+    "inherited",
+    "measured_keys",
+    "schema_key",
+]
 
 Real = float | None
 """A number, or null where there is none (nan, infinite)."""
@@ -14,25 +37,158 @@ OwnComponents = Annotated[
 ]
 Version = Annotated[str, Field(description="Version.")]
 
-
-class ContactJson(TypedDict):
-    """Mesh of a contact at the force of the impact; null without a mesh."""
-
-    surfaces: Annotated[str, Field(description="Empty for a stop without surfaces.")]
-    half_width_m: Real
-    size_over_half_width: Annotated[Real, Field(description="Good up to 1, doubtful above 1.5.")]
-    points_across: Annotated[int | None, Field(description="Too few below 5.")]
-    doubts: Annotated[
-        list[str],
-        Field(description="Reasons why no error of impacts there can be estimated; empty if none."),
-    ]
-    needed_yield_Pa: Annotated[
-        Real, Field(description="Yield stress from which on both bodies stay elastic, about.")
-    ]
+Read = str | Callable[[Any], Any]
+"""Attribute of a record, further ones behind dots, or a function of it."""
 
 
-class RejectedJson(TypedDict):
-    """A recording that was left out."""
+class Key(NamedTuple):
+    """One entry of an object.
+
+    Parameters
+    ----------
+    type : type, or the shape of the entry
+        A :class:`JsonForm` stands for an object, ``[FORM]`` for a list of such objects,
+        ``{str: FORM}`` for objects by name, ``(FORM, None)`` for one that may be null.
+    words : str
+        What the name does not say.
+    of : str or callable
+        What it is read from, what the record calls so by default.
+    depth : int
+        From how far above it is inherited.
+    after : str
+        Key that it follows in the schema, where that has another order than the object.
+    """
 
     name: str
-    reason: str
+    type: Any
+    words: str = ""
+    of: Read = ""
+    depth: int = 0
+    after: str = ""
+
+    def value(self, record: Any) -> Any:
+        """Entry of a record, as plain JSON."""
+        return _json(_read(self.of or self.name, record), self.type)
+
+
+class JsonForm:
+    """An object of JSON.
+
+    Parameters
+    ----------
+    name : str
+        Of its type in the schema.
+    words : str
+        What it is.
+    keys : Key
+        In their order; in the schema inherited ones come first.
+    module : str
+        Of its type, where another type has the same name.
+    """
+
+    def __init__(self, name: str, words: str, *keys: Key, module: str = __name__) -> None:
+        self.name, self.words, self.keys, self.module = name, words, keys, module
+
+    def json(self, record: Any) -> dict[str, Any]:
+        """The object of a record."""
+        return {key.name: key.value(record) for key in self.keys}
+
+    @cached_property
+    def type(self) -> Any:
+        """Typed dictionary, for the schema of results."""
+        order = sorted((key for key in self.keys if not key.after), key=lambda key: -key.depth)
+        for key in (key for key in self.keys if key.after):
+            order.insert(1 + [other.name for other in order].index(key.after), key)
+        entries: dict[str, Any] = {
+            key.name: Annotated[_type(key.type), Field(description=key.words)]
+            if key.words
+            else _type(key.type)
+            for key in order
+        }
+        found: Any = TypedDict(self.name, entries)  # type: ignore[misc]
+        found.__doc__, found.__module__ = self.words, self.module
+        return found
+
+
+def inherited(form: JsonForm, of: Read) -> tuple[Key, ...]:
+    """Keys of another form, of a part of the record."""
+
+    def within(key: Key) -> Key:
+        return key._replace(
+            of=lambda record: _read(key.of or key.name, _read(of, record)), depth=key.depth + 1
+        )
+
+    return tuple(map(within, form.keys))
+
+
+def measured_keys(
+    measures: Iterable[Measure[Any]], of: Read = lambda item: item
+) -> tuple[Key, ...]:
+    """Keys of measures, of the record or of a part of it."""
+
+    def key(item: Measure[Any]) -> Key:
+        return Key(
+            item.json_key,
+            JSON_TYPES[item.kind],
+            item.definition,
+            lambda record: item.json(_read(of, record)),
+            depth=1,
+        )
+
+    return tuple(map(key, measures))
+
+
+def schema_key(name: str) -> Key:
+    """The key that tells which of all results an object is."""
+    return Key("schema", Literal[name], of=lambda _: name)
+
+
+def _read(of: Read, record: Any) -> Any:
+    return of(record) if callable(of) else attrgetter(of)(record)
+
+
+def _json(value: Any, shape: Any) -> Any:
+    """Value of a record as an entry of such a shape."""
+    if isinstance(shape, JsonForm):
+        return shape.json(value)
+    if isinstance(shape, list):
+        return [_json(item, shape[0]) for item in value]
+    if isinstance(shape, dict):
+        return {name: _json(item, shape[str]) for name, item in value.items()}
+    if isinstance(shape, tuple):
+        return None if value is None else _json(value, shape[0])
+    return _plain(value)
+
+
+def _plain(value: Any) -> Any:
+    """Numbers and words alone; None for numbers that do not exist."""
+    if isinstance(value, np.ndarray | np.generic):
+        if value.dtype.kind in "biu" or np.isfinite(value).all():
+            return value.tolist()
+        value = value.tolist()
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
+
+
+def _type(shape: Any) -> Any:
+    if isinstance(shape, JsonForm):
+        return shape.type
+    if isinstance(shape, list):
+        return GenericAlias(list, (_type(shape[0]),))
+    if isinstance(shape, dict):
+        return GenericAlias(dict, (str, _type(shape[str])))
+    if isinstance(shape, tuple):
+        return Optional[_type(shape[0])]  # noqa: UP045
+    return shape
+
+
+OWN_COMPONENTS = Key("own_components", OwnComponents)
+CASE = (Key("case", str), Key("klack", Version, of="version"))
+"""Of which case a record is, and by which version."""
+
+REJECTED = JsonForm(
+    "RejectedJson", "A recording that was left out.", Key("name", str), Key("reason", str)
+)

@@ -18,6 +18,7 @@ from klack.terminal.tables import TextTable
 from klack.units import format_si
 
 __all__ = [
+    "JSON_TYPES",
     "Column",
     "Measure",
     "Value",
@@ -61,7 +62,8 @@ _SUFFIXES = {
     "": "",
 }
 _LEVELS = {"amplitude": 20.0, "energy": 10.0}
-_KINDS: Mapping[str, Any] = {"number": float | None, "whole": int, "truth": bool}
+JSON_TYPES: Mapping[str, Any] = {"number": float | None, "whole": int, "truth": bool}
+"""By the kind of a measure."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +126,6 @@ class Measure(Generic[Of]):
         How a report prints it: a ``"quantity"`` with ``digits`` significant digits and a prefix,
         ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, which
         is that of whole numbers, or with a sign.
-    digits : int
     column : Column, optional
         Of tables on a terminal that show it.
     given : callable
@@ -192,6 +193,13 @@ class Measure(Generic[Of]):
         unit = self.column.unit if self.column is not None else self.unit
         name = (self.column.head if self.column is not None else "") or self.name
         return f"{name} [{unit}]" if unit not in ("", "1") else name
+
+    def json(self, of: Of) -> Value:
+        """Value as plain JSON, which knows no nan and no infinity."""
+        value = self.read(of) if self.given(of) else None
+        if value is None or not isfinite(value):
+            return None
+        return {"number": float, "whole": int, "truth": bool}[self.kind](value)
 
     def cell(self, of: Of) -> str:
         """Value in its column on a terminal; a dash where it does not exist."""
@@ -298,11 +306,8 @@ def page_cells(measures: Iterable[Measure[Of]], of: Of) -> tuple[str, ...]:
 
 
 def json_of(measures: Iterable[Measure[Of]], of: Of) -> dict[str, Value]:
-    """Values by JSON key; None where there is no number (JSON knows no nan and no infinity)."""
-    return {
-        measure.json_key: _plain(measure.read(of), measure.kind) if measure.given(of) else None
-        for measure in measures
-    }
+    """Values by JSON key; None where there is no number."""
+    return {measure.json_key: measure.json(of) for measure in measures}
 
 
 def number_or_none(value: float) -> float | None:
@@ -310,16 +315,10 @@ def number_or_none(value: float) -> float | None:
     return float(value) if isfinite(value) else None
 
 
-def _plain(value: Value, kind: str) -> Value:
-    if value is None or not isfinite(value):
-        return None
-    return {"number": float, "whole": int, "truth": bool}[kind](value)
-
-
 def with_measures(measures: Iterable[Measure[Any]]) -> Callable[[Kind], Kind]:
     """Add what :func:`json_of` returns to a typed dictionary, for the schema of results."""
     keys: dict[str, Any] = {
-        item.json_key: Annotated[_KINDS[item.kind], Field(description=item.definition)]
+        item.json_key: Annotated[JSON_TYPES[item.kind], Field(description=item.definition)]
         for item in measures
     }
 

@@ -1,17 +1,22 @@
-"""Page of a record: the common parts of every report."""
+"""Page of a record: the common parts of every report, and of tables beside it."""
 
-from collections.abc import Iterable, Mapping
+import csv
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
+from io import StringIO
+from pathlib import Path
+from xml.etree import ElementTree
 
-from klack.analyses.record import AnyRecord
-from klack.report.page import Content, NextStep, Section, Table
+from klack.analyses.record import Record
+from klack.report.page import Content, NextStep, Picture, Section, Table
 from klack.report.wording import own_code, quantity
+from klack.whole_file import whole_file
 
-__all__ = ["page_of", "stage_table"]
+__all__ = ["page_of", "schematic_section", "stage_table", "write_table"]
 
 
 def page_of(
-    record: AnyRecord,
+    record: Record,
     kind: str,
     *,
     subtitle: Iterable[str] = (),
@@ -26,7 +31,6 @@ def page_of(
 
     Parameters
     ----------
-    record : CaseRecord or the record of several cases
     kind : str
         What was computed.
     subtitle : iterable of str
@@ -35,9 +39,7 @@ def page_of(
         In one paragraph.
     numbers : Table
         The key numbers.
-    sections : iterable of Section
     definitions, limits : tuple of (term, text)
-    next_steps : iterable of NextStep
     """
     made = f"klack {record.version}"
     heading = (kind, f"case {record.case}", *subtitle, _date_text(record.created), made)
@@ -51,7 +53,15 @@ def page_of(
         answer=answer,
         numbers=numbers,
         warnings=record.warnings,
-        sections=tuple(section for section in every if _has_something(section)),
+        sections=tuple(
+            section
+            for section in every
+            if section.paragraphs
+            or section.picture
+            or section.charts
+            or section.tables
+            or section.sounds
+        ),
         definitions=definitions,
         limits=limits,
         case_text=record.case_text,
@@ -67,6 +77,14 @@ def stage_table(stage_times: Mapping[str, float], wall_time: float) -> Table:
     return Table(columns=("stage", "time"), rows=tuple(rows))
 
 
+def write_table(file: Path, rows: Iterable[Sequence[str]]) -> None:
+    """Write rows of text as CSV, heads first."""
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows(rows)
+    with whole_file(file) as part:
+        part.write_text(text.getvalue(), encoding="utf-8", newline="")
+
+
 def _date_text(created: str) -> str:
     """``2025-01-31T12:00:00+00:00`` as ``2025-01-31 12:00 UTC``; other text as it came."""
     try:
@@ -76,7 +94,21 @@ def _date_text(created: str) -> str:
     return f"{moment:%Y-%m-%d %H:%M} {moment.tzname() or ''}".strip()
 
 
-def _has_something(section: Section) -> bool:
-    return bool(
-        section.paragraphs or section.picture or section.charts or section.tables or section.sounds
-    )
+_NOTE = (
+    "The network of the case: chambers, restrictions and lines of the fluid on the left, bodies in "
+    "the middle, what pushes and stops them on the right, magnets and drivers beside them. (0) is "
+    "the state at the start. A dashed ring is a port in no connection."
+)
+_TITLE = "Schematic"
+
+
+def schematic_section(picture: str) -> Section:
+    """Show a stored schematic; empty for a result of an earlier klack, which has none."""
+    if not picture:
+        return Section(title=_TITLE)
+    try:
+        ElementTree.fromstring(picture)
+    except ElementTree.ParseError:
+        text = "The picture in this result is damaged; klack show draws it again from the case."
+        return Section(title=_TITLE, paragraphs=(text,))
+    return Section(title=_TITLE, picture=Picture(picture.encode(), _NOTE), wide=True)

@@ -10,20 +10,15 @@ from datetime import UTC, datetime
 from functools import cache
 from importlib.metadata import version
 from time import perf_counter
-from typing import Protocol, TypedDict
+from typing import TYPE_CHECKING, Any
 
 from klack import __version__
 from klack.stages import StageClock
 
-__all__ = [
-    "AnyRecord",
-    "CaseFields",
-    "CaseRecord",
-    "Record",
-    "RunFields",
-    "case_fields",
-    "run_fields",
-]
+if TYPE_CHECKING:
+    from klack.case.any_case import AnyCase
+
+__all__ = ["CaseRecord", "Record", "case_fields", "run_fields"]
 
 _LIBRARIES = ("numpy", "scipy", "numba", "netgen-mesher")
 
@@ -34,7 +29,6 @@ class Record:
 
     Parameters
     ----------
-    title, description : str
     version : str
         Of klack; ``versions`` holds those of the libraries.
     created : str
@@ -42,7 +36,6 @@ class Record:
     wall_time : float [s]
         Of the whole analysis.
     stage_times : mapping of str to float [s]
-    warnings : tuple of str
     """
 
     title: str
@@ -53,6 +46,23 @@ class Record:
     wall_time: float
     stage_times: Mapping[str, float]
     warnings: tuple[str, ...] = ()
+
+    if TYPE_CHECKING:  # every record has them: of one case, or of several
+
+        @property
+        def case(self) -> str:
+            """Name."""
+            raise NotImplementedError
+
+        @property
+        def case_text(self) -> str:
+            """The file itself."""
+            raise NotImplementedError
+
+        @property
+        def own_components(self) -> Mapping[str, str]:
+            """Components that are not part of klack."""
+            raise NotImplementedError
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,77 +92,12 @@ class CaseRecord(Record):
         object.__setattr__(self, "warnings", (*self.warnings, *new))
 
 
-class _Head(Protocol):
-    @property
-    def case(self) -> str: ...
-    @property
-    def case_text(self) -> str: ...
-    @property
-    def own_components(self) -> Mapping[str, str]: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def description(self) -> str: ...
-    @property
-    def version(self) -> str: ...
-    @property
-    def versions(self) -> Mapping[str, str]: ...
-    @property
-    def created(self) -> str: ...
-    @property
-    def wall_time(self) -> float: ...
-    @property
-    def stage_times(self) -> Mapping[str, float]: ...
-    @property
-    def warnings(self) -> tuple[str, ...]: ...
-
-
-class AnyRecord(_Head, Protocol):
-    """What can be read of every record, be it of one case (:class:`CaseRecord`) or of several."""
-
-
-class RunFields(TypedDict):
-    """Fields of a record that the run itself gives."""
-
-    version: str
-    versions: dict[str, str]
-    created: str
-    wall_time: float
-    stage_times: Mapping[str, float]
-
-
-class CaseFields(TypedDict):
-    """Fields of a record that its case gives."""
-
-    case: str
-    title: str
-    description: str
-    case_text: str
-    own_components: Mapping[str, str]
-    case_notes: tuple[str, ...]
-
-
-class _Case(Protocol):
-    @property
-    def name(self) -> str: ...
-    @property
-    def title(self) -> str: ...
-    @property
-    def description(self) -> str: ...
-    @property
-    def source(self) -> str: ...
-    @property
-    def own_components(self) -> Mapping[str, str]: ...
-    @property
-    def input_notes(self) -> tuple[str, ...]: ...
-
-
 _version = cache(version)
 """Installed version of a library; reading its description takes milliseconds."""
 
 
-def run_fields(begin: float, clock: StageClock, *libraries: str) -> RunFields:
-    """Versions and times of a run that began at ``begin`` of ``time.perf_counter`` [s]."""
+def run_fields(begin: float, clock: StageClock, *libraries: str) -> dict[str, Any]:
+    """Fields of a record that its run gives, which began at ``begin`` of ``perf_counter`` [s]."""
     return {
         "version": __version__,
         "versions": {name: _version(name) for name in (*_LIBRARIES, *libraries)},
@@ -162,8 +107,8 @@ def run_fields(begin: float, clock: StageClock, *libraries: str) -> RunFields:
     }
 
 
-def case_fields(case: _Case | CaseRecord, case_text: str | None = None) -> CaseFields:
-    """Name, title and text of a case, or of the record that an analysis starts from."""
+def case_fields(case: "AnyCase | CaseRecord", case_text: str | None = None) -> dict[str, Any]:
+    """Fields that a case gives, or the record that an analysis starts from."""
     notes: tuple[str, ...]
     if isinstance(case, CaseRecord):
         name, text, notes = case.case, case.case_text, ()

@@ -23,7 +23,6 @@ class Statistic:
         In the name of a measure.
     name : str
         In words.
-    json_key : str
     definition : str
         Of the values of the sample.
     of : callable
@@ -105,7 +104,6 @@ def moments(
     ----------
     values : array, shape (n,)
         Nan where there is none.
-    statistics : iterable of Statistic
     """
     known = values[np.isfinite(values)]
     found = {item.json_key: item.of(known) if known.size else np.nan for item in statistics}

@@ -42,7 +42,6 @@ class RecordFormat:
     ----------
     name : str
         Written into the store.
-    version : int
     kind : type
         Frozen dataclass of numbers, words, arrays and further such records.
     command : str
@@ -82,7 +81,6 @@ def load_record(folder: Path, form: RecordFormat, *, largest: int = _LARGEST) ->
     ----------
     folder : Path
         The folder given to :func:`save_record`, or the store itself.
-    form : RecordFormat
     largest : int [byte]
         Of all arrays together; more is refused before it is read.
 

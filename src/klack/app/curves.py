@@ -5,8 +5,8 @@ import numpy as np
 from klack.analyses.impact.measures import CONTACT_TIME, PEAK_FORCE, RESTITUTION
 from klack.analyses.impact.record import LevelResult
 from klack.analyses.measures import json_of
+from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.record import StrokeChannels, StrokeVariant
-from klack.analyses.stroke.summary import first_impact
 from klack.app.answers import Floats, Number
 from klack.contact.history import ImpactHistory
 from klack.signals import TimeSeries

@@ -23,9 +23,9 @@ from klack.acoustics.signal_statistics import sound_statistics
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
 from klack.acoustics.wav import level_statement, wav_bytes
 from klack.analyses.contact_doubts import contact_doubt
-from klack.analyses.impact.estimate_wording import FAIR, GOOD, estimate_sentence, worst_error
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bodies
+from klack.analyses.impact.wording import FAIR, GOOD, estimate_sentence, worst_error
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import NoiseSource, impact_sources, stroke_sources

@@ -181,7 +181,7 @@ def law_loops(
     """Static loops for the law of a reduced model; None where it stays elastic.
 
     They are kept in the cache of the upper body.  Bodies of three dimensions are told of by
-    :func:`klack.analyses.impact.yield_check.check_yield`.
+    :func:`klack.analyses.impact.contact_check.check_yield`.
 
     Parameters
     ----------

@@ -139,9 +139,10 @@ def _with_measurement(
     ending: Ending,
 ) -> int:
     from klack.analyses.catalogue import analysis_in, load_result
-    from klack.analyses.comparison.analysis import MEASURED_SHOTS, MEASURED_STROKES
     from klack.analyses.comparison.shots import compare_shots
+    from klack.analyses.comparison.shots_summary import MEASURED_SHOTS
     from klack.analyses.comparison.strokes import compare_strokes
+    from klack.analyses.comparison.strokes_summary import MEASURED_STROKES
     from klack.analyses.impact.record import ImpactStudy
     from klack.analyses.shots.record import ShotsStudy
     from klack.analyses.stroke.record import StrokeStudy
@@ -182,8 +183,8 @@ class _Sensor:
 def _with_pulses(
     study: "ImpactStudy", given: Sequence[str], case: Path | None, sensor: _Sensor, ending: Ending
 ) -> int:
-    from klack.analyses.comparison.analysis import MEASURED_IMPACT
     from klack.analyses.comparison.impacts import compare_impact
+    from klack.analyses.comparison.impacts_summary import MEASURED_IMPACT
 
     paths = [Path(text) for text in given]
     for path in paths:
@@ -268,8 +269,7 @@ def _section(
 
 
 def _with_calculix(result: Path, calculix: Path, level: str, folder: Path, wanted: Shown) -> None:
-    from klack.analyses.comparison.analysis import CALCULIX
-    from klack.analyses.comparison.calculix import compare_with, level_of, with_other
+    from klack.analyses.comparison.calculix import CALCULIX, compare_with, level_of, with_other
     from klack.analyses.impact.analysis import IMPACT
     from klack.analyses.impact.figures import force_chart
     from klack.analyses.incomplete import missing_in

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from klack.analyses.result_folder import is_result
+from klack.analyses.ending import is_result
 from klack.errors import InputError
 from klack.terminal.options import Components, Out, imported
 from klack.terminal.output import Written, require_folder

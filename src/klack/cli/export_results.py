@@ -97,7 +97,7 @@ def parquet_is_for_studies(got: str) -> InputError:
 def export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:
     """Write the case file of a point of a stored study."""
     from klack.analyses.catalogue import load_result
-    from klack.analyses.result_folder import is_result
+    from klack.analyses.ending import is_result
     from klack.analyses.study.point_case import case_of_point
     from klack.analyses.study.record import StudyRecord
     from klack.terminal.output import require_folder

@@ -28,8 +28,8 @@ def report(
 ) -> int:
     """Write report.html and report.pdf of a stored result."""
     from klack.analyses.catalogue import analysis_in
+    from klack.analyses.ending import REPORTS, beside_result, write_reports
     from klack.analyses.incomplete import missing_in
-    from klack.analyses.result_folder import REPORTS, beside_result, write_reports
 
     folder = out if out is not None else result
     beside = beside_result(folder) if folder.absolute() == result.absolute() else {}

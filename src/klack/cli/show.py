@@ -85,7 +85,7 @@ def show(
 def _draw_schematic(
     source: Path, out: Path | None, own: "Sequence[type[Component]]", wanted: Shown
 ) -> int:
-    from klack.analyses.result_folder import is_result
+    from klack.analyses.ending import is_result
     from klack.case.any_case import load_valve_case
     from klack.case.reader import find_case
 

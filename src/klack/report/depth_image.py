@@ -60,7 +60,6 @@ class Window:
     ----------
     left, bottom, pixel : float [m]
         ``pixel`` is the side of one.
-    columns, rows : int
     """
 
     left: float

@@ -1,5 +1,6 @@
 """How curves and parts of bars look: told apart by style or hatch as well as by colour."""
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,7 +8,17 @@ from numpy.typing import NDArray
 
 from klack.report.chart import Colour, Curve, Style
 
-__all__ = ["LOOKS", "OTHER", "PART_LOOKS", "Look", "look_of"]
+__all__ = [
+    "LINE_LOOKS",
+    "LOOKS",
+    "OTHER",
+    "PART_LOOKS",
+    "PIXELS",
+    "Look",
+    "dotted",
+    "look_of",
+    "thinned",
+]
 
 
 class Look(NamedTuple):
@@ -53,6 +64,66 @@ PART_LOOKS: tuple[tuple[Colour, str], ...] = (
 """Colour and hatch of the parts of a bar."""
 
 
+LINE_LOOKS: tuple[tuple[Colour, Style], ...] = (
+    ("blue", "solid"),
+    ("orange", "dashed"),
+    ("green", "dotted"),
+    ("red", "dashdot"),
+    ("sky", "long"),
+    ("pink", "sparse"),
+)
+"""Of lines with a dot at each point."""
+
+
+def dotted(line: Curve) -> tuple[Curve, Curve]:
+    """A line, and a dot at each of its points."""
+    return line, replace(line, label="", style="solid", drawn="points", width=3.0, listed=False)
+
+
 def look_of(index: int) -> Look:
     """Look of the k-th curve."""
     return LOOKS[index % len(LOOKS)]
+
+
+PIXELS = 700
+"""Columns of a picture on the page."""
+
+Floats = NDArray[np.float64]
+
+
+def thinned(
+    x: Floats, y: Floats, *, window: tuple[float, float] | None = None, columns: int = PIXELS
+) -> tuple[Floats, Floats]:
+    """Points of a curve that a picture of some columns can show.
+
+    Each column keeps the points with the smallest and the largest ``y``, at their own ``x``, so
+    that no peak is lost and none moves; a curve of few points stays as it is.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Rising.
+    y : array, shape (n,)
+        nan breaks the curve; it is not thinned then.
+    window : (low, high), optional
+        Only this part of x is kept.
+
+    Examples
+    --------
+    >>> x = np.arange(10000.0)
+    >>> y = np.where(x == 4321, 1.0, 0.0)
+    >>> few_x, few_y = thinned(x, y, columns=100)
+    >>> few_x.size <= 202, float(few_x[few_y == 1.0][0])
+    (True, 4321.0)
+    """
+    if window is not None:
+        seen = (x >= window[0]) & (x <= window[1])
+        x, y = x[seen], y[seen]
+    if x.size <= 2 * columns or np.isnan(y).any():
+        return x, y
+    column = ((x - x[0]) / (x[-1] - x[0]) * columns).astype(np.int64).clip(0, columns - 1)
+    order = np.lexsort((y, column))  # by column, inside it by value
+    edges = np.flatnonzero(np.diff(column[order])) + 1
+    lowest, highest = np.concatenate([[0], edges]), np.concatenate([edges, [x.size]]) - 1
+    kept = np.unique(np.concatenate([[0, x.size - 1], order[lowest], order[highest]]))
+    return x[kept], y[kept]

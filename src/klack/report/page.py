@@ -7,7 +7,7 @@ the text of the case come from the user.
 import re
 import shlex
 from dataclasses import dataclass, replace
-from typing import Protocol, Self
+from typing import Self
 
 from klack.report.chart import AnyChart
 
@@ -25,16 +25,12 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
 
-class Picture(Protocol):
+@dataclass(frozen=True, slots=True)
+class Picture:
     """Image (SVG) and its caption."""
 
-    @property
-    def image(self) -> bytes:
-        """SVG."""
-
-    @property
-    def note(self) -> str:
-        """Caption."""
+    image: bytes
+    note: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -81,15 +77,9 @@ class Content:
 
     Parameters
     ----------
-    title, subtitle, description, answer : str
     numbers : Table
         The key numbers per level.
-    warnings : tuple of str
-    sections : tuple of Section
     definitions, limits : tuple of (term, text)
-    case_text : str
-    versions : str
-    next_steps : tuple of NextStep
     """
 
     title: str

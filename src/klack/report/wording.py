@@ -11,6 +11,7 @@ from klack.units import takes_prefix
 
 __all__ = [
     "count",
+    "file_word",
     "fixed",
     "listed",
     "own_code",
@@ -139,6 +140,15 @@ def listed(words: list[str]) -> str:
     ('a, b and c', 'a')
     """
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def file_word(text: str) -> str:
+    """Word for links and file names.
+
+    >>> file_word("Loop (spring.end force)")
+    'loop-spring-end-force'
+    """
+    return re.sub(r"[^A-Za-z0-9]+", "-", text).strip("-").lower()
 
 
 def sentence(text: str) -> str:

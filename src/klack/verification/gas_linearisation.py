@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from klack.analyses.linearisation.gas_drives import gas_drives
+from klack.analyses.linearisation.loops import gas_drives
 from klack.hydraulics.pressure_history import PressureStep
 from klack.network.component import Component
 from klack.network.network import Network

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.linalg import expm
 
-from klack.analyses.heat.heated_stroke import heated_stroke, sent_heat
+from klack.analyses.heat.heated_stroke import aspects_of, heated_stroke, sent_heat, warm_valve
 from klack.analyses.heat.run import run_heat
-from klack.analyses.heat.warm_valve import aspects_of, warm_valve
 from klack.assembling.valve import build_valve
 from klack.case.any_case import read_valve_case
 from klack.case.valve_roles import find_roles

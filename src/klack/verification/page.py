@@ -15,8 +15,8 @@ import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
+from klack.report.looks import thinned
 from klack.report.printed import svg_chart
-from klack.report.thinning import thinned
 from klack.verification.check import (
     COVERS,
     LARGEST_HEADROOM,

@@ -17,7 +17,7 @@ from klack.case.reader import read_case
 from klack.errors import InputError
 from klack.network.component import Component
 from klack.progress import Progress, silent
-from klack.report.thinning import thinned
+from klack.report.looks import thinned
 from klack.viewer.of_case import view_of_case
 from klack.viewer.view import BodyView, ContactView, Curve, MotionView, View
 

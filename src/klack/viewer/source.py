@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from klack.analyses.catalogue import load_result
-from klack.analyses.result_folder import is_result
+from klack.analyses.ending import is_result
 from klack.case.any_case import load_any_case
 from klack.case.reader import find_case
 from klack.case.valve import ValveCase

@@ -33,8 +33,6 @@ class Measured:
 
     Parameters
     ----------
-    setting : Setting
-    ladder : Ladder
     runs : str
         For the table: level, bodies, what was run.
     at_least : float
@@ -62,7 +60,6 @@ class Fixed:
 
     Parameters
     ----------
-    name : str
     errors : array, shape (m,)
     remedy : str
         What to do instead.
@@ -79,7 +76,6 @@ class Counsel:
 
     Parameters
     ----------
-    measured : Measured
     values : mapping of key to float
         Advised [SI].
     factor : float
@@ -125,17 +121,12 @@ class Advice:
 
     Parameters
     ----------
-    case, title : str
     level : str
         ``reduced``, ``interface`` or ``stroke``.
-    measures : tuple of Measure
     up_to : float [Hz]
         Middle frequency of the highest third octave that is judged; nan for strokes.
     band_from_case : bool
         Whether the target band was taken from the force of the case.
-    counsels : tuple of Counsel
-    fixed : tuple of Fixed
-    notes : tuple of str
     unmeshed : tuple of str
         Bodies whose meshes were given: their errors are in no sum.
     dofs : pair of int or None
@@ -216,12 +207,6 @@ def settle(
     Every setting gets the same share of the target; what it cannot use goes to the others (see
     :func:`klack.analyses.advice.ladder.allotment`).  The scores are added although the worst
     measures of two settings may differ: the sum of every single measure is then within its limit.
-
-    Parameters
-    ----------
-    measured : sequence of Measured
-    fixed : sequence of Fixed
-    measures : sequence of Measure
     """
     spent = sum(score(item.errors, measures) for item in fixed)
     budget = max(1.0 - spent, _LEAST_BUDGET)
@@ -235,9 +220,7 @@ def counsel(item: Measured, share: float, measures: Sequence[Measure]) -> Counse
 
     Parameters
     ----------
-    item : Measured
     share : float [-]
-    measures : sequence of Measure
     """
     factor = coarsest_within(item.ladder, share, measures, coarsest=item.coarsest)
     values = item.setting.advised(factor)

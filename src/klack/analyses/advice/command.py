@@ -76,10 +76,13 @@ def advise(
     checked = read_any_case(tree.text, tree.path, tree.components.values())
 
     from klack import __version__
-    from klack.analyses.advice.advised_case import advice_yaml, advised_text, changed_values
-    from klack.analyses.advice.analysis import ADVICE
-    from klack.analyses.advice.any_case import advise_case
-    from klack.analyses.advice.summary import AdvisedCase
+    from klack.analyses.advice.advised_case import (
+        advice_yaml,
+        advise_case,
+        advised_text,
+        changed_values,
+    )
+    from klack.analyses.advice.analysis import ADVICE, AdvisedCase
 
     with show_progress(wanted.quiet) as progress:
         advice = advise_case(

@@ -9,14 +9,17 @@ from typing import Literal
 import numpy as np
 
 from klack.analyses.advice.advice import Advice, Fixed, Measured
-from klack.analyses.advice.affordable import affordable
-from klack.analyses.advice.cost import added, fits, larger, memory_of, time_of
+from klack.analyses.advice.affordable import added, affordable, fits, larger, memory_of, time_of
 from klack.analyses.advice.modes import (
     counted,
     expected_count,
     explicit_modes,
+    highest_band,
     history_ladder,
+    impact_errors,
+    impact_measures,
     interface_history,
+    judged_up_to,
     mode_ladder,
     mode_setting,
     modes_in_band,
@@ -31,12 +34,6 @@ from klack.analyses.advice.regions import (
     unmeshed_notes,
 )
 from klack.analyses.advice.settings import Setting, SettingValue, applied
-from klack.analyses.advice.target import (
-    highest_band,
-    impact_errors,
-    impact_measures,
-    judged_up_to,
-)
 from klack.analyses.impact.interface_level import build_interface, simulate_case
 from klack.assembling.bodies import BodyPair, build_bodies
 from klack.assembling.modes import mode_pools
@@ -137,7 +134,6 @@ def advise_impact(
 
     Parameters
     ----------
-    case : Case
     error : float [-]
         Accepted for peak force, contact time and force history.
     level_error : float [dB]
@@ -149,8 +145,6 @@ def advise_impact(
         interface for a case off its axis.
     confirm : bool
         Run the advised case and compare it with the finest run.
-    progress : callable
-    threads : int, optional
 
     Raises
     ------

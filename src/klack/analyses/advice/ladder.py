@@ -31,7 +31,6 @@ class Measure:
 
     Parameters
     ----------
-    name : str
     limit : float
         Greatest error that the user accepts; inf for a number that is only reported.
     decibel : bool
@@ -49,7 +48,6 @@ def score(errors: NDArray[np.float64], measures: Sequence[Measure]) -> float:
     Parameters
     ----------
     errors : array, shape (m,)
-    measures : sequence of Measure
     """
     limits = np.array([measure.limit for measure in measures])
     return float(np.max(np.abs(errors) / limits))
@@ -120,12 +118,7 @@ class Ladder:
         return np.maximum(upwards, _SMALLEST)
 
     def error(self, factor: float) -> NDArray[np.float64]:
-        """Expected error, shape (m,): a power law between the runs, and beyond them.
-
-        Parameters
-        ----------
-        factor : float
-        """
+        """Expected error, shape (m,): a power law between the runs, and beyond them."""
         known, points = np.array(self.factors), self._points
         if factor >= known[0]:
             return np.asarray(points[0] * (factor / known[0]) ** self.order)
@@ -147,11 +140,8 @@ def coarsest_within(
 
     Parameters
     ----------
-    ladder : Ladder
     allowed : float [-]
         Share of the target.
-    measures : sequence of Measure
-    coarsest : float
     """
     finest = min(ladder.finest, coarsest)
     if score(ladder.error(coarsest), measures) <= allowed:
@@ -178,7 +168,6 @@ def allotment(caps: Sequence[float], budget: float) -> float:
     ----------
     caps : sequence of float
         Score of each setting at its coarsest.
-    budget : float
     """
     left = sorted(caps)
     while left:

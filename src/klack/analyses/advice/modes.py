@@ -1,6 +1,6 @@
 """Kept modes of each body as settings: by number, by frequency, or by participation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from math import ceil
@@ -9,10 +9,10 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.acoustics.third_octave import band_edges
-from klack.analyses.advice.ladder import Ladder
+from klack.acoustics.comparison import compare_histories, impact_third_octaves
+from klack.acoustics.third_octave import ThirdOctaves, band_edges
+from klack.analyses.advice.ladder import Ladder, Measure
 from klack.analyses.advice.settings import Setting, SettingValue
-from klack.analyses.advice.target import HISTORY, impact_errors
 from klack.analyses.impact.interface_level import build_interface, simulate_case
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem
@@ -21,20 +21,111 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.contact.history import ImpactHistory
 from klack.elasticity.eigen import Modes
+from klack.errors import InputError
 from klack.progress import Progress
 from klack.reduction.ports import Port
+from klack.units import format_si
 
 __all__ = [
+    "HISTORY",
     "counted",
     "expected_count",
     "explicit_modes",
+    "highest_band",
     "history_ladder",
+    "impact_errors",
+    "impact_measures",
     "interface_history",
+    "judged_up_to",
     "mode_ladder",
     "mode_setting",
     "modes_in_band",
     "richer_pools",
 ]
+
+
+HISTORY = 2
+"""Place of the force history among the measures: the norm that orders are measured on."""
+
+_RANGE = 40.0  # [dB] below the highest band
+
+
+def impact_measures(error: float, level: float) -> tuple[Measure, ...]:
+    """Measures of one impact.
+
+    Parameters
+    ----------
+    error : float [-]
+        Accepted for peak force, contact time and force history (rms, over the peak force).
+    level : float [dB]
+        Accepted in every third octave of the target band.
+    """
+    return (
+        Measure(name="peak force", limit=error),
+        Measure(name="contact time", limit=error),
+        Measure(name="force history", limit=error),
+        Measure(name="third octaves", limit=level, decibel=True),
+        Measure(name="impulse"),
+        Measure(name="restitution"),
+    )
+
+
+def highest_band(history: ImpactHistory) -> float:
+    """Middle frequency [Hz] of the highest third octave within 40 dB of the strongest."""
+    bands = impact_third_octaves(history)
+    return float(bands.middle[_judged(bands)][-1])
+
+
+def judged_up_to(history: ImpactHistory, up_to: float) -> float:
+    """Middle frequency [Hz] of the highest band that is judged in a target band.
+
+    Raises
+    ------
+    InputError
+        For a target band below the first third octave of the force.
+    """
+    bands = impact_third_octaves(history)
+    judged = bands.middle[_judged(bands) & (bands.low < up_to)]
+    if not judged.size:
+        raise InputError(
+            "--up-to",
+            got=format_si(up_to, "Hz"),
+            expected=f"{format_si(float(bands.low[0]), 'Hz', 2)} or more",
+            hint="give the highest frequency that matters, e.g. 20 kHz.",
+        )
+    return float(judged[-1])
+
+
+def _judged(bands: ThirdOctaves) -> NDArray[np.bool_]:
+    return np.asarray(bands.level >= bands.level.max() - _RANGE)
+
+
+def impact_errors(
+    reference: ImpactHistory, candidate: ImpactHistory, up_to: float
+) -> NDArray[np.float64]:
+    """Absolute deviations in the order of :func:`impact_measures`, shape (6,).
+
+    Parameters
+    ----------
+    up_to : float [Hz]
+        Third octaves that begin below it are compared, as far as those of the reference lie
+        within 40 dB of its strongest.
+    """
+    whole = compare_histories(reference, candidate)
+    high = 0.1 / max(reference.step, candidate.step)
+    bands = [impact_third_octaves(item, high=high) for item in (reference, candidate)]
+    chosen = _judged(bands[0]) & (bands[0].low < up_to)
+    difference = np.abs(bands[1].level - bands[0].level)[chosen]
+    found: Sequence[float] = (
+        whole.peak_force,
+        whole.contact_time,
+        whole.history_l2,
+        float(difference.max(initial=0.0)),
+        whole.impulse,
+        whole.restitution,
+    )
+    return np.abs(np.nan_to_num(np.array(found)))
+
 
 AnyCase = TypeVar("AnyCase", Case, ValveCase)
 
@@ -113,8 +204,6 @@ def mode_setting(
 
     Parameters
     ----------
-    body : str
-    choice : ModeChoice
     count : int
         That it keeps.
     frequencies : array, shape (k,) [Hz]
@@ -152,13 +241,10 @@ def mode_ladder(
 
     Parameters
     ----------
-    problem : ContactProblem
     pools : mapping of str to Modes
         Twice as many as kept.
-    ports : pair of Port
     counts : mapping of str to int
         Kept.
-    body : str
     reference : ImpactHistory
         With twice the modes of every body.
     step : float [s]

@@ -29,7 +29,6 @@ def mesh_settings(
 
     Parameters
     ----------
-    bodies : mapping of str to CaseBody
     surfaces : tuple of SurfaceName
         That touch.
     """
@@ -92,7 +91,6 @@ def axisymmetric_twin(case: Case, highest: Mapping[str, float]) -> Case | None:
 
     Parameters
     ----------
-    case : Case
     highest : mapping of str to float [Hz]
         Highest kept mode of each body.
     """
@@ -129,7 +127,6 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
 
     Parameters
     ----------
-    bodies : mapping of str to CaseBody
     size_ratio : float [-]
         Element size across the contact over its half width; nan if unknown.
     """

@@ -98,7 +98,6 @@ class Setting:
         For example ``"needle, away from the contact"``.
     group : str
         ``mesh``, ``layers``, ``modes`` or ``step``.
-    values : tuple of SettingValue
     """
 
     name: str
@@ -153,7 +152,6 @@ def applied(node: Any, values: Mapping[Key, float]) -> Any:
 
     Parameters
     ----------
-    node : Case
     values : mapping of key to float
         Whole numbers where the case has some.
     """

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.advice.advice import Advice, Measured
-from klack.analyses.advice.affordable import affordable
-from klack.analyses.advice.cost import time_of
+from klack.analyses.advice.affordable import affordable, time_of
 from klack.analyses.advice.ladder import Ladder, Measure, score
 from klack.analyses.advice.modes import explicit_modes, mode_setting
 from klack.analyses.advice.regions import mesh_settings, unmeshed, unmeshed_notes
@@ -59,7 +58,6 @@ def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArr
 
     Parameters
     ----------
-    valve : Valve
     step : float, optional [s]
         Of the network; that of the case without.  Macro steps change in proportion.
     """
@@ -112,13 +110,10 @@ def advise_stroke(
 
     Parameters
     ----------
-    case : ValveCase
     error : float [-]
         Accepted for time and peak force of first impacts, and for their restitution.
     confirm : bool
         Run the advised valve and lay it over the one with everything finest.
-    progress : callable
-    threads : int, optional
 
     Raises
     ------
@@ -242,10 +237,8 @@ def step_ladder(
 
     Parameters
     ----------
-    valve : Valve
     now : mapping of str to array
         First impacts with the step of the case.
-    measures : sequence of Measure
     """
     step, doubles = valve.case.run.fine_step, _may_double(valve)
     factors = _NEAR if doubles else _REST

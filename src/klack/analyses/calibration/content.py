@@ -1,7 +1,6 @@
 """What a calibration report says and shows before its layout: the same for screen and paper."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
@@ -29,30 +28,22 @@ from klack.analyses.measures import glossary, page_cells, page_heads
 from klack.analyses.page import page_of
 from klack.measurement.fit_window import FitWindow
 from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
-from klack.report.page import Content, Section, Table
+from klack.report.looks import thinned
+from klack.report.page import Content, Picture, Section, Table
 from klack.report.printed import STYLE, plain, svg
-from klack.report.thinning import thinned
 from klack.report.wording import listed, printed_unit, quantity
 
-__all__ = ["CorrelationFigure", "calibration_content", "stroke_chart"]
+__all__ = ["calibration_content", "stroke_chart"]
 
 
 _WIDTH = 6.7  # [in], text of an A4 page
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CorrelationFigure:
-    """Image and caption."""
-
-    image: bytes
-    note: str
 
 
 def correlation_figure(
     names: Sequence[str],
     matrices: Sequence[tuple[str, NDArray[np.float64]]],
     note: str,
-) -> CorrelationFigure:
+) -> Picture:
     """Draw correlation matrices side by side; every field carries its number.
 
     Parameters
@@ -68,7 +59,7 @@ def correlation_figure(
         grid = figure.subplots(1, len(matrices), squeeze=False)[0]
         for k, (axes, (title, matrix)) in enumerate(zip(grid, matrices, strict=True)):
             _draw(axes, names if k == 0 else [""] * count, names, title, matrix)
-        return CorrelationFigure(image=svg(figure), note=note)
+        return Picture(image=svg(figure), note=note)
 
 
 def _draw(

@@ -3,38 +3,34 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import isfinite
-from typing import Any, Literal, cast
-
-from typing_extensions import TypedDict
 
 from klack.acoustics.comparison import compare_histories
-from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
+from klack.analyses.analysis import Analysis
+from klack.analyses.impact.analysis import DEVIATION
+from klack.analyses.impact.measures import LEVEL_MEASURES
 from klack.analyses.impact.record import ImpactStudy, LevelResult
-from klack.analyses.impact.summary import DeviationJson
-from klack.analyses.json_parts import Real
-from klack.analyses.measures import (
-    Column,
-    Measure,
-    cells,
-    heads,
-    json_of,
-    with_measures,
+from klack.analyses.json_parts import (
+    JsonForm,
+    Key,
+    Real,
+    inherited,
+    measured_keys,
+    schema_key,
 )
+from klack.analyses.measures import Column, Measure, cells, heads
 from klack.contact.history import EnergyLedger, ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, measure_impact
 from klack.errors import InputError
 from klack.terminal.tables import TextTable
 
 __all__ = [
+    "CALCULIX",
     "COMPARISON_COLUMNS",
     "PROGRAM_MEASURES",
-    "CalculixJson",
     "Comparison",
     "OtherRun",
     "compare_with",
     "comparison_rows",
-    "comparison_to_json",
-    "comparison_told",
     "level_of",
     "with_other",
 ]
@@ -48,10 +44,8 @@ class OtherRun:
     ----------
     program : str
         Its name, as a table says it.
-    history : ImpactHistory
     energy_swing : float or None [-]
         Largest distance of the total energy from that at the start, over that at the start.
-    steps : int
     iterations : int or None
         Of all steps together.
     wall_time : float or None [s]
@@ -71,9 +65,6 @@ class Comparison:
 
     Parameters
     ----------
-    case, title : str
-    level : LevelResult
-    other : OtherRun
     measures : ImpactMeasures
         Of the other program.
     deviation : Deviation
@@ -143,29 +134,28 @@ PROGRAM_MEASURES: tuple[Measure[LevelResult], ...] = (
 COMPARISON_COLUMNS = ("", *heads(PROGRAM_MEASURES))
 
 
-@with_measures(PROGRAM_MEASURES)
-class ProgramJson(TypedDict):
-    """Impact as one program computed it."""
-
-
-class OtherProgramJson(ProgramJson):
-    """Impact as the other program computed it."""
-
-    iterations: int | None
-    energy_swing: Real
-
-
-class CalculixJson(TypedDict):
-    """``klack compare --calculix``."""
-
-    schema: Literal["klack-compare-calculix/1"]
-    case: str
-    level: str
-    program: str
-    klack: ProgramJson
-    other: OtherProgramJson
-    deviation: DeviationJson
-    wall_time_ratio: Real
+_PROGRAM = JsonForm(
+    "ProgramJson", "Impact as one program computed it.", *measured_keys(PROGRAM_MEASURES)
+)
+_OTHER = JsonForm(
+    "OtherProgramJson",
+    "Impact as the other program computed it.",
+    *inherited(_PROGRAM, lambda comparison: comparison.runs[0]),
+    Key("iterations", int | None, of="other.iterations"),
+    Key("energy_swing", Real, of="other.energy_swing"),
+)
+_COMPARISON = JsonForm(
+    "CalculixJson",
+    "``klack compare --calculix``.",
+    schema_key("klack-compare-calculix/1"),
+    Key("case", str),
+    Key("level", str, of="level.level"),
+    Key("program", str, of="other.program"),
+    Key("klack", _PROGRAM, of=lambda comparison: comparison.runs[1]),
+    Key("other", _OTHER, of=lambda comparison: comparison),
+    Key("deviation", DEVIATION),
+    Key("wall_time_ratio", Real),
+)
 
 
 def level_of(study: ImpactStudy, name: str) -> LevelResult:
@@ -234,7 +224,7 @@ def comparison_rows(comparison: Comparison) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def comparison_told(comparison: Comparison) -> Iterator[TextTable | str]:
+def _told(comparison: Comparison) -> Iterator[TextTable | str]:
     """What a terminal shows: both programs, and how far their histories are apart."""
     yield TextTable(
         title=comparison.title, columns=COMPARISON_COLUMNS, rows=comparison_rows(comparison)
@@ -244,7 +234,8 @@ def comparison_told(comparison: Comparison) -> Iterator[TextTable | str]:
         f"Force history: {100 * d.history_l2:.2f} % rms of the peak; third octaves within "
         f"{d.third_octave_max_dB:.2g} dB up to {d.third_octave_up_to_Hz / 1e3:.4g} kHz."
     )
-    swing, friction = comparison.other.energy_swing, _rubbed(comparison.level.history.ledger)
+    swing, ledger = comparison.other.energy_swing, comparison.level.history.ledger
+    friction = _over_all(ledger, ledger.friction)
     if swing is None:
         return
     if friction:
@@ -269,35 +260,18 @@ def energy_balance(ledger: EnergyLedger) -> float | None:
     """
     if not ledger.bodies:
         return None
-    return ledger.residual - _lost(ledger) + _rubbed(ledger)
+    return ledger.residual - _over_all(ledger, ledger.lost) + _over_all(ledger, ledger.friction)
 
 
-def _lost(ledger: EnergyLedger) -> float:
+def _over_all(ledger: EnergyLedger, energy: float) -> float:
+    """Energy over the energy turned over [-]."""
     turned_over = max(ledger.initial, abs(ledger.work))
-    return ledger.lost / turned_over if turned_over else 0.0
+    return energy / turned_over if turned_over else 0.0
 
 
-def _rubbed(ledger: EnergyLedger) -> float:
-    turned_over = max(ledger.initial, abs(ledger.work))
-    return ledger.friction / turned_over if turned_over else 0.0
-
-
-def comparison_to_json(comparison: Comparison) -> CalculixJson:
-    """Plain numbers in SI, the unit in the key; what is not known is None."""
-    other = comparison.other
-    theirs, ours = comparison.runs
-    found: Any = {
-        "schema": "klack-compare-calculix/1",
-        "case": comparison.case,
-        "level": comparison.level.level,
-        "program": other.program,
-        "klack": json_of(PROGRAM_MEASURES, ours),
-        "other": {
-            **json_of(PROGRAM_MEASURES, theirs),
-            "iterations": other.iterations,
-            "energy_swing": other.energy_swing,
-        },
-        "deviation": json_of(DEVIATION_MEASURES, comparison.deviation),
-        "wall_time_ratio": comparison.wall_time_ratio,
-    }
-    return cast(CalculixJson, found)
+CALCULIX = Analysis(
+    json=_COMPARISON.type,
+    to_json=_COMPARISON.json,
+    told=_told,
+    measures={"impact by a program": PROGRAM_MEASURES},
+)

@@ -7,11 +7,16 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
-from klack.analyses.comparison.strokes_record import ComparedImpact, ComparedVariant, stop_words
+from klack.analyses.comparison.record import (
+    ComparedImpact,
+    ComparedVariant,
+    MeasuredDistribution,
+    MeasuredShotsStudy,
+    stop_words,
+)
 from klack.analyses.shots.wording import length_unit
 from klack.report.chart import AxisSpec, Chart, Colour, Curve, Mark, Panel, Style
-from klack.report.thinning import thinned
+from klack.report.looks import thinned
 from klack.report.wording import quantity
 
 __all__ = [
@@ -81,13 +86,8 @@ def first_touch_chart(variant: ComparedVariant, stop: str) -> Chart | None:
         title=f"First impact on the {stop_words(stop)}: {variant.variant}",
         x=AxisSpec(label="time from the trigger", unit="ms", range=window),
         panels=(
-            Panel(y=axis, curves=lift.curves, marks=marks, share=lift.share),
-            Panel(
-                y=velocity.y,
-                curves=velocity.curves,
-                marks=(*(Mark(value=m.value) for m in marks), _ZERO),
-                share=velocity.share,
-            ),
+            replace(lift, y=axis, marks=marks),
+            replace(velocity, marks=(*(Mark(value=m.value) for m in marks), _ZERO)),
         ),
         note="First touch: where the fitted flight reaches the level of the stop.",
     )
@@ -102,43 +102,51 @@ def _with_room(panel: Panel) -> tuple[float, float]:
 
 def side_by_side_chart(variants: Sequence[ComparedVariant]) -> Chart:
     """Lift of several variants, each beside its measured median."""
-    panels = []
-    for variant in variants:
-        window = _moving(variant)
-        panel = _lift_panel(variant, window, 0.8)
-        axis = AxisSpec(label=f"lift, {variant.variant}", unit="µm")
-        panels.append(Panel(y=axis, curves=panel.curves, marks=panel.marks, share=panel.share))
-    low = min(_moving(variant)[0] for variant in variants)
-    high = max(_moving(variant)[1] for variant in variants)
+    windows = [_moving(variant) for variant in variants]
+    panels = tuple(
+        _panel(v, "lift", AxisSpec(label=f"lift, {v.variant}", unit="µm"), 1e6, window, 0.8)
+        for v, window in zip(variants, windows, strict=True)
+    )
+    low, high = min(window[0] for window in windows), max(window[1] for window in windows)
     return Chart(
         name="side-by-side",
         title="Effect of the fluid, computed and measured",
         x=AxisSpec(label="time from the trigger", unit="ms", range=(low, high)),
-        panels=tuple(panels),
+        panels=panels,
         note="; ".join(f"{v.variant}: {v.label}, {v.count} measured strokes" for v in variants)
         + ".",
     )
 
 
 def _lift_panel(variant: ComparedVariant, window: tuple[float, float], share: float) -> Panel:
-    curves = [
-        *_thin(variant, 1e6 * variant.lift.astype(float), window),
-        _area(variant, 1e6 * variant.lift_low, 1e6 * variant.lift_high, window),
-        _line(variant, 1e6 * variant.lift_median, window, _MEDIAN, "blue", 1.6),
-        _line(variant, 1e6 * variant.computed_lift, window, _COMPUTED, "black", 1.8, "dashed"),
-    ]
-    return Panel(y=AxisSpec(label="lift", unit="µm"), curves=tuple(curves), share=share)
+    return _panel(variant, "lift", AxisSpec(label="lift", unit="µm"), 1e6, window, share)
 
 
 def _velocity_panel(variant: ComparedVariant, window: tuple[float, float], share: float) -> Panel:
-    curves = [
-        *_thin(variant, variant.velocity.astype(float), window),
-        _area(variant, variant.velocity_low, variant.velocity_high, window),
-        _line(variant, variant.velocity_median, window, _MEDIAN, "blue", 1.6),
-        _line(variant, variant.computed_velocity, window, _COMPUTED, "black", 1.8, "dashed"),
-    ]
     axis = AxisSpec(label="velocity", unit="m/s")
-    return Panel(y=axis, curves=tuple(curves), marks=(_ZERO,), share=share)
+    return replace(_panel(variant, "velocity", axis, 1.0, window, share), marks=(_ZERO,))
+
+
+def _panel(
+    variant: ComparedVariant,
+    what: str,
+    axis: AxisSpec,
+    factor: float,
+    window: tuple[float, float],
+    share: float,
+) -> Panel:
+    """Computed over measured lift or velocity, with the band of the strokes."""
+    low, median, high, computed = (
+        factor * getattr(variant, name)
+        for name in (f"{what}_low", f"{what}_median", f"{what}_high", f"computed_{what}")
+    )
+    curves = (
+        *_thin(variant, factor * getattr(variant, what).astype(float), window),
+        _area(variant, low, high, window),
+        _line(variant, median, window, _MEDIAN, "blue", 1.6),
+        _line(variant, computed, window, _COMPUTED, "black", 1.8, "dashed"),
+    )
+    return Panel(y=axis, curves=curves, share=share)
 
 
 def _thin(variant: ComparedVariant, rows: Floats, window: tuple[float, float]) -> list[Curve]:

@@ -65,10 +65,8 @@ def compare_impact(
 
     Parameters
     ----------
-    study : ImpactStudy
     paths : sequence of Path
         Recordings of repeated shots.
-    level : str
     output : str, optional
         Name of the output; needed where the case has several.
     channel : str, optional
@@ -77,7 +75,6 @@ def compare_impact(
         Instead of that of the output.
     known_speed : bool
         The speed is known and the recordings are absolute: no factor is fitted.
-    progress : callable
 
     Raises
     ------

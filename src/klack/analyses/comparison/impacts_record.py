@@ -5,10 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.measures import Column, Measure, described_in
 from klack.analyses.record import CaseRecord
 from klack.measurement.pulse import Pulse
 
-__all__ = ["ComparedPulse", "MeasuredImpactStudy"]
+__all__ = ["PULSE_MEASURES", "ComparedPulse", "MeasuredImpactStudy"]
+
 
 Floats = NDArray[np.float64]
 
@@ -75,7 +77,6 @@ class MeasuredImpactStudy(CaseRecord):
     middle, low, high : array, shape (n,)
         Median, 5 % and 95 % of the recordings.
     computed : array, shape (n,)
-    notes : tuple of str
     """
 
     level: str
@@ -91,3 +92,98 @@ class MeasuredImpactStudy(CaseRecord):
     high: Floats
     computed: Floats
     notes: tuple[str, ...]
+
+
+_US = ("us", 1e6, ".2f")
+
+
+def _pair(key: str, definition: str) -> tuple[Measure[ComparedPulse], ...]:
+    """One time of the pulse, measured and computed."""
+    words = key.replace("_", " ")
+    return (
+        Measure(
+            key=f"measured_{key}",
+            unit="s",
+            definition=f"{definition} Of the measured pulse.",
+            read=lambda pulse: getattr(pulse.measured, key),
+            column=Column(*_US, f"{words}, measured"),
+            page=True,
+        ),
+        Measure(
+            key=f"computed_{key}",
+            unit="s",
+            definition=f"{definition} Of the computed pulse.",
+            read=lambda pulse: getattr(pulse.computed, key),
+            column=Column(*_US, "computed"),
+            page=True,
+        ),
+    )
+
+
+PULSE_MEASURES: tuple[Measure[ComparedPulse], ...] = described_in(
+    "reference/measured",
+    Measure(
+        key="factor",
+        definition="Measured over computed: the one factor that is fitted, unless the speed is "
+        "known.",
+        column=Column("", 1.0, ".4f"),
+        page=True,
+    ),
+    Measure(
+        key="shift",
+        unit="s",
+        definition="Time of the computed pulse minus that of the measured one, fitted.",
+    ),
+    Measure(
+        key="measured_plateau",
+        unit="1",
+        definition="Mean over the middle half of the measured pulse, in SI.",
+        read=lambda pulse: pulse.measured.plateau,
+    ),
+    Measure(
+        key="rms",
+        definition="Root mean square of the difference over the measured plateau, from 20 % of the "
+        "length before the front to 20 % behind the end.",
+        form="share",
+        digits=2,
+        column=Column("%", 100.0, ".2f", "rms"),
+        page=True,
+    ),
+    *_pair("length", "Between the crossings of half of the plateau."),
+    Measure(
+        key="length_difference",
+        definition="Computed length over the measured one, minus 1.",
+        form="signed share",
+        digits=2,
+        column=Column("%", 100.0, "+.2f", "length, difference"),
+        page=True,
+    ),
+    *_pair("rise", "From 10 to 90 % of the plateau."),
+    *_pair("fall", "From 90 to 10 % of the plateau."),
+    Measure(
+        key="measured_peak",
+        definition="Highest value of the measured pulse over its plateau.",
+        read=lambda pulse: pulse.measured.peak,
+        column=Column("", 1.0, ".3f", "peak / plateau, measured"),
+    ),
+    Measure(
+        key="computed_peak",
+        definition="Highest value of the computed pulse over its plateau.",
+        read=lambda pulse: pulse.computed.peak,
+        column=Column("", 1.0, ".3f", "computed"),
+    ),
+    Measure(
+        key="measured_ripple",
+        definition="Standard deviation of the measured plateau over its mean.",
+        read=lambda pulse: pulse.measured.ripple,
+        form="share",
+    ),
+    Measure(
+        key="computed_ripple",
+        definition="Standard deviation of the computed plateau over its mean.",
+        read=lambda pulse: pulse.computed.ripple,
+        form="share",
+    ),
+    *_pair("ripple_period", "From the first to the second crest behind the front."),
+)
+"""Of one recording; catalogue of its page."""

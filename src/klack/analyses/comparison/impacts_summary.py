@@ -1,52 +1,50 @@
 """The few numbers of an impact beside measured pulses that a script or a terminal wants."""
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal, cast
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured
-from klack.analyses.comparison.impacts_measures import PULSE_MEASURES
-from klack.analyses.comparison.impacts_record import MeasuredImpactStudy
-from klack.analyses.json_parts import Version
-from klack.analyses.measures import json_of, text_table, with_measures
+from klack.analyses.analysis import Measured, StoredAnalysis
+from klack.analyses.comparison.impacts_record import PULSE_MEASURES, MeasuredImpactStudy
+from klack.analyses.json_parts import CASE, JsonForm, Key, measured_keys, schema_key
+from klack.analyses.measures import text_table
+from klack.analyses.store import RecordFormat
 from klack.terminal.tables import Notes, TextTable
 
 __all__ = [
-    "ImpactPulsesJson",
+    "MEASURED_IMPACT",
     "factor_sentence",
-    "measured_impact_to_json",
-    "measured_impact_told",
     "pulse_verdict",
-    "pulses_measured",
 ]
 
 
-@with_measures(PULSE_MEASURES)
-class PulseJson(TypedDict):
-    """One recording beside the computed pulse."""
+_PULSE = JsonForm(
+    "PulseJson",
+    "One recording beside the computed pulse.",
+    Key("recording", str, of="name"),
+    Key("channel", str, "Name in the file, with its unit."),
+    *measured_keys(PULSE_MEASURES),
+)
+_STUDY = JsonForm(
+    "ImpactPulsesJson",
+    "``klack compare`` of an impact with recordings of a sensor.",
+    schema_key("klack-compare-impact/1"),
+    *CASE,
+    Key("level", str),
+    Key("output", str),
+    Key("what", str, "Kind, place and low pass of the output.", "label"),
+    Key(
+        "factor_fitted",
+        bool,
+        "False where the speed is known.",
+        lambda study: study.pulses[0].fitted,
+    ),
+    Key("pulses", [_PULSE]),
+    Key("verdict", str, of=lambda study: pulse_verdict(study)),
+)
 
-    recording: str
-    channel: Annotated[str, Field(description="Name in the file, with its unit.")]
 
-
-class ImpactPulsesJson(TypedDict):
-    """``klack compare`` of an impact with recordings of a sensor."""
-
-    schema: Literal["klack-compare-impact/1"]
-    case: str
-    klack: Version
-    level: str
-    output: str
-    what: Annotated[str, Field(description="Kind, place and low pass of the output.")]
-    factor_fitted: Annotated[bool, Field(description="False where the speed is known.")]
-    pulses: list[PulseJson]
-    verdict: str
-
-
-def measured_impact_told(study: MeasuredImpactStudy) -> Iterator[TextTable | Notes | str]:
+def _told(study: MeasuredImpactStudy) -> Iterator[TextTable | Notes | str]:
     """What a terminal shows: a line for each recording, and what follows from them."""
     title = f"{study.title}, level '{study.level}': {study.label}"
     yield text_table(
@@ -106,34 +104,23 @@ def factor_sentence(study: MeasuredImpactStudy) -> str:
     )
 
 
-def pulses_measured(study: MeasuredImpactStudy) -> Iterator[Measured]:
-    """Every recording with its measures."""
+def _measured(study: MeasuredImpactStudy) -> Iterator[Measured]:
     for pulse in study.pulses:
         yield pulse.name, pulse, PULSE_MEASURES
 
 
-def measured_impact_to_json(study: MeasuredImpactStudy) -> ImpactPulsesJson:
-    """Plain numbers in SI, the unit in the key.
-
-    Returns
-    -------
-    dict
-        ``case``, ``level``, ``output``; ``pulses``: for each recording the fitted factor and
-        shift, and the numbers of both pulses; ``verdict``.  Numbers that do not exist (nan) are
-        None.
-    """
-    found: Any = {
-        "schema": "klack-compare-impact/1",
-        "case": study.case,
-        "klack": study.version,
-        "level": study.level,
-        "output": study.output,
-        "what": study.label,
-        "factor_fitted": study.pulses[0].fitted,
-        "pulses": [
-            {"recording": pulse.name, "channel": pulse.channel, **json_of(PULSE_MEASURES, pulse)}
-            for pulse in study.pulses
-        ],
-        "verdict": pulse_verdict(study),
-    }
-    return cast(ImpactPulsesJson, found)
+MEASURED_IMPACT = StoredAnalysis(
+    form=RecordFormat(
+        name="klack measured impact",
+        version=1,
+        kind=MeasuredImpactStudy,
+        command="klack compare RESULT --measurement",
+        units={"time": "s"},
+    ),
+    page="comparison.content:measured_impact_content",
+    json=_STUDY.type,
+    to_json=_STUDY.json,
+    told=_told,
+    measures={"pulse beside a measurement": PULSE_MEASURES},
+    measured=_measured,
+)

@@ -4,12 +4,13 @@ from collections.abc import Callable
 from operator import attrgetter
 from typing import TypeVar
 
-from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
-from klack.analyses.comparison.strokes_record import (
+from klack.analyses.comparison.record import (
     Compared,
     ComparedImpact,
     ComparedVariant,
     HighestShot,
+    MeasuredDistribution,
+    MeasuredShotsStudy,
 )
 from klack.analyses.measures import Column, Measure, described_in
 

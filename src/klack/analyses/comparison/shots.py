@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
+from klack.analyses.comparison.record import MeasuredDistribution, MeasuredShotsStudy
 from klack.analyses.comparison.strokes import compare_numbers, sensor_words
 from klack.analyses.measures import Measure
 from klack.analyses.record import case_fields, run_fields
@@ -57,7 +57,6 @@ def compare_shots(
 
     Parameters
     ----------
-    study : ShotsStudy
     paths : sequence of Path
         Recordings of the drops.
     section : CaseMeasurement or None
@@ -65,7 +64,6 @@ def compare_shots(
         on its seat somewhere in the record.
     case_text : str, optional
         The case that ``section`` stands in, if it is not that of the study.
-    progress : callable
 
     Raises
     ------
@@ -115,7 +113,6 @@ def mean_of_highest(values: Floats, heights: Floats, count: int) -> float:
     ----------
     values, heights : array, shape (n,)
         Shots without a value or a height are left out.
-    count : int
 
     Examples
     --------

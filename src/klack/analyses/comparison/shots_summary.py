@@ -2,31 +2,35 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
-from typing_extensions import TypedDict
 
-from klack.analyses.analysis import Measured
+from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.comparison.measures import DISTRIBUTION_MEASURES, DROPS_MEASURES
-from klack.analyses.comparison.shots_record import MeasuredDistribution, MeasuredShotsStudy
-from klack.analyses.json_parts import Real, RejectedJson, Version
-from klack.analyses.measures import json_of, number_or_none, with_measures
+from klack.analyses.comparison.record import MeasuredDistribution, MeasuredShotsStudy
+from klack.analyses.json_parts import (
+    CASE,
+    REJECTED,
+    JsonForm,
+    Key,
+    Real,
+    measured_keys,
+    schema_key,
+)
 from klack.analyses.sample import moments
+from klack.analyses.store import RecordFormat
 from klack.terminal.tables import Notes, TextTable
 from klack.units import format_si
 
 __all__ = [
     "DROP_COLUMNS",
-    "DropsJson",
+    "MEASURED_SHOTS",
     "bias_sentence",
     "drop_rows",
     "drop_rule",
     "drop_verdict",
-    "drops_measured",
-    "measured_shots_to_json",
-    "measured_shots_told",
 ]
 
 DROP_COLUMNS = ("measure", "", "median", "5 %", "95 %", "highest rebound", "shots")
@@ -43,29 +47,33 @@ _Sample = Annotated[
 ]
 
 
-@with_measures(DISTRIBUTION_MEASURES)
-class DistributionJson(TypedDict):
-    """One number of many drops, in the unit of its key."""
+_DISTRIBUTION = JsonForm(
+    "DistributionJson",
+    "One number of many drops, in the unit of its key.",
+    Key("computed", _Sample, of=lambda d: _moments(d.computed, d.computed_highest)),
+    Key("measured", _Sample, of=lambda d: _moments(d.measured, d.measured_highest)),
+    *measured_keys(DISTRIBUTION_MEASURES),
+)
+_STUDY = JsonForm(
+    "DropsJson",
+    "``klack compare`` of shots.",
+    schema_key("klack-compare-shots/1"),
+    *CASE,
+    Key("rejected", [REJECTED]),
+    *measured_keys(DROPS_MEASURES),
+    Key(
+        "distribution",
+        {str: _DISTRIBUTION},
+        "By measure.",
+        lambda study: {_KEYS.get(d.name, d.name): d for d in study.distributions},
+    ),
+    Key("verdict", str, of=lambda study: drop_verdict(study)),
+    Key("bias", str, of=lambda study: bias_sentence(study)),
+    Key("rule", str, "How the verdict is found.", lambda study: drop_rule(study)),
+)
 
-    computed: _Sample
-    measured: _Sample
 
-
-@with_measures(DROPS_MEASURES)
-class DropsJson(TypedDict):
-    """``klack compare`` of shots."""
-
-    schema: Literal["klack-compare-shots/1"]
-    case: str
-    klack: Version
-    rejected: list[RejectedJson]
-    distribution: Annotated[dict[str, DistributionJson], Field(description="By measure.")]
-    verdict: str
-    bias: str
-    rule: Annotated[str, Field(description="How the verdict is found.")]
-
-
-def measured_shots_told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
+def _told(study: MeasuredShotsStudy) -> Iterator[TextTable | Notes | str]:
     """What a terminal shows: both distributions, and what follows from them."""
     title = f"{study.title}: beside {len(study.names)} measured drops"
     yield TextTable(title=title, columns=DROP_COLUMNS, rows=drop_rows(study), left=2)
@@ -125,49 +133,14 @@ def drop_rows(study: MeasuredShotsStudy) -> tuple[tuple[str, ...], ...]:
     return tuple(rows)
 
 
-def measured_shots_to_json(study: MeasuredShotsStudy) -> DropsJson:
-    """Plain numbers in SI, the unit in the key.
-
-    Returns
-    -------
-    dict
-        ``case``; per measure: quantiles, mean and standard deviation computed and measured,
-        ``highest``, ``centred``, the expected highest of as many shots and its ``bias``, the
-        statistic and significance of the test; ``verdict``.  Numbers that do not exist (nan) are
-        None.
-    """
-    found: Any = {
-        "schema": "klack-compare-shots/1",
-        "case": study.case,
-        "klack": study.version,
-        "rejected": [{"name": item.name, "reason": item.reason} for item in study.rejected],
-        **json_of(DROPS_MEASURES, study),
-        "distribution": {_KEYS.get(d.name, d.name): _distribution(d) for d in study.distributions},
-        "verdict": drop_verdict(study),
-        "bias": bias_sentence(study),
-        "rule": drop_rule(study),
-    }
-    return cast(DropsJson, found)
-
-
-def drops_measured(study: MeasuredShotsStudy) -> Iterator[Measured]:
-    """All drops and each of their distributions with their measures."""
+def _measured(study: MeasuredShotsStudy) -> Iterator[Measured]:
     yield "drops", study, DROPS_MEASURES
     for d in study.distributions:
         yield d.name, d, DISTRIBUTION_MEASURES
 
 
-def _distribution(d: MeasuredDistribution) -> dict[str, Any]:
-    return {
-        "computed": _moments(d.computed, d.computed_highest),
-        "measured": _moments(d.measured, d.measured_highest),
-        **json_of(DISTRIBUTION_MEASURES, d),
-    }
-
-
 def _moments(values: np.ndarray, highest: float) -> dict[str, float | None]:
-    known = {"count": int(np.isfinite(values).sum()), "highest": number_or_none(highest)}
-    return moments(values) | known
+    return moments(values) | {"count": int(np.isfinite(values).sum()), "highest": highest}
 
 
 def _value(value: float, of: MeasuredDistribution | str, *, sign: bool = False) -> str:
@@ -176,3 +149,23 @@ def _value(value: float, of: MeasuredDistribution | str, *, sign: bool = False) 
         return "–"
     plus = "+" if sign and value > 0.0 else ""
     return plus + (format_si(value, unit, 3) if unit else f"{value:.4f}")
+
+
+MEASURED_SHOTS = StoredAnalysis(
+    form=RecordFormat(
+        name="klack measured shots",
+        version=1,
+        kind=MeasuredShotsStudy,
+        command="klack compare RESULT --measurement",
+        units={"time": "s", "lift": "m", "computed_time": "s", "computed_height": "m"},
+    ),
+    page="comparison.content:measured_shots_content",
+    json=_STUDY.type,
+    to_json=_STUDY.json,
+    told=_told,
+    measures={
+        "measured drops": DROPS_MEASURES,
+        "distribution beside a measurement": DISTRIBUTION_MEASURES,
+    },
+    measured=_measured,
+)

@@ -14,7 +14,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.comparison.strokes_record import (
+from klack.analyses.comparison.record import (
     IMPACT_NUMBERS,
     Compared,
     ComparedImpact,
@@ -70,7 +70,6 @@ def compare_strokes(
 
     Parameters
     ----------
-    study : StrokeStudy
     measurements : mapping of variant to files
         Of one set each.
     section : CaseMeasurement or None
@@ -78,7 +77,6 @@ def compare_strokes(
         is one stroke, and the sensor is perfect.
     case_text : str, optional
         The case that ``section`` stands in, if it is not that of the study.
-    progress : callable
 
     Raises
     ------

@@ -2,12 +2,9 @@
 
 from collections.abc import Iterator
 from math import isfinite
-from typing import Annotated, Any, Literal, cast
+from typing import Literal, NamedTuple
 
-from pydantic import Field
-from typing_extensions import TypedDict
-
-from klack.analyses.analysis import Measured
+from klack.analyses.analysis import Measured, StoredAnalysis
 from klack.analyses.comparison.measures import (
     COMPARED,
     HIGHEST_MEASURES,
@@ -17,29 +14,35 @@ from klack.analyses.comparison.measures import (
     VARIANT_MEASURES,
     VELOCITY_CURVE,
 )
-from klack.analyses.comparison.strokes_record import (
+from klack.analyses.comparison.record import (
     ComparedVariant,
     MeasuredStrokeStudy,
     stop_words,
 )
-from klack.analyses.json_parts import RejectedJson, Version
-from klack.analyses.measures import cells, heads, json_of, with_measures
+from klack.analyses.json_parts import (
+    CASE,
+    REJECTED,
+    JsonForm,
+    Key,
+    inherited,
+    measured_keys,
+    schema_key,
+)
+from klack.analyses.measures import cells, heads
+from klack.analyses.store import RecordFormat
 from klack.terminal.tables import Notes, TextTable
 
 __all__ = [
     "CURVE_COLUMNS",
     "HIGHEST_COLUMNS",
     "IMPACT_COLUMNS",
+    "MEASURED_STROKES",
     "RULE",
-    "StrokesJson",
     "agreement",
     "curve_rows",
     "highest_rows",
     "impact_rows",
-    "measured_strokes_told",
-    "measured_to_json",
     "rule",
-    "strokes_measured",
     "verdict",
 ]
 
@@ -55,48 +58,59 @@ RULE = (
     "counted."
 )
 
-_Stop = Annotated[str, Field(description="``opening`` or ``seat``.")]
+_STOP = Key("stop", str, "``opening`` or ``seat``.")
+_IMPACT = JsonForm(
+    "ComparedImpactJson",
+    "One impact, computed and measured.",
+    _STOP,
+    Key("number", int, "1 for the first on this stop."),
+    *measured_keys(IMPACT_MEASURES),
+)
+_HIGHEST = JsonForm(
+    "HighestStrokeJson",
+    "The measured stroke that rebounds highest from a stop.",
+    _STOP,
+    Key("stroke", str),
+    *measured_keys(HIGHEST_MEASURES),
+)
 
 
-@with_measures(IMPACT_MEASURES)
-class ComparedImpactJson(TypedDict):
-    """One impact, computed and measured."""
-
-    stop: _Stop
-    number: Annotated[int, Field(description="1 for the first on this stop.")]
+class _Variant(NamedTuple):
+    study: MeasuredStrokeStudy
+    variant: ComparedVariant
 
 
-@with_measures(HIGHEST_MEASURES)
-class HighestStrokeJson(TypedDict):
-    """The measured stroke that rebounds highest from a stop."""
-
-    stop: _Stop
-    stroke: str
+def _variants(study: MeasuredStrokeStudy) -> dict[str, _Variant]:
+    return {name: _Variant(study, variant) for name, variant in study.variants.items()}
 
 
-@with_measures(VARIANT_MEASURES)
-class ComparedVariantJson(TypedDict):
-    """A variant compared with its recording."""
+_VARIANT = JsonForm(
+    "ComparedVariantJson",
+    "A variant compared with its recording.",
+    Key(
+        "agreement",
+        Literal["excellent", "fair", "none", "unknown"],
+        of=lambda of: agreement(*of),
+    ),
+    Key("verdict", str, of=lambda of: verdict(*of)),
+    Key("rejected", [REJECTED], of="variant.rejected"),
+    *measured_keys(VARIANT_MEASURES, "variant"),
+    Key("impacts", [_IMPACT], of="variant.impacts"),
+    Key("highest_rebound", [_HIGHEST], of="variant.highest"),
+)
+_STUDY = JsonForm(
+    "StrokesJson",
+    "``klack compare`` of strokes: numbers of the first variant, and of all.",
+    schema_key("klack-compare-strokes/1"),
+    *CASE,
+    Key("variant", str, of=lambda study: next(iter(study.variants))),
+    *inherited(_VARIANT, lambda study: next(iter(_variants(study).values()))),
+    Key("variants", {str: _VARIANT}, "All of them by name.", _variants),
+    Key("rule", str, "How the verdict is found.", lambda study: rule(study)),
+)
 
-    agreement: Literal["excellent", "fair", "none", "unknown"]
-    verdict: str
-    rejected: list[RejectedJson]
-    impacts: list[ComparedImpactJson]
-    highest_rebound: list[HighestStrokeJson]
 
-
-class StrokesJson(ComparedVariantJson):
-    """``klack compare`` of strokes: numbers of the first variant, and of all."""
-
-    schema: Literal["klack-compare-strokes/1"]
-    case: str
-    klack: Version
-    variant: str
-    variants: Annotated[dict[str, ComparedVariantJson], Field(description="All of them by name.")]
-    rule: Annotated[str, Field(description="How the verdict is found.")]
-
-
-def measured_strokes_told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
+def _told(study: MeasuredStrokeStudy) -> Iterator[TextTable | Notes | str]:
     """What a terminal shows: curves and impacts of each variant, and the verdicts."""
     for variant in study.variants.values():
         aside = f", {len(variant.rejected)} discarded" if variant.rejected else ""
@@ -179,8 +193,7 @@ def highest_rows(variant: ComparedVariant) -> tuple[tuple[str, ...], ...]:
     )
 
 
-def strokes_measured(study: MeasuredStrokeStudy) -> Iterator[Measured]:
-    """Every variant, its impacts and highest rebounds with their measures."""
+def _measured(study: MeasuredStrokeStudy) -> Iterator[Measured]:
     for name, variant in study.variants.items():
         yield name, variant, VARIANT_MEASURES
         for impact in variant.impacts:
@@ -189,49 +202,35 @@ def strokes_measured(study: MeasuredStrokeStudy) -> Iterator[Measured]:
             yield f"{name}, highest rebound from {shot.stop}", shot, HIGHEST_MEASURES
 
 
-# --------------------------------------------------------------------------- JSON
-
-
-def measured_to_json(study: MeasuredStrokeStudy) -> StrokesJson:
-    """Plain numbers in SI, the unit in the key.
-
-    Returns
-    -------
-    dict
-        ``case``, ``variant`` (the first one) and its numbers: ``lift_rms_m`` and
-        ``velocity_rms_m_s``, with ``..._rms_scatter_...`` of single strokes; ``lift_m`` between
-        the stops; ``highest_rebound``: the measured stroke that rebounds highest from each stop,
-        and how much a maximum of so many adds; ``impacts``: per impact each number computed,
-        ``_measured``, ``_scatter``, ``_reading_error``, ``_difference`` and
-        ``_difference_in_scatter``;
-        ``variants``: the same of all.  Numbers that do not exist (nan) are None.
-    """
-    variants = {name: _variant(study, variant) for name, variant in study.variants.items()}
-    first = next(iter(variants))
-    return {
-        "schema": "klack-compare-strokes/1",
-        "case": study.case,
-        "klack": study.version,
-        "variant": first,
-        **variants[first],
-        "variants": variants,
-        "rule": rule(study),
-    }
-
-
-def _variant(study: MeasuredStrokeStudy, variant: ComparedVariant) -> ComparedVariantJson:
-    numbers: Any = {
-        "agreement": agreement(study, variant),
-        "verdict": verdict(study, variant),
-        "rejected": [{"name": item.name, "reason": item.reason} for item in variant.rejected],
-        **json_of(VARIANT_MEASURES, variant),
-        "impacts": [
-            {"stop": impact.stop, "number": impact.number, **json_of(IMPACT_MEASURES, impact)}
-            for impact in variant.impacts
-        ],
-        "highest_rebound": [
-            {"stop": shot.stop, "stroke": shot.stroke, **json_of(HIGHEST_MEASURES, shot)}
-            for shot in variant.highest
-        ],
-    }
-    return cast(ComparedVariantJson, numbers)
+MEASURED_STROKES = StoredAnalysis(
+    form=RecordFormat(
+        name="klack measured strokes",
+        version=1,
+        kind=MeasuredStrokeStudy,
+        command="klack compare RESULT --measurement",
+        units={
+            "time": "s",
+            **dict.fromkeys(("lift", "lift_median", "lift_low", "lift_high", "computed_lift"), "m"),
+            **dict.fromkeys(
+                (
+                    "velocity",
+                    "velocity_median",
+                    "velocity_low",
+                    "velocity_high",
+                    "computed_velocity",
+                ),
+                "m/s",
+            ),
+        },
+    ),
+    page="comparison.content:measured_strokes_content",
+    json=_STUDY.type,
+    to_json=_STUDY.json,
+    told=_told,
+    measures={
+        "variant beside a measurement": VARIANT_MEASURES,
+        "impact beside a measurement": IMPACT_MEASURES,
+        "highest measured rebound": HIGHEST_MEASURES,
+    },
+    measured=_measured,
+)

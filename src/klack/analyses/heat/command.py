@@ -69,11 +69,15 @@ def heat(
     ending = Ending.of(wanted, f"{checked.name}-{'soaked' if temperatures else 'heat'}")
 
     with show_progress(wanted.quiet):
-        from klack.analyses.heat.analysis import HEAT
-        from klack.analyses.heat.figures import heat_charts
-        from klack.analyses.heat.log import HEAT_LOG
-        from klack.analyses.heat.run import run_heat
-        from klack.analyses.heat.table import CAUSES_NAME, CSV_NAME, write_causes, write_csv
+        from klack.analyses.heat.content import (
+            CAUSES_NAME,
+            CSV_NAME,
+            heat_charts,
+            write_causes,
+            write_csv,
+        )
+        from klack.analyses.heat.run import HEAT_LOG, run_heat
+        from klack.analyses.heat.summary import HEAT
         from klack.compiling.ahead import compiling_ahead
 
     ahead = compiling_ahead(("loop", "rest"), wanted.threads)
@@ -88,16 +92,10 @@ def heat(
         )
 
     def beside(folder: Path) -> tuple[str, ...]:
-        from klack.report.printed import png_chart, svg_chart
+        from klack.report.printed import write_charts
 
         write_csv(record, folder / CSV_NAME)
         write_causes(record, folder / CAUSES_NAME)
-        names = [CSV_NAME, CAUSES_NAME]
-        for chart in heat_charts(record):
-            for end, draw in (("svg", svg_chart), ("png", png_chart)):
-                name = f"{chart.name}.{end}"
-                (folder / name).write_bytes(draw(chart))
-                names.append(name)
-        return tuple(names)
+        return (CSV_NAME, CAUSES_NAME, *write_charts(heat_charts(record), folder))
 
     return ending.end(HEAT, record, beside=beside, unfinished=HEAT_LOG)

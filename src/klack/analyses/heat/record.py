@@ -40,7 +40,6 @@ class CauseRow:
         At which temperatures, in words.
     cause : str
         ``"base"``, an aspect, or ``"all"``.
-    numbers : mapping of str to float
     """
 
     state: str
@@ -54,7 +53,6 @@ class HeatStudy(CaseRecord):
 
     Parameters
     ----------
-    variant : str
     period : float [s]
         From one stroke to the next.
     time : array, shape (points,) [s]
@@ -65,7 +63,6 @@ class HeatStudy(CaseRecord):
         Mean heat of the strokes into each node.
     numbers, values : tuple of WarmColumn
         Of the strokes: delays and peaks; resistances and gaps.
-    causes : tuple of CauseRow
     end : str
         ``"steady"``, ``"duration"``, ``"runaway"``, ``"hot"``, or ``"soaked"``.
     gain : float [-]

@@ -6,15 +6,23 @@ from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
 from time import perf_counter, process_time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.heat.heated_stroke import NUMBERS, HeatedStroke, heated_stroke, sent_heat
-from klack.analyses.heat.log import HEAT_LOG, HeatLog, heat_mark
+from klack.analyses.heat.heated_stroke import (
+    NUMBERS,
+    Aspect,
+    HeatedStroke,
+    aspects_of,
+    heated_stroke,
+    hot_windings,
+    sent_heat,
+)
 from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
-from klack.analyses.heat.warm_valve import Aspect, aspects_of, hot_windings
 from klack.analyses.record import case_fields, run_fields
+from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.valve import Valve, build_valve
 from klack.cache.setting import result_cache
 from klack.case.levels import Variant
@@ -28,7 +36,49 @@ from klack.stages import StageClock, collected_warnings
 from klack.thermal.heat_network import HeatNetwork, heat_network
 from klack.thermal.slow_warm_up import SlowSettings, SlowWarmUp, WarmPoint, warm_up
 
-__all__ = ["run_heat"]
+__all__ = ["HEAT_LOG", "run_heat"]
+
+
+HeatLog = UnfinishedLog[str, HeatedStroke]
+"""Strokes by their temperatures."""
+
+
+def heat_mark(case: ValveCase, threads: int | None) -> str:
+    """Digest of all that decides the numbers of a stroke."""
+    files = (path.read_bytes() for path in case.component_files.values())
+    own = (f"{name} {digest}".encode() for name, digest in case.own_components.items())
+    run = case.run.model_dump_json().encode()
+    return fingerprint(case, (run, str(threads).encode(), *own, *files))
+
+
+def _data(key: str, stroke: HeatedStroke) -> Mapping[str, Any]:
+    return {
+        "key": key,
+        "losses": dict(stroke.losses),
+        "numbers": dict(stroke.numbers),
+        "values": {name: list(value) for name, value in stroke.values.items()},
+        "doubts": list(stroke.doubts),
+    }
+
+
+def _stroke(data: Mapping[str, Any]) -> tuple[str, HeatedStroke]:
+    return str(data["key"]), HeatedStroke(
+        losses={str(name): float(value) for name, value in data["losses"].items()},
+        numbers={str(name): float(value) for name, value in data["numbers"].items()},
+        values={str(name): (float(v), str(unit)) for name, (v, unit) in data["values"].items()},
+        doubts=tuple(map(str, data["doubts"])),
+    )
+
+
+HEAT_LOG = LogForm(
+    file="heat.unfinished.jsonl",
+    format="klack heat 1",
+    parts="finished strokes",
+    data=_data,
+    read=_stroke,
+)
+"""How finished strokes are kept."""
+
 
 Vector = NDArray[np.float64]
 Temperatures = Mapping[str, float]
@@ -93,10 +143,8 @@ def run_heat(
         The first one of the case by default.
     soak : sequence of float [K]
         Temperatures of the whole valve, instead of a warm-up.
-    threads : int, optional
     folder : Path, optional
         Where finished strokes are kept until the result stands; in memory without one.
-    progress : callable
 
     Raises
     ------
@@ -183,7 +231,7 @@ class _Found:
 
 def _soaked(strokes: _Strokes, network: HeatNetwork, soak: Sequence[float]) -> _Found:
     """Strokes of a valve that is at one temperature throughout."""
-    names = _every_name(network)
+    names = (*network.node_of, *network.fixed_names)
     base = dict.fromkeys(names, REFERENCE)
     states = {_celsius(T): dict.fromkeys(names, T) for T in soak}
     whole = [strokes.at(state) for state in states.values()]
@@ -242,10 +290,6 @@ def _causes(
             rows.append(CauseRow(state=name, cause=aspect, numbers=dict(stroke.numbers)))
         rows.append(CauseRow(state=name, cause="all", numbers=dict(strokes.at(state).numbers)))
     return tuple(rows)
-
-
-def _every_name(network: HeatNetwork) -> tuple[str, ...]:
-    return (*network.node_of, *network.fixed_names)
 
 
 def _nodes(network: HeatNetwork, temperature: Vector) -> dict[str, float]:

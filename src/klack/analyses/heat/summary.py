@@ -1,31 +1,25 @@
-"""Warm-ups for scripts and terminals."""
+"""Warm-ups for scripts and terminals, and on disk; see :mod:`klack.analyses.store`.
 
-from collections.abc import Iterator, Mapping, Sequence
+``result.zarr/study/temperature/0/values`` is the temperature of the first node at every point.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isfinite
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
-from pydantic import Field
-from typing_extensions import TypedDict
 
+from klack.analyses.analysis import StoredAnalysis
+from klack.analyses.heat.heated_stroke import ASPECTS
 from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
-from klack.analyses.heat.warm_valve import ASPECTS
-from klack.analyses.json_parts import OwnComponents, Real, Version
+from klack.analyses.json_parts import CASE, OWN_COMPONENTS, JsonForm, Key, Real, schema_key
+from klack.analyses.store import RecordFormat
 from klack.report.wording import listed, quantity
 from klack.terminal.tables import TextTable
 from klack.units import format_si
 
-__all__ = [
-    "HeatJson",
-    "answer",
-    "cause_words",
-    "cell",
-    "heat_to_json",
-    "heat_told",
-    "main_columns",
-    "rows_of_causes",
-    "time_cell",
-]
+__all__ = ["HEAT", "answer", "cause_words", "cell", "main_columns", "rows_of_causes", "time_cell"]
+
 
 _ZERO_CELSIUS = 273.15
 _NOISE = 1e-9  # of the base: the rounding of a difference
@@ -33,96 +27,61 @@ _TOLD = 40
 """Points on a terminal."""
 
 
-class ColumnJson(TypedDict):
-    """One quantity of all points."""
+_COLUMN = JsonForm(
+    "ColumnJson",
+    "One quantity of all points.",
+    Key("unit", str, "SI; 1 for a pure number."),
+    Key("values", list[Real], "One per point; null where there is none."),
+    module=__name__,
+)
+_CAUSE = JsonForm(
+    "CauseJson",
+    "A stroke with one cause at other temperatures than the base.",
+    Key("state", str, "At which temperatures."),
+    Key("cause", str, "base, one aspect, or all of them."),
+    Key("numbers", dict[str, Real], "SI, by the names of 'strokes'."),
+)
 
-    unit: Annotated[str, Field(description="SI; 1 for a pure number.")]
-    values: Annotated[list[Real], Field(description="One per point; null where there is none.")]
+
+def _values(name: str) -> Callable[[HeatStudy], dict[str, Any]]:
+    return lambda record: {x.name: x.values for x in getattr(record, name)}
 
 
-class CauseJson(TypedDict):
-    """A stroke with one cause at other temperatures than the base."""
-
-    state: Annotated[str, Field(description="At which temperatures.")]
-    cause: Annotated[str, Field(description="base, one aspect, or all of them.")]
-    numbers: Annotated[dict[str, Real], Field(description="SI, by the names of 'strokes'.")]
+def _columns(name: str) -> Callable[[HeatStudy], dict[str, WarmColumn]]:
+    return lambda record: {x.name: x for x in getattr(record, name)}
 
 
-class HeatJson(TypedDict):
-    """``klack heat``."""
-
-    schema: Literal["klack-heat/1"]
-    case: str
-    klack: Version
-    own_components: OwnComponents
-    variant: str
-    period_s: float
-    end: Annotated[
+HEAT_FORM = JsonForm(
+    "HeatJson",
+    "``klack heat``.",
+    schema_key("klack-heat/1"),
+    *CASE,
+    OWN_COMPONENTS,
+    Key("variant", str),
+    Key("period_s", float, of="period"),
+    Key(
+        "end",
         Literal["steady", "duration", "runaway", "hot", "soaked"],
-        Field(description="How it ended; soaked: strokes at given temperatures."),
-    ]
-    gain: Annotated[Real, Field(description="From 1 on there is no steady state.")]
-    time_s: Annotated[list[Real], Field(description="null for the steady state.")]
-    temperature_K: Annotated[dict[str, list[Real]], Field(description="By node.")]
-    heat_W: Annotated[dict[str, list[Real]], Field(description="Mean heat of the strokes.")]
-    strokes: Annotated[dict[str, ColumnJson], Field(description="Delays and peaks.")]
-    values: Annotated[dict[str, ColumnJson], Field(description="Resistances and gaps.")]
-    causes: list[CauseJson]
-    supplied_J: Annotated[dict[str, float], Field(description="Heat into each node.")]
-    stored_J: dict[str, float]
-    given_off_J: Annotated[dict[str, float], Field(description="To each known temperature.")]
-    energy_residual: float
-    unsent_W: Annotated[dict[str, float], Field(description="Losses that warm no node.")]
-    stroke_count: int
-    repeats: Annotated[int, Field(description="Steps that were done again.")]
-    cpu_time_s: float
-    wall_time_s: float
-    warnings: list[str]
-
-
-def heat_to_json(record: HeatStudy) -> dict[str, Any]:
-    """Plain numbers in SI."""
-    return {
-        "schema": "klack-heat/1",
-        "case": record.case,
-        "klack": record.version,
-        "own_components": dict(record.own_components),
-        "variant": record.variant,
-        "period_s": record.period,
-        "end": record.end,
-        "gain": _plain(record.gain),
-        "time_s": [_plain(x) for x in record.time],
-        "temperature_K": {x.name: [_plain(v) for v in x.values] for x in record.temperature},
-        "heat_W": {x.name: [_plain(v) for v in x.values] for x in record.heat},
-        "strokes": _table(record.numbers),
-        "values": _table(record.values),
-        "causes": [
-            {
-                "state": row.state,
-                "cause": row.cause,
-                "numbers": {name: _plain(x) for name, x in row.numbers.items()},
-            }
-            for row in record.causes
-        ],
-        "supplied_J": dict(record.supplied),
-        "stored_J": dict(record.stored),
-        "given_off_J": dict(record.given_off),
-        "energy_residual": record.energy_residual,
-        "unsent_W": dict(record.unsent),
-        "stroke_count": record.strokes,
-        "repeats": record.repeats,
-        "cpu_time_s": record.cpu_time,
-        "wall_time_s": record.wall_time,
-        "warnings": list(record.warnings),
-    }
-
-
-def _plain(value: float) -> float | None:
-    return float(value) if isfinite(value) else None
-
-
-def _table(columns: Sequence[WarmColumn]) -> dict[str, ColumnJson]:
-    return {x.name: {"unit": x.unit, "values": [_plain(v) for v in x.values]} for x in columns}
+        "How it ended; soaked: strokes at given temperatures.",
+    ),
+    Key("gain", Real, "From 1 on there is no steady state."),
+    Key("time_s", list[Real], "null for the steady state.", "time"),
+    Key("temperature_K", dict[str, list[Real]], "By node.", _values("temperature")),
+    Key("heat_W", dict[str, list[Real]], "Mean heat of the strokes.", _values("heat")),
+    Key("strokes", {str: _COLUMN}, "Delays and peaks.", _columns("numbers")),
+    Key("values", {str: _COLUMN}, "Resistances and gaps.", _columns("values")),
+    Key("causes", [_CAUSE]),
+    Key("supplied_J", dict[str, float], "Heat into each node.", "supplied"),
+    Key("stored_J", dict[str, float], of="stored"),
+    Key("given_off_J", dict[str, float], "To each known temperature.", "given_off"),
+    Key("energy_residual", float),
+    Key("unsent_W", dict[str, float], "Losses that warm no node.", "unsent"),
+    Key("stroke_count", int, of="strokes"),
+    Key("repeats", int, "Steps that were done again."),
+    Key("cpu_time_s", float, of="cpu_time"),
+    Key("wall_time_s", float, of="wall_time"),
+    Key("warnings", list[str]),
+)
 
 
 def heat_told(record: HeatStudy) -> Iterator[TextTable | str]:
@@ -263,3 +222,14 @@ def _largest(record: HeatStudy, most: int = 3) -> list[str]:
     found = sorted(record.unsent.items(), key=lambda item: -abs(item[1]))
     words = [f"'{name}' {format_si(power, 'W', 3)}" for name, power in found[:most]]
     return words + (["others"] if len(found) > most else [])
+
+
+HEAT = StoredAnalysis(
+    form=RecordFormat(
+        name="klack heat", version=1, kind=HeatStudy, command="klack heat", units={"time": "s"}
+    ),
+    page="heat.content:heat_content",
+    json=HEAT_FORM.type,
+    to_json=HEAT_FORM.json,
+    told=heat_told,
+)

@@ -1,16 +1,267 @@
-"""An impact study on disk; see :mod:`klack.analyses.store`.
+"""An impact study in words and numbers, and on disk; see :mod:`klack.analyses.store`.
 
 ``result.zarr/study/levels/full/history/force`` is the force of the full-order run in newtons.
 """
 
-from klack.analyses.analysis import StoredAnalysis
-from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
-from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.impact.summary import ImpactJson, study_measured, study_to_json, study_told
-from klack.analyses.store import RecordFormat
-from klack.reduction.structure import STRUCTURE_UNITS
+from collections.abc import Iterator
+from typing import NamedTuple, Self
 
-__all__ = ["IMPACT"]
+import numpy as np
+
+from klack.analyses.analysis import Measured, StoredAnalysis
+from klack.analyses.contact_doubts import CONTACT, contact_doubt, elastic_above
+from klack.analyses.impact.measures import (
+    CONTACT_TIME,
+    DEVIATION_MEASURES,
+    LEVEL_MEASURES,
+    PEAK_FORCE,
+)
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.running_in import running_in_columns, running_in_rows
+from klack.analyses.json_parts import JsonForm, Key, Real, measured_keys, schema_key
+from klack.analyses.measures import text_table
+from klack.analyses.store import RecordFormat
+from klack.gauges.gauge import GaugeRecord
+from klack.reduction.structure import STRUCTURE_UNITS
+from klack.terminal.tables import TextTable
+from klack.units import format_si
+
+__all__ = [
+    "DEVIATION",
+    "GAUGE_COLUMNS",
+    "IMPACT",
+    "answer_line",
+    "answer_so_far",
+    "estimate_lines",
+    "gauge_rows",
+    "gauge_text",
+    "no_estimate",
+    "study_told",
+]
+
+
+DEVIATION = JsonForm(
+    "DeviationJson", "Deviation of one result from another.", *measured_keys(DEVIATION_MEASURES)
+)
+
+
+class _Ends(NamedTuple):
+    """Lowest and highest value of an output, and when [s]."""
+
+    record: GaugeRecord
+    lowest: float
+    lowest_at: float
+    highest: float
+    highest_at: float
+
+    @classmethod
+    def of(cls, record: GaugeRecord) -> Self:
+        values, time = record.values, record.time
+        places = (int(np.argmin(values)), int(np.argmax(values)))
+        return cls(record, *(float(of[k]) for k in places for of in (values, time)))
+
+
+_OUTPUT = JsonForm(
+    "OutputJson",
+    "What one sensor shows during the impact.",
+    Key("kind", str, "displacement, velocity, strain or stress.", "record.kind"),
+    Key("unit", str, "Of the two values; 1 for a strain.", "record.unit"),
+    Key("lowest", Real),
+    Key("lowest_at_s", Real, of="lowest_at"),
+    Key("highest", Real),
+    Key("highest_at_s", Real, of="highest_at"),
+)
+_LEVEL = JsonForm(
+    "LevelJson",
+    "Impact at one level.",
+    *measured_keys(LEVEL_MEASURES),
+    Key("doubts", list[str], "Why the level may be wrong."),
+    Key(
+        "outputs",
+        {str: _OUTPUT},
+        "By the name of the channel.",
+        lambda level: {record.name: _Ends.of(record) for record in level.gauges},
+    ),
+)
+_RUNNING_IN = JsonForm(
+    "RunningInJson",
+    "Impacts one after another on the same faces, a number each.",
+    Key("level", str),
+    Key("asked", int),
+    Key("run_in", bool, "The last one does not yield any more."),
+    Key("peak_force_N", list[Real], of="peak_force"),
+    Key("contact_time_s", list[Real], of="contact_time"),
+    Key("restitution", list[Real]),
+    Key("lost_J", list[Real], "In yield.", "lost"),
+    Key("set_m", list[Real], "How much lower the bodies touch after it.", "set"),
+    Key("land_m", list[Real], "Width of the strip in contact so far; level reduced.", "land"),
+)
+STUDY = JsonForm(
+    "ImpactJson",
+    "``klack impact`` and ``klack demo``.",
+    schema_key("klack-impact/1"),
+    Key("case", str),
+    Key("complete", bool, "False: a level failed.", lambda study: not study.failures),
+    Key("failures", dict[str, str], "Why a level has no numbers, by its name."),
+    Key("answer", str, "Name of the best level.", "reference"),
+    Key("levels", {str: _LEVEL}, "By the name of the level."),
+    Key(
+        "deviation",
+        (DEVIATION, None),
+        "Of the level reduced from the reference.",
+        lambda study: study.deviations.get("reduced"),
+    ),
+    Key("deviations", {str: DEVIATION}, "Of every level that is not the reference."),
+    Key(
+        "estimated_error",
+        {str: (DEVIATION, None)},
+        "Of every reduced level, and of the steps of the full order, by a run at the interface "
+        "level.",
+        lambda study: {
+            name: item if study.estimates_settled else None
+            for name, item in study.estimates.items()
+        },
+    ),
+    Key(
+        "estimate_margin",
+        {str: DEVIATION},
+        "So far may each be off; no signs.",
+        "estimate_margins",
+    ),
+    Key("contact", CONTACT, "All levels but lumped share it."),
+    Key("running_in", (_RUNNING_IN, None), "Null for one impact, or elastic faces."),
+    Key("warnings", list[str]),
+)
+
+
+def study_told(study: ImpactStudy) -> Iterator[TextTable | str]:
+    """Terminal output: the levels side by side, the answer, the error of the others."""
+    yield text_table(study.title, "level", LEVEL_MEASURES, study.levels.items())
+    yield answer_line(study)
+    if doubt := contact_doubt(study.contact):
+        yield doubt
+    if line := elastic_above(study.contact):
+        yield line
+    yield from estimate_lines(study)
+    if rows := gauge_rows(study):
+        yield TextTable(title="Outputs", columns=GAUGE_COLUMNS, rows=rows, left=3)
+    if found := study.running_in:
+        yield TextTable(
+            title="Running in",
+            columns=running_in_columns(found),
+            rows=running_in_rows(found, format_si),
+        )
+
+
+GAUGE_COLUMNS = ("output", "what", "level", "lowest", "at", "highest", "at")
+"""Heads of :func:`gauge_rows`."""
+
+
+def gauge_rows(study: ImpactStudy) -> tuple[tuple[str, ...], ...]:
+    """Extremes of every output at every level."""
+    return tuple(
+        (
+            record.name,
+            record.label,
+            level.level,
+            gauge_text(record, ends.lowest),
+            format_si(ends.lowest_at, "s"),
+            gauge_text(record, ends.highest),
+            format_si(ends.highest_at, "s"),
+        )
+        for level in study.ordered
+        for record in level.gauges
+        for ends in (_Ends.of(record),)
+    )
+
+
+def gauge_text(record: GaugeRecord, value: float) -> str:
+    """Value of an output with its unit; a strain in um/m."""
+    if record.kind == "strain":
+        return f"{1e6 * value:.4g} um/m"
+    return format_si(value, record.unit)
+
+
+def study_measured(study: ImpactStudy) -> Iterator[Measured]:
+    """Every level with its measures."""
+    for name, level in study.levels.items():
+        yield name, level, LEVEL_MEASURES
+
+
+def answer_line(study: ImpactStudy) -> str:
+    """Line with the level of the answer and its numbers."""
+    level = study.levels[study.reference]
+    m = level.measures
+    begin = f"Answer (level '{study.reference}'): "
+    touch = f"{m.approach_speed:.4g} m/s at first touch"
+    if m.cut_off:
+        return (
+            f"{begin}{touch}; the run is cut off in contact, at {m.peak_force:.2f} N so far: "
+            "no peak force, no contact time, no restitution."
+        )
+    contacts = f", {m.sub_contacts} contacts" if m.sub_contacts > 1 else ""
+    return (
+        f"{begin}peak force {PEAK_FORCE.told(level)}, contact time {CONTACT_TIME.told(level)}"
+        f"{contacts}; {touch}, "
+        f"{100 * m.restitution:.2f} % of it after the impact."
+    )
+
+
+def answer_so_far(study: ImpactStudy) -> tuple[str, ...]:
+    """Lines on a study to which further levels and comparisons are still to come."""
+    line = answer_line(study).replace("Answer", "Answer so far", 1)
+    doubts = (*study.levels[study.reference].doubts, contact_doubt(study.contact))
+    return (line, *filter(None, doubts), *estimate_lines(study))
+
+
+def no_estimate(study: ImpactStudy) -> str:
+    """Why the error of reduced levels was not estimated; empty where it was, or not requested."""
+    if study.estimate_doubt:
+        return f"No error estimate: {study.estimate_doubt}"
+    if study.estimates and not study.estimates_settled:
+        advice = "" if "full" in study.levels else " Compare with --level full."
+        return (
+            "No error estimate: the interface level itself has not converged "
+            f"(its force history changes by {100 * study.estimate_spread:.0f} % with half the "
+            f"modes in longer steps), as when flat faces meet all at once.{advice}"
+        )
+    return ""
+
+
+def estimate_lines(study: ImpactStudy) -> tuple[str, ...]:
+    """Error of every reduced level and of the steps of the full order, one line each."""
+    if reason := no_estimate(study):
+        return (reason,)
+    return tuple(_estimate_line(study, name) for name in study.estimates)
+
+
+def _estimate_line(study: ImpactStudy, name: str) -> str:
+    item, within = study.estimates[name], study.estimate_margins.get(name)
+    peak, time, impulse, restitution = (
+        (getattr(item, key), None if within is None else getattr(within, key))
+        for key in ("peak_force", "contact_time", "impulse", "restitution")
+    )
+    return (
+        f"Estimated error of {'the steps of ' * (name == 'full')}'{name}': peak force "
+        f"{_percent(*peak)}, contact time {_percent(*time)}, impulse {_percent(*impulse)}, "
+        f"restitution {_signed(*restitution, 4)} (against the {study.estimate_basis})."
+    )
+
+
+def _percent(value: float, within: float | None) -> str:
+    """Two significant digits, but nothing below a hundredth of a per cent."""
+    size = abs(100.0 * value)
+    digits = 2 if size < 1.0 else 1 if size < 10.0 else 0
+    text = _signed(100.0 * value, None if within is None else 100.0 * within, digits)
+    return text if text == "unknown" else f"{text} %"
+
+
+def _signed(value: float, within: float | None, digits: int) -> str:
+    if not abs(value) < float("inf"):
+        return "unknown"
+    text = f"{value:+.{digits}f}"
+    return text if within is None or within != within else f"{text} ± {within:.{digits}f}"
+
 
 _UNITS = {
     **STRUCTURE_UNITS,
@@ -54,8 +305,8 @@ IMPACT = StoredAnalysis(
         units=_UNITS,
     ),
     page="impact.content:report_content",
-    json=ImpactJson,
-    to_json=study_to_json,
+    json=STUDY.type,
+    to_json=STUDY.json,
     told=study_told,
     measures={
         "impact level": LEVEL_MEASURES,

@@ -50,7 +50,6 @@ def body_pictures(
     ----------
     problem : ContactProblem
         With its factorisations.
-    pools : mapping of body name to Modes
     pair : ReducedPair
         As the case asks.
     ran : LevelResult or None
@@ -104,9 +103,6 @@ def with_peak_stress(
 
     Parameters
     ----------
-    picture : BodyPicture
-    case : Case
-    body : ElasticBody
     displacement : array, shape (n_dof,) [m]
     """
     if case.bodies[body.name].material is None:

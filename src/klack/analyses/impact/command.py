@@ -46,7 +46,7 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
 
         from klack.analyses.impact.analysis import IMPACT
         from klack.analyses.impact.run import run_impact
-        from klack.analyses.impact.worn_case import WORN, worn_text
+        from klack.analyses.impact.running_in import WORN, worn_text
         from klack.analyses.incomplete import IncompleteImpactError
         from klack.compiling.ahead import compiling_ahead
 

@@ -10,19 +10,19 @@ from math import isfinite
 
 import numpy as np
 
-from klack.analyses.impact.estimate_wording import (
-    ESTIMATE_COLUMNS,
-    estimate_rows,
-    estimate_sentence,
-)
+from klack.analyses.impact.analysis import GAUGE_COLUMNS, gauge_rows, no_estimate
 from klack.analyses.impact.figures import charts
 from klack.analyses.impact.measures import DEVIATION_MEASURES, LEVEL_MEASURES
-from klack.analyses.impact.pressure_view import friction_views, study_views
-from klack.analyses.impact.pressure_wording import pressure_rows
+from klack.analyses.impact.pressure_view import friction_views, pressure_rows, study_views
 from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.running_in import running_in_columns, running_in_rows
-from klack.analyses.impact.summary import GAUGE_COLUMNS, gauge_rows, no_estimate
-from klack.analyses.impact.wording import answer, leaves_axis
+from klack.analyses.impact.wording import (
+    ESTIMATE_COLUMNS,
+    answer,
+    estimate_rows,
+    estimate_sentence,
+    leaves_axis,
+)
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
 from klack.assembling.body_summary import BodySummary
@@ -275,7 +275,7 @@ def _friction(study: ImpactStudy) -> Section:
     views = friction_views(study)
     if not views:
         return Section(title=title)
-    from klack.analyses.impact.friction_figure import friction_figure
+    from klack.analyses.impact.pressure_figure import friction_figure
 
     rubbing = [r for r in study.ordered if r.energies.get("friction")]
     rows = [

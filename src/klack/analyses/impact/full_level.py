@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from klack.analyses.impact.gauges import FullGauges
-from klack.analyses.impact.levels import level_result
-from klack.analyses.impact.pressure import pressure_record
+from klack.analyses.impact.levels import level_result, pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.modes import damping_of, is_damped
 from klack.assembling.problem import ContactProblem
@@ -45,12 +44,9 @@ def simulate_in_full(
 
     Parameters
     ----------
-    problem : ContactProblem
     kept : mapping of body name to Modes
         Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
         there, and they tell when the bodies have parted for good.
-    progress : callable
-    threads : int or None
     space : ContactSpace, optional
         Other contact points of the same surfaces than those of the static contact.
     longest_period : float [s]
@@ -160,7 +156,7 @@ def run_full(
     )
     unchecked = () if case.contact.faces.is_constant else (_JUMPS,)
     gauges = reading.records(case.run.full_step)
-    return replace(level, gauges=gauges, doubts=(*level.doubts, *unchecked)), result
+    return replace(level, gauges=gauges).doubted(*unchecked), result
 
 
 def _friction(case: Case, result: FullOrderResult) -> FrictionRecord | None:

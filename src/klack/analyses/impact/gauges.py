@@ -174,7 +174,6 @@ def with_reduced_gauges(
 
     Parameters
     ----------
-    result : LevelResult
     problem : ContactProblem
         With its static solutions still there.
     pair : ReducedPair

@@ -10,7 +10,13 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.impact.levels import deviations, level_result, lumped_level
+from klack.analyses.impact.levels import (
+    deviations,
+    law_summary,
+    law_words,
+    level_result,
+    lumped_level,
+)
 from klack.analyses.impact.record import ContactSummary, ImpactStudy, LawSummary, LevelResult
 from klack.analyses.impact.trust import best_level, trust_notes
 from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_notes
@@ -42,8 +48,6 @@ def run_given_impact(
     ----------
     case : Case
         With at least one body without surfaces.
-    levels : sequence of str
-    progress : callable
     threads : int, optional
         Of the factorisation of a body that klack reduces.
 
@@ -133,16 +137,12 @@ def _reduced(case: Case, pair: GivenPair, setup_time: float) -> LevelResult:
     return level_result(
         history,
         level="reduced",
-        label=f"reduced, {counts}, {_law_words(pair.law)}",
+        label=f"reduced, {counts}, {law_words(pair.law)}",
         dofs=pair.upper.mode_count + pair.lower.mode_count,
         step=case.run.reduced_step,
         wall_time=wall_time,
         setup_time=setup_time,
     )
-
-
-def _law_words(law: LinearLaw | HertzLaw) -> str:
-    return f"{law.stiffness / 1e6:.4g} N/um" if isinstance(law, LinearLaw) else "Hertz law"
 
 
 def _contact(case: Case, pair: GivenPair, peak: float) -> ContactSummary:
@@ -166,21 +166,10 @@ def _law(pair: GivenPair, peak: float) -> LawSummary:
     force = np.linspace(0.0, 1.2 * peak, _POINTS)
     local = _indentation(pair.law, force)
     indentation = local + pair.series_compliance * force
-    fit_range = (0.5 * peak, peak)
-    load = np.linspace(*fit_range, _POINTS)
-    slope = np.polyfit(np.interp(load, force, indentation), load, 1)[0]
     total = indentation + pair.modal_compliance * force
     share = np.append(np.nan, indentation[1:] / total[1:])
-    return LawSummary(
-        kind="linear" if isinstance(pair.law, LinearLaw) else "hertz",
-        indentation=indentation,
-        force=force,
-        share=share,
-        linear_stiffness=float(slope),
-        fit_range=fit_range,
-        classical_stiffness=np.nan,
-        classical_size=np.nan,
-    )
+    kind = "linear" if isinstance(pair.law, LinearLaw) else "hertz"
+    return law_summary(kind, indentation, force, share, peak)
 
 
 def _indentation(law: LinearLaw | HertzLaw, force: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.analyses.impact.gauges import interface_gauges
-from klack.analyses.impact.levels import level_result
-from klack.analyses.impact.pressure import pressure_record
+from klack.analyses.impact.levels import level_result, pressure_record
 from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.modes import damping_of, selection_of
@@ -105,7 +104,6 @@ def build_interface(
     ----------
     problem : ContactProblem
         With its factorisations still there.
-    pools : mapping of body name to Modes
     ports : pair of Port, optional
         Contact ports of both bodies: needed when modes are chosen by participation.
     count : int, optional

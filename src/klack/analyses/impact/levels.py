@@ -4,26 +4,41 @@ from collections.abc import Mapping
 from dataclasses import replace
 from time import perf_counter
 
+import numpy as np
+from numpy.typing import NDArray
+
 from klack.acoustics.comparison import compare_histories
-from klack.analyses.impact.record import LevelResult, ModalEnergy, PressureRecord
+from klack.analyses.impact.record import (
+    FrictionRecord,
+    LawSummary,
+    LevelResult,
+    ModalEnergy,
+    PressureRecord,
+)
 from klack.analyses.impact.trust import doubts_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import PORT, ReducedPair, friction_doubt, simulate_bodies
-from klack.case.schema import (
-    Case,
-)
+from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
-from klack.contact.laws import (
-    ContactLaw,
-    HuntCrossley,
-    LinearLaw,
-    gonthier_coefficient,
-)
+from klack.contact.laws import ContactLaw, HuntCrossley, LinearLaw, gonthier_coefficient
 from klack.contact.restitution import Deviation, measure_impact
+from klack.contact.submodel import LocalStiffness
 from klack.errors import InputError
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 
-__all__ = ["deviations", "level_result", "lumped_level", "run_lumped", "run_reduced"]
+__all__ = [
+    "deviations",
+    "law_summary",
+    "law_words",
+    "level_result",
+    "lumped_level",
+    "pressure_record",
+    "run_lumped",
+    "run_reduced",
+]
+
+_INSTANTS = 120
+_FITTED = 50  # points of a straight line
 
 
 def run_reduced(
@@ -45,11 +60,7 @@ def run_reduced(
         setup_time=setup_time,
     )
     has_memory, correction = pair.rubbing is not None, pair.upper.correction
-    return _doubted(result, friction_doubt(case, has_memory=has_memory, correction=correction))
-
-
-def _doubted(result: LevelResult, doubt: str) -> LevelResult:
-    return replace(result, doubts=(*result.doubts, doubt)) if doubt else result
+    return result.doubted(friction_doubt(case, has_memory=has_memory, correction=correction))
 
 
 def run_lumped(problem: ContactProblem) -> LevelResult:
@@ -84,7 +95,7 @@ def lumped_level(case: Case, masses: Mapping[str, float | None]) -> LevelResult:
         wall_time=perf_counter() - begin,
         setup_time=0.0,
     )
-    return _doubted(result, friction_doubt(case, has_memory=False))
+    return result.doubted(friction_doubt(case, has_memory=False))
 
 
 def level_result(
@@ -107,7 +118,7 @@ def level_result(
         history=history,
         measures=measure_impact(history),
         degrees_of_freedom=dofs,
-        steps=_steps(history, step),
+        steps=round(len(history.force) * history.step / step),
         step=step,
         wall_time=wall_time,
         setup_time=setup_time,
@@ -124,8 +135,32 @@ def level_result(
     return replace(result, doubts=doubts_of(result))
 
 
-def _steps(history: ImpactHistory, step: float) -> int:
-    return round(len(history.force) * history.step / step)
+def law_summary(
+    kind: str,
+    indentation: NDArray[np.float64],
+    force: NDArray[np.float64],
+    share: NDArray[np.float64],
+    peak: float,
+    classical: LocalStiffness | None = None,
+) -> LawSummary:
+    """A local law, and its straight line between half the peak force [N] and all of it."""
+    load = np.linspace(0.5 * peak, peak, _FITTED)
+    slope = np.polyfit(np.interp(load, force, indentation), load, 1)[0]
+    return LawSummary(
+        kind=kind,
+        indentation=indentation,
+        force=force,
+        share=share,
+        linear_stiffness=float(slope),
+        fit_range=(0.5 * peak, peak),
+        classical_stiffness=np.nan if classical is None else classical.stiffness,
+        classical_size=np.nan if classical is None else classical.size,
+    )
+
+
+def law_words(law: object) -> str:
+    """A law that the case gives, for a legend."""
+    return f"{law.stiffness / 1e6:.4g} N/um" if isinstance(law, LinearLaw) else "Hertz law"
 
 
 def deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, Deviation]:
@@ -137,3 +172,37 @@ def deviations(results: Mapping[str, LevelResult], reference: str) -> dict[str, 
         for name, result in results.items()
         if name != reference and not result.measures.cut_off
     }
+
+
+def pressure_record(
+    history: ImpactHistory,
+    point_force: NDArray[np.float32],
+    points: NDArray[np.float64],
+    area: NDArray[np.float64],
+    friction: FrictionRecord | None = None,
+) -> PressureRecord | None:
+    """Contact forces of all points over the first impact, thinned to a hundred instants or so.
+
+    ``friction`` is that of every step of the history, as ``point_force`` is.
+    """
+    if not len(point_force):
+        return None
+    measures = measure_impact(history)
+    first = int((measures.first_touch - history.start) / history.step)
+    last = int((measures.first_touch + measures.total_contact_time - history.start) / history.step)
+    last = min(last + 2, len(point_force))
+    every = max(1, (last - first) // _INSTANTS)
+    chosen = slice(max(first, 0), last, every)
+    return PressureRecord(
+        time=history.time[chosen],
+        points=points,
+        area=area,
+        point_force=np.ascontiguousarray(point_force[chosen]),
+        friction=None
+        if friction is None
+        else FrictionRecord(
+            force=np.ascontiguousarray(friction.force[chosen]),
+            doing=np.ascontiguousarray(friction.doing[chosen]),
+            coefficient=friction.coefficient,
+        ),
+    )

@@ -5,7 +5,8 @@ without the solver.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,7 +172,6 @@ class LevelResult:
         ``reduced-participation``, ``interface`` or ``full``.
     label : str
         What a legend says, for example ``"reduced, 20 + 40 modes, consistent law"``.
-    degrees_of_freedom, steps : int
     step : float [s]
     wall_time : float [s]
         Of the time integration alone.
@@ -182,7 +182,6 @@ class LevelResult:
         entry is ``"initial kinetic"``.
     energy_residual : float [-]
         Residual of the energy balance over the initial kinetic energy.
-    modal_energy : tuple of ModalEnergy
     pressure : PressureRecord or None
         Of levels that resolve the contact point by point.
     frictionless : ImpactMeasures or None
@@ -210,6 +209,10 @@ class LevelResult:
     doubts: tuple[str, ...] = ()
     gauges: tuple[GaugeRecord, ...] = ()
 
+    def doubted(self, *doubts: str) -> Self:
+        """The same with further doubts; empty ones are none."""
+        return replace(self, doubts=(*self.doubts, *filter(None, doubts)))
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SectionPicture:
@@ -217,7 +220,6 @@ class SectionPicture:
 
     Parameters
     ----------
-    body : str
     points : array, shape (n, 2) [m]
         Undeformed coordinates, distance from the axis and height.
     displacement : array, shape (n, 2) [m]
@@ -248,7 +250,6 @@ class BodyPicture:
 
     Parameters
     ----------
-    body : str
     skin : Skin
         In its place at the start.
     held : bool array, shape (v,)
@@ -319,7 +320,6 @@ class RunningIn:
         Gap between both faces that has stayed at them after the last impact.
     worn_by : float [N]
         Force up to which the faces are elastic now; nan at the interface level.
-    level : str
     """
 
     asked: int
@@ -343,7 +343,6 @@ class ImpactStudy(CaseRecord):
     Parameters
     ----------
     speed, gap : float [m/s], [m]
-    levels : mapping of str to LevelResult
     reference : str
         Level whose numbers are the answer: the finest one that nothing speaks against.
     deviations : mapping of level to Deviation
@@ -363,8 +362,6 @@ class ImpactStudy(CaseRecord):
         Why there is no estimate, although one was asked for.
     structures : tuple of Structure
         Held bodies as sources of sound; their stop is called ``"contact"``.
-    transfer : tuple of TransferComparison
-    sections : tuple of SectionPicture
     failures : mapping of str to str
         Why a level that was asked for has no result, by its name.
     running_in : RunningIn or None

@@ -117,7 +117,6 @@ def recovered_motion(
         With its factorisations; they are needed until the last instant.
     instants : sequence of int
         In steps of ``run.reduced_step``, rising; 0 is the start.
-    progress : callable
 
     Yields
     ------

@@ -9,17 +9,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.analysis import answer_so_far
 from klack.analyses.impact.body_picture import body_pictures, with_peak_stress
 from klack.analyses.impact.contact_check import (
     ContactCheck,
     check_contact,
     ends_reached,
     force_all_round,
-)
-from klack.analyses.impact.flat_faces import (
-    doubt_modal_levels,
-    flat_for_modes,
-    flat_for_reduced,
 )
 from klack.analyses.impact.full_level import run_full
 from klack.analyses.impact.gauges import with_reduced_gauges
@@ -32,7 +28,7 @@ from klack.analyses.impact.interface_level import (
     simulate_case,
     within_reach,
 )
-from klack.analyses.impact.levels import deviations, run_lumped, run_reduced
+from klack.analyses.impact.levels import deviations, law_summary, law_words, run_lumped, run_reduced
 from klack.analyses.impact.record import (
     SETTLED,
     BodyPicture,
@@ -45,13 +41,15 @@ from klack.analyses.impact.record import (
 )
 from klack.analyses.impact.running_in import asks_for_more, points_running_in, running_in
 from klack.analyses.impact.section import section_picture
-from klack.analyses.impact.summary import answer_so_far
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
 from klack.analyses.impact.trust import (
     DISAGREEMENT,
     STEPS_PER_CONTACT,
     best_level,
     disagreement,
+    doubt_modal_levels,
+    flat_for_modes,
+    flat_for_reduced,
     trust_notes,
 )
 from klack.analyses.impact.yielding_level import (
@@ -95,7 +93,6 @@ from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.closing import Closing
 from klack.contact.history import ImpactHistory
-from klack.contact.laws import LinearLaw
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.statics import ReachError, StaticContact, static_contact
@@ -145,7 +142,6 @@ def run_impact(
 
     Parameters
     ----------
-    case : Case
     levels : sequence of str
         Among :data:`klack.case.levels.LEVELS`.
     certify : bool
@@ -184,7 +180,6 @@ class ImpactBodies(Closing):
 
     Parameters
     ----------
-    placed : PlacedBodies
     pools : mapping of body name to Modes
         As many as the levels of the impact need.
     notes : tuple of str
@@ -255,10 +250,8 @@ def impact_of_bodies(
         Made for the same levels; they stay open.
     levels : sequence of str
         Without ``full``, which frees the factorisations first.
-    certify : bool
     near : mapping of body name to NearLoads, optional
         Of earlier impacts: the structures then depend on these to about 1e-6, the impact does not.
-    progress : callable
     """
     begin = perf_counter()
     wanted = case.require_levels(levels)
@@ -727,9 +720,7 @@ def _law_words(pair: ReducedPair) -> str:
         return "consistent law with yield"
     if pair.local is not None:
         return "consistent law"
-    if isinstance(pair.law, LinearLaw):
-        return f"{pair.law.stiffness / 1e6:.4g} N/um"
-    return "Hertz law"
+    return law_words(pair.law)
 
 
 def _sections(problem: ContactProblem, run: FullOrderResult) -> tuple[SectionPicture, ...]:
@@ -822,17 +813,6 @@ def _contact_summary(problem: ContactProblem, check: ContactCheck) -> ContactSum
 
 def _law_summary(pair: ReducedPair, classical: LocalStiffness | None, peak: float) -> LawSummary:
     indentation, force = static_curve(pair)
-    fit_range = (0.5 * peak, peak)
-    load = np.linspace(*fit_range, 50)
-    slope = np.polyfit(np.interp(load, force, indentation), load, 1)[0]
     share = np.append(np.nan, pair.local.share) if pair.local else np.full(len(force), np.nan)
-    return LawSummary(
-        kind="consistent" if pair.local is not None else "given",
-        indentation=indentation,
-        force=force,
-        share=share,
-        linear_stiffness=float(slope),
-        fit_range=fit_range,
-        classical_stiffness=np.nan if classical is None else classical.stiffness,
-        classical_size=np.nan if classical is None else classical.size,
-    )
+    kind = "consistent" if pair.local is not None else "given"
+    return law_summary(kind, indentation, force, share, peak, classical)

@@ -9,6 +9,7 @@ body of energy E the limit is the force :math:`P_\infty` whose elastic opening g
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +17,32 @@ from numpy.typing import NDArray
 from klack.analyses.impact.interface_level import simulate_case
 from klack.analyses.impact.record import RunningIn
 from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
+from klack.case.any_case import CaseTree
+from klack.case.case_text import parse
+from klack.case.key_path import written_at
+from klack.case.reader import read_case
+from klack.case.rewriting import moved_files, with_values
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, InputError
+from klack.input.problem import Key
 from klack.plasticity.loops import YieldingLoops
 from klack.transient.guide import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.units import format_si
 
 __all__ = [
+    "WORN",
     "asks_for_more",
     "points_running_in",
     "running_in",
     "running_in_columns",
     "running_in_rows",
+    "worn_text",
 ]
+
 
 _RUN_IN = 1e-4
 """Share of the energy [-] that a run-in contact may still lose in yield."""
@@ -113,10 +123,8 @@ def points_running_in(case: Case, model: InterfaceModel, guide: Guide | None) ->
 
     Parameters
     ----------
-    case : Case
     model : InterfaceModel
         With a pressure limit.
-    guide : Guide or None
     """
     if model.limit is None or not asks_for_more(case):
         return None
@@ -230,3 +238,45 @@ def _name(found: RunningIn, place: int) -> str:
     name = f"impact {place + 1}"
     is_last = place == len(found.peak_force) - 1
     return f"{name}, run in" if is_last and found.run_in else name
+
+
+WORN = "worn.yaml"
+"""File beside the result."""
+
+
+def worn_text(text: str, source: Path, found: RunningIn, folder: Path, version: str) -> str:
+    """Text of the case with ``contact.worn``, for a file in ``folder``; comments and order stay.
+
+    Parameters
+    ----------
+    text : str
+        Of the case whose impacts have worn the faces.
+    source : Path
+        Its file.
+    version : str
+        Of klack.
+
+    Raises
+    ------
+    InputError
+        Where the layout of the text does not allow it.
+    """
+    data, lines = parse(text, source)
+    tree = CaseTree(path=source, text=text, data=data, lines=lines)
+    radius = ", ".join(f"{1e6 * r:.4f} um" for r in found.radius)
+    opening = ", ".join(f"{1e9 * w:.4f} nm" for w in found.opening)
+    values: dict[Key, str] = {
+        ("contact", "worn"): f"{{force: {found.worn_by:.5g} N, "
+        f"radius: [{radius}], opening: [{opening}]}}",
+    }
+    for key, once in ((("run", "impacts"), "1"), (("run", "run_in"), "false")):
+        if written_at(data, key) is not None:
+            values[key] = once
+    state = "run in" if found.run_in else "not yet run in"
+    header = (
+        f"klack {version}, klack impact: faces of {source.name} after {len(found.peak_force)} "
+        f"impacts, {state}.\nTheir set at the {len(found.radius)} contact points of that mesh "
+        f"is in contact.worn; they are elastic up to {found.worn_by:.4g} N."
+    )
+    read_case(with_values(tree, values, header), source)
+    return with_values(tree, {**moved_files(tree, folder), **values}, header)

@@ -8,7 +8,7 @@ strains are so large that magnified elements turn inside out; they are left out.
 contact is drawn at true scale, where the surfaces do touch.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import floor, isfinite, log10
 from typing import Any
 
@@ -19,10 +19,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from klack.analyses.impact.record import ImpactStudy, SectionPicture
+from klack.report.page import Picture
 from klack.report.printed import STYLE, plain, svg
 from klack.report.wording import quantity
 
-__all__ = ["SectionFigure", "section_figure"]
+__all__ = ["section_figure"]
 
 Floats = NDArray[np.float64]
 
@@ -36,16 +37,7 @@ _CRUSHED = 0.2
 """Triangles that magnification leaves less than this share of their area are not drawn."""
 
 
-@dataclass(frozen=True, slots=True)
-class SectionFigure:
-    """Picture (SVG) and its caption."""
-
-    image: bytes
-    magnification: float
-    note: str
-
-
-def section_figure(study: ImpactStudy) -> SectionFigure:
+def section_figure(study: ImpactStudy) -> Picture:
     """Draw all bodies of ``study.sections`` in one picture with equal scales."""
     pictures = study.sections
     low, high = _bounds(pictures)
@@ -69,7 +61,7 @@ def section_figure(study: ImpactStudy) -> SectionFigure:
         _draw_zoom(zoom, pictures, spot, _reach(study, max(width, height)), top)
         bar = figure.colorbar(colours, ax=[whole, zoom], location="bottom", shrink=0.6, aspect=40)
         bar.set_label("magnitude of the displacement [µm]")
-        return SectionFigure(svg(figure), factor, _note(study, factor))
+        return Picture(svg(figure), _note(study, factor))
 
 
 def _note(study: ImpactStudy, factor: float) -> str:

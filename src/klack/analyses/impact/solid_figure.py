@@ -23,9 +23,10 @@ from klack.analyses.impact.record import BodyPicture, ImpactStudy
 from klack.assembling.touch_ring import goes_round
 from klack.mesh.skin import Skin
 from klack.report.depth_image import Camera, Quarter, Seen, Window, outlines, seen_of
+from klack.report.page import Picture
 from klack.report.printed import STYLE, plain, svg
 
-__all__ = ["SolidFigure", "solid_figure"]
+__all__ = ["solid_figure"]
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -58,15 +59,7 @@ _STRIPES = 14
 """Pixels from one stripe of a held surface to the next."""
 
 
-@dataclass(frozen=True, slots=True)
-class SolidFigure:
-    """Picture (SVG) and its caption."""
-
-    image: bytes
-    note: str
-
-
-def solid_figure(study: ImpactStudy) -> SolidFigure:
+def solid_figure(study: ImpactStudy) -> Picture:
     """Draw ``study.pictures``: the whole on the left, the contact enlarged on the right."""
     pictures = study.pictures
     touching = _contact_triangles(study)
@@ -89,7 +82,7 @@ def solid_figure(study: ImpactStudy) -> SolidFigure:
         _draw_axes(figure.axes[0], whole)
         _draw_frame(figure.axes[0], near, whole)
         _legend(figure, study, any(own.any() for own in touching))
-        return SolidFigure(svg(figure), _note(study, touching))
+        return Picture(svg(figure), _note(study, touching))
 
 
 # --------------------------------------------------------------------------- what is drawn

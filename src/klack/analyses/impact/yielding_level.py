@@ -7,7 +7,7 @@ the reduced bodies; the interface level has a pressure limit at every contact po
 
 import warnings
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -66,8 +66,6 @@ class YieldingFaces:
         ----------
         problem : ContactProblem
             With its factorisations.
-        laws, points : bool
-        progress : callable
 
         Warns
         -----
@@ -87,7 +85,6 @@ def elastic_twin(problem: ContactProblem, pair: ReducedPair) -> ImpactHistory:
 
     Parameters
     ----------
-    problem : ContactProblem
     pair : ReducedPair
         With the consistent law.
     """
@@ -104,7 +101,6 @@ def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> No
         With the law of faces that yield.
     elastic : ImpactHistory
         Of the same bodies, elastic.
-    surfaces : str
 
     Warns
     -----
@@ -140,12 +136,11 @@ def doubt_large_strain(result: LevelResult, loops: YieldingLoops) -> LevelResult
     strain = float(np.interp(result.measures.peak_force, loops.force, strains))
     if strain < _LARGE:
         return result
-    doubt = (
+    return result.doubted(
         f"plastic strain reaches {100 * strain:.2g} % at the peak, where small strain and linear "
         "hardening hold to about 10 %; set and land are estimates. Try: a lower speed, or a yield "
         "stress that suits the body."
     )
-    return replace(result, doubts=(*result.doubts, doubt))
 
 
 def doubt_elastic_levels(
@@ -155,7 +150,6 @@ def doubt_elastic_levels(
 
     Parameters
     ----------
-    results : mapping of str to LevelResult
     yielding : collection of str
         Names of the levels that have yield.
     """
@@ -167,7 +161,7 @@ def doubt_elastic_levels(
         f"impact. Try: level {next(iter(yielding))}, which has it."
     )
     return {
-        name: result if name in yielding else replace(result, doubts=(*result.doubts, doubt))
+        name: result if name in yielding else result.doubted(doubt)
         for name, result in results.items()
     }
 

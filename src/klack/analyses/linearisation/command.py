@@ -113,9 +113,8 @@ def linearise(
         checked = tree.case()
 
         from klack.analyses.linearisation.analysis import LINEARISATION
-        from klack.analyses.linearisation.figures import linear_charts
+        from klack.analyses.linearisation.content import linear_charts, write_files
         from klack.analyses.linearisation.run import run_linearisation
-        from klack.analyses.linearisation.table import write_files
         from klack.analyses.operating_point.conditions import (
             Conditions,
             asked_sweeps,
@@ -169,14 +168,8 @@ def linearise(
         )
 
     def beside(folder: Path) -> tuple[str, ...]:
-        from klack.report.printed import png_chart, svg_chart
+        from klack.report.printed import write_charts
 
-        names = list(write_files(record, folder))
-        for chart in linear_charts(record):
-            for end, draw in (("svg", svg_chart), ("png", png_chart)):
-                name = f"{chart.name}.{end}"
-                (folder / name).write_bytes(draw(chart))
-                names.append(name)
-        return tuple(names)
+        return (*write_files(record, folder), *write_charts(linear_charts(record), folder))
 
     return ending.end(LINEARISATION, record, beside=beside)

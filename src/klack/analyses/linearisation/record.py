@@ -72,7 +72,6 @@ class Response:
 
     Parameters
     ----------
-    source, target : SignalName
     frequency : array [Hz]
     real, imaginary : array
         In the unit of the output per unit of the input.
@@ -176,15 +175,12 @@ class LinearModel(CaseRecord):
 
     Parameters
     ----------
-    variant : str
     drive : mapping of str to float [A]
         Current of each coil.
-    point : tuple of PointValue
     band : float [Hz]
         Up to which the matrices and the eigenvalues hold where there are lines.
     delays : array [s]
         Of the segments of lines, both directions; empty without lines.
-    states, inputs, outputs : tuple of SignalName
     A, B, C, D : array
         Without delays: those of lines are all-passes.
     eigenvalues : tuple of Eigenvalue
@@ -196,8 +192,6 @@ class LinearModel(CaseRecord):
     unconfirmed : int
         Eigenvalues of the matrices within the band that lead to no root of the equation with
         delays.
-    responses : tuple of Response
-    loops : tuple of LoopMargins
     sweeps : tuple of StabilitySweep
         None or one.
     cpu_time : float [s]

@@ -1,15 +1,20 @@
 """``klack linearise``: from a case to its linear model."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from time import perf_counter, process_time
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.linearisation.controllers import controllers_of, pid_loop, plain_name
-from klack.analyses.linearisation.gas_drives import gas_drives
-from klack.analyses.linearisation.loops import loop_margins, return_ratio
+from klack.analyses.linearisation.loops import (
+    controllers_of,
+    gas_drives,
+    loop_margins,
+    pid_loop,
+    plain_name,
+    return_ratio,
+)
 from klack.analyses.linearisation.record import (
     Eigenvalue,
     LinearModel,
@@ -122,8 +127,6 @@ def run_linearisation(
 
     Parameters
     ----------
-    case : ValveCase
-    variant : str, optional
     base : Conditions, optional
         Drive and lift of the operating point.
     origin : "start" or "far"
@@ -202,7 +205,15 @@ def run_linearisation(
         B=model.B,
         C=model.C,
         D=model.D,
-        eigenvalues=tuple(_told(mode) for mode in found_modes),
+        eigenvalues=tuple(
+            Eigenvalue(
+                real=mode.root.real,
+                imaginary=mode.root.imag,
+                uncertainty=mode.uncertainty,
+                verdict=_WORDS[mode.verdict],
+            )
+            for mode in found_modes
+        ),
         owners=tuple(owners),
         shares=np.array(
             [[mode.participation.get(name, 0.0) for name in owners] for mode in found_modes]
@@ -288,23 +299,14 @@ def _notes(network: Network, lost: int, band: float) -> list[str]:
     return told
 
 
-def _told(mode: Mode) -> Eigenvalue:
-    return Eigenvalue(
-        real=mode.root.real,
-        imaginary=mode.root.imag,
-        uncertainty=mode.uncertainty,
-        verdict=_WORDS[mode.verdict],
-    )
-
-
 def _names(signals: Sequence[Signal]) -> tuple[SignalName, ...]:
     return tuple(SignalName(name=x.name, unit=x.unit) for x in signals)
 
 
-def _place(option: str, signals: Sequence[Signal], name: str) -> int:
-    names = [x.name for x in signals]
-    plain = [plain_name(x) for x in names]
+def _place(option: str, signals: Sequence[Signal], name: str, others: Iterable[str] = ()) -> int:
+    plain = [plain_name(x.name) for x in signals]
     if plain_name(name) not in plain:
+        names = [*(x.name for x in signals), *others]
         raise InputError(
             option,
             got=f"'{name}'",
@@ -339,15 +341,7 @@ def _opened(
     if name in controllers:
         return name, *pid_loop(name, network, rows, linear.system)
     signals = [linear.system.outputs[k] for k in linear.adds]
-    words = [*(x.name for x in signals), *controllers]
-    if plain_name(name) not in [plain_name(x.name) for x in signals]:
-        raise InputError(
-            "--loop",
-            got=f"'{name}'",
-            expected=f"one of: {one_of(words)}" if words else "a valve that has one",
-            hint=nearest(name, words, "take a name from this list."),
-        )
-    output = list(linear.adds)[_place("--loop", signals, name)]
+    output = list(linear.adds)[_place("--loop", signals, name, controllers)]
     source, sign = linear.adds[output]
     loop = return_ratio(linear.system, output, source, sign)
     return linear.system.outputs[output].name, loop, np.inf

@@ -1,15 +1,140 @@
-"""A noise study on disk; see :mod:`klack.analyses.store`.
+"""The numbers of a noise study that a script or a terminal wants, and how they are stored.
 
-``result.zarr/study/designs/0/sound/pressure/values`` is the sound pressure of one click.
+``result.zarr/study/designs/0/sound/pressure/values`` is the sound pressure of one click; see
+:mod:`klack.analyses.store`.
 """
 
-from klack.analyses.analysis import StoredAnalysis
+from collections.abc import Iterator
+from dataclasses import replace
+from operator import itemgetter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves, nominal_label
+from klack.analyses.analysis import Measured, StoredAnalysis
+from klack.analyses.json_parts import (
+    OWN_COMPONENTS,
+    JsonForm,
+    Key,
+    Real,
+    inherited,
+    measured_keys,
+    schema_key,
+)
+from klack.analyses.measures import text_table
 from klack.analyses.noise.measures import BODY_MEASURES, DESIGN_MEASURES, STOP_MEASURES
-from klack.analyses.noise.record import NoiseStudy
-from klack.analyses.noise.summary import NoiseJson, noise_measured, noise_to_json, noise_told
+from klack.analyses.noise.record import NoiseDesign, NoiseStudy
 from klack.analyses.store import RecordFormat
+from klack.terminal.tables import TextTable
 
 __all__ = ["NOISE"]
+
+Floats = NDArray[np.float64]
+
+_BAND = JsonForm(
+    "BandJson",
+    "Level in a third octave.",
+    Key("center_Hz", float, of=itemgetter(0)),
+    Key("nominal", str, of=itemgetter(1)),
+    Key("level_dB", float, "re (1 uN)^2 s.", itemgetter(2)),
+)
+_STOP = JsonForm(
+    "StopNoiseJson",
+    "Force of one stop.",
+    *measured_keys(STOP_MEASURES),
+    Key("third_octave", [_BAND], of=lambda stop: _bands(stop.bands, stop.bands.energy)),
+)
+_BODY = JsonForm(
+    "BodyNoiseJson",
+    "Vibration and radiation of one body.",
+    *measured_keys(BODY_MEASURES),
+    Key(
+        "injected_energy_J",
+        dict[str, Real],
+        "By port.",
+        lambda body: dict(zip(body.ports, body.injected, strict=True)),
+    ),
+    Key(
+        "radiated_energy_J",
+        dict[str, Real],
+        "By group of surfaces.",
+        lambda body: dict(zip(body.groups, body.radiated.sum(axis=1), strict=True)),
+    ),
+)
+_DESIGN = JsonForm(
+    "DesignNoiseJson",
+    "Noise of one design; measures of sound are null where nothing radiates.",
+    Key("kind", str),
+    Key("run", str),
+    OWN_COMPONENTS,
+    Key(
+        "third_octave",
+        [_BAND],
+        "Of the force of all stops.",
+        lambda design: _bands(design.stops[0].bands, design.band_energy),
+    ),
+    *measured_keys(DESIGN_MEASURES),
+    Key("stops", {str: _STOP}, "By stop.", lambda design: {x.stop: x for x in design.stops}),
+    Key("bodies", {str: _BODY}, "By body.", lambda design: {x.name: x for x in design.bodies}),
+)
+_STUDY = JsonForm(
+    "NoiseJson",
+    "``klack noise``: numbers of the first design, and of all.",
+    schema_key("klack-noise/1"),
+    Key("case", str),
+    *inherited(_DESIGN, "reference"),
+    Key(
+        "designs",
+        {str: _DESIGN},
+        "All of them by name.",
+        lambda study: {design.name: design for design in study.designs},
+    ),
+    Key("warnings", list[str]),
+)
+
+
+def _bands(bands: ThirdOctaves, energy: Floats) -> list[tuple[float, str, float]]:
+    """Middle frequency [Hz], nominal one and level [dB] of each band."""
+    return [
+        (
+            middle,
+            nominal_label(int(number)),
+            float(10.0 * np.log10(max(float(value), 1e-300) / ENERGY_REFERENCE)),
+        )
+        for number, middle, value in zip(bands.number, bands.middle, energy, strict=True)
+    ]
+
+
+def _told(study: NoiseStudy) -> Iterator[TextTable | str]:
+    """Show the designs side by side, then how far each is from the first.
+
+    Differences are levels; those of loudness and sharpness are factors.  dBA: A-weighted, dBZ:
+    unweighted (IEC 61672-1).
+    """
+    first, *others = study.designs
+    table = text_table(study.title, "design", DESIGN_MEASURES, ((d.name, d) for d in study.designs))
+    yield replace(table, rows=(*table.rows, *(_difference_row(other, first) for other in others)))
+
+
+def _measured(study: NoiseStudy) -> Iterator[Measured]:
+    for design in study.designs:
+        yield design.name, design, DESIGN_MEASURES
+        for stop in design.stops:
+            yield f"{design.name}, {stop.stop}", stop, STOP_MEASURES
+        for body in design.bodies:
+            yield f"{design.name}, {body.name}", body, BODY_MEASURES
+
+
+def _difference_row(design: NoiseDesign, first: NoiseDesign) -> tuple[str, ...]:
+    return (
+        f"{design.name} - {first.name}",
+        *(
+            measure.apart(design, first) if measure.deviation else ""
+            for measure in DESIGN_MEASURES
+            if measure.column is not None
+        ),
+    )
 
 
 NOISE = StoredAnalysis(
@@ -38,13 +163,13 @@ NOISE = StoredAnalysis(
         },
     ),
     page="noise.content:noise_content",
-    json=NoiseJson,
-    to_json=noise_to_json,
-    told=noise_told,
+    json=_STUDY.type,
+    to_json=_STUDY.json,
+    told=_told,
     measures={
         "design and its noise": DESIGN_MEASURES,
         "stop and its force": STOP_MEASURES,
         "body that vibrates": BODY_MEASURES,
     },
-    measured=noise_measured,
+    measured=_measured,
 )

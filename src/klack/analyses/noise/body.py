@@ -1,13 +1,30 @@
-"""What the forces of the stops do to one held body: energy, mobility, hold, radiation."""
+r"""What the forces of the stops do to one held body: energy, mobility, hold, radiation.
 
-from collections.abc import Mapping
+What a valve balances within itself, and what it shows to the outside.
+
+Springs, magnets and fluid push the needle from the same housing that the needle hits.  As long as
+nothing but the needle moves, the resultant of all forces on the housing is minus the mass times
+acceleration of the needle,
+
+.. math:: \sum F_\text{contact} + \sum F_\text{other} = - m\, \ddot x .
+
+At high frequencies the contact forces are all of it.  Below about one over the time of flight they
+are balanced by the others almost completely: a needle that is pressed on its seat by a spring makes
+no noise.  The share of the energy that is left per band,
+
+.. math:: s_b = \min\left(1, \frac{\int_b |m \ddot x|^2}{\sum_s \int_b |F_s|^2}\right),
+
+is taken on all ways from the force to the ear.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.acoustics.force_bands import force_bands
-from klack.acoustics.force_response import ModalResponse, modal_response, port_forces
+from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density, injected_energy
 from klack.acoustics.mobility import transfer_mobility
 from klack.acoustics.mount import Mount, mounted
@@ -15,14 +32,62 @@ from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import Efficiency, power_transfer
 from klack.acoustics.surface_bands import surface_spectra
 from klack.acoustics.third_octave import ThirdOctaves
-from klack.analyses.noise.balance import share_at
 from klack.analyses.noise.record import BodyNoise, Surface
 from klack.reduction.structure import Structure
 from klack.signals import TimeSeries
 
-__all__ = ["ASSUMED_DAMPING", "Surroundings", "Transfers", "body_noise", "port_transfers"]
+__all__ = [
+    "ASSUMED_DAMPING",
+    "Surroundings",
+    "Transfers",
+    "body_noise",
+    "net_share",
+    "port_transfers",
+    "share_at",
+]
+
 
 Floats = NDArray[np.float64]
+
+_SMALLEST = 1e-30
+
+
+def net_share(net: TimeSeries | None, bands: Sequence[ThirdOctaves]) -> Floats:
+    """Share of the energy of all stops per band that is not balanced, shape (b,).
+
+    Parameters
+    ----------
+    net : TimeSeries or None [N]
+        Mass times acceleration of the needle, means over intervals; None for all of it.
+    bands : sequence of ThirdOctaves
+        Of each stop; those above a tenth of the sampling rate of ``net`` count in full.
+    """
+    total = np.sum([octaves.energy for octaves in bands], axis=0)
+    share = np.ones(total.size)
+    if net is None:
+        return share
+    left = force_bands(_at_rest_outside(net))
+    known = min(left.energy.size, total.size)
+    share[:known] = left.energy[:known] / np.maximum(total[:known], 1e-300)
+    return np.clip(share, _SMALLEST, 1.0)
+
+
+def share_at(frequency: Floats, bands: ThirdOctaves, share: Floats) -> Floats:
+    """The share at some frequencies [Hz], straight in logarithms between the bands."""
+    level = np.interp(np.log(frequency), np.log(bands.middle), np.log(share))
+    return np.asarray(np.exp(level))
+
+
+def _at_rest_outside(net: TimeSeries) -> TimeSeries:
+    """With a zero on both sides: before and after the record the needle is not pushed."""
+    return TimeSeries(
+        step=net.step,
+        values=np.pad(net.values, 1),
+        unit=net.unit,
+        start=net.start - net.step,
+        name=net.name,
+    )
+
 
 ASSUMED_DAMPING = 0.005
 """Damping ratio of radiating modes, where the case gives none: a loss factor of 1 %."""
@@ -39,8 +104,6 @@ class Surroundings:
 
     Parameters
     ----------
-    mount, plate : Mount, Plate or None
-    air : Air
     efficiency : "piston" or "unity"
     period : float [s]
         From click to click.
@@ -100,7 +163,7 @@ def body_noise(
         vibration_spectral=_by_mobility(structure, forces),
         dissipated=float(moved.dissipated.sum()),
         ringing=float(moved.ringing.sum()),
-        static_energy=_static_energy(moved),
+        static_energy=moved.injected_energy - moved.vibration_energy,
         residual=moved.residual,
         assumed=sounding is not structure,
         frequency=frequency,
@@ -199,8 +262,3 @@ def _by_mobility(structure: Structure, forces: Mapping[str, TimeSeries]) -> floa
     if not np.all(width > 0.0) or 3.0 / (width.min() * step) > _LONGEST:
         return float("nan")
     return injected_energy(injected_density(structure, forces))
-
-
-def _static_energy(moved: ModalResponse) -> float:
-    """Injected, but neither lost nor ringing [J]."""
-    return moved.injected_energy - moved.vibration_energy

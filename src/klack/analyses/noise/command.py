@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.analyses.ending import Ending
-from klack.analyses.result_folder import is_result
+from klack.analyses.ending import Ending, is_result
 from klack.terminal.options import Components, imported
 from klack.terminal.progress import Progress, show_progress
 from klack.terminal.wanted import WANTED_RESULT, WantedResult
@@ -54,7 +53,7 @@ def noise(
     names = tuple(name for item in variant or () for name in item.split(",") if name)
     paths = (a,) if b is None else (a, b)
     cases = _cases(paths, imported(component))
-    ending = Ending.of(wanted, _folder_name(paths))
+    ending = Ending.of(wanted, "-".join(["noise", *map(_short, paths)]))
 
     with show_progress(wanted.quiet):
         from klack.analyses.noise.analysis import NOISE
@@ -77,10 +76,6 @@ def _cases(paths: Sequence[Path], own: "OwnComponents") -> "list[AnyCase | None]
     from klack.case.reader import find_case
 
     return [None if is_result(path) else load_any_case(find_case(path), own) for path in paths]
-
-
-def _folder_name(paths: Sequence[Path]) -> str:
-    return "-".join(["noise", *(_short(path) for path in paths)])
 
 
 def _short(path: Path) -> str:

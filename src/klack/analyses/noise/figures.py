@@ -3,7 +3,7 @@
 One colour and dash per design; the first design is the one that the others are compared with.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import ceil, floor
 
@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from klack.acoustics.signal_statistics import EXPOSURE_REFERENCE
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
-from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy
+from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy, StopForce
 from klack.report.chart import AxisSpec, Band, Chart, Curve, Mark, Panel
-from klack.report.looks import look_of
-from klack.report.thinning import thinned
+from klack.report.looks import look_of, thinned
 from klack.report.wording import quantity
 
 __all__ = [
@@ -58,23 +57,38 @@ def _bodies(study: NoiseStudy, name: str) -> list[tuple[int, NoiseDesign, BodyNo
     ]
 
 
+def _of_stops(
+    study: NoiseStudy,
+    drawn: Callable[[StopForce], tuple[Floats, Floats]],
+    *,
+    hit: bool = False,
+) -> list[tuple[str, list[Curve]]]:
+    """Curves of the designs on each stop, or if it is ``hit``; each in the legend once."""
+    found, named = [], set[str]()
+    for name in _stop_names(study):
+        curves = []
+        for i, design in _designs(study):
+            for stop in design.stops:
+                if stop.stop == name and (stop.impacts or not hit):
+                    listed = design.label not in named
+                    named.add(design.label)
+                    curves.append(look_of(i).curve(*drawn(stop), design.label, listed=listed))
+        if curves:
+            found.append((name, curves))
+    return found
+
+
 # --------------------------------------------------------------------------- force over time
 
 
 def force_chart(study: NoiseStudy) -> Chart:
     """Force of every stop over the whole record."""
     scale, unit = _time_unit(study)
-    panels, named = [], set()
-    for name in _stop_names(study):
-        curves = []
-        for i, design in _designs(study):
-            for stop in design.stops:
-                if stop.stop == name:
-                    x, y = thinned(scale * stop.force.time, stop.force.values)
-                    listed = design.label not in named
-                    named.add(design.label)
-                    curves.append(look_of(i).curve(x, y, design.label, listed=listed))
-        panels.append(Panel(y=AxisSpec(label=name, unit="N"), curves=tuple(curves), share=0.6))
+    stops = _of_stops(study, lambda stop: thinned(scale * stop.force.time, stop.force.values))
+    panels = [
+        Panel(y=AxisSpec(label=name, unit="N"), curves=tuple(curves), share=0.6)
+        for name, curves in stops
+    ]
     return Chart(
         name="force",
         title="Force of the stops over time",
@@ -94,19 +108,13 @@ def _time_unit(study: NoiseStudy) -> tuple[float, str]:
 
 def strongest_chart(study: NoiseStudy) -> Chart:
     """Strongest impact on every stop, first touch at zero."""
-    panels, named = [], set()
-    for name in _stop_names(study):
-        curves = []
-        for i, design in _designs(study):
-            for stop in design.stops:
-                if stop.stop == name and stop.impacts:
-                    x, y = thinned(1e6 * stop.first.time, stop.first.values)
-                    listed = design.label not in named
-                    named.add(design.label)
-                    curves.append(look_of(i).curve(x, y, design.label, listed=listed))
-        if curves:
-            axis = AxisSpec(label=name, unit="N")
-            panels.append(Panel(y=axis, curves=tuple(curves), share=0.7))
+    stops = _of_stops(
+        study, lambda stop: thinned(1e6 * stop.first.time, stop.first.values), hit=True
+    )
+    panels = [
+        Panel(y=AxisSpec(label=name, unit="N"), curves=tuple(curves), share=0.7)
+        for name, curves in stops
+    ]
     return Chart(
         name="strongest",
         title="The strongest impact on every stop",
@@ -135,18 +143,9 @@ def _window(panels: Sequence[Panel]) -> tuple[float, float]:
 
 def spectrum_chart(study: NoiseStudy) -> Chart:
     """Spectra of the strongest impacts; third octaves, difference and gathered energy of all."""
-    panels, named = [], set()
-    for name in _stop_names(study):
-        curves = []
-        for i, design in _designs(study):
-            for stop in design.stops:
-                if stop.stop == name and stop.impacts:
-                    listed = design.label not in named
-                    named.add(design.label)
-                    x = 1e-3 * stop.frequency
-                    curves.append(look_of(i).curve(x, stop.level, design.label, listed=listed))
-        if curves:
-            panels.append(_level_panel(name, "dB re 1 µN s", curves, 70.0))
+    stops = _of_stops(study, lambda stop: (1e-3 * stop.frequency, stop.level), hit=True)
+    panels = [_level_panel(name, "dB re 1 µN s", curves, 70.0) for name, curves in stops]
+    named = {curve.label for _, curves in stops for curve in curves}
     bands, left, gathered, differences = [], [], [], []
     reference = study.reference
     for i, design in _designs(study):
@@ -168,10 +167,8 @@ def spectrum_chart(study: NoiseStudy) -> Chart:
                 reference.unbalanced_energy, ENERGY_REFERENCE
             )
             differences.append(_steps(octaves, apart, i, design.label))
-    bands_panel = _level_panel("bands", "dB re 1 pN²s", [*bands, *left], 70.0)
-    panels.append(replace(bands_panel, bands=_trusted(study)))
-    if differences:
-        panels.append(_difference_panel(differences))
+    curves = [*bands, *left]
+    panels += _compared("bands", "dB re 1 pN²s", curves, 70.0, differences, _trusted(study))
     axis = AxisSpec(label="energy below", unit="%", range=(0.0, 103.0))
     panels.append(Panel(y=axis, curves=tuple(gathered), share=0.55))
     note = (
@@ -223,15 +220,27 @@ def _level_panel(label: str, unit: str, curves: Sequence[Curve], depth: float) -
     return Panel(y=AxisSpec(label=label, unit=unit, range=limits), curves=tuple(curves), share=0.7)
 
 
-def _difference_panel(curves: Sequence[Curve]) -> Panel:
-    largest = max(float(np.nanmax(np.abs(curve.y))) for curve in curves)
+def _compared(
+    label: str,
+    unit: str,
+    curves: Sequence[Curve],
+    depth: float,
+    differences: Sequence[Curve],
+    bands: tuple[Band, ...] = (),
+) -> tuple[Panel, ...]:
+    """Levels, and below them how far designs are from the first one, if there are several."""
+    levels = replace(_level_panel(label, unit, curves, depth), bands=bands)
+    if not differences:
+        return (levels,)
+    largest = max(float(np.nanmax(np.abs(curve.y))) for curve in differences)
     limit = min(max(1.1 * largest, 5.0), 40.0)
-    return Panel(
+    apart = Panel(
         y=AxisSpec(label="difference", unit="dB", range=(-limit, limit)),
-        curves=tuple(curves),
+        curves=tuple(differences),
         marks=tuple(Mark(value=value, axis="y") for value in (-3.0, 0.0, 3.0)),
         share=0.5,
     )
+    return levels, apart
 
 
 def _limits(study: NoiseStudy) -> tuple[float, float]:
@@ -320,42 +329,34 @@ def blocked_charts(study: NoiseStudy) -> tuple[Chart, ...]:
     """Force on the support of every body, over time and in third octaves."""
     charts = []
     for name in _body_names(study):
-        curves, bands, differences = [], [], []
-        found = _bodies(study, name)
+        curves, bands, differences, levels = [], [], [], list[Floats]()
         scale, unit = _time_unit(study)
-        for i, design, body in found:
+        for i, design, body in _bodies(study, name):
             x, y = thinned(scale * body.blocked.time, body.blocked.values)
             curves.append(look_of(i).curve(x, y, design.label))
-            level = _level(body.blocked_bands.energy, ENERGY_REFERENCE)
-            bands.append((body.blocked_bands, level, i, design))
-            first = bands[0]
-            if i and first[0].number.size == body.blocked_bands.number.size:
-                differences.append((body.blocked_bands, level - first[1], i, design))
-        time = AxisSpec(label="time", unit=unit)
+            octaves = body.blocked_bands
+            levels.append(_level(octaves.energy, ENERGY_REFERENCE))
+            bands.append(_steps(octaves, levels[-1], i, design.label, listed=True))
+            if i and levels[0].size == levels[-1].size:
+                differences.append(_steps(octaves, levels[-1] - levels[0], i, design.label))
         panel = Panel(y=AxisSpec(label="force", unit="N"), curves=tuple(curves), share=0.8)
         charts.append(
             Chart(
                 name=f"blocked-{name}",
                 title=f"Force of the {name} on its rigid support",
-                x=time,
+                x=AxisSpec(label="time", unit=unit),
                 panels=(panel,),
                 note="What the hold has to bear along the axis, if it is rigid (blocked force).",
             )
         )
-        steps = [_steps(b, level, i, d.label, listed=True) for b, level, i, d in bands]
-        panels = [
-            replace(_level_panel("level", "dB re 1 pN²s", steps, 80.0), bands=_trusted(study))
-        ]
-        if differences:
-            panels.append(
-                _difference_panel([_steps(b, y, i, d.label) for b, y, i, d in differences])
-            )
         charts.append(
             Chart(
                 name=f"blocked-bands-{name}",
                 title=f"Force of the {name} on its rigid support, third octaves",
                 x=_FREQUENCY_AXIS,
-                panels=tuple(panels),
+                panels=_compared(
+                    "level", "dB re 1 pN²s", bands, 80.0, differences, _trusted(study)
+                ),
                 note=(
                     "A record that ends while the body still rings is cut there: bands below one "
                     f"over its length are those of the cut. {_trusted_words(study)}"
@@ -382,15 +383,12 @@ def radiation_chart(study: NoiseStudy) -> Chart | None:
         if design is not first and _same_bands(design, first):
             apart = level - _level(first.radiated_bands, SOUND_ENERGY_REFERENCE)
             differences.append(_steps(octaves, apart, i, design.label))
-    panel = _level_panel("energy", "dB re 1 pJ", [*curves, *bounds], 80.0)
-    panels = [replace(panel, bands=_trusted(study))]
-    if differences:
-        panels.append(_difference_panel(differences))
+    levels = [*curves, *bounds]
     return Chart(
         name="radiation",
         title="Radiated sound energy of one run, an estimate",
         x=_FREQUENCY_AXIS,
-        panels=tuple(panels),
+        panels=_compared("energy", "dB re 1 pJ", levels, 80.0, differences, _trusted(study)),
         note=(
             "Thick: estimate, with the radiation efficiency of the case. Thin dotted lines: upper "
             f"bound, radiation efficiency 1 in every band. {_trusted_words(study)}"
@@ -439,14 +437,11 @@ def click_charts(study: NoiseStudy) -> tuple[Chart, ...]:
             "sound, as hearing does."
         ),
     )
-    panels = [_level_panel("level", "dB re (20 µPa)²s", bands, _SILENCE)]
-    if differences:
-        panels.append(_difference_panel(differences))
     over_bands = Chart(
         name="click-bands",
         title=f"One click at {distance}, third octaves",
         x=AxisSpec(label="frequency", unit="kHz", log=True, range=(0.02, 20.0)),
-        panels=tuple(panels),
+        panels=_compared("level", "dB re (20 µPa)²s", bands, _SILENCE, differences),
         note="Sound exposure of one click per band, without weighting. Sound ends at 20 kHz.",
     )
     return over_time, over_bands

@@ -4,7 +4,7 @@ The numbers are plain arrays and small frozen records, so that a stored study ca
 without the solver.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,7 +37,6 @@ class StopForce:
     ----------
     stop : str
         Component; ``"contact"`` for an impact.
-    impacts : int
     peak_force : float [N]
         Largest mean over a step.
     impulse : float [N s]
@@ -92,12 +91,9 @@ class BodyNoise:
 
     Parameters
     ----------
-    name : str
     mass : float [kg]
     highest_frequency : float [Hz]
         Highest kept mode.
-    modes : int
-    ports, stops : tuple of str
     injected : array, shape (p,) [J]
         ``int F v dt``: structure-borne energy through each port.
     vibration_energy : float [J]
@@ -119,7 +115,6 @@ class BodyNoise:
     blocked : TimeSeries [N]
         Force on the rigid support.
     blocked_bands : ThirdOctaves [N^2 s]
-    groups : tuple of str
     area : array, shape (g,) [m^2]
         Nan for the plate.
     radiated : array, shape (g, b) [J]
@@ -129,7 +124,6 @@ class BodyNoise:
     support_energy : float [J]
         That flows through the held surfaces into mount and plate; nan in results of former
         versions.
-    surface : Surface
     """
 
     name: str
@@ -232,7 +226,6 @@ class NoiseDesign:
     valid_from, valid_up_to : float [Hz]
         One over the record, 0 if every force ends as it began; lowest of the highest kept modes of
         the bodies, nan without any.
-    stops : tuple of StopForce
     net_share : array, shape (b,) [-]
         Share of the energy of the forces per band that springs, magnets and fluid do not balance
         within the valve: (mass times acceleration of the needle)^2 over the forces squared.
@@ -241,8 +234,6 @@ class NoiseDesign:
         Empty if there is no elastic held body.
     sound : ClickSound or None
         None without bodies.
-    settings : NoiseSettings
-    notes : tuple of str
     own_components : mapping of str to str
         See :class:`klack.analyses.stroke.record.StrokeStudy`.
     """
@@ -292,16 +283,12 @@ class NoiseDesign:
         It does not stand in :attr:`injected_energy`, whose bodies are held rigidly: on a mount a
         body moves as a whole and takes up more.  The radiated energy comes from both.
         """
-        if not self.bodies:
-            return float("nan")
-        return float(sum(body.support_energy for body in self.bodies))
+        return self._over_bodies(lambda body: body.support_energy)
 
     @property
     def injected_energy(self) -> float:
         """Structure-borne energy through all ports of held bodies [J]; nan without bodies."""
-        if not self.bodies:
-            return float("nan")
-        return float(sum(body.injected.sum() for body in self.bodies))
+        return self._over_bodies(lambda body: body.injected.sum())
 
     @property
     def radiated_energy(self) -> float:
@@ -318,9 +305,10 @@ class NoiseDesign:
     @property
     def upper_bound(self) -> float:
         """Equivalent radiated energy, radiation efficiency 1 [J]; nan without bodies."""
-        if not self.bodies:
-            return float("nan")
-        return float(sum(body.upper_bound.sum() for body in self.bodies))
+        return self._over_bodies(lambda body: body.upper_bound.sum())
+
+    def _over_bodies(self, energy: Callable[[BodyNoise], float]) -> float:
+        return float(sum(map(energy, self.bodies))) if self.bodies else float("nan")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -331,7 +319,6 @@ class NoiseStudy(Record):
     ----------
     wall_time : float [s]
         Of the noise chain, without the runs before.
-    designs : tuple of NoiseDesign
     """
 
     designs: tuple[NoiseDesign, ...]

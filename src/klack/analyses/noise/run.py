@@ -18,12 +18,12 @@ from klack.acoustics.signal_statistics import (
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.spectrum import force_spectrum, impulse_level
 from klack.acoustics.third_octave import ThirdOctaves
-from klack.analyses.noise.balance import net_share
 from klack.analyses.noise.body import (
     ASSUMED_DAMPING,
     Surroundings,
     Transfers,
     body_noise,
+    net_share,
     port_transfers,
 )
 from klack.analyses.noise.record import (
@@ -105,7 +105,6 @@ def click_sound(
 
     Parameters
     ----------
-    source : NoiseSource
     transfers : Transfers
         Of its structures, as far as they are known.
     bands : sequence of ThirdOctaves, optional

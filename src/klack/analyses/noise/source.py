@@ -16,11 +16,11 @@ from klack.analyses.impact.yielding_level import SMALL_YIELD, yield_share
 from klack.analyses.incomplete import failure_notes
 from klack.analyses.noise.force import (
     before_impact,
+    first_part,
     impact_force,
     interrupted_impact,
     stop_forces,
 )
-from klack.analyses.noise.window import first_part
 from klack.analyses.stroke.record import StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.assembling.body_summary import BodySummary
@@ -69,22 +69,16 @@ class NoiseSource:
     ----------
     kind : str
         ``"impact"`` or ``"stroke"``.
-    case, title, case_text : str
     run, label : str
         Name of the variant or level, and in words.
-    stops : tuple of SourceStop
-    structures : tuple of Structure
     net : TimeSeries or None [N]
         Mass times acceleration of the needle, means over records: the force that all of the valve
         together exerts on it.  None where it is the contact force (a needle that only falls), or
         where it is not known.
     kept_up_to : float [Hz]
         Lowest of the highest kept modes of all bodies; nan for rigid ones.
-    noise : CaseNoise
     given : bool
         Whether the case has a section ``noise``.
-    materials : mapping of str to CaseMaterial
-    notes : tuple of str
     own_components : mapping of str to str
         See :class:`klack.analyses.stroke.record.StrokeStudy`.
     """
@@ -114,7 +108,6 @@ def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, 
 
     Parameters
     ----------
-    folder : Path
     names : sequence of str
         Variants or levels; the best one of an impact and the first one of a stroke without.
 
@@ -164,11 +157,8 @@ def run_sources(
 
     Parameters
     ----------
-    case : Case or ValveCase
     names : sequence of str
         Levels of an impact, ``reduced`` without; variants of a stroke, the first one without.
-    progress : callable
-    threads : int, optional
     """
     if isinstance(case, ValveCase):
         variants = tuple(names) or case.run.variants[:1]

@@ -6,7 +6,6 @@ out.  One row per design, all colours to one scale.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from math import ceil, floor
 from typing import Any
 
@@ -22,10 +21,11 @@ from numpy.typing import NDArray
 from klack.acoustics.radiation import PLATE
 from klack.acoustics.third_octave import ThirdOctaves, nominal_label
 from klack.analyses.noise.record import BodyNoise, NoiseDesign, NoiseStudy, Surface
+from klack.report.page import Picture
 from klack.report.printed import STYLE, plain, svg
 from klack.report.wording import listed
 
-__all__ = ["SurfaceFigure", "shown_bands", "surface_figure"]
+__all__ = ["shown_bands", "surface_figure"]
 
 Floats = NDArray[np.float64]
 
@@ -36,14 +36,6 @@ _HEARING = 20e3  # [Hz]
 _TURN, _LIFT = np.radians(35.0), np.radians(25.0)  # of the view, about z and above the ground
 _VECTOR_FACES = 3000
 _MOST = 4  # pictures side by side
-
-
-@dataclass(frozen=True, slots=True)
-class SurfaceFigure:
-    """Picture (SVG) and its caption."""
-
-    image: bytes
-    note: str
 
 
 def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
@@ -59,7 +51,7 @@ def shown_bands(study: NoiseStudy) -> tuple[int, ...]:
     return tuple(dict.fromkeys((int(np.argmax(audible)), int(np.argmax(energy)))))
 
 
-def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
+def surface_figure(study: NoiseStudy) -> Picture | None:
     """Draw all bodies of every design in the loudest bands; None without bodies."""
     designs = [design for design in study.designs if design.bodies]
     if not designs:
@@ -84,7 +76,7 @@ def surface_figure(study: NoiseStudy) -> SurfaceFigure | None:
             _draw(axes, design.bodies, band, scale)
             axes.set_title(plain(f"{whose}{nominal_label(int(octaves.number[band]))}"), fontsize=8)
         _bar(figure, grid, scale)
-        return SurfaceFigure(svg(figure), _note(designs, octaves, bands))
+        return Picture(svg(figure), _note(designs, octaves, bands))
 
 
 def _level(velocity: NDArray[np.float32]) -> Floats:

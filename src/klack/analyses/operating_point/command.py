@@ -28,9 +28,8 @@ def show_operating_points(
             asked_sweeps,
             stated_drive,
         )
-        from klack.analyses.operating_point.figures import sweep_charts
+        from klack.analyses.operating_point.content import CSV_NAME, sweep_charts, write_csv
         from klack.analyses.operating_point.run import run_operating_points
-        from klack.analyses.operating_point.table import CSV_NAME, write_csv
         from klack.case.any_case import read_case_tree
         from klack.case.reader import find_case
         from klack.units import CURRENT, LENGTH, VOLTAGE, parse_quantity
@@ -66,15 +65,9 @@ def show_operating_points(
     charts = sweep_charts(record, at_rest.over or "", at_rest.show or ())
 
     def beside(folder: Path) -> tuple[str, ...]:
-        from klack.report.printed import png_chart, svg_chart
+        from klack.report.printed import write_charts
 
         write_csv(record, folder / CSV_NAME)
-        names = [CSV_NAME]
-        for chart in charts:
-            for end, draw in (("svg", svg_chart), ("png", png_chart)):
-                name = f"{chart.name}.{end}"
-                (folder / name).write_bytes(draw(chart))
-                names.append(name)
-        return tuple(names)
+        return (CSV_NAME, *write_charts(charts, folder))
 
     return ending.end(OPERATING_POINT, record, beside=beside)

@@ -91,8 +91,6 @@ class Sweep:
     ----------
     name : str
         Key of the case, or one of ``lift``, ``current``, ``voltage``.
-    unit : str
-    values : tuple of float
     place : Quantity or None
         Of a key.
     """

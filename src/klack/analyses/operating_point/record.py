@@ -42,7 +42,6 @@ class PointQuantity:
 
     Parameters
     ----------
-    component, quantity : str
     unit : str
         SI.
     values : array, shape (points,)
@@ -71,7 +70,6 @@ class OperatingPoints(CaseRecord):
 
     Parameters
     ----------
-    variant : str
     needle : str
         ``component.point`` whose displacement is the lift.
     origin : str
@@ -80,7 +78,6 @@ class OperatingPoints(CaseRecord):
         Current of each coil, of the first point.
     swept : tuple of SweptQuantity
         None, one or two of them.
-    quantities : tuple of PointQuantity
     force_left : array, shape (points,) [N]
         Largest force that is left on a free body.
     flow_left : array, shape (points,) [m^3/s]

@@ -74,12 +74,9 @@ class PointFound:
 
     Parameters
     ----------
-    point : OperatingPoint
     network : Network
         With everything that drives it constant.
-    rows : Rows
     currents : mapping of str to float [A]
-    notes : tuple of str
     """
 
     point: OperatingPoint
@@ -105,7 +102,6 @@ def run_operating_points(
 
     Parameters
     ----------
-    case : ValveCase
     tree : CaseTree
         The same as it was written.
     variant : str, optional
@@ -116,8 +112,6 @@ def run_operating_points(
         None, one or two.
     origin : "start" or "far"
         Where the search begins: bodies where they are drawn, or at the stops farthest from there.
-    threads : int, optional
-    progress : callable
 
     Raises
     ------

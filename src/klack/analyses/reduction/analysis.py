@@ -1,20 +1,316 @@
-"""The reduction of two bodies: tables and JSON; what it leaves behind are the bodies themselves."""
+"""The few numbers of a reduction that a script or a terminal wants.
 
-from klack.analyses.analysis import Analysis
-from klack.analyses.reduction.summary import (
-    BODY_MEASURES,
-    ReductionJson,
-    reduction_measured,
-    reduction_to_json,
-    reduction_told,
+What it leaves behind are the bodies themselves.
+"""
+
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.analyses.analysis import Analysis, Measured
+from klack.analyses.impact.transfer import TRANSFER_COUNTS
+from klack.analyses.json_parts import JsonForm, Key, measured_keys, schema_key
+from klack.analyses.measures import Column, Measure, described_in, text_table
+from klack.analyses.reduction.one_node import corrected_label, place_words
+from klack.analyses.reduction.run import ReductionStudy
+from klack.assembling.modes import elastic_count
+from klack.reduction.reduced_body import ReducedBody
+from klack.reduction.transfer import TransferComparison
+from klack.terminal.tables import TextTable
+
+__all__ = ["BODY_MEASURES", "REDUCTION", "reduction_told"]
+
+_THEORY = "theory/reduction"
+_BENDING_TOLD = 10
+
+
+def _highest(body: ReducedBody) -> float:
+    kept = body.frequencies[: body.rigid_count + elastic_count(body)]
+    return float(kept[-1]) if len(kept) else 0.0
+
+
+def _share(body: ReducedBody) -> float | None:
+    return float(body.compliance_share[0]) if body.static_compliance[0, 0] else None
+
+
+BODY_MEASURES: tuple[Measure[ReducedBody], ...] = described_in(
+    _THEORY,
+    Measure(
+        key="mass",
+        symbol="m",
+        unit="kg",
+        definition="Mass of the body; missing where a reduced model does not tell it.",
+    ),
+    Measure(
+        key="degrees_of_freedom",
+        symbol="n",
+        definition="Free displacements of the body before reduction.",
+        read=lambda body: body.dof_count,
+        kind="whole",
+        column=Column("", 1.0, "d"),
+    ),
+    Measure(
+        key="rigid_modes",
+        symbol="n_r",
+        definition="Rigid motions that are kept.",
+        read=lambda body: body.rigid_count,
+        kind="whole",
+    ),
+    Measure(
+        key="elastic_modes",
+        name="modes",
+        symbol="n_e",
+        definition="Elastic eigenmodes that are kept, without attachment modes.",
+        read=elastic_count,
+        kind="whole",
+        column=Column("", 1.0, "d"),
+    ),
+    Measure(
+        key="highest_mode",
+        symbol="f_max",
+        unit="Hz",
+        definition="Highest frequency of a mode that is no attachment mode; 0 without any.",
+        read=_highest,
+        column=Column("kHz", 1e-3, ".4g", "up to"),
+    ),
+    Measure(
+        key="static_compliance",
+        symbol="b^T K^+ b",
+        unit="m/N",
+        definition="Displacement of the contact per static force on it, of the whole body.",
+        read=lambda body: float(body.static_compliance[0, 0]),
+        column=Column("m/N", 1.0, ".4g"),
+    ),
+    Measure(
+        key="modal_compliance",
+        symbol="sum phi^2/omega^2",
+        unit="m/N",
+        definition="Part of the static compliance that the kept modes have.",
+        read=lambda body: float(body.modal_compliance[0, 0]),
+    ),
+    Measure(
+        key="compliance_share",
+        name="share of the modes",
+        definition="Modal over static compliance.",
+        read=_share,
+        form="share",
+        column=Column("%", 100.0, ".3g"),
+    ),
+)
+"""Of one reduced body at its contact."""
+
+
+def _limits(item: TransferComparison) -> dict[str, float]:
+    """Frequency [Hz] up to which each kind of reduction is right."""
+    return dict(zip(item.labels, item.valid_up_to, strict=True))
+
+
+_BODY = JsonForm(
+    "ReducedBodyJson",
+    "A body after reduction.",
+    *measured_keys(BODY_MEASURES),
+    Key(
+        "frequencies_Hz",
+        list[float],
+        "Of the elastic modes, attachment modes included.",
+        lambda body: body.frequencies[body.rigid_count :],
+    ),
+    Key("correction", str),
+)
+_TRANSFER = JsonForm(
+    "TransferJson",
+    "Transfer functions of a body.",
+    Key("valid_up_to_Hz", dict[str, float], "By the kind of reduction.", _limits),
+    Key("tolerance_dB", float, of="tolerance"),
+    Key("loss_factor", float),
+)
+_ONE_NODE = JsonForm(
+    "OneNodeJson",
+    "A node of a body as its output, beside the contact port.",
+    Key("node", int, "In the mesh, from 0."),
+    Key("place_m", list[float], "Of the node, in the drawing.", "place"),
+    Key("distance_m", float, "From the place that the case asks for.", "distance"),
+    Key("correction", str, "Attachment modes of the recipe, in words."),
+    Key(
+        "compliance_over_port",
+        float,
+        "Static displacement of the node over that of the port.",
+        "compliance",
+    ),
+    Key(
+        "valid_up_to_Hz",
+        dict[str, float],
+        "By the kind of reduction.",
+        lambda node: _limits(node.transfer),
+    ),
+)
+_ONE_NODE_IMPACT = JsonForm(
+    "OneNodeImpactJson",
+    "The impact of the recipe with its gap between nodes.",
+    Key("modes", int, "Kept elastic modes of each body."),
+    Key(
+        "energy_change",
+        float,
+        "Of the energy of the impact, made by the one-node outputs.",
+        lambda item: item.nodes.energy - 1.0,
+    ),
+    Key("peak_force_N", float, of="nodes.peak_force"),
+    Key("restitution", float, of="nodes.restitution"),
+    Key("peak_force_of_ports_N", float, "With the gap at the ports.", "ports.peak_force"),
+    Key("restitution_of_ports", float, of="ports.restitution"),
+    Key("energy_change_of_ports", float, "Round-off.", lambda item: item.ports.energy - 1.0),
+)
+_BENDING = JsonForm(
+    "BendingJson",
+    "Elastic modes of an axisymmetric body, the lowest of either kind.",
+    Key(
+        "bending_frequencies_Hz",
+        list[float],
+        "Of Fourier order 1; each is two modes, in directions at right angles.",
+        "bending",
+    ),
+    Key("axial_frequencies_Hz", list[float], "Of order 0 without torsion, as many.", "axial"),
+    Key(
+        "rigid_modes_of_order_1",
+        int,
+        "2 of a free body, shift and rotation; 0 of a held one.",
+        "rigid",
+    ),
+)
+_STUDY = JsonForm(
+    "ReductionJson",
+    "``klack reduce``.",
+    schema_key("klack-reduce/1"),
+    Key("case", str),
+    Key("bodies", {str: _BODY}, "By name.", lambda study: {x.name: x for x in study.bodies}),
+    Key("transfer", {str: _TRANSFER}, "By body.", lambda study: _by_body(study.transfer)),
+    Key(
+        "one_node",
+        {str: _ONE_NODE},
+        "By body; of those with run.transfer.nodes.",
+        lambda study: _by_body(study.nodes),
+    ),
+    Key(
+        "one_node_impacts",
+        [_ONE_NODE_IMPACT],
+        "With 20 and 50 modes, where there is a node.",
+        "impacts",
+    ),
+    Key(
+        "bending",
+        {str: _BENDING},
+        "By body; of axisymmetric bodies meshed here.",
+        lambda study: _by_body(study.bending),
+    ),
 )
 
-__all__ = ["REDUCTION"]
+
+def _by_body(items: Iterable[Any]) -> dict[str, Any]:
+    return {item.body: item for item in items}
+
+
+def reduction_told(study: ReductionStudy) -> Iterator[TextTable]:
+    """What a terminal shows: both bodies."""
+    yield text_table(study.title, "body", BODY_MEASURES, ((b.name, b) for b in study.bodies))
+    if study.nodes:
+        yield _nodes_told(study)
+        yield _impacts_told(study)
+    if study.bending:
+        yield _bending_told(study)
+
+
+def _nodes_told(study: ReductionStudy) -> TextTable:
+    """Nodes as outputs, and how far up the recipe is right there."""
+    rows = []
+    for node in study.nodes:
+        limits = _limits(node.transfer)
+        corrected = (limits.get(corrected_label(count)) for count in TRANSFER_COUNTS)
+        rows.append(
+            (
+                node.body,
+                f"{node.node} at {place_words(node)}",
+                node.correction,
+                f"{1e6 * node.distance:.3g}",
+                f"{node.compliance:.4g}",
+                *("none" if limit is None else f"{1e-3 * limit:.4g}" for limit in corrected),
+            )
+        )
+    counts = [f"{count} modes valid to [kHz]" for count in TRANSFER_COUNTS]
+    return TextTable(
+        title="Displacement of one node per contact force",
+        columns=(
+            "body",
+            "node",
+            "attachment modes",
+            "off by [um]",
+            "static, over the port",
+            *counts,
+        ),
+        rows=rows,
+        left=3,
+    )
+
+
+def _impacts_told(study: ReductionStudy) -> TextTable:
+    """Energy that these nodes make or take where they stand for the contact."""
+    rows = []
+    for item in study.impacts:
+        for name, found in (("one node", item.nodes), ("port", item.ports)):
+            rows.append(
+                (
+                    f"{item.modes} modes, {name}",
+                    f"{found.peak_force:.2f}",
+                    f"{found.restitution:.4f}",
+                    _change(100.0 * (found.energy - 1.0)),
+                )
+            )
+    return TextTable(
+        title="Impact of the recipe with its gap read there",
+        columns=("output", "peak force [N]", "restitution", "energy change [%]"),
+        rows=rows,
+    )
+
+
+def _bending_told(study: ReductionStudy) -> TextTable:
+    """Lowest modes of order 1 beside the axial ones; a dash where a body keeps no more."""
+    columns = [
+        (f"{item.body} {kind} [kHz]", frequencies)
+        for item in study.bending
+        for kind, frequencies in (("bending", item.bending), ("axial", item.axial))
+    ]
+    rows = [
+        (str(i + 1), *(_khz(frequencies, i) for _, frequencies in columns))
+        for i in range(max(len(frequencies) for _, frequencies in columns))
+    ]
+    return TextTable(
+        title="Bending modes (order 1) beside the axial ones, the lowest of each",
+        columns=("mode", *(title for title, _ in columns)),
+        rows=rows[:_BENDING_TOLD],
+    )
+
+
+def _khz(frequencies: NDArray[np.float64], i: int) -> str:
+    return f"{1e-3 * frequencies[i]:.4g}" if i < len(frequencies) else "-"
+
+
+def _change(percent: float) -> str:
+    """With a sign; what is below 0.005 % depends on the step and is not told."""
+    if abs(percent) < 0.005:
+        return "0.00"
+    return f"{percent:+.2f}" if abs(percent) < 1.0 else f"{percent:+.1f}"
+
+
+def _measured(study: ReductionStudy) -> Iterator[Measured]:
+    for body in study.bodies:
+        yield body.name, body, BODY_MEASURES
+
 
 REDUCTION = Analysis(
-    json=ReductionJson,
-    to_json=reduction_to_json,
+    json=_STUDY.type,
+    to_json=_STUDY.json,
     told=reduction_told,
     measures={"reduced body": BODY_MEASURES},
-    measured=reduction_measured,
+    measured=_measured,
 )

@@ -6,16 +6,13 @@ gives a body (``reduction.shifts``), else the residual one.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.impact.transfer import (
-    LOSS_FACTOR,
-    TRANSFER_COUNTS,
-    sweep_of,
-)
+from klack.analyses.impact.figures import transfer_chart
+from klack.analyses.impact.transfer import LOSS_FACTOR, TRANSFER_COUNTS, sweep_of
 from klack.assembling.gauges import placed_point
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import recipe_stiffness
@@ -38,10 +35,21 @@ from klack.reduction.reduce import Correction, reduce_body
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount
 from klack.reduction.transfer import TransferComparison, compare_curves
+from klack.report.chart import Chart
+from klack.report.wording import sentence
 from klack.simulation.observed_contact import ObservedImpact, observed_impact
 from klack.units import format_si
 
-__all__ = ["OneNode", "OneNodeImpact", "corrected_label", "one_node_impacts", "one_nodes"]
+__all__ = [
+    "OneNode",
+    "OneNodeImpact",
+    "corrected_label",
+    "node_chart",
+    "one_node_impacts",
+    "one_nodes",
+    "place_words",
+]
+
 
 Floats = NDArray[np.float64]
 
@@ -55,7 +63,6 @@ class OneNode:
 
     Parameters
     ----------
-    body : str
     node : int
         In the mesh of the body, from 0.
     place : array, shape (2,) or (3,) [m]
@@ -89,7 +96,6 @@ class OneNodeImpact:
     ----------
     modes : int
         Kept elastic modes of each body; attachment modes come in addition.
-    nodes, ports : ObservedImpact
     """
 
     modes: int
@@ -307,3 +313,33 @@ def _drawn(point: Floats, pose: Pose) -> Floats:
     if len(point) == 2:
         return point - pose.shift[2] * np.array([0.0, 1.0])
     return np.asarray(pose.drawn(point))
+
+
+def place_words(node: OneNode) -> str:
+    """Where the node is, for example ``(0, 0, -0.6) mm``."""
+    return f"({', '.join(f'{round(1e3 * x, 4) + 0.0:g}' for x in node.place)}) mm"
+
+
+def _attached(node: OneNode) -> str:
+    return "without a shift (residual)" if node.correction == "residual" else node.correction
+
+
+def node_chart(node: OneNode) -> Chart:
+    """Displacement of the node per contact force, and the deviation from the full order there."""
+    item = node.transfer
+    drawn = transfer_chart(item)
+    return replace(
+        drawn,
+        name=f"node-{node.body}",
+        title=f"Transfer function of the {node.body} from the contact force to one node",
+        note=(
+            f"Above: axial displacement of node {node.node} at {place_words(node)}, per harmonic "
+            "force over the contact area. With correction: attachment modes "
+            f"{_attached(node)}. At the port: mean displacement, weighted like that load. Below: "
+            "magnitude of the level difference from the full body at the node, averaged over a "
+            f"sliding third octave; the level line is at {item.tolerance:g} dB, a vertical "
+            "line marks where a curve first exceeds it. Structural damping with a loss factor of "
+            f"{item.loss_factor:g} in every curve. {sentence(item.reference_note)} "
+            f"The node is {format_si(node.distance, 'm', 3)} from the place in the case."
+        ),
+    )

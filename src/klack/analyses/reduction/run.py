@@ -1,26 +1,31 @@
 """``klack reduce``: both bodies reduced at their contact, and how far up they can be trusted."""
 
 import csv
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from klack.analyses.impact.transfer import TRANSFER_MODES, compare_transfer
-from klack.analyses.reduction.bending import BendingModes, bending_modes
 from klack.analyses.reduction.one_node import (
     OneNode,
     OneNodeImpact,
     one_node_impacts,
     one_nodes,
 )
+from klack.assembling.bending import bending_body
 from klack.assembling.given_pair import build_given_pair
-from klack.assembling.modes import mode_pools
-from klack.assembling.problem import build_problem
+from klack.assembling.modes import elastic_count, mode_pools
+from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.assembling.yielding import tell_elastic
+from klack.cache.setting import result_cache
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
+from klack.elasticity.eigen import Modes, eigenmodes
+from klack.elasticity.statics import Flexibility
 from klack.progress import Progress, silent
 from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.transfer import TransferComparison
@@ -29,13 +34,61 @@ __all__ = ["ReductionStudy", "run_reduce"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class BendingModes:
+    """Lowest elastic modes of an axisymmetric body, as many of either kind as it keeps.
+
+    Parameters
+    ----------
+    axial : array, shape (m,) [Hz]
+        Of Fourier order 0 without torsion: those of the impact.
+    bending : array, shape (m,) [Hz]
+        Of order 1; each is two modes, in directions at right angles.
+    rigid : int
+        Rigid modes of order 1: 2 (shift and rotation) of a free body, 0 of a held one.
+    """
+
+    body: str
+    axial: NDArray[np.float64]
+    bending: NDArray[np.float64]
+    rigid: int
+
+
+def bending_modes(
+    problem: ContactProblem,
+    pools: Mapping[str, Modes],
+    reduced: tuple[ReducedBody, ...],
+    *,
+    threads: int | None,
+    progress: Progress,
+) -> tuple[BendingModes, ...]:
+    """Bending modes of both bodies; none of solids and of bodies from given matrices."""
+    found = []
+    progress("bending modes", 0.0)
+    for body, kept in zip((problem.pair.upper, problem.pair.lower), reduced, strict=True):
+        bending = bending_body(problem.case, body.name, body.mesh)
+        if bending is None:
+            continue
+        count = max(1, elastic_count(kept))
+        with Flexibility(bending, threads=threads, cache=result_cache()) as flexibility:
+            modes = eigenmodes(bending, count=count, flexibility=flexibility)
+        found.append(
+            BendingModes(
+                body=body.name,
+                axial=pools[body.name].frequency[:count],
+                bending=modes.frequency,
+                rigid=bending.rigid_modes.shape[1],
+            )
+        )
+    progress("bending modes", 1.0)
+    return tuple(found)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class ReductionStudy:
     """Two reduced bodies with a port at their contact, and their transfer functions.
 
     Parameters
     ----------
-    case, title : str
-    bodies : tuple of ReducedBody
     transfer : tuple of TransferComparison
         Of each body: full order first, then 20 and 50 modes with and without correction.
     nodes : tuple of OneNode
@@ -61,7 +114,7 @@ class ReductionStudy:
         and ``.svg``, at the node that the case names.
         """
         from klack.analyses.impact.figures import transfer_chart
-        from klack.analyses.reduction.node_figure import node_chart
+        from klack.analyses.reduction.one_node import node_chart
         from klack.report.printed import svg_chart
 
         for body in self.bodies:

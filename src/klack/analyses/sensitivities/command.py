@@ -65,7 +65,7 @@ def sensitivities(
         source = study_if_any(checked, tree, study)
 
         from klack.analyses.sensitivities.analysis import SENSITIVITIES
-        from klack.analyses.sensitivities.any_case import sensitivities_of
+        from klack.analyses.sensitivities.differences import sensitivities_of
         from klack.case.valve import ValveCase
         from klack.compiling.ahead import compiling_ahead
 

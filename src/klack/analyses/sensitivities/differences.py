@@ -13,24 +13,21 @@ parameter is changed by :math:`h` = 1 % and by 2 % of its size, up and down,
 this is told.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import isfinite
 from time import perf_counter, process_time
 
 from klack.analyses.point_table import PointTable
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.sensitivities.asked_measures import asked_measures
-from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
-from klack.analyses.sensitivities.record import (
-    HOLDS,
-    MeasureSlopes,
-    SensitivityRecord,
-)
+from klack.analyses.sensitivities.parameters import SlopeSpace, asked_measures, slope_space
+from klack.analyses.sensitivities.record import HOLDS, MeasureSlopes, SensitivityRecord
+from klack.analyses.sensitivities.run import run_sensitivities
 from klack.analyses.study.kinds import kind_of
 from klack.analyses.study.measures import impact_measures
-from klack.analyses.study.run_points import run_points
+from klack.analyses.study.run_points import require_way, run_points
 from klack.analyses.study.where import Where
-from klack.case.any_case import CaseTree
+from klack.case.any_case import AnyCase, CaseTree
 from klack.case.schema import Case
 from klack.case.study_source import StudySource
 from klack.errors import ConvergenceError
@@ -38,7 +35,8 @@ from klack.input.problem import one_of
 from klack.progress import Progress, silent
 from klack.stages import StageClock, collected_warnings
 
-__all__ = ["run_differences"]
+__all__ = ["sensitivities_of"]
+
 
 _CHANGE = 0.01
 _WAYS = (1.0, -1.0, 2.0, -2.0)
@@ -165,3 +163,33 @@ def _slopes(
         scale=scale,
         resolution=resolution,
     )
+
+
+def sensitivities_of(
+    case: AnyCase, variant: str | None = None, level: str | None = None
+) -> Callable[..., SensitivityRecord]:
+    """Return what differentiates a case: a stroke by exact tangents, an impact by differences.
+
+    Parameters
+    ----------
+    case : Case or ValveCase
+    variant : str, optional
+        Of a stroke.
+    level : str, optional
+        Of an impact.
+
+    Returns
+    -------
+    callable
+        :func:`~klack.analyses.sensitivities.run.run_sensitivities` or
+        :func:`~klack.analyses.sensitivities.differences.run_differences`, which take the rest.
+
+    Raises
+    ------
+    InputError
+        For a variant of an impact, or a level of a stroke.
+    """
+    require_way(case, variant, level)
+    if isinstance(case, Case):
+        return partial(run_differences, level=level)
+    return partial(run_sensitivities, variant=variant)

@@ -17,7 +17,15 @@ from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.studies.designs import Normal, Range, Spread
 from klack.units import RATIO, Kind
 
-__all__ = ["SlopeSpace", "VariedKey", "slope_space"]
+__all__ = ["SlopeSpace", "VariedKey", "asked_measures", "slope_space"]
+
+
+def asked_measures(source: StudySource | None, names: Sequence[str] = ()) -> tuple[str, ...]:
+    """Names that are given; without any, measures and constraints of the study, if there is one."""
+    if names or source is None:
+        return tuple(names)
+    return tuple(dict.fromkeys((*source.study.measures, *source.study.constraints)))
+
 
 _WHERE = "--parameter"
 _EXPECTED = (
@@ -33,8 +41,6 @@ class VariedKey:
 
     Parameters
     ----------
-    name : str
-    kind : Kind
     value : float [SI]
     size : float [SI]
         Of the value; of its range where that is zero.
@@ -57,7 +63,6 @@ class SlopeSpace:
 
     Parameters
     ----------
-    varied : tuple of VariedKey
     others : mapping of str to value [SI]
         Parameters of the study that stay as they are.
     kinds : mapping of str to Kind or None
@@ -95,7 +100,6 @@ class SlopeSpace:
 
         Parameters
         ----------
-        share : float
         slopes : sequence of float or None
             With each parameter, per its unit.
 
@@ -138,7 +142,6 @@ def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] 
 
     Parameters
     ----------
-    case : Case or ValveCase
     source : StudySource or None
         Whose parameters are meant, with what is linked to them.
     names : sequence of str

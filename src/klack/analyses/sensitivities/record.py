@@ -26,7 +26,6 @@ class SlopeParameter:
         Path of its key, or a word of the study.
     unit : str
         SI; ``"1"`` for a pure number.
-    value : float
     """
 
     name: str
@@ -40,7 +39,6 @@ class MeasureSlopes:
 
     Parameters
     ----------
-    name : str
     title : str
         What it is.
     unit : str
@@ -129,7 +127,6 @@ class ImpactSlope:
 
     Parameters
     ----------
-    stop : str
     number : int
         On that stop, from 1.
     time : float [s]
@@ -158,8 +155,6 @@ class SensitivityRecord(CaseRecord):
     ----------
     variant : str
         Of an impact its level.
-    parameters : tuple of SlopeParameter
-    measures : tuple of MeasureSlopes
     impacts : tuple of ImpactSlope
         In order of time.
     share : float

@@ -6,8 +6,7 @@ from math import inf, sqrt
 from time import perf_counter, process_time
 
 from klack.analyses.record import case_fields, run_fields
-from klack.analyses.sensitivities.asked_measures import asked_measures
-from klack.analyses.sensitivities.parameters import SlopeSpace, slope_space
+from klack.analyses.sensitivities.parameters import SlopeSpace, asked_measures, slope_space
 from klack.analyses.sensitivities.record import (
     HOLDS,
     MISSED,
@@ -58,7 +57,6 @@ def run_sensitivities(
 
     Parameters
     ----------
-    case : ValveCase
     tree : CaseTree
         The same as it was written.
     source : StudySource, optional
@@ -76,7 +74,6 @@ def run_sensitivities(
         the values have to be those of the third.
     threads : int, optional
         Of the factorisations of bodies.
-    progress : callable
 
     Raises
     ------
@@ -179,7 +176,6 @@ class _Others:
     ----------
     time : float [s]
         Processor time of one of them.
-    same, plus, minus : StrokeOfPoint
     """
 
     time: float

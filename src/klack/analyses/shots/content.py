@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from klack.analyses.impact.pressure_figure import pressure_figure
-from klack.analyses.impact.pressure_view import PressureView, pressure_view
-from klack.analyses.impact.pressure_wording import pressure_rows
+from klack.analyses.impact.pressure_view import PressureView, pressure_rows, pressure_view
 from klack.analyses.measures import Measure, glossary
 from klack.analyses.page import page_of
 from klack.analyses.sample import rank_correlation

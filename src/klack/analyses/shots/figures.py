@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from klack.analyses.shots.record import ShotColumns, ShotsStudy, ShotTraces
 from klack.analyses.shots.wording import length_unit, shot_name
 from klack.report.chart import COLOURS, AxisSpec, Chart, Colour, Curve, Mark, Panel, Style, dots
+from klack.report.page import Picture
 from klack.report.printed import STYLE, svg
 
 __all__ = [
-    "ShotsMap",
     "Shown",
     "distribution_chart",
     "force_traces_chart",
@@ -32,15 +32,7 @@ __all__ = [
 _MAP = "viridis"
 
 
-@dataclass(frozen=True, slots=True)
-class ShotsMap:
-    """Picture (SVG) and its caption."""
-
-    image: bytes
-    note: str
-
-
-def shots_map(study: ShotsStudy) -> ShotsMap:
+def shots_map(study: ShotsStudy) -> Picture:
     """Draw every shot as a dot at its eccentricity and tilt."""
     shots, centred = study.shots, study.centric
     unit, factor = length_unit(shots.eccentricity)
@@ -82,7 +74,7 @@ def shots_map(study: ShotsStudy) -> ShotsMap:
         axes.set_ylabel("tilt [°]")
         axes.margins(x=0.06, y=0.1)
         figure.colorbar(dots, ax=axes, aspect=25).set_label("restitution")
-        return ShotsMap(
+        return Picture(
             svg(figure),
             "Every dot is one shot; its colour is the restitution. The centred impact has neither "
             "eccentricity nor tilt.",

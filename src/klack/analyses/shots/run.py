@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.impact.pressure import pressure_record
+from klack.analyses.impact.levels import pressure_record
 from klack.analyses.impact.record import PressureRecord
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.draw import (

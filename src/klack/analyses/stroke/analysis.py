@@ -1,22 +1,495 @@
-"""A stroke study on disk; see :mod:`klack.analyses.store`.
+"""A stroke study in words and numbers, and on disk; see :mod:`klack.analyses.store`.
 
 ``result.zarr/study/variants/wet/result/channels/coil current/values`` is the current of the wet
 run; its unit stands beside it as ``unit``.
 """
 
+from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import zip_longest
 from math import isfinite
+from typing import Literal, NamedTuple
 
-from klack.analyses.analysis import StoredAnalysis
+import numpy as np
+
+from klack.analyses.analysis import Measured, StoredAnalysis
+from klack.analyses.contact_doubts import CONTACT, contact_doubt, elastic_above
+from klack.analyses.json_parts import (
+    CASE,
+    OWN_COMPONENTS,
+    JsonForm,
+    Key,
+    Real,
+    inherited,
+    measured_keys,
+    schema_key,
+)
+from klack.analyses.measures import text_table
 from klack.analyses.store import RecordFormat
-from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
-from klack.analyses.stroke.record import StrokeStudy
-from klack.analyses.stroke.step_check import CHANGE_MEASURES
-from klack.analyses.stroke.summary import StrokeJson, stroke_measured, stroke_to_json, stroke_told
+from klack.analyses.stroke.axis import AxisPlace, axis_place, moves_in_space
+from klack.analyses.stroke.measures import (
+    EVENT_MEASURES,
+    NOT_REACHED,
+    VARIANT_MEASURES,
+    real_time_factor,
+    steps_told,
+)
+from klack.analyses.stroke.missing import cut_records
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.step_check import CHANGE_MEASURES, NOTICED, ImpactChange
+from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.reduction.structure import STRUCTURE_UNITS
+from klack.report.wording import quantity, share
 from klack.simulation.flow_channels import present_name, with_present_names
+from klack.simulation.network_result import ImpactEvent
+from klack.terminal.tables import TextTable
+from klack.units import format_si
 
-__all__ = ["STROKE"]
+__all__ = [
+    "AXIS_COLUMNS",
+    "CHANGES",
+    "STROKE",
+    "TIME_COLUMNS",
+    "change_name",
+    "first_impact",
+    "largest",
+    "start_text",
+    "stroke_answer",
+    "time_rows",
+]
+
+
+TIME_COLUMNS = (
+    "variant",
+    "body",
+    "motion",
+    "lift [um]",
+    "10 % [ms]",
+    "50 % [ms]",
+    "90 % [ms]",
+    "touch [ms]",
+    "of",
+)
+
+AXIS_COLUMNS = ("axis at seat x, y [um]", "tilt x, y [mrad]")
+"""Place of the axis at a touch."""
+
+CHANGES = "what changes when all time steps are doubled"
+
+_TOLD = 20
+"""Impacts of a variant on a terminal."""
+
+
+class _Variant(NamedTuple):
+    study: StrokeStudy
+    variant: StrokeVariant
+
+
+class _Event(NamedTuple):
+    event: ImpactEvent
+    change: ImpactChange | None
+    axis: AxisPlace | None
+
+
+def _events(of: _Variant) -> list[_Event]:
+    events = zip_longest(of.variant.result.events, of.variant.changes)
+    return [_Event(e, change, axis_place(of.study, of.variant, e.time)) for e, change in events]
+
+
+_AXIS = JsonForm(
+    "AxisJson",
+    "Where the axis of the needle is, in three dimensions.",
+    Key("x_m", float, "At the height of the seat.", "x"),
+    Key("y_m", float, of="y"),
+    Key("tilt_x_rad", float, "Slope of the axis along x, upwards.", "tilt_x"),
+    Key("tilt_y_rad", float, of="tilt_y"),
+)
+_CHANGE = JsonForm(
+    "ChangeJson",
+    "Change of an impact when all time steps are doubled; null where it cannot be compared.",
+    Key("promised", bool, "Whether klack promises its accuracy: first to third on a stop."),
+    Key(
+        "reason",
+        str | None,
+        "Why a number is missing.",
+        lambda change: change.reason or None,
+    ),
+    *measured_keys(CHANGE_MEASURES),
+)
+_EVENT = JsonForm(
+    "EventJson",
+    "One impact of a stroke.",
+    Key("stop", str, "Name of the end stop.", "event.stop"),
+    Key("axis", (_AXIS, None), "At first touch; null for a motion along the axis."),
+    Key("doubled_steps", (_CHANGE, None), "Null where the steps were not checked.", "change"),
+    *measured_keys(EVENT_MEASURES, "event"),
+)
+_PASSAGE = JsonForm(
+    "PassageJson",
+    "One passage between two stops; null for what the run does not reach.",
+    Key("at_10_percent_s", Real, "Of the lift.", "at_10"),
+    Key("at_50_percent_s", Real, of="at_50"),
+    Key("at_90_percent_s", Real, of="at_90"),
+    Key("stop", str | None, "Name of the end stop.", lambda passage: passage.stop or None),
+    Key("touch_s", Real, "First touch of that stop.", "touch"),
+)
+_TIMES = JsonForm(
+    "TimesJson",
+    "Opening and closing of one body.",
+    Key("starts", str, "closed or open: opening or closing comes first."),
+    Key("lift_m", Real, of="lift"),
+    Key("lift_between_stops", bool, "False: largest minus smallest lift.", "between_stops"),
+    Key("opening", _PASSAGE),
+    Key("closing", _PASSAGE),
+)
+_START = JsonForm(
+    "StartJson",
+    "Static equilibrium at time zero.",
+    Key("displacement_m", dict[str, float], "By port.", "displacement"),
+    Key("pressure_Pa", dict[str, float], "Absolute, by node.", "pressure"),
+    Key(
+        "pressure_stated",
+        dict[str, bool],
+        "Whether the case states it; else it is found.",
+        "stated",
+    ),
+    Key("mass_flow_kg_s", dict[str, float], "By restriction.", "flow"),
+    Key("residual_force_N", dict[str, float], "What is left, by body.", "residual"),
+    Key("notes", list[str], "Quantities without a steady state."),
+)
+_FACES = JsonForm(
+    "FacesJson",
+    "Faces of an end stop that yield, at the end.",
+    Key("set_m", float, "By which they part later than when new.", "set"),
+    Key("largest_force_N", float, "So far: up to it they are elastic from now on.", "force"),
+)
+_VARIANT = JsonForm(
+    "VariantJson",
+    "One variant of a stroke; opening and closing are those of the needle.",
+    Key("label", str, of="variant.label"),
+    Key(
+        "motion",
+        Literal["axial", "three-dimensional"],
+        of=lambda of: "three-dimensional" if moves_in_space(*of) else "axial",
+    ),
+    Key(
+        "axis",
+        (_AXIS, None),
+        "At the start; null for a motion along the axis.",
+        lambda of: axis_place(of.study, of.variant, float(of.variant.result.time[0])),
+    ),
+    Key(
+        "failure",
+        str | None,
+        "Why the run ended early.",
+        lambda of: of.variant.result.failure or None,
+    ),
+    Key(
+        "fine_record_ends_s",
+        dict[str, Real],
+        "Stops whose force in fine steps ends there.",
+        lambda of: cut_records(of.variant.result),
+    ),
+    Key("events", [_EVENT], "Impacts in the order of time.", _events),
+    *measured_keys(VARIANT_MEASURES, "variant"),
+    *inherited(_TIMES, "variant.needle_times"),
+    Key(
+        "bodies",
+        {str: _TIMES},
+        "Of every other body between stops, by name.",
+        lambda of: {times.body: times for times in of.variant.times[1:]},
+    ),
+    Key(
+        "start",
+        (_START, None),
+        "Null for a continued or free start.",
+        "variant.result.start",
+        after="axis",
+    ),
+    Key("faces", {str: _FACES}, "By end stop, where its faces yield.", "variant.result.faces"),
+)
+STUDY = JsonForm(
+    "StrokeJson",
+    "``klack stroke``: numbers of the reference variant, and of all.",
+    schema_key("klack-stroke/1"),
+    *CASE,
+    OWN_COMPONENTS,
+    Key("variant", str, "Name of the reference variant.", "reference.name"),
+    *inherited(_VARIANT, lambda study: _Variant(study, study.reference)),
+    Key(
+        "variants",
+        {str: _VARIANT},
+        "All of them by name.",
+        lambda study: {name: _Variant(study, x) for name, x in study.variants.items()},
+    ),
+    Key(
+        "stops",
+        {str: CONTACT},
+        "By the name of the end stop; all variants but lumped ones share them.",
+        lambda study: {stop.name: stop for stop in study.stops},
+    ),
+    Key("warnings", list[str]),
+)
+
+
+def stroke_told(study: StrokeStudy) -> Iterator[TextTable | str]:
+    """Terminal output: variants side by side, times at shares of the lift, impacts."""
+    yield text_table(study.title, "variant", VARIANT_MEASURES, study.variants.items())
+    if times := time_rows(study):
+        title = "times at shares of the lift"
+        yield TextTable(title=title, columns=TIME_COLUMNS, rows=times, left=3)
+    for variant in study.variants.values():
+        yield f"{variant.name}: steps: {steps_told(variant)}"
+        if begun := start_text(variant):
+            yield f"{variant.name}: {begun}"
+        title, total = f"{variant.name}: {variant.label}", len(variant.result.events)
+        if not total:
+            yield f"{title}\n  no impacts"
+            continue
+        if total > _TOLD:
+            title += f" (the first {_TOLD} of {total} impacts; all of them with --json)"
+        events = variant.result.events[:_TOLD]
+        yield text_table(title, "stop", EVENT_MEASURES, ((event.stop, event) for event in events))
+        yield from _changes_told(variant)
+        yield from _axis_told(study, variant)
+        yield from yield_told(variant)
+    for stop in study.stops:
+        if doubt := contact_doubt(stop):
+            yield f"Impacts on '{stop.name}': {doubt}"
+        if line := elastic_above(stop):
+            yield f"Impacts on '{stop.name}': {line}"
+
+
+def stroke_measured(study: StrokeStudy) -> Iterator[Measured]:
+    """Every variant and each of its impacts with its measures."""
+    for name, variant in study.variants.items():
+        yield name, variant, VARIANT_MEASURES
+        counts, called = Counter[str](), list[str]()
+        for event in variant.result.events:
+            counts[event.stop] += 1
+            called.append(f"{name}, {event.stop} {counts[event.stop]}")
+            yield called[-1], event, EVENT_MEASURES
+        for impact, change in zip(called, variant.changes, strict=False):
+            yield f"{impact}, steps doubled", change, CHANGE_MEASURES
+
+
+def time_rows(study: StrokeStudy) -> tuple[tuple[str, ...], ...]:
+    """Rows of :data:`TIME_COLUMNS`: opening and closing of every body between stops, in order."""
+    return tuple(
+        (
+            variant.name,
+            times.body,
+            way,
+            _lift(times),
+            _moment(passage.at_10),
+            _moment(passage.at_50),
+            _moment(passage.at_90),
+            _moment(passage.touch) if passage.stop else "no stop",
+            passage.stop or "–",
+        )
+        for variant in study.variants.values()
+        for times in variant.times
+        for way, passage in times.in_order
+    )
+
+
+def change_name(event: ImpactEvent, change: ImpactChange) -> str:
+    """Which impact changes so, and what is not promised of it, or why it has no numbers."""
+    number = f" {change.number}" if change.number else ""
+    later = change.number and not change.promised and not change.reason
+    note = change.reason or ("not promised" if later else "")
+    return f"{event.stop}{number}{f' ({note})' if note else ''}"
+
+
+def _changes_told(variant: StrokeVariant) -> Iterator[TextTable]:
+    """What doubled steps change in promised impacts; nothing where that was not asked for."""
+    pairs = zip(variant.result.events, variant.changes, strict=False)
+    named = [(change_name(event, change), change) for event, change in pairs if change.promised]
+    if named:
+        title = f"{variant.name}: {CHANGES}"
+        yield text_table(title, "impact", CHANGE_MEASURES, named)
+
+
+def _axis_told(study: StrokeStudy, variant: StrokeVariant) -> Iterator[TextTable]:
+    """Where the axis is at the start and at each touch; nothing for a motion along the axis."""
+    moments = [("start", float(variant.result.time[0]))]
+    moments += [(event.stop, event.time) for event in variant.result.events[:_TOLD]]
+    rows = [
+        (word, f"{1e3 * time:.4f}", place.position, place.tilt)
+        for word, time in moments
+        if (place := axis_place(study, variant, time)) is not None
+    ]
+    if rows:
+        title = f"{variant.name}: axis of the needle"
+        yield TextTable(title=title, columns=("at", "time [ms]", *AXIS_COLUMNS), rows=tuple(rows))
+
+
+def yield_told(variant: StrokeVariant) -> Iterator[str]:
+    """What yield has left on the faces of each stop; nothing where they stay elastic."""
+    for stop, faces in variant.result.faces.items():
+        if faces.set > 0.0:
+            lost = variant.result.books.losses.get(f"{stop} contact", 0.0)
+            yield (
+                f"{variant.name}: the faces of '{stop}' have yielded: a set of "
+                f"{format_si(faces.set, 'm', 3)} after {format_si(faces.force, 'N', 4)}, "
+                f"{format_si(lost, 'J', 3)} lost; up to that force they are elastic from now on"
+            )
+
+
+def touch_event(variant: StrokeVariant, passage: Passage) -> ImpactEvent | None:
+    """Impact that ends a passage; None if it does not reach its stop."""
+    return next(
+        (
+            event
+            for event in variant.result.events
+            if event.time == passage.touch and passage.stop in ("", event.stop)
+        ),
+        None,
+    )
+
+
+def first_impact(variant: StrokeVariant, stop: str) -> ImpactEvent | None:
+    """First impact on a stop that is one.
+
+    A needle that is pressed on its seat may lift by nanometres when the spring or the magnet
+    starts; such touches, slower than 2 % of the fastest impact on that stop, do not count.
+    """
+    events = variant.impacts(stop)
+    fastest = max((event.approach_speed for event in events), default=0.0)
+    return next((event for event in events if event.approach_speed > NOTICED * fastest), None)
+
+
+def start_text(variant: StrokeVariant) -> str:
+    """Equilibrium from which a variant began, in one line; empty if it began in none."""
+    start = variant.result.start
+    if start is None:
+        return ""
+    places: dict[str, list[float]] = {}
+    for name, y in start.displacement.items():
+        places.setdefault(name.partition(".")[0], []).append(y)
+    parts = [f"{body} {_from_to(ys)}" for body, ys in places.items()]
+    for name, p in start.pressure.items():
+        parts.append(f"{name} {p / 1e5:.5g} bar" + (" (stated)" if start.stated[name] else ""))
+    left = max((abs(force) for force in start.residual.values()), default=0.0)
+    return f"start at rest: {', '.join(parts)}; forces balance to {format_si(left, 'N', 1)}"
+
+
+def _from_to(displacements: list[float]) -> str:
+    """Where the points of a body are: one displacement if it is rigid."""
+    ends = dict.fromkeys((min(displacements), max(displacements)))
+    return " to ".join(format_si(y, "m", 3) for y in ends)
+
+
+def _lift(times: LiftTimes) -> str:
+    """Reference of the shares: between stops, or the largest lift of the run."""
+    if times.lift is None:
+        return "none"
+    return f"{1e6 * times.lift:.4g}{'' if times.between_stops else ' (largest)'}"
+
+
+def _moment(time: float | None) -> str:
+    return NOT_REACHED if time is None else f"{1e3 * time:.4f}"
+
+
+def stroke_answer(study: StrokeStudy) -> str:
+    """Opening, closing and the impacts of the reference, and how the other variants differ."""
+    variant = study.reference
+    times = variant.needle_times
+    ways = [_opening(study, variant), _closing(study, variant)]
+    if times.starts == "open":
+        ways = [f"The {study.needle} starts open.", *ways[::-1]]
+    words = [" ".join(ways)]
+    words.append(
+        f"These numbers come from the variant '{variant.name}' ({variant.label}), "
+        f"{quantity(float(variant.result.time[-1] - variant.result.time[0]), 's', 3)} computed in "
+        f"{quantity(variant.result.wall_time, 's', 2)}: {real_time_factor(variant):.3g} times the "
+        "real time."
+    )
+    words += [_compared(variant, other) for other in list(study.variants.values())[1:]]
+    return " ".join(word for word in words if word)
+
+
+def largest(variant: StrokeVariant, channels: tuple[str, ...]) -> float:
+    """Largest magnitude of some channels over the run; nan if there are none."""
+    found = [data for name in channels if (data := variant.channel(name)) is not None]
+    return max((float(np.abs(data.values).max(initial=0.0)) for data in found), default=np.nan)
+
+
+def _opening(study: StrokeStudy, variant: StrokeVariant) -> str:
+    passage = variant.needle_times.opening
+    stop = study.channels.opening_stop
+    event = touch_event(variant, passage)
+    if passage.touch is not None and event is not None:
+        again = " again" if variant.needle_times.starts == "open" else ""
+        return (
+            f"The {study.needle} reaches the opening stop{again} after "
+            f"{quantity(passage.touch, 's', 4)} {_hit(study, variant, event)}."
+        )
+    if variant.needle_times.starts == "open":
+        if passage.at_90 is not None:
+            return f"It is open again, to 90 % of its lift, at {quantity(passage.at_90, 's', 4)}."
+        return "It has not opened again at the end of the run."
+    lift = variant.channel(study.channels.lift)
+    way = float(lift.values.max()) if lift is not None else float("nan")
+    end = " and does not reach the opening stop." if stop else "."
+    if stop and passage.at_90 is not None:
+        end = (
+            f", passes 90 % of its lift at {quantity(passage.at_90, 's', 4)} and does not touch "
+            "the opening stop."
+        )
+    return f"The {study.needle} lifts by {quantity(way, 'm', 3)}{end}"
+
+
+def _closing(study: StrokeStudy, variant: StrokeVariant) -> str:
+    seat = study.channels.seat
+    passage = variant.needle_times.closing
+    if passage.touch is None:
+        if passage.at_10 is not None:
+            return (
+                f"It is closed to 10 % of its lift at {quantity(passage.at_10, 's', 4)} and does "
+                "not touch its seat."
+            )
+        return "It has not closed at the end of the run." if seat else ""
+    event = touch_event(variant, passage)
+    is_first = variant.needle_times.starts == "open"
+    text = f"It {'touches' if is_first else 'is back on'} its seat at "
+    text += quantity(passage.touch, "s", 4)
+    if study.switch_off is not None and passage.touch > study.switch_off:
+        after = quantity(passage.touch - study.switch_off, "s", 3)
+        text += f", {after} after the end of the drive"
+    if event is None:
+        return f"{text}."
+    bounces = len(variant.impacts(seat)) - 1
+    more = f", and bounces {bounces} times" if bounces > 1 else ""
+    return f"{text}, {_hit(study, variant, event)}{more}."
+
+
+def _hit(study: StrokeStudy, variant: StrokeVariant, event: ImpactEvent) -> str:
+    filmed = variant.wet and any(stop.film for stop in study.stops if stop.name == event.stop)
+    since = " (the highest since its film force set in)" if filmed else ""
+    text = (
+        f"with {event.approach_speed:.3g} m/s{since} and a peak force of "
+        f"{quantity(event.peak_force, 'N', 3)}"
+    )
+    if isfinite(event.restitution):
+        text += f" (restitution {event.restitution:.3g})"
+    return text
+
+
+def _compared(reference: StrokeVariant, other: StrokeVariant) -> str:
+    """Difference of the opening and closing times of another variant."""
+    parts = []
+    here, there = reference.needle_times, other.needle_times
+    for word, one, two in (
+        ("opens", here.opening.touch, there.opening.touch),
+        ("closes", here.closing.touch, there.closing.touch),
+    ):
+        if one is not None and two is not None:
+            side = "later" if two >= one else "earlier"
+            apart = abs(two - one)
+            parts.append(f"{word} {quantity(apart, 's', 3)} {side} ({share(apart / one, 1)})")
+    return f"Variant '{other.name}' {' and '.join(parts)}." if parts else ""
 
 
 def _renewed(study: StrokeStudy) -> StrokeStudy:
@@ -75,8 +548,8 @@ STROKE = StoredAnalysis(
         tables=("events", "changes"),
     ),
     page="stroke.content:stroke_content",
-    json=StrokeJson,
-    to_json=stroke_to_json,
+    json=STUDY.type,
+    to_json=STUDY.json,
     told=stroke_told,
     measures={
         "stroke variant": VARIANT_MEASURES,

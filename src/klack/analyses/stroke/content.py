@@ -7,36 +7,41 @@ import numpy as np
 
 from klack.analyses.impact.content import body_table, size_verdict
 from klack.analyses.measures import Measure, glossary, page_cells, page_heads
-from klack.analyses.page import page_of
-from klack.analyses.schematic_section import schematic_section
-from klack.analyses.stroke.axis_figures import axis_over_time_chart, axis_path_chart
-from klack.analyses.stroke.axis_place import acts_across, axis_place, moves_in_space
+from klack.analyses.page import page_of, schematic_section
+from klack.analyses.stroke.analysis import (
+    AXIS_COLUMNS,
+    CHANGES,
+    TIME_COLUMNS,
+    change_name,
+    first_impact,
+    largest,
+    start_text,
+    stroke_answer,
+    time_rows,
+)
+from klack.analyses.stroke.axis import (
+    acts_across,
+    axis_over_time_chart,
+    axis_path_chart,
+    axis_place,
+    moves_in_space,
+)
 from klack.analyses.stroke.figures import (
     actuation_chart,
     echo_chart,
     energy_bars,
     first_impact_chart,
+    loop_chart,
     mechanical_energy_bars,
     shown_stops,
     stop_law_chart,
     variants_chart,
 )
 from klack.analyses.stroke.film_frames import film_charts
-from klack.analyses.stroke.loop_figure import loop_chart
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import FluidSummary, StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.step_check import CHANGE_MEASURES
-from klack.analyses.stroke.summary import (
-    AXIS_COLUMNS,
-    CHANGES,
-    TIME_COLUMNS,
-    change_name,
-    first_impact,
-    start_text,
-    time_rows,
-)
-from klack.analyses.stroke.wording import largest, stroke_answer
 from klack.report.chart import AnyChart, Chart
 from klack.report.page import Content, NextStep, Section, Table
 from klack.report.wording import quantity

@@ -4,27 +4,17 @@ Units on the axes are those of the workshop: ms, us, V, A, N, bar, um, m/s.  Lon
 thinned to the smallest and the largest value of each pixel column.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.record import LineSummary, StopSummary, StrokeStudy, StrokeVariant
-from klack.analyses.stroke.summary import first_impact
-from klack.report.chart import (
-    AxisSpec,
-    Band,
-    BarChart,
-    BarPart,
-    Chart,
-    Curve,
-    Mark,
-    Panel,
-)
-from klack.report.looks import OTHER, PART_LOOKS, Look, look_of
-from klack.report.thinning import thinned
+from klack.report.chart import AxisSpec, Band, BarChart, BarPart, Chart, Curve, Mark, Panel
+from klack.report.looks import OTHER, PART_LOOKS, Look, look_of, thinned
 from klack.report.wording import listed, quantity
 from klack.simulation.network_result import EnergyBooks, ImpactEvent
 
@@ -33,11 +23,13 @@ __all__ = [
     "echo_chart",
     "energy_bars",
     "first_impact_chart",
+    "loop_chart",
     "mechanical_energy_bars",
     "shown_stops",
     "stop_law_chart",
     "variants_chart",
 ]
+
 
 Floats = NDArray[np.float64]
 
@@ -70,24 +62,20 @@ def actuation_chart(study: StrokeStudy) -> Chart:
     """Everything about the reference on one time axis, from the voltage to the motion."""
     variant, channels = study.reference, study.channels
     panels = [
-        _channel_panel(variant, channels.voltage, AxisSpec(label="voltage", unit="V"), 1.0, 0.4),
-        _channel_panel(variant, channels.current, AxisSpec(label="current", unit="A"), 1.0, 0.5),
-        _channel_panel(
-            variant, channels.magnetic_force, AxisSpec(label="magnet", unit="N"), 1.0, 0.5
-        ),
-        _channel_panel(
-            variant, channels.pressures, AxisSpec(label="pressure", unit="bar"), 1e-5, 0.6
-        ),
-        _channel_panel(variant, (channels.lift,), AxisSpec(label="lift", unit="µm"), 1e6, 0.6),
-        _channel_panel(
-            variant, (channels.velocity,), AxisSpec(label="velocity", unit="m/s"), 1.0, 0.6
-        ),
+        _channel_panel(variant, names, AxisSpec(label=label, unit=unit), factor, share)
+        for names, label, unit, factor, share in (
+            (channels.voltage, "voltage", "V", 1.0, 0.4),
+            (channels.current, "current", "A", 1.0, 0.5),
+            (channels.magnetic_force, "magnet", "N", 1.0, 0.5),
+            (channels.pressures, "pressure", "bar", 1e-5, 0.6),
+            ((channels.lift,), "lift", "µm", 1e6, 0.6),
+            ((channels.velocity,), "velocity", "m/s", 1.0, 0.6),
+        )
     ]
     marks, plain = _moments(study, variant)
-    shown = [panel for panel in panels if panel.curves]
     shown = [
-        replace(panel, marks=(*(marks if i == 0 else plain), _ZERO))
-        for i, panel in enumerate(shown)
+        replace(panel, marks=(*(plain if i else marks), _ZERO))
+        for i, panel in enumerate(panel for panel in panels if panel.curves)
     ]
     return Chart(
         name="actuation",
@@ -230,21 +218,15 @@ def first_impact_chart(
             since = 1e6 * (variant.result.time - event.time)
             curve = thinned(since, speed.values, window=window)
             speeds.append(_variant_curve(variant, *curve, label=False))
-    panels = [Panel(y=AxisSpec(label="contact", unit="N"), curves=tuple(contact), share=0.65)]
-    if film:
-        axis = AxisSpec(label="film", unit="N")
-        panels.append(Panel(y=axis, curves=tuple(film), marks=(_ZERO,), share=0.35))
-    panels.append(
-        Panel(y=AxisSpec(label="gap", unit="µm"), curves=tuple(gaps), marks=(_ZERO,), share=0.4)
-    )
-    panels.append(
-        Panel(
-            y=AxisSpec(label="velocity", unit="m/s"),
-            curves=tuple(speeds),
-            marks=(_ZERO,),
-            share=0.45,
+    panels = [
+        Panel(y=AxisSpec(label=label, unit=unit), curves=tuple(curves), marks=marks, share=share)
+        for label, unit, curves, marks, share in (
+            ("contact", "N", contact, (), 0.65),
+            ("film", "N", film, (_ZERO,), 0.35),
+            ("gap", "µm", gaps, (_ZERO,), 0.4),
+            ("velocity", "m/s", speeds, (_ZERO,), 0.45),
         )
-    )
+    ]
     return Chart(
         name=name,
         title=title,
@@ -330,7 +312,7 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
     event = first_impact(wet[0], stop) if wet else None
     if event is None:
         return None
-    variant, echo = wet[0], 1e6 * line.echo_time
+    variant, channels, echo = wet[0], study.channels, 1e6 * line.echo_time
     since = 1e6 * (variant.result.time - event.time)
     window = (-echo, min(6.0 * echo, float(since[-1])))
     marks = [
@@ -339,23 +321,25 @@ def echo_chart(study: StrokeStudy, stop: str, line: LineSummary) -> Chart | None
         if k * echo <= window[1]
     ]
     plain = tuple(Mark(value=mark.value) for mark in marks)
-    speed = variant.channel(study.channels.velocity)
-    lift = variant.channel(study.channels.lift_velocity)
-    motion = []
-    if lift is not None:
-        x, y = thinned(since, lift.values, window=window)
-        label = f"{study.channels.lift_velocity}"
-        motion.append(Curve(x=x, y=y, label=label, colour="sky", style="long", width=1.2))
-    if speed is not None:
-        x, y = thinned(since, speed.values, window=window)
-        label = f"{study.channels.velocity} (centre of mass)"
-        motion.append(Curve(x=x, y=y, label=label, width=2.0))
-    pressures = []
-    for i, name in enumerate(study.channels.pressures):
-        data = variant.channel(name)
-        if data is not None:
-            x, y = thinned(since, 1e-5 * data.values, window=window)
-            pressures.append(look_of(i).curve(x, y, name))
+
+    def drawn(named: Iterable[tuple[str, str, Look]], factor: float = 1.0) -> Iterator[Curve]:
+        for name, label, look in named:
+            data = variant.channel(name)
+            if data is not None:
+                x, y = thinned(since, factor * data.values, window=window)
+                yield look.curve(x, y, label)
+
+    motion = drawn(
+        (
+            (channels.lift_velocity, channels.lift_velocity, Look("sky", "long", 1.2)),
+            (
+                channels.velocity,
+                f"{channels.velocity} (centre of mass)",
+                Look("black", "solid", 2.0),
+            ),
+        )
+    )
+    pressures = drawn(((name, name, look_of(i)) for i, name in enumerate(channels.pressures)), 1e-5)
     return Chart(
         name=f"echo-{stop}-{line.name}",
         title=f"After the first impact on '{stop}', echoes of the line '{line.name}'",
@@ -573,4 +557,51 @@ def _bars(
         rows=tuple(rows),
         parts=tuple(parts),
         note=f"{note} Parts below {100 * _SMALL:g} % are in the table only.",
+    )
+
+
+_MOST = 2000  # points of a curve
+_SHARE = 0.8
+
+
+def loop_chart(study: StrokeStudy) -> Chart | None:
+    """Flux over current of the reference; None without hysteresis."""
+    variant = study.reference
+    losses, channels = variant.result.books.losses, variant.result.channels
+    coils = [name.removesuffix(" hysteresis") for name in losses if name.endswith(" hysteresis")]
+    curves: list[Curve] = []
+    for coil in coils:
+        current, flux = channels.get(f"{coil} current"), channels.get(f"{coil} flux")
+        if current is None or flux is None:
+            continue
+        every = max(1, len(flux.values) // _MOST)
+        x, y = current.values[::every], 1e6 * flux.values[::every]
+        curves.append(look_of(len(curves)).curve(x, y, coil))
+        curves.append(
+            Curve(
+                x=x[:1],
+                y=y[:1],
+                label=f"start of {coil}",
+                drawn="points",
+                width=3.5,
+                colour="black",
+            )
+        )
+    if not curves:
+        return None
+    heat = "; ".join(
+        f"{coil}: {1e3 * losses[f'{coil} hysteresis']:.3g} mJ lost in hysteresis" for coil in coils
+    )
+    zero = (Mark(value=0.0, axis="y"), Mark(value=0.0))
+    return Chart(
+        name="loops",
+        title=f"Flux over current: {variant.label}",
+        x=AxisSpec(label="current", unit="A"),
+        panels=(
+            Panel(
+                y=AxisSpec(label="flux", unit="µWb"), curves=tuple(curves), marks=zero, share=_SHARE
+            ),
+        ),
+        note=f"Reference variant '{variant.name}'; {heat}. The flux is that of the working gap, so "
+        "the loop also holds eddy currents and the motion of the armature.",
     )

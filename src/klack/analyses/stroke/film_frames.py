@@ -3,15 +3,33 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.analyses.stroke.impact_order import recorded_impacts
 from klack.analyses.stroke.record import StrokeVariant
-from klack.report.ring_frames import RingFrames
+from klack.report.chart import RingFrames
 from klack.report.wording import quantity
 from klack.simulation.film_sectors import sector_pressure
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.spatial_impact import SpatialImpact
 
-__all__ = ["film_charts"]
+__all__ = ["film_charts", "recorded_impacts"]
+
+
+def recorded_impacts(variant: StrokeVariant) -> tuple[tuple[int, ImpactEvent, SpatialImpact], ...]:
+    """Impacts of a variant whose contact forces were recorded: number, event, record.
+
+    Numbers count all impacts of the variant from 1, as the table of impacts does.  A touch that is
+    no impact, such as a tremble while the stop is left, is not among them.
+    """
+    return tuple(
+        (number, event, record)
+        for number, event in enumerate(variant.result.events, start=1)
+        for record in variant.result.spatial_impacts or ()
+        if record.stop == event.stop
+        and abs(record.begin - event.time) < _SAME * float(record.durations[0])
+    )
+
+
+_SAME = 0.5  # of the first interval: an impact of a continued run has the same first touch
+
 
 Floats = NDArray[np.float64]
 

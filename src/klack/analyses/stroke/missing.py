@@ -2,11 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from klack.analyses.stroke.record import StrokeVariant
 from klack.simulation.network_result import NetworkResult
 from klack.units import format_si
 
-__all__ = ["cut_records", "missing_notes"]
+__all__ = ["cut_records", "missing_notes", "rest_note"]
 
 
 def missing_notes(
@@ -16,7 +18,6 @@ def missing_notes(
 
     Parameters
     ----------
-    variants : mapping of name to StrokeVariant
     not_run : sequence of str
         Variants that were asked for and have no record.
     failure : Exception or None
@@ -53,3 +54,28 @@ def cut_records(result: NetworkResult) -> dict[str, float]:
 
 def _line(text: object) -> str:
     return " ".join(str(text).split())
+
+
+def rest_note(variant: str, result: NetworkResult, seat: str) -> str:
+    """Note that the needle never left its seat; empty if it did.
+
+    The smallest force on the seat is what was missing to lift it at the best moment.
+
+    Parameters
+    ----------
+    seat : str
+        Component.
+    """
+    pressing = result.channels.get(f"{seat} contact force")
+    if pressing is None or pressing.values.size < 2:
+        return ""
+    force = pressing.values
+    if not np.all(force > 0.0):
+        return ""
+    return (
+        f"'{variant}': the needle never left its seat. It was pressed on '{seat}' with "
+        f"{force[0]:.3g} N at first, and {force.min():.3g} N were still missing to lift it at "
+        f"{1e3 * result.time[int(np.argmin(force))]:.3g} ms. Check the preload of the spring, "
+        "the current and the force of the magnet, the pressures, and the signs: forces that open "
+        "are positive."
+    )

@@ -36,7 +36,6 @@ class FluidSummary:
 
     Parameters
     ----------
-    name : str
     temperature : float [K]
     pressure : float [Pa]
         Absolute, at which the numbers below hold: the highest start pressure of the valve.
@@ -155,7 +154,6 @@ class StrokeChannels:
         Of the centre of mass of the needle.
     voltage, current, magnetic_force : tuple of str
         One per solenoid.
-    pressures, flows : tuple of str
     opening_stop, seat : str
         Components of the two stops; empty if the valve has none.
     """
@@ -182,7 +180,6 @@ class StrokeVariant:
         ``"wet"``, ``"dry"``, ``"wet-lumped"`` or ``"dry-lumped"``.
     label : str
         What a legend says, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
-    wet, flexible : bool
     modes : int
         Degrees of freedom of all bodies.
     opening_time : float or None [s]
@@ -194,7 +191,6 @@ class StrokeVariant:
     times : tuple of LiftTimes
         Of the needle first, then of every other body between stops: passing 10, 50 and 90 % of the
         lift, and the touches.
-    result : NetworkResult
     setup_time : float [s]
         Wall time of everything before the time loop that is this variant's own.
     changes : tuple of ImpactChange
@@ -264,13 +260,10 @@ class StrokeStudy(CaseRecord):
     variants : mapping of name to StrokeVariant
         The first one is the one to compare with; the last one may be incomplete, see
         :attr:`~klack.simulation.network_result.NetworkResult.failure`.
-    channels : StrokeChannels
     bodies : tuple of BodySummary
         Their ``compliance_share`` is the smallest of all contact ports.
-    stops : tuple of StopSummary
     fluid : FluidSummary or None
         None for a case without fluid.
-    lines : tuple of LineSummary
     structures : tuple of Structure
         Held bodies as sources of sound, their stops by the names of the end stops.
     schematic : str
@@ -312,7 +305,6 @@ class IncompleteStrokeError(ConvergenceError):
 
     Parameters
     ----------
-    text : str
     study : StrokeStudy
         Says in its warnings what is missing.
     """

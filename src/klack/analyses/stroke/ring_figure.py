@@ -1,33 +1,24 @@
 """Line load round the ring over time, one field for each impact."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from klack.analyses.stroke.impact_order import recorded_impacts
+from klack.analyses.stroke.film_frames import recorded_impacts
 from klack.analyses.stroke.record import StrokeVariant
+from klack.report.page import Picture
 from klack.report.printed import STYLE, plain, svg
 from klack.report.wording import quantity
 from klack.simulation.network_result import ImpactEvent
 from klack.simulation.spatial_impact import SpatialImpact
 
-__all__ = ["RingPicture", "line_load_picture"]
+__all__ = ["line_load_picture"]
 
 _SHOWN, _COLUMNS = 8, 2
 _NOTHING = 1e-9  # of the highest load: round-off
 
 
-@dataclass(frozen=True, slots=True)
-class RingPicture:
-    """Picture (SVG) and its caption."""
-
-    image: bytes
-    note: str
-
-
-def line_load_picture(variant: StrokeVariant) -> RingPicture | None:
+def line_load_picture(variant: StrokeVariant) -> Picture | None:
     """Draw the first impacts of a variant; None where none was recorded."""
     found = recorded_impacts(variant)
     shown = found[:_SHOWN]
@@ -42,7 +33,7 @@ def line_load_picture(variant: StrokeVariant) -> RingPicture | None:
             axes.set_axis_off()
         for axes, (number, event, record) in zip(grid, shown, strict=False):
             _draw(figure, axes, number, event, record)
-        return RingPicture(svg(figure), _note(variant, len(shown), shown))
+        return Picture(svg(figure), _note(variant, len(shown), shown))
 
 
 def _draw(figure: Figure, axes, number: int, event: ImpactEvent, record: SpatialImpact) -> None:  # type: ignore[no-untyped-def]

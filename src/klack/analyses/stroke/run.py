@@ -7,14 +7,14 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from klack.analyses.impact.contact_check import check_contact
-from klack.analyses.record import RunFields, case_fields, run_fields
+from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.controllers import controller_notes
-from klack.analyses.stroke.missing import cut_records, missing_notes
+from klack.analyses.stroke.missing import cut_records, missing_notes, rest_note
 from klack.analyses.stroke.record import (
     FluidSummary,
     IncompleteStrokeError,
@@ -24,7 +24,6 @@ from klack.analyses.stroke.record import (
     StrokeStudy,
     StrokeVariant,
 )
-from klack.analyses.stroke.rest import rest_note
 from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_checked
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
@@ -87,7 +86,6 @@ def run_stroke(
 
     Parameters
     ----------
-    case : ValveCase
     variants : sequence of str
         Among :data:`klack.case.valve_sections.VARIANTS`; those of the case by default.
     after : StrokeStudy, optional
@@ -190,8 +188,6 @@ class VariantRun:
 
     Parameters
     ----------
-    variant : StrokeVariant
-    rows : Rows
     failure : ConvergenceError or None
         With ``variant`` up to there.
     steps : CheckedSteps or None
@@ -214,7 +210,7 @@ def stroke_study(
     valve: Valve,
     roles: ValveRoles,
     runs: Mapping[Variant, VariantRun],
-    made: RunFields,
+    made: Mapping[str, Any],
     *,
     bodies: tuple[BodySummary, ...],
     stops: tuple[StopSummary, ...],
@@ -227,13 +223,8 @@ def stroke_study(
     ----------
     valve : Valve
         Its meshes and contacts are not needed.
-    roles : ValveRoles
-    runs : mapping of str to VariantRun
-    made : RunFields
-        By which version, when, in which time.
-    bodies : tuple of BodySummary
-    stops : tuple of StopSummary
-    warnings : tuple of str
+    made : mapping
+        See :func:`~klack.analyses.record.run_fields`: by which version, when, in which time.
     schematic : str
         Picture of the network (SVG).
     """
@@ -344,11 +335,6 @@ def one_variant(
 
     Parameters
     ----------
-    valve : Valve
-    roles : ValveRoles
-    name : Variant
-    progress : callable
-    after : NetworkResult, optional
     sizes : StepSizes, optional
         Of steps that are not checked.
     check : bool

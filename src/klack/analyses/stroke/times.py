@@ -63,7 +63,6 @@ class LiftTimes:
     between_stops : bool
         Whether stops end the lift; else it counts to the furthest place of the run, because no stop
         is there or because less than 10 % of the way to it are used.
-    opening, closing : Passage
     """
 
     body: str
@@ -87,7 +86,6 @@ def all_lift_times(
 
     Parameters
     ----------
-    result : NetworkResult
     rows : Rows
         Of the same run.
     needle, point : str
@@ -136,8 +134,6 @@ def lift_times(
     time : array, shape (n,) [s]
     displacement : array, shape (n,) [m]
         Along +z, the direction of opening.
-    events : sequence of ImpactEvent
-    body : str
     ends : (float, float) [m]
         Displacements closed and open; infinite where no stop ends the lift.
     stops : (str, str)

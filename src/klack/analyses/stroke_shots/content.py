@@ -1,6 +1,5 @@
 """Content and figures of a report of many strokes before its layout, for screen and paper."""
 
-from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
@@ -9,8 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from numpy.typing import NDArray
 
-from klack.analyses.page import page_of
-from klack.analyses.schematic_section import schematic_section
+from klack.analyses.page import page_of, schematic_section
 from klack.analyses.shots.wording import degrees, drawn_section, length_unit, plain
 from klack.analyses.stroke_shots.analysis import RATIO_COLUMNS, correlation_rows, ratio_rows
 from klack.analyses.stroke_shots.record import (
@@ -30,11 +28,11 @@ from klack.analyses.stroke_shots.scatter import (
     scattered,
 )
 from klack.report.chart import COLOURS, AxisSpec, Chart, Colour, Curve, Panel, dots
-from klack.report.page import Content, Section, Table
+from klack.report.page import Content, Picture, Section, Table
 from klack.report.printed import STYLE, svg
 from klack.report.wording import count, power, printed_unit, quantity, sentence
 
-__all__ = ["Drawing", "stroke_shots_content"]
+__all__ = ["stroke_shots_content"]
 
 
 Floats = NDArray[np.float64]
@@ -135,15 +133,7 @@ _ACROSS = 3
 _LEVER = 3e-3  # [m] of the lines that show the tilt
 
 
-@dataclass(frozen=True, slots=True)
-class Drawing:
-    """Picture (SVG) and its caption."""
-
-    image: bytes
-    note: str
-
-
-def histograms(study: StrokeShotsStudy) -> Drawing | None:
+def histograms(study: StrokeShotsStudy) -> Picture | None:
     """Histogram of each measure, the variants over each other."""
     found: dict[str, dict[str, Scattered]] = {}
     for name, shots in study.variants.items():
@@ -166,7 +156,7 @@ def histograms(study: StrokeShotsStudy) -> Drawing | None:
             for name in study.variants
         ]
         figure.legend(handles, list(study.variants), loc="outside upper left", ncols=2)
-        return Drawing(
+        return Picture(
             svg(figure),
             f"How many of {study.count} strokes fall into each class. Dashed: the stroke that "
             "starts centred.",
@@ -197,7 +187,7 @@ def _histogram(axis, items: dict[str, Scattered]) -> None:  # type: ignore[no-un
     axis.locator_params(axis="y", nbins=4, integer=True)
 
 
-def touch_map(study: StrokeShotsStudy) -> Drawing | None:
+def touch_map(study: StrokeShotsStudy) -> Picture | None:
     """Axis of the needle at first touch of each stop, seen from above."""
     stops = [
         stop
@@ -212,7 +202,7 @@ def touch_map(study: StrokeShotsStudy) -> Drawing | None:
             _touch_panel(axis, study, stop)
         handles, labels = figure.axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper left", ncols=3)
-        return Drawing(
+        return Picture(
             svg(figure),
             "Every dot is the axis of the needle at the height of the stop when a stroke first "
             "touches it; the line leads to where the axis is 3 mm above. Circle: what the guide "

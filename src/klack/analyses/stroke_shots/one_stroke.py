@@ -13,10 +13,10 @@ from klack.analyses.noise.measures import DESIGN_MEASURES
 from klack.analyses.noise.run import noise_design
 from klack.analyses.noise.source import stroke_sources
 from klack.analyses.shots.draw import drawn_face_friction, drawn_friction, drawn_position, polar
+from klack.analyses.stroke.analysis import first_impact
+from klack.analyses.stroke.missing import rest_note
 from klack.analyses.stroke.record import StopSummary, StrokeVariant
-from klack.analyses.stroke.rest import rest_note
 from klack.analyses.stroke.run import VariantRun, one_variant, study_of_run
-from klack.analyses.stroke.summary import first_impact
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.body_summary import BodySummary

@@ -12,10 +12,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass, replace
 
 from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.impact.analysis import no_estimate
 from klack.analyses.impact.given_models import require_given_levels
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bodies, run_impact
-from klack.analyses.impact.summary import no_estimate
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import impact_sources
 from klack.analyses.shots.draw import shots_of

@@ -26,9 +26,9 @@ from klack.analyses.noise.source import NoiseSource
 from klack.analyses.sample import STATISTICS, Statistic
 from klack.analyses.shots.record import RESULTS, RULE_MEASURES, RuleVerdict
 from klack.analyses.shots.run import DroppedShots, highest_of, judge_rule
+from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeVariant
-from klack.analyses.stroke.summary import first_impact
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP
@@ -423,7 +423,7 @@ def stroke_measures(case: ValveCase, names: Iterable[str]) -> tuple[ChosenMeasur
     """Find measures of a stroke by their names, each once.
 
     ``"opening_time"``; ``"seat.peak_force"`` of the first impact on the stop ``seat`` that is no
-    mere tremble, see :func:`~klack.analyses.stroke.summary.first_impact`; ``"seat.2.peak_force"``
+    mere tremble, see :func:`~klack.analyses.stroke.analysis.first_impact`; ``"seat.2.peak_force"``
     of the second one in the list of all impacts; ``"noise.sound_exposure_level_weighted"``.
 
     Raises

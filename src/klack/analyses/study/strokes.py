@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.source import NoiseSource, stroke_sources
+from klack.analyses.stroke.missing import rest_note
 from klack.analyses.stroke.record import StopSummary, StrokeVariant
-from klack.analyses.stroke.rest import rest_note
 from klack.analyses.stroke.run import (
     body_summaries,
     one_variant,

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from klack.analyses.stroke.impact_order import recorded_impacts
+from klack.analyses.stroke.film_frames import recorded_impacts
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.assembling.modes import shape_marks
 from klack.assembling.spatial import modes_in_network

@@ -1,4 +1,4 @@
-"""What ``klack compare`` leaves behind of a stroke and its measurement, side by side.
+"""What ``klack compare`` leaves behind of strokes and shots and their measurements.
 
 The numbers are plain arrays and small frozen records, so that a stored comparison can be reported
 again without the recordings.
@@ -20,9 +20,12 @@ __all__ = [
     "ComparedImpact",
     "ComparedVariant",
     "HighestShot",
+    "MeasuredDistribution",
+    "MeasuredShotsStudy",
     "MeasuredStrokeStudy",
     "stop_words",
 ]
+
 
 Floats = NDArray[np.float64]
 
@@ -105,7 +108,6 @@ class HighestShot:
     ----------
     stop : str
         ``"opening"`` or ``"seat"``.
-    stroke : str
     count : int
         Strokes of which it is the highest.
     rebound_height, rebound_height_error : float [m]
@@ -144,7 +146,6 @@ class ComparedVariant:
         Files of the measurement.
     count : int
         Strokes that are used.
-    rejected : tuple of Rejection
     notes : tuple of str
         Of the reader.
     time : array, shape (n,) [s]
@@ -167,7 +168,6 @@ class ComparedVariant:
         Root mean square of the single strokes about the median, noise included; nan for one stroke.
     way : Compared [m]
         Lift between both stops.
-    impacts : tuple of ComparedImpact
     highest : tuple of HighestShot
         Of the measured strokes, per stop.
     """
@@ -238,7 +238,6 @@ class MeasuredStrokeStudy(CaseRecord):
         In words.
     point : str
         Channel of the model that is the lift.
-    variants : mapping of str to ComparedVariant
     excellent, fair : float [-]
         Limits of the verdict: differences over the scatter.
     """
@@ -250,3 +249,87 @@ class MeasuredStrokeStudy(CaseRecord):
     variants: Mapping[str, ComparedVariant]
     excellent: float
     fair: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredDistribution:
+    """One number of many drops, computed and measured.
+
+    Parameters
+    ----------
+    name : str
+        In words.
+    unit : str
+        SI; ``""`` for a plain number.
+    computed, measured : array, shape (n,), (m,)
+        One value per shot; nan for a shot without.
+    error : float
+        Standard error of reading it off one drop, median of the drops.
+    computed_highest, measured_highest : float
+        Of the shot with the highest rebound.
+    centred : float
+        Of the computed shot that is centred.
+    expected_highest : float
+        Mean over the highest of any m computed shots, m as many as were measured.
+    statistic, significance : float [-]
+        Largest distance of the two cumulative distributions (Kolmogorov and Smirnov), and the
+        probability of a larger one if both were the same.
+    """
+
+    name: str
+    unit: str
+    computed: Floats
+    measured: Floats
+    error: float
+    computed_highest: float
+    measured_highest: float
+    centred: float
+    expected_highest: float
+    statistic: float
+    significance: float
+
+    @property
+    def highest_bias(self) -> float:
+        """Highest of as many computed shots as were measured, minus the centred one."""
+        return self.expected_highest - self.centred
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeasuredShotsStudy(CaseRecord):
+    """Computed shots beside measured drops.
+
+    Parameters
+    ----------
+    source : str
+        Files of the measurement.
+    names : tuple of str
+        Of the measured drops, in the order of the distributions.
+    sensor : str
+        In words.
+    approach_speed : Compared [m/s]
+        Mean of the computed shots as ``computed``.
+    distributions : tuple of MeasuredDistribution
+        Restitution, rebound height.
+    time : array, shape (k,) [s]
+        From the first touch.
+    lift : float32 array, shape (drops, k) [m]
+        Measured, above the seat.
+    computed_time : array, shape (j,) [s]
+    computed_height : float32 array, shape (shots, j) [m]
+        Of the centre of mass.
+    likely : float [-]
+        Limit of the verdict: significance from which two distributions are called alike.
+    """
+
+    source: str
+    names: tuple[str, ...]
+    rejected: tuple[Rejection, ...]
+    notes: tuple[str, ...]
+    sensor: str
+    approach_speed: Compared
+    distributions: tuple[MeasuredDistribution, ...]
+    time: Floats
+    lift: NDArray[np.float32]
+    computed_time: Floats
+    computed_height: NDArray[np.float32]
+    likely: float

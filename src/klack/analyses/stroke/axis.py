@@ -1,16 +1,90 @@
-"""Figures of the axis of a needle that moves in three dimensions: from above, and over time."""
+"""Where the axis of a needle is that moves in three dimensions: at each touch, and in figures."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from ruamel.yaml import YAML
 
-from klack.analyses.stroke.axis_place import acts_across, guide_of, moves_in_space
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.case.guide import ValveGuide
 from klack.report.chart import AxisSpec, Chart, Colour, Curve, Mark, Panel
-from klack.report.looks import look_of
-from klack.report.thinning import thinned
+from klack.report.looks import look_of, thinned
 from klack.units import format_si
 
-__all__ = ["axis_over_time_chart", "axis_path_chart"]
+__all__ = [
+    "AxisPlace",
+    "acts_across",
+    "axis_over_time_chart",
+    "axis_path_chart",
+    "axis_place",
+    "guide_of",
+    "moves_in_space",
+]
+
+
+_LEAST_PLACE, _LEAST_TILT = 1e-5, 1e-6  # [um], [mrad]; less is round-off, and shown as 0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AxisPlace:
+    """Position of the axis at the height of the seat, and its slope.
+
+    Parameters
+    ----------
+    x, y : float [m]
+    tilt_x, tilt_y : float [rad]
+        Of the axis along x and along y, upwards.
+    """
+
+    x: float
+    y: float
+    tilt_x: float
+    tilt_y: float
+
+    @property
+    def position(self) -> str:
+        """Both coordinates in micrometres."""
+        return _both(1e6 * self.x, 1e6 * self.y, _LEAST_PLACE)
+
+    @property
+    def tilt(self) -> str:
+        """Both slopes in millirad."""
+        return _both(1e3 * self.tilt_x, 1e3 * self.tilt_y, _LEAST_TILT)
+
+
+def _both(first: float, second: float, least: float) -> str:
+    shown = (0.0 if abs(value) < least else value for value in (first, second))
+    return ", ".join(f"{value:.3g}" for value in shown)
+
+
+def moves_in_space(study: StrokeStudy, variant: StrokeVariant) -> bool:
+    """Whether a variant was computed in three dimensions."""
+    return variant.channel(f"{study.needle} x") is not None
+
+
+def axis_place(study: StrokeStudy, variant: StrokeVariant, time: float) -> AxisPlace | None:
+    """Place of the axis at a moment, between records; None for a motion along the axis."""
+    found = []
+    for what in ("x", "y", "tilt x", "tilt y"):
+        channel = variant.channel(f"{study.needle} {what}")
+        if channel is None:
+            return None
+        found.append(float(np.interp(time, variant.result.time, channel.values)))
+    return AxisPlace(x=found[0], y=found[1], tilt_x=found[2], tilt_y=found[3])
+
+
+def acts_across(variant: StrokeVariant) -> tuple[str, ...]:
+    """Magnets and seats that act across the axis in a variant."""
+    end = " side force x"
+    return tuple(name.removesuffix(end) for name in variant.result.channels if name.endswith(end))
+
+
+def guide_of(study: StrokeStudy) -> ValveGuide | None:
+    """Section ``guide`` of the case, which was checked when it was run; None without."""
+    given = YAML(typ="safe").load(study.case_text).get("guide")
+    return None if given is None else ValveGuide.model_validate(given)
+
 
 Floats = NDArray[np.float64]
 
@@ -35,11 +109,8 @@ def axis_path_chart(study: StrokeStudy) -> Chart | None:
     clearance = 1e6 * guide.clearance
     angle = np.linspace(0.0, 2.0 * np.pi, _ROUND)
     panels = []
-    reach = clearance
     paths = [_path(variant, number) for number in (last, 1)]
-    for path in paths:
-        reach = max(reach, float(np.abs(path).max()))
-    reach *= _ROOM
+    reach = _ROOM * max(clearance, *(float(np.abs(path).max()) for path in paths))
     for number, path in zip((last, 1), paths, strict=True):
         every = max(1, len(path) // _MOST)
         label = number == last
