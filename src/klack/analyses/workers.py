@@ -171,7 +171,8 @@ class WorkerPool(Closing):
             self._employ(compute, next_task)
             if not self._tasks:
                 break
-            for connection in _ready(self._tasks):
+            ready = wait(list(self._tasks))  # with an answer, or of a process that is gone
+            for connection in [one for one in self._tasks if one in ready]:
                 task = self._tasks[connection]
                 try:
                     result, error = self._receive(connection)
@@ -316,12 +317,6 @@ def deaf_to_interrupts() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _ready(running: Iterable[Connection]) -> list[Connection]:
-    """Connections with an answer, or of a process that is gone; wait for the first."""
-    ready = wait(list(running))
-    return [connection for connection in running if connection in ready]
 
 
 def _work(connection: Connection, start: Callable[[object], None]) -> None:

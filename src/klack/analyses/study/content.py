@@ -69,6 +69,13 @@ def study_content(record: StudyRecord) -> Content:
         for item in record.measures
         if record.count >= _FEWEST and record.optimum is None  # a search crowds about its front
     }
+    keys = Table(
+        columns=("key", "today", "values"),
+        rows=tuple(
+            (item.name, on_page(item, item.today), item.spread)
+            for item in (*record.parameters, *record.linked)
+        ),
+    )
     sections = [
         *_optimum_sections(record, labels),
         Section(
@@ -97,7 +104,7 @@ def study_content(record: StudyRecord) -> Content:
         _screening_section(record, labels),
         _sensitivity_section(record, labels),
         *_surrogate_sections(record, labels),
-        Section(title="Parameters", tables=(_parameter_table(record),)),
+        Section(title="Parameters", tables=(keys,)),
         Section(title="Points", tables=(_point_table(record, labels),), paragraphs=_left(record)),
     ]
     return page_of(
@@ -268,16 +275,6 @@ def _number_table(record: StudyRecord) -> Table:
         rows.append((item.name, on_page(item, item.today), *cells, count(missing)))
     return Table(
         columns=("", "today", "lowest", "median", "highest", "points without"), rows=tuple(rows)
-    )
-
-
-def _parameter_table(record: StudyRecord) -> Table:
-    return Table(
-        columns=("key", "today", "values"),
-        rows=tuple(
-            (item.name, on_page(item, item.today), item.spread)
-            for item in (*record.parameters, *record.linked)
-        ),
     )
 
 

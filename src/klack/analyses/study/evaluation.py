@@ -383,16 +383,13 @@ def _of_rows(rows: Sequence[PointRow]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _missing_measures(columns: Sequence[StudyColumn]) -> tuple[str, ...]:
-    return tuple(
-        f"'{item.name}' has no value at any point. Try: a longer run.duration if it comes later."
-        for item in columns
-        if not np.isfinite(item.values).any()
-    )
-
-
 def row_warnings(
     rows: Sequence[PointRow], today: PointRow, columns: Sequence[StudyColumn]
 ) -> tuple[str, ...]:
     """How many points failed or are in doubt, with the most frequent reasons."""
-    return (*_of_rows(rows), *_missing_measures(columns), *_today_notes(today))
+    missing = (
+        f"'{item.name}' has no value at any point. Try: a longer run.duration if it comes later."
+        for item in columns
+        if not np.isfinite(item.values).any()
+    )
+    return (*_of_rows(rows), *missing, *_today_notes(today))

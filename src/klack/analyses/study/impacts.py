@@ -244,11 +244,7 @@ def _point(
 ) -> _Point:
     """Impact and shots of a point, as far as its measures take them."""
     case = case_at(Case, asked.tree, asked.tree, asked.points.changes(place))
-    level = _level(asked)
-
-    def progress(stage: str, fraction: float) -> None:
-        check()
-
+    level, progress = _level(asked), lambda stage, fraction: check()
     if built.shots is None:
         return _impact(case, built.bodies, level, progress)
     names = [item.name for item in asked.chosen if item.of == SHOTS]

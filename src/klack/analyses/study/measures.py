@@ -23,7 +23,7 @@ from klack.analyses.noise.measures import CLICK_MEASURES, DESIGN_MEASURES
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import click_sound, noise_design
 from klack.analyses.noise.source import NoiseSource
-from klack.analyses.sample import STATISTICS, Statistic
+from klack.analyses.sample import STATISTICS
 from klack.analyses.shots.record import RESULTS, RULE_MEASURES, RuleVerdict
 from klack.analyses.shots.run import DroppedShots, highest_of, judge_rule
 from klack.analyses.stroke.analysis import first_impact
@@ -275,15 +275,26 @@ def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
     if any(of == _RULE for of, _ in parts):
         columns, single = columns | dict.fromkeys(_JUDGED), single | dict.fromkeys(_JUDGED)
     statistics = dict.fromkeys(_STATISTICS[key] for of, key in parts if of in _RESULTS)
+    count = found.shots.count
     return (
-        *_missing(columns, found),
+        *(
+            f"{missing} of {count} shots ended before their {_RESULTS[key].name} was known: "
+            "there are no statistics of the others alone. Try: a longer shots.duration."
+            for key in columns
+            if (missing := int(np.sum(~np.isfinite(getattr(found.shots, key)))))
+        ),
         *(
             f"The centred shot ended before its {_RESULTS[key].name} was known. "
             "Try: a longer shots.duration."
             for key in single
             if not np.isfinite(found.centric.row(0)[key])
         ),
-        *_too_few(statistics, found.shots.count),
+        *(
+            f"{count} shots are too few for their {item.name}, which takes {item.fewest}. "
+            "Try: a larger shots.count."
+            for item in statistics
+            if count < item.fewest
+        ),
     )
 
 
@@ -302,26 +313,6 @@ def _judged(found: DroppedShots, measure: Measure[RuleVerdict]) -> float | None:
         return None
     value = measure.read(judge_rule(found.shots, found.centric, highest))
     return None if value is None else float(value)
-
-
-def _missing(columns: Iterable[str], found: DroppedShots) -> Iterable[str]:
-    count = found.shots.count
-    for key in columns:
-        missing = int(np.sum(~np.isfinite(getattr(found.shots, key))))
-        if missing:
-            yield (
-                f"{missing} of {count} shots ended before their {_RESULTS[key].name} was known: "
-                "there are no statistics of the others alone. Try: a longer shots.duration."
-            )
-
-
-def _too_few(statistics: Iterable[Statistic], count: int) -> Iterable[str]:
-    for item in statistics:
-        if count < item.fewest:
-            yield (
-                f"{count} shots are too few for their {item.name}, which takes {item.fewest}. "
-                "Try: a larger shots.count."
-            )
 
 
 _OF_THE_CLOCK = ("wall_time", "setup_time")

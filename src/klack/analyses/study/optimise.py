@@ -101,9 +101,16 @@ def run_optimisation(
     require_pymoo()
     space = space_of(case, source)
     require_varied(source, space.varied)
-    settings = _settings(source, space)
-    _require_same_draws(source)
     study = source.study
+    settings = SearchSettings(
+        parameters=len(space.varied),
+        objectives=len(study.objectives),
+        population=study.search.population,
+        generations=study.search.generations,
+        seed=study.search.seed,
+        edge=_edge(space),
+    )
+    _require_same_draws(source)
     names = dict.fromkeys((*study.measures, *study.objectives, *study.constraints))
     asked = asked_of(case, tree, source, [{}], names)
     slopes = require_gradients(source, asked, space)
@@ -381,18 +388,6 @@ class _Front:
 
 def _edge(space: Space) -> float:
     return 0.0 if all(isinstance(item.spread, Range) for item in space.varied) else _EDGE
-
-
-def _settings(source: StudySource, space: Space) -> SearchSettings:
-    given = source.study.search
-    return SearchSettings(
-        parameters=len(space.varied),
-        objectives=len(source.study.objectives),
-        population=given.population,
-        generations=given.generations,
-        seed=given.seed,
-        edge=_edge(space),
-    )
 
 
 def _refinement(source: StudySource, work: _Work, front: _Front) -> Batches | None:

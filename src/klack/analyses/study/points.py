@@ -167,17 +167,14 @@ def _parameter(case: AnyCase, source: StudySource, name: str, item: StudyParamet
             return _own_word(source, name, item)
         node, field = node_at(case, place)
         if kind_at(node, field) is None or isinstance(node, str | bool):
-            today = node if _plain(node) else None
+            is_plain = isinstance(node, str | int | float) and not isinstance(node, bool)
+            today = node if is_plain else None
             return Parameter(name=name, kind=None, spread=_listed(item, today), today=today)
         quantity = quantity_at(case, place)
     except CaseProblem as problem:
         raise source.refuse(at, problem) from None
     spread = _spread(source, name, item, quantity)
     return Parameter(name=name, kind=quantity.kind, spread=spread, today=quantity.value)
-
-
-def _plain(node: object) -> bool:
-    return isinstance(node, str | int | float) and not isinstance(node, bool)
 
 
 def _listed(item: StudyParameter, today: object) -> Listed:
@@ -534,7 +531,14 @@ def _levels(
     if design.kind == "one-at-a-time":
         return _one_at_a_time(varied, design.levels), "one parameter at a time"
     levels = [item.spread.levels(design.levels) for item in varied]
-    _require_few(source, prod(map(len, levels)))
+    count = prod(map(len, levels))
+    refuse_if(
+        count > _MOST_POINTS,
+        source.where(("design", "levels")),
+        got=f"a grid of {count} points",
+        expected=f"at most {_MOST_POINTS}",
+        hint="use fewer levels, or kind: sobol.",
+    )
     return product(*levels), f"grid of {' x '.join(str(len(x)) for x in levels)}"
 
 
@@ -584,16 +588,6 @@ def require_varied(source: StudySource, varied: Sequence[Parameter]) -> None:
         got="no parameter that varies",
         expected="at least one range, distribution or list of values",
         hint="write {from: 8 N, to: 20 N}.",
-    )
-
-
-def _require_few(source: StudySource, count: int) -> None:
-    refuse_if(
-        count > _MOST_POINTS,
-        source.where(("design", "levels")),
-        got=f"a grid of {count} points",
-        expected=f"at most {_MOST_POINTS}",
-        hint="use fewer levels, or kind: sobol.",
     )
 
 
