@@ -15,8 +15,8 @@ from typing import Any
 
 import psutil
 
-from klack.viewer.page import page_of
 from klack.viewer.source import view_of_source
+from klack.viewer.view import page_of
 
 _SECONDS = 4.0
 _SOFTWARE = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")

@@ -79,9 +79,8 @@ def planned(step: int, **other: str) -> Callable[[Path], None]:
     """The guide at a step, with the drawings of the example and their faces chosen."""
 
     def keep(folder: Path) -> None:
-        from klack.app.drawing_table import EXAMPLES
         from klack.app.folder import OpenFolder
-        from klack.app.valve_plan import Plans, ValvePlan
+        from klack.app.valve_plan import EXAMPLES, Plans, ValvePlan
 
         given = {f"{body}_table": rows for body, rows in EXAMPLES.items()}
         given |= {"needle_contact": "tip", "housing_contact": "seat"} | other

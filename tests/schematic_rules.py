@@ -29,7 +29,7 @@ from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.port import COIL, ELEMENT, FLOW, MOTION, Port, Role
 from klack.network.rows import Rows
-from klack.schematic.schematic import Schematic
+from klack.schematic.picture import Schematic
 from klack.schematic.shapes import Box, Point
 from klack.units import Pressure
 

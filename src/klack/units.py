@@ -16,7 +16,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
 from klack.errors import InputError
-from klack.input.computed import Computed
+from klack.input.section import Computed
 
 __all__ = [
     "KINDS",

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from klack.cache.entry import Entry
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.cli.main import main
 
 

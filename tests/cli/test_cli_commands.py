@@ -12,8 +12,8 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 
+import klack.cli.commands as demo_module
 from klack import verification
-from klack.cli import demo as demo_module
 from klack.cli.commands import COMMANDS
 from klack.cli.main import main
 from klack.errors import AccuracyWarning, ConvergenceError, InputError

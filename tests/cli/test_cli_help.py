@@ -5,7 +5,7 @@ import shlex
 import pytest
 
 from klack.case import find_case
-from klack.cli.commands import COMMANDS, app
+from klack.cli.commands import COMMANDS, parser
 from klack.cli.main import main
 
 
@@ -18,7 +18,7 @@ def test_the_example_can_be_typed(command, example, capsys):
     assert " ".join(capsys.readouterr().out.split("Example:")[-1].split("╭")[0].split()) == example
 
     first, *words = shlex.split(example)
-    found, bound, _ = app.parse_args(words, print_error=False, exit_on_error=False)
+    found, bound, _ = parser.parse_args(words, print_error=False, exit_on_error=False)
 
     assert (first, words[0]) == ("klack", name)
     assert found is command

@@ -17,11 +17,9 @@ from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import impact_sources, sources_of
 from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke
-from klack.app.curves import drawn, stroke_numbers
-from klack.app.explorer import Explorer
-from klack.app.form import checked_text, exchanged_text
+from klack.app.explorer import Explorer, drawn, sliders_of, stroke_numbers
 from klack.app.reader import Reader
-from klack.app.sliders import sliders_of
+from klack.app.texts import checked_text, exchanged_text
 from klack.case.any_case import read_case_tree, tree_of
 from klack.case.reader import find_case, read_case
 from klack.errors import InputError

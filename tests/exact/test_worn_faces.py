@@ -14,7 +14,7 @@ from klack.assembling.problem import build_problem
 from klack.case.reader import load_case, read_case
 from klack.contact.worn_faces import WornFaces, opened_by
 from klack.errors import InputError
-from klack.terminal.wanted import WantedResult
+from klack.terminal.options import WantedResult
 
 CASES = Path(__file__).parents[2] / "cases" / "demo-valve-axisymmetric"
 STEEL = "density: 7850 kg/m^3}"

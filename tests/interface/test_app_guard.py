@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from klack.app.access import Access, PasswordGate, access_for
-from klack.app.guard import POLICY, Guard
+from klack.app.guard import POLICY, Access, Guard, PasswordGate, access_for
 from klack.errors import InputError
 
 httpx = pytest.importorskip("httpx")

@@ -15,8 +15,7 @@ from klack.app import folder as app_folder
 from klack.app import jobs as jobs_module
 from klack.app.folder import OpenFolder
 from klack.app.jobs import Jobs
-from klack.app.state import Notes
-from klack.app.uploads import Uploads
+from klack.app.state import Notes, Uploads
 from klack.app.valve_plan import Plans, ValvePlan
 from klack.errors import InputError
 

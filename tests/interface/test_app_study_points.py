@@ -9,21 +9,25 @@ import pytest
 import yaml
 from made_study import made_study
 
+import klack.app.study_points as study_points
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.evaluation import Evaluation
 from klack.analyses.study.live import LiveRecord
 from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.run import asked_points, run_study
-from klack.app import study_points
 from klack.app.answers import StudyChoice
 from klack.app.folder import OpenFolder
-from klack.app.form import checked_text, exchanged_text
 from klack.app.jobs import Jobs
-from klack.app.points_answer import points_source
 from klack.app.state import State
-from klack.app.study_files import beside_case, case_of_study, free_name, result_of_study
+from klack.app.study_files import (
+    beside_case,
+    case_of_study,
+    free_name,
+    points_source,
+    result_of_study,
+)
 from klack.app.study_points import StudyPoints, points_json
-from klack.app.study_texts import study_offer, study_problem, study_text
+from klack.app.texts import checked_text, exchanged_text, study_offer, study_problem, study_text
 from klack.case.any_case import read_case_tree
 from klack.case.study_source import study_of
 from klack.errors import InputError, KlackError

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from klack.assembling.generated_mesh import entry_of_mesh, mesh_of_entry
 from klack.cache.content import content_key
 from klack.cache.entry import DamagedEntry, Entry, read_entry, write_entry
-from klack.cache.origin import origin
+from klack.cache.remember import origin
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement

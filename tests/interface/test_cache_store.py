@@ -21,8 +21,7 @@ from hypothesis import strategies as st
 from klack.cache.content import content_key
 from klack.cache.entry import Entry
 from klack.cache.remember import remembered
-from klack.cache.result_cache import ResultCache
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import ResultCache, result_cache
 from klack.errors import CacheWarning, InputError
 
 LARGE = 10**9

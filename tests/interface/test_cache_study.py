@@ -14,14 +14,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import klack.cache.result_cache as setting
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.analyses.reduction.run import run_reduce
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
-from klack.cache import setting
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case import find_case
 from klack.case.geometry import StepFile
 from klack.case.reader import read_case

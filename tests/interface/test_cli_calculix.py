@@ -14,7 +14,7 @@ import pytest
 from klack.analyses.comparison.calculix import COMPARISON_COLUMNS
 from klack.analyses.impact.analysis import IMPACT
 from klack.case import find_case
-from klack.cli.commands import app
+from klack.cli.commands import parser
 from klack.cli.main import main
 from klack.errors import ConvergenceError, InputError
 from klack.exchange.calculix_run import run_calculix
@@ -147,12 +147,12 @@ def test_export_refuses_with_one_message(arguments, words, capsys, tmp_path):
 def test_the_how_to_page_asks_for_what_there_is(monkeypatch):
     """Its commands are taken as they stand, and its table has the columns of the real one."""
     # the folder of the second command is made by the first
-    monkeypatch.setattr("klack.terminal.wanted.require_json_target", lambda path: None)
+    monkeypatch.setattr("klack.terminal.options.require_json_target", lambda path: None)
     text = HOW_TO.read_text(encoding="utf-8")
     commands = [line for line in text.splitlines() if line.startswith("klack ")]
     assert len(commands) == 4
     for line in commands:
-        command, bound, _ = app.parse_args(
+        command, bound, _ = parser.parse_args(
             shlex.split(line)[1:], print_error=False, exit_on_error=False
         )
         assert command.__name__ in ("impact", "export", "compare")

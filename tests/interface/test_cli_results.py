@@ -92,7 +92,7 @@ def test_levels_come_from_the_case_if_none_are_asked_for(asked):
 def test_demo_runs_the_shipped_valve(asked, quick_report, monkeypatch):
     opened = []
     monkeypatch.setattr("webbrowser.open", opened.append)
-    monkeypatch.setattr("klack.cli.demo._has_display", lambda: True)
+    monkeypatch.setattr("klack.cli.commands._has_display", lambda: True)
     Path("demo-valve").write_text("a file of the same name in the working folder")
 
     assert main(["demo", "-q"]) == 0

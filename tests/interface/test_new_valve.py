@@ -10,13 +10,12 @@ from pathlib import Path
 import pytest
 
 from klack.analyses.impact.run import run_impact
-from klack.app.drawing_table import EXAMPLES, outline_of_table
 from klack.app.folder import OpenFolder
 from klack.app.guard import LARGEST_UPLOAD
-from klack.app.parts import part_of_step, part_of_table
+from klack.app.parts import outline_of_table, part_of_step, part_of_table
 from klack.app.plan_review import review
-from klack.app.uploads import Uploads
-from klack.app.valve_plan import BODIES, Plans, ValvePlan
+from klack.app.state import Uploads
+from klack.app.valve_plan import BODIES, EXAMPLES, Plans, ValvePlan
 from klack.case.any_case import load_any_case
 from klack.case.reader import find_case, read_case
 from klack.errors import InputError
@@ -352,7 +351,7 @@ def test_an_upload_is_kept_as_a_whole_or_not_at_all(tmp_path, monkeypatch):
     for bad in ((), (b"PK\x03\x04",), (b"<script>",)):
         with pytest.raises(InputError, match="STEP file"):
             asyncio.run(uploads.take(_parts(*bad)))
-    monkeypatch.setattr("klack.app.uploads.LARGEST_UPLOAD", 30)
+    monkeypatch.setattr("klack.app.state.LARGEST_UPLOAD", 30)
     with pytest.raises(InputError, match="more than"):
         asyncio.run(uploads.take(_parts(good, good)))
     assert len(list(home.iterdir())) == 12

@@ -4,7 +4,7 @@ import pytest
 
 from klack.network.catalogue import component_classes
 from klack.network.described import described_type
-from klack.terminal.plain_math import plain_math
+from klack.terminal.tables import plain_math
 
 
 @pytest.mark.parametrize(

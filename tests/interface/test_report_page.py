@@ -15,7 +15,7 @@ from matplotlib.axes import Axes
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.content import NEXT_STEPS
-from klack.cli.commands import app
+from klack.cli.commands import parser
 from klack.report.chart import AxisSpec, Chart, Curve, Panel
 from klack.report.html import render_html
 from klack.report.page import Content, NextStep, Section, Table
@@ -60,7 +60,7 @@ def test_next_steps_are_commands_that_exist(impact_study: ImpactStudy):
     for command in found:
         program, *words = shlex.split(command)
         assert program == "klack"
-        app.parse_args(words, exit_on_error=False, print_error=False)
+        parser.parse_args(words, exit_on_error=False, print_error=False)
 
 
 def test_steps_that_need_an_unknown_case_are_left_out():

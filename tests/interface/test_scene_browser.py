@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from viewer_case import brick_view
 
-from klack.viewer.page import page_of
+from klack.viewer.view import page_of
 
 pytestmark = pytest.mark.slow
 

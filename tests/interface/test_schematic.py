@@ -21,10 +21,8 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.component import Component
 from klack.network.network import Network
-from klack.schematic.legend import with_legend
-from klack.schematic.lettering import text_width
-from klack.schematic.picture import schematic_svg
-from klack.schematic.schematic import Schematic, schematic_of
+from klack.schematic.picture import Schematic, schematic_of, schematic_svg, with_legend
+from klack.schematic.shapes import text_width
 from klack.schematic.values import value_lines
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"

@@ -17,7 +17,7 @@ import klack
 from klack.analyses.catalogue import load_result
 from klack.cli.main import main
 from klack.errors import InputError
-from klack.terminal.printable import printable
+from klack.terminal.tables import printable
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="mounts and capabilities")
 
@@ -187,7 +187,7 @@ def test_no_home_and_no_folder_for_temporary_files(result: Path, tmp_path: Path)
 
 def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypatch, capsys):
     """In a private folder: numba runs what it finds there."""
-    from klack.cli import surroundings
+    import klack.cli.surroundings as surroundings
     from klack.compiling import compiled_folder
 
     monkeypatch.setattr(os, "environ", dict(os.environ))

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from viewer_case import brick_view
 
-from klack.viewer.page import page_of
-from klack.viewer.payload import payload_of
+from klack.viewer.view import page_of, payload_of
 
 KINDS = {"f4": "<f4", "i2": "<i2", "i1": "<i1", "u1": "<u1", "u2": "<u2", "u4": "<u4"}
 

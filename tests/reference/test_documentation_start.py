@@ -73,7 +73,7 @@ def test_the_commands_run_and_give_the_quoted_numbers(tmp_path):
 
 
 def test_every_command_of_the_page_exists():
-    from klack.cli.commands import app
+    from klack.cli.commands import parser
 
     for name in set(re.findall(r"`klack (\w+)", PAGE)):
-        app[name]
+        parser[name]

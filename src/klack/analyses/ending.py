@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 from klack.errors import InputError
 from klack.held_folder import Mark
 from klack.progress import Progress
+from klack.terminal.options import Shown, WantedResult
 from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import Shown, WantedResult
 from klack.uninterrupted import uninterrupted
 from klack.whole_file import completed, mark_of, outdated
 

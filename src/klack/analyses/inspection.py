@@ -16,9 +16,8 @@ from klack.case.parameters import ParameterValue
 from klack.case.surface_names import require_surface_names
 from klack.case.valve import ValveCase
 from klack.errors import InputError
-from klack.input.computed import Computed
-from klack.input.existing_file import refuse_lfs_pointer
 from klack.input.problem import CaseProblem, Key, key_text
+from klack.input.section import Computed, refuse_lfs_pointer
 from klack.mechanics.fmu_file import FmuDescription, inspect_fmu
 from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS, format_of
 from klack.mesh.files.mesh_file import read_mesh_file

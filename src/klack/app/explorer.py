@@ -5,12 +5,13 @@ contact, the pattern of the port, the modes' share and the law are all made agai
 of ``klack stroke``, with the laws of its stops as they were built.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import isfinite
 from pathlib import Path
 from time import perf_counter
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import numpy as np
 import scipy
@@ -21,16 +22,19 @@ from klack.acoustics.force_bands import force_bands
 from klack.acoustics.loudness import time_varying_loudness
 from klack.acoustics.signal_statistics import sound_statistics
 from klack.acoustics.third_octave import ENERGY_REFERENCE, ThirdOctaves
-from klack.acoustics.wav import level_statement, wav_bytes
+from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
 from klack.analyses.contact_doubts import contact_doubt
-from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.measures import CONTACT_TIME, PEAK_FORCE, RESTITUTION
+from klack.analyses.impact.record import ImpactStudy, LevelResult
 from klack.analyses.impact.run import ImpactBodies, impact_bodies, impact_of_bodies
 from klack.analyses.impact.wording import FAIR, GOOD, estimate_sentence, worst_error
+from klack.analyses.measures import json_of
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
-from klack.analyses.noise.source import NoiseSource, impact_sources, stroke_sources
+from klack.analyses.noise.source import NoiseSource, SourceStop, impact_sources, stroke_sources
+from klack.analyses.stroke.analysis import first_impact
 from klack.analyses.stroke.missing import missing_notes
-from klack.analyses.stroke.record import StrokeVariant
+from klack.analyses.stroke.record import StrokeChannels, StrokeVariant
 from klack.analyses.stroke.run import (
     body_summaries,
     one_variant,
@@ -38,25 +42,298 @@ from klack.analyses.stroke.run import (
     stroke_notes,
     study_of_run,
 )
+from klack.analyses.study.kinds import kind_of
 from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number, Opened, Slider
-from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
-from klack.app.listening import common_scale
-from klack.app.sliders import sliders_of, written
 from klack.assembling.problem import contact_problem
 from klack.assembling.valve import Valve, build_valve, filled_network
 from klack.case.any_case import AnyCase, CaseTree, tree_of
+from klack.case.key_path import quantity_at, written_at
 from klack.case.points import case_at
 from klack.case.rewriting import with_values
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
+from klack.contact.history import ImpactHistory
 from klack.elasticity.loads import NearLoads
 from klack.errors import InputError, KlackError
+from klack.input.problem import CaseProblem, Key
 from klack.progress import silent
 from klack.signals import TimeSeries
 from klack.stages import collected_warnings
+from klack.units import Kind, format_si
 
-__all__ = ["Explorer"]
+__all__ = [
+    "Curves",
+    "Explorer",
+    "common_scale",
+    "drawn",
+    "force_levels",
+    "impact_curves",
+    "impact_numbers",
+    "level_numbers",
+    "sliders_of",
+    "stroke_curves",
+    "stroke_numbers",
+]
+
+
+Curves = tuple[tuple[Curve, ...], tuple[Curve, ...]]
+"""Force [N] and lift [um], over time in us (impact) or ms (stroke)."""
+
+_HEADROOM = 12.0  # [dB] of the click that others are compared with, for what they add
+_DRAWN = 700  # points of a curve; a chart is up to 800 pixels wide
+
+
+def drawn(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """Points of a smooth curve in equal steps, with its ends and its highest and lowest point."""
+    steps = np.linspace(0, x.size - 1, min(x.size, _DRAWN)).round().astype(int)
+    shown = np.union1d(steps, [y.argmin(), y.argmax()])
+    return x[shown], y[shown]
+
+
+def _travelled(history: ImpactHistory) -> tuple[Floats, Floats]:
+    """Displacement of the centre of mass of the moving body since the start, up is positive.
+
+    The integral of its velocity, which every level records.
+    """
+    mean = 0.5 * (history.velocity_a[1:] + history.velocity_a[:-1])
+    return history.edges, np.append(0.0, np.cumsum(mean) * history.step)
+
+
+def _enveloped(force: TimeSeries) -> tuple[Floats, Floats]:
+    """Lowest and highest value of each stretch: no impact falls between two points."""
+    count = _DRAWN // 2
+    size = max(1, -(-force.values.size // count))
+    padded = np.pad(force.values, (0, -force.values.size % size), mode="edge").reshape(-1, size)
+    at = force.start + force.step * size * (np.arange(padded.shape[0]) + 0.5)
+    return np.repeat(at, 2), np.column_stack([padded.min(axis=1), padded.max(axis=1)]).ravel()
+
+
+def impact_curves(level: LevelResult) -> Curves:
+    """Of one level."""
+    history = level.history
+    force = Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0)
+    return (force,), (Curve.scaled("needle", *drawn(*_travelled(history)), 1e6, 1e6),)
+
+
+def stroke_curves(
+    variant: StrokeVariant, channels: StrokeChannels, stops: Iterable[SourceStop]
+) -> Curves:
+    """Of one variant, and of the stops that its noise comes from."""
+    force = tuple(Curve.scaled(stop.name, *_enveloped(stop.force), 1e3, 1.0) for stop in stops)
+    channel = variant.channel(channels.lift)
+    if channel is None:
+        return force, ()
+    lift = drawn(variant.result.time, channel.values)
+    return force, (Curve.scaled("lift", *lift, 1e3, 1e6),)
+
+
+def force_levels(bands: Sequence[ThirdOctaves]) -> Floats:
+    """Levels [dB] of the forces of all stops together."""
+    energy = np.sum([band.energy for band in bands], axis=0)
+    return np.asarray(10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE))
+
+
+def level_numbers(pressure: TimeSeries | None) -> tuple[Number, ...]:
+    """Sound exposure level, where something radiates."""
+    if pressure is None:
+        return ()
+    level = sound_statistics(pressure).exposure_level_A
+    name = "sound exposure level"
+    return (Number(key="level", name=name, unit="dB(A)", value=level, difference="dB"),)
+
+
+def common_scale(now: TimeSeries, base: TimeSeries | None) -> float:
+    """Full scale [Pa] of two clicks: that of the base with room above, or of the louder one."""
+    louder = full_scale_of(now, headroom=0.1)
+    return louder if base is None else max(full_scale_of(base, headroom=_HEADROOM), louder)
+
+
+def impact_numbers(level: LevelResult) -> tuple[Number, ...]:
+    """Of an impact; what a run that is cut off in contact does not have has no value."""
+    return tuple(
+        Number(
+            key=measure.key,
+            name=measure.name + measure.remark(level),
+            unit=unit,
+            value=None if value is None else scale * value,
+            difference=difference,
+        )
+        for measure, unit, scale, difference in (
+            (PEAK_FORCE, "N", 1.0, "%"),
+            (CONTACT_TIME, "us", 1e6, "us"),
+            (RESTITUTION, "", 1.0, "1"),
+        )
+        for value in json_of([measure], level).values()
+    )
+
+
+def stroke_numbers(variant: StrokeVariant, channels: StrokeChannels) -> tuple[Number, ...]:
+    """Of a stroke: its times, and the first impact on each stop."""
+    times = (
+        ("opening", "opening time", variant.opening_time),
+        ("closing", "closing time", variant.closing_time),
+    )
+    stops = [name for name in (channels.opening_stop, channels.seat) if name]
+    firsts = [(stop, first_impact(variant, stop)) for stop in stops]
+    return (
+        *(
+            Number(
+                key=key,
+                name=name,
+                unit="us",
+                value=None if value is None else 1e6 * value,
+                difference="us",
+            )
+            for key, name, value in times
+        ),
+        *(
+            Number(
+                key=f"peak_{stop}",
+                name=f"first peak, {stop}",
+                unit="N",
+                value=None if event is None else event.peak_force,
+            )
+            for stop, event in firsts
+        ),
+    )
+
+
+_MOST = 60
+_REACH = 2.5  # times the value of the case, up; to a fifth of it, down
+_FIRST: tuple[tuple[str, ...], ...] = (
+    ("speed",),
+    ("preload",),
+    ("gap", "lift"),
+    ("force",),
+    ("damping", "modal"),
+    ("cut_off", "roughness"),
+    ("voltage", "current"),
+    ("stiffness",),
+    ("pressure",),
+)
+"""Last words of keys that most people move, in this order."""
+_NEVER = ("study", "calibration", "measurement", "run", "reduction", "include", "lumped", "parts")
+_STEPS = 200
+
+
+def sliders_of(case: AnyCase, tree: CaseTree) -> tuple[Slider, ...]:
+    """Quantities that the case has written, those that move first."""
+    kind: Any = kind_of(case)
+    found = []
+    for place in _leaves(tree.data):
+        if place[0] in _NEVER:
+            continue
+        try:
+            quantity = quantity_at(case, place)
+        except CaseProblem:
+            continue
+        needs_mesh = any(kind.makes_bodies(case, key) for key in case.behind(place))
+        if quantity.value == 0 or not isfinite(quantity.value):
+            continue
+        found.append(_slider(place, quantity.kind, quantity.value, needs_mesh))
+    if isinstance(case, Case):
+        found += _offered(case, tree)
+    moving = _in_turns(s for s in found if not s.needs_mesh)
+    fixed = [s for s in found if s.needs_mesh and "profile" not in s.place]
+    return tuple(moving[:_MOST] + fixed[:_MOST])
+
+
+def _offered(case: Case, tree: CaseTree) -> Iterator[Slider]:
+    """What an impact has though its file does not name it: a closing force, damping of bodies."""
+    if written_at(tree.data, ("motion", "force")) is None:
+        yield _from_zero(("motion", "force"), "closing force", "N", 100.0)
+    for body in case.bodies:
+        if not written_at(tree.data, ("bodies", body, "damping")):
+            place = ("bodies", body, "damping", "modal")
+            yield _from_zero(place, f"{body} damping modal", "", 0.05)
+
+
+def _from_zero(place: Key, label: str, unit: str, high: float) -> Slider:
+    return Slider(
+        key=".".join(map(str, place)),
+        place=place,
+        label=label,
+        unit=unit,
+        low=0.0,
+        high=high,
+        start=0.0,
+        step=high / _STEPS,
+        needs_mesh=False,
+        written="not given",
+    )
+
+
+def written(slider: Slider, value: float) -> str | float:
+    """A value as the page shows it and the case file gets it: what is computed is what is read."""
+    if not isfinite(value):
+        raise InputError(slider.key, got=str(value), expected="a number", hint="move the slider.")
+    text = slider.text(value)
+    return text if slider.unit else float(text)
+
+
+def _slider(place: Key, kind: Kind, value: float, needs_mesh: bool) -> Slider:
+    unit = "" if kind.bare else kind.unit
+    low, high = sorted((0.2 * value, _REACH * value))
+    if kind.bare and 0 < value < 1:
+        high = min(high, 0.99)
+    return Slider(
+        key=".".join(map(str, place)),
+        place=place,
+        label=_label(place),
+        unit=unit,
+        low=low,
+        high=high,
+        start=value,
+        step=(high - low) / _STEPS,
+        needs_mesh=needs_mesh,
+        written=format_si(value, unit),
+    )
+
+
+def _label(place: Key) -> str:
+    """``network.components.spring.preload`` is ``spring preload``."""
+    parts = [str(part) for part in place]
+    for start in (["network", "components"], ["bodies"], ["parameters"]):
+        if parts[: len(start)] == start:
+            parts = parts[len(start) :]
+    return " ".join(part.replace("_", " ") for part in parts if part != "motion")
+
+
+def _rank(slider: Slider) -> tuple[int, str]:
+    if slider.place[0] == "parameters":  # named by who wrote the case
+        return -1, slider.key
+    if slider.place[0] == "noise":
+        return len(_FIRST) + 1, slider.key
+    last = str(slider.place[-1])
+    for rank, words in enumerate(_FIRST):
+        if any(word in last for word in words):
+            return rank, slider.key
+    return len(_FIRST), slider.key
+
+
+def _in_turns(sliders: Iterable[Slider]) -> list[Slider]:
+    """Two of each kind of number, then the next two of each, in the order of :data:`_FIRST`."""
+    counted: dict[int, int] = {}
+    keyed = []
+    for slider in sorted(sliders, key=_rank):
+        rank = _rank(slider)[0]
+        turn = counted[rank] = counted.get(rank, -1) + 1
+        keyed.append(((turn // 2 if rank >= 0 else 0, rank, turn), slider))
+    return [slider for _, slider in sorted(keyed, key=lambda item: item[0])]
+
+
+def _leaves(data: Any, above: Key = ()) -> Iterator[Key]:
+    items: Iterable[tuple[Any, Any]] = ()
+    if isinstance(data, dict):
+        items = data.items()
+    elif isinstance(data, list):
+        items = enumerate(data)
+    else:
+        yield above
+    for key, value in items:
+        yield from _leaves(value, (*above, key))
+
 
 Values = Mapping[str, float]
 """Of sliders, by their keys, in SI."""
@@ -90,25 +367,6 @@ class _Computed:
     doubts: tuple[str, ...]
 
 
-class _Design(Protocol):
-    """Bodies of a case."""
-
-    run: str
-    time_unit: str
-
-    def at(self, case: Any) -> _Computed:
-        """Compute one position."""
-        ...
-
-    def judged(self, case: Any) -> tuple[str, str]:
-        """Grade of the estimate, and words."""
-        ...
-
-    def close(self) -> None:
-        """Free the bodies."""
-        ...
-
-
 class Explorer:
     """The object behind a slider page, in a process of its own."""
 
@@ -116,7 +374,7 @@ class Explorer:
         self._text = ""
         self._tree: CaseTree | None = None
         self._case: AnyCase | None = None
-        self._design: _Design | None = None
+        self._design: _Impacts | _Strokes | None = None
         self._sliders: dict[str, Slider] = {}
         self._pinned: TimeSeries | None = None
         self._last: tuple[dict[str, float], _Computed] | None = None
@@ -169,8 +427,6 @@ class Explorer:
         with self._one_thread():
             found = self._computed(values)
         bands = found.bands
-        energy = np.sum([band.energy for band in bands], axis=0)
-        levels = 10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE)
         if pin:
             self._pinned, self._pinned_loudness = found.pressure, None
         wav, ghost, scale = _sounds(found.pressure, self._pinned)
@@ -179,8 +435,8 @@ class Explorer:
             lift=found.lift,
             time_unit=design.time_unit,
             bands=bands[0].middle,
-            levels=levels,
-            numbers=(*found.numbers, *_level_numbers(found.pressure)),
+            levels=force_levels(bands),
+            numbers=(*found.numbers, *level_numbers(found.pressure)),
             wav=wav,
             ghost_wav=ghost,
             scale=scale,
@@ -267,7 +523,7 @@ class Explorer:
         except InputError:
             return None
 
-    def _require_open(self) -> _Design:
+    def _require_open(self) -> "_Impacts | _Strokes":
         if self._design is None:
             raise InputError("sliders", got="no case", expected="an open one", hint="reload.")
         return self._design
@@ -306,14 +562,14 @@ class _Impacts:
         study = self._study(case, certify=False)
         level = study.levels[self.run]
         source = impact_sources(study, (self.run,), case)[0]
-        history = level.history
+        force, lift = impact_curves(level)
         bands = tuple(force_bands(stop.force) for stop in source.stops)
         return _Computed(
             source=source,
             bands=bands,
             pressure=click_sound(source, self._transfers, bands),
-            force=(Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),),
-            lift=(Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),),
+            force=force,
+            lift=lift,
             numbers=impact_numbers(level),
             doubts=(*study.warnings, contact_doubt(study.contact), *source.notes),
         )
@@ -362,13 +618,8 @@ class _Strokes:
             run = one_variant(valve, roles, variant, silent, check=False)
             study = study_of_run(valve, roles, variant, run, self._bodies, self._stops)
             source = stroke_sources(study, case=case)[0]
-        found, time = run.variant, run.variant.result.time
-        channel = found.channel(study.channels.lift)
-        lift = (
-            ()
-            if channel is None
-            else (Curve.scaled("lift", *drawn(time, channel.values), 1e3, 1e6),)
-        )
+        found = run.variant
+        force, lift = stroke_curves(found, study.channels, source.stops)
         bands = tuple(force_bands(stop.force) for stop in source.stops)
         of_run: dict[str, StrokeVariant] = {variant: found}
         warned = tuple(dict.fromkeys((*self._notes, *caught)))
@@ -376,9 +627,7 @@ class _Strokes:
             source=source,
             bands=bands,
             pressure=click_sound(source, self._transfers, bands),
-            force=tuple(
-                Curve.scaled(stop.name, *enveloped(stop.force), 1e3, 1.0) for stop in source.stops
-            ),
+            force=force,
             lift=lift,
             numbers=stroke_numbers(found, study.channels),
             doubts=(
@@ -398,17 +647,6 @@ class _Strokes:
 
 
 # --------------------------------------------------------------------------- sounds
-
-
-def _level_numbers(pressure: TimeSeries | None) -> tuple[Number, ...]:
-    if pressure is None:
-        return ()
-    level = sound_statistics(pressure).exposure_level_A
-    return (
-        Number(
-            key="level", name="sound exposure level", unit="dB(A)", value=level, difference="dB"
-        ),
-    )
 
 
 def _loudness(pressure: TimeSeries) -> Number:

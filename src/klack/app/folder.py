@@ -20,7 +20,7 @@ from typing import Any
 from klack.errors import InputError
 from klack.held_folder import HeldFolder, synchronise
 from klack.own_file import SAFELY, kind_of
-from klack.terminal.printable import printable
+from klack.terminal.tables import printable
 
 __all__ = ["OWN", "RESULT_NAME", "Found", "OpenFolder", "replace_file", "result_names"]
 

@@ -143,6 +143,10 @@ class Jobs:
         names = result_names({*self._folder.look().cases, case})
         return self.start(command, case, f"klack-results/{names[case]}")
 
+    def resume(self, job: Job) -> Job:
+        """Start a study again that was stopped: its points are kept."""
+        return self.start(job.command, job.case, job.out, (), job.study)
+
     def _started(
         self, command: str, case: str, path: Path, out: str, options: Sequence[str], study: str
     ) -> Job:

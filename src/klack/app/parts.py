@@ -1,9 +1,10 @@
 """A part of a new valve: from a STEP file or a drawing, as half section where it has one."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import hypot
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.app.answers import FaceFacts, PartFacts
-from klack.app.drawing_table import outline_of_table
 from klack.case.geometry import Outline
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian
@@ -24,7 +24,100 @@ from klack.mesh.solid import mesh_step, read_step
 from klack.mesh.step_content import StepContent, StepPart, step_content
 from klack.mesh.step_profile import NotTurnedError, profiles_of_step
 
-__all__ = ["Part", "part_of_step", "part_of_table"]
+__all__ = ["Part", "outline_of_table", "part_of_step", "part_of_table"]
+
+
+_MOST = 500  # rows
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,60}")
+
+
+def outline_of_table(body: str, text: str) -> dict[str, Any]:
+    """Outline as a case has it, in mm: ``start`` and ``edges``.
+
+    Raises
+    ------
+    InputError
+        With the number of the row, for what is no row of a drawing.
+    """
+    rows = list(_rows(body, text))
+    if len(rows) < 3:
+        raise InputError(
+            f"drawing of the {body}",
+            got=f"{len(rows)} corners",
+            expected="at least 3, one in each row: r, z, surface",
+            hint="fill in the example, and change it.",
+        )
+    if rows[0][1][2]:
+        raise _refused(body, rows[0][0], f"the surface '{rows[0][1][2]}'", "r, z alone: the start")
+    start = rows[0][1][:2]
+    edges: list[dict[str, Any]] = []
+    for number, (r, z, name, centre) in rows[1:]:
+        edge: dict[str, Any] = {"line": [r, z]} if centre is None else {"arc": [r, z]}
+        if centre is not None:
+            edge["centre"] = list(centre)
+        edge["name"] = name or f"row{number}"
+        edges.append(edge)
+    end = rows[-1][1][:2]
+    if hypot(end[0] - start[0], end[1] - start[1]) > 0.0:
+        edges.append({"close": True, "name": "axis" if start[0] == end[0] == 0.0 else "closing"})
+    return {"start": list(start), "edges": edges}
+
+
+_Row = tuple[float, float, str, tuple[float, float] | None]
+
+
+def _rows(body: str, text: str) -> Iterator[tuple[int, _Row]]:
+    count = 0
+    for number, line in enumerate(text.splitlines(), 1):
+        cells = _cells(line)
+        if not any(cells) or cells[0].lstrip().startswith("#") or _is_heading(cells):
+            continue
+        count += 1
+        if count > _MOST:
+            raise _refused(body, number, f"more than {_MOST} corners", f"at most {_MOST}")
+        cells = [*cells, "", "", "", "", ""][: max(5, len(cells))]
+        if any(cells[5:]):
+            raise _refused(body, number, f"{len(cells)} columns", "r, z, surface, centre r, z")
+        r, z = (_number(body, number, cell) for cell in cells[:2])
+        centre = None
+        if cells[3] or cells[4]:
+            centre = _number(body, number, cells[3]), _number(body, number, cells[4])
+        name = cells[2]
+        if name and not _NAME.fullmatch(name):
+            raise _refused(
+                body, number, f"the name '{name[:60]}'", "a letter, then letters, digits, - and _"
+            )
+        yield number, (r, z, name, centre)
+
+
+def _cells(line: str) -> list[str]:
+    sign = next((sign for sign in ";\t," if sign in line), None)
+    cells = [cell.strip().strip('"') for cell in line.split(sign)]
+    return [cell.replace(",", ".") for cell in cells] if sign in (";", "\t") else cells
+
+
+def _is_heading(cells: list[str]) -> bool:
+    return cells[0].lower().startswith("r") and not cells[0][1:2].isdigit()
+
+
+def _number(body: str, row: int, text: str) -> float:
+    try:
+        found = float(text)
+    except ValueError:
+        raise _refused(body, row, f"'{text[:40]}'", "a number in mm") from None
+    if not abs(found) < 1e6:
+        raise _refused(body, row, f"'{text[:40]}'", "a number in mm")
+    return found + 0.0
+
+
+def _refused(body: str, row: int, got: str, expected: str) -> InputError:
+    return InputError(
+        f"drawing of the {body}, row {row}",
+        got=got,
+        expected=expected,
+        hint="0.6, 0, tip, 0, 0 is an arc round (0, 0) that forms the surface 'tip'.",
+    )
+
 
 _FINER = (25, 50, 100)  # elements over the longest side, of a mesh for the picture alone
 _MOST_FACES = 400  # in a list

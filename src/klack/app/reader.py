@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 
 from klack.acoustics.force_bands import force_bands
-from klack.acoustics.signal_statistics import sound_statistics
-from klack.acoustics.third_octave import ENERGY_REFERENCE
 from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes
 from klack.analyses.catalogue import analysis_in
 from klack.analyses.contact_doubts import MeshedContact, contact_doubt
@@ -22,19 +20,21 @@ from klack.analyses.study.point_case import case_of_point
 from klack.analyses.study.record import StudyRecord
 from klack.app.answers import (
     Answer,
-    Checked,
-    Curve,
     Number,
     ResultCard,
-    StudyChoice,
-    StudyOffer,
 )
-from klack.app.curves import drawn, enveloped, impact_numbers, stroke_numbers, travelled
-from klack.app.form import checked_text, exchanged_text
+from klack.app.explorer import (
+    Curves,
+    force_levels,
+    impact_curves,
+    impact_numbers,
+    level_numbers,
+    stroke_curves,
+    stroke_numbers,
+)
 from klack.app.study_points import StudyPoints, points_json
-from klack.app.study_texts import study_offer, study_problem, study_text
+from klack.app.texts import checked_text, exchanged_text, study_offer, study_problem, study_text
 from klack.errors import InputError, KlackError
-from klack.input.problem import Key
 from klack.signals import TimeSeries
 
 __all__ = ["Reader"]
@@ -48,13 +48,11 @@ class Reader:
     def __init__(self) -> None:
         self._points = StudyPoints()
 
-    def check(self, text: str, path: str, has_form: bool = True) -> Checked:
-        """See :func:`klack.app.form.checked_text`."""
-        return checked_text(text, path, has_form=has_form)
-
-    def exchange(self, text: str, path: str, place: Key, written: str) -> str:
-        """See :func:`klack.app.form.exchanged_text`."""
-        return exchanged_text(text, path, place, written)
+    check = staticmethod(checked_text)
+    exchange = staticmethod(exchanged_text)
+    study_problem = staticmethod(study_problem)
+    study_offer = staticmethod(study_offer)
+    study_text = staticmethod(study_text)
 
     def card(self, folder: str) -> ResultCard:
         """A stored result in short.
@@ -107,18 +105,6 @@ class Reader:
         record = self._points.record(folder)
         return record.case, record.case_text
 
-    def study_problem(self, text: str, path: str, case_text: str, case_path: str) -> Checked:
-        """See :func:`klack.app.study_texts.study_problem`."""
-        return study_problem(text, path, case_text, case_path)
-
-    def study_offer(self, text: str, path: str) -> StudyOffer:
-        """See :func:`klack.app.study_texts.study_offer`."""
-        return study_offer(text, path)
-
-    def study_text(self, choice: StudyChoice, case_text: str, case_path: str) -> str:
-        """See :func:`klack.app.study_texts.study_text`."""
-        return study_text(choice, case_text, case_path)
-
     def compare(self, first: str, second: str) -> tuple[Answer, Answer]:
         """Two results of one kind, with their clicks to one full scale.
 
@@ -130,10 +116,10 @@ class Reader:
         analyses = [analysis_in(Path(folder)) for folder in (first, second)]
         kinds = {analysis.form.kind for analysis in analyses}
         if len(kinds) != 1 or not kinds <= {ImpactStudy, StrokeStudy}:
-            one, other = (analysis.form.command for analysis in analyses)
+            kind, another = (analysis.form.command for analysis in analyses)
             raise InputError(
                 "these two results cannot be compared",
-                got=f"one of {one} and one of {other}",
+                got=f"one of {kind} and one of {another}",
                 expected="two of klack impact, or two of klack stroke",
                 hint="tick compare at two of one kind in the list of results.",
             )
@@ -141,19 +127,15 @@ class Reader:
             _answer(analysis.load(Path(folder)))
             for analysis, folder in zip(analyses, (first, second), strict=True)
         ]
-        pressures = [pressure for _, pressure in found]
-        known = [pressure for pressure in pressures if pressure is not None]
+        known = [pressure for _, pressure in found if pressure is not None]
         scale = full_scale_of(*known) if known else 1.0
-        wavs = [b"" if p is None else wav_bytes(p, full_scale=scale) for p in pressures]
-        answers = [
-            _with_sound(answer, wav, wavs[0], level_statement(scale) if known else "")
+        wavs = [b"" if p is None else wav_bytes(p, full_scale=scale) for _, p in found]
+        words = level_statement(scale) if known else ""
+        one, other = (
+            replace(answer, wav=wav, ghost_wav=wavs[0], scale=words)
             for (answer, _), wav in zip(found, wavs, strict=True)
-        ]
-        return answers[0], answers[1]
-
-
-def _with_sound(answer: Answer, wav: bytes, ghost: bytes, scale: str) -> Answer:
-    return replace(answer, wav=wav, ghost_wav=ghost, scale=scale)
+        )
+        return one, other
 
 
 def _doubts(record: Any) -> tuple[str, ...]:
@@ -188,52 +170,25 @@ def _answer(record: ImpactStudy | StrokeStudy) -> tuple[Answer, TimeSeries | Non
         pressure = click_sound(source, Transfers())
         found = [force_bands(stop.force) for stop in source.stops]
         bands = found[0].middle
-        energy = np.sum([band.energy for band in found], axis=0)
-        levels = 10.0 * np.log10(np.maximum(energy, 1e-30) / ENERGY_REFERENCE)
+        levels = force_levels(found)
     except KlackError as error:
         doubts.append(f"No sound: {error}")
         source = None
-    force: tuple[Curve, ...]
-    lift: tuple[Curve, ...]
+    curves: Curves
     if isinstance(record, ImpactStudy):
-        history = record.levels[record.reference].history
-        force = (Curve.scaled("contact force", *drawn(history.time, history.force), 1e6, 1.0),)
-        lift = (Curve.scaled("needle", *drawn(*travelled(history)), 1e6, 1e6),)
+        curves = impact_curves(record.levels[record.reference])
         unit, run = "us", f"level {record.reference}"
     else:
-        variant = record.reference
-        run = f"variant {variant.name}"
-        force = tuple(
-            Curve.scaled(stop.name, *enveloped(stop.force), 1e3, 1.0)
-            for stop in (source.stops if source is not None else ())
-        )
-        channel = variant.channel(record.channels.lift)
-        lift = (
-            ()
-            if channel is None
-            else (Curve.scaled("lift", *drawn(variant.result.time, channel.values), 1e3, 1e6),)
-        )
-        unit = "ms"
-    level = (
-        ()
-        if pressure is None
-        else (
-            Number(
-                key="level",
-                name="sound exposure level",
-                unit="dB(A)",
-                value=sound_statistics(pressure).exposure_level_A,
-                difference="dB",
-            ),
-        )
-    )
+        stops = () if source is None else source.stops
+        curves = stroke_curves(record.reference, record.channels, stops)
+        unit, run = "ms", f"variant {record.reference.name}"
     answer = Answer(
-        force=force,
-        lift=lift,
+        force=curves[0],
+        lift=curves[1],
         time_unit=unit,
         bands=bands,
         levels=levels,
-        numbers=(*_numbers(record), *level),
+        numbers=(*_numbers(record), *level_numbers(pressure)),
         doubts=tuple(doubts),
         run=run,
     )

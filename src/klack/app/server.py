@@ -13,21 +13,20 @@ from fastapi.responses import PlainTextResponse, Response
 from nicegui import Client, ui
 from nicegui import app as pages_app
 
-from klack.app.access import Access, access_for
 from klack.app.answers import typed
 from klack.app.folder import OpenFolder
-from klack.app.guard import LARGEST_BODY, UPLOAD, Guard
+from klack.app.guard import LARGEST_BODY, UPLOAD, Access, Guard, access_for
 from klack.app.pages.case_editor import case_editor_page
-from klack.app.pages.comparing import comparing_page
+from klack.app.pages.charts import comparing_page
 from klack.app.pages.frame import dead_end, frame
 from klack.app.pages.new_study import new_study_page
 from klack.app.pages.new_valve import new_valve_page
 from klack.app.pages.overview import overview_page
-from klack.app.pages.showing import showing_page
+from klack.app.pages.scene import showing_page
 from klack.app.pages.sliders import sliders_page
-from klack.app.pages.study_points import study_points_page
-from klack.app.points_answer import points_answer
+from klack.app.pages.studies import study_points_page
 from klack.app.state import State
+from klack.app.study_files import points_answer
 from klack.errors import InputError, KlackError
 
 __all__ = ["REPORT_POLICY", "build", "serve"]

@@ -1,4 +1,4 @@
-"""The points of a study as a page draws them: one JSON text, of bounded size."""
+"""The points of a study: one JSON text of bounded size, as a page draws them, and their clicks."""
 
 import json
 import os
@@ -12,21 +12,32 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.acoustics.signal_statistics import sound_statistics
+from klack.acoustics.wav import level_statement, wav_bytes
 from klack.analyses.store import load_record
 from klack.analyses.study.analysis import STUDY
+from klack.analyses.study.asked_points import AskedPoints
+from klack.analyses.study.computing import Builds, compute_alone, sounds_of
 from klack.analyses.study.goals import Goals, goals_of
+from klack.analyses.study.kinds import ask
+from klack.analyses.study.point_case import written_of_point
 from klack.analyses.study.record import NOT_YET, StudyColumn, StudyRecord
 from klack.analyses.study.wording import short_labels, shown_unit
-from klack.app.answers import typed
+from klack.app.answers import Heard, typed
+from klack.app.explorer import common_scale
+from klack.case.any_case import tree_of
 from klack.case.reader import parse, validated
 from klack.case.study import StudyFile
 from klack.case.study_source import StudySource
 from klack.errors import InputError, KlackError
+from klack.progress import silent
 from klack.report.wording import printed_unit
+from klack.signals import TimeSeries
 from klack.studies.fronts import compromise, find_front
 from klack.units import is_level
 
-__all__ = ["MOST_DRAWN", "Front", "StudyPoints", "front_of", "points_json"]
+__all__ = ["MOST_DRAWN", "Front", "Listener", "StudyPoints", "front_of", "points_json"]
+
 
 MOST_DRAWN = 10_000
 """Points that a page gets; of more, those of the front and an even choice of the others."""
@@ -294,3 +305,107 @@ def _failures(failures: Sequence[str], failed: NDArray[np.bool_]) -> dict[str, A
         "reasons": reasons.most_common(20),
         "points": [[place, failures[place][:_LONGEST]] for place in places[:_LISTED].tolist()],
     }
+
+
+_LEVEL = "noise.sound_exposure_level_weighted"
+_CASE = -1  # the case as it is, among the points
+_MOST = 64  # clicks that are kept
+
+
+class Listener:
+    """The object behind the players of a study."""
+
+    def __init__(self) -> None:
+        self._points = StudyPoints()
+        self._record: StudyRecord | None = None
+        self._sounds: dict[int, TimeSeries] = {}
+
+    def listen(self, folder: str, near: str, point: int) -> Heard:
+        """Click of a point and of the case as it is, to one full scale.
+
+        Parameters
+        ----------
+        folder : str
+            Of the result.
+        near : str
+            Folder of the case, for the files that it names.
+        point : int
+
+        Raises
+        ------
+        InputError
+            For a point that is not there, and where nothing radiates, with the reason.
+        """
+        record = self._points.record(folder)
+        if not 0 <= point < record.count:
+            raise InputError(
+                "point",
+                got=str(point),
+                expected=f"0 to {record.count - 1}",
+                hint="choose a point of the chart or of the table.",
+            )
+        if self._record is not record:
+            if self._record is None or not _same_points(self._record, record):
+                self._sounds = {}
+            self._sounds |= {item.point: item.pressure for item in record.sounds}
+            self._record = record
+        base = self._sound(record, near, _CASE)
+        own = self._sound(record, near, point)
+        scale = common_scale(own, base)
+        return Heard(
+            point=point,
+            wav=wav_bytes(own, full_scale=scale),
+            base_wav=wav_bytes(base, full_scale=scale),
+            scale=level_statement(scale),
+            level=sound_statistics(own).exposure_level_A,
+            base_level=sound_statistics(base).exposure_level_A,
+        )
+
+    def _sound(self, record: StudyRecord, near: str, point: int) -> TimeSeries:
+        if point not in self._sounds:
+            asked = _asked(record, near, point)
+            (found,) = sounds_of(asked, silent)
+            if found is None:
+                raise _silent(asked, point)
+            while len(self._sounds) >= _MOST:
+                self._sounds.pop(next(key for key in self._sounds if key != _CASE))
+            self._sounds[point] = found
+        return self._sounds[point]
+
+
+def _same_points(one: StudyRecord, other: StudyRecord) -> bool:
+    """Whether a number means the same point in both: in the record of a study that runs, too."""
+
+    def told(record: StudyRecord) -> tuple[str, ...]:
+        return record.case_text, record.study_text, record.variant, record.design
+
+    return told(one) == told(other)
+
+
+def _asked(record: StudyRecord, near: str, point: int) -> AskedPoints:
+    tree = tree_of(record.case_text, Path(near) / f"{record.case}.yaml")
+    written: dict[str, Any] = {} if point == _CASE else written_of_point(record, point)
+    return ask(tree.any_case(), tree, [written], (_LEVEL,), _variant(record))
+
+
+def _variant(record: StudyRecord) -> str | None:
+    """Variant of a stroke, or level of an impact; shots are judged by their level of its own."""
+    if not record.model:
+        return record.variant
+    level = record.variant.partition(" + ")[0]
+    return None if level == "shots" else level
+
+
+def _silent(asked: AskedPoints, point: int) -> InputError:
+    """Why a point has no sound, in the words of its row."""
+    with Builds() as builds:
+        row = compute_alone(asked, builds)[0]
+    words: Sequence[str] = [row.failure] if row.failure else row.notes
+    which = "the case as it is" if point == _CASE else f"point {point}"
+    reason = " ".join(words).replace("\n", " ") or "nothing that radiates"
+    return InputError(
+        f"click of {which}",
+        got=reason.rstrip("."),
+        expected="a section 'noise', and bodies with surfaces",
+        hint="klack noise tells what is missing.",
+    )

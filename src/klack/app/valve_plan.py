@@ -9,7 +9,7 @@ from typing import Any
 from klack.app.folder import OpenFolder
 from klack.errors import InputError
 
-__all__ = ["BODIES", "STEPS", "Plans", "ValvePlan"]
+__all__ = ["BODIES", "EXAMPLES", "STEPS", "Plans", "ValvePlan"]
 
 BODIES = ("needle", "housing")
 """The moving body, and the one that it hits."""
@@ -19,6 +19,30 @@ STEPS = ("Parts", "Faces", "Materials", "Motion", "Check", "Case")
 _FILE = "new-valve.json"
 _LONGEST = 100_000  # characters of a table
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
+
+EXAMPLES = {
+    "needle": """r, z, surface, centre r, centre z
+0, -0.6
+0.6, 0, tip, 0, 0
+2.5, 1.9, taper
+2.5, 15, shaft
+5, 15, disc_bottom
+5, 19.4, disc_rim
+0, 19.4, top
+""",
+    "housing": """r, z, surface
+0.24, -1.8
+6.5, -1.8, bottom
+6.5, 2, outside
+6.5, 5, rim
+5, 5, top
+5, -0.1485, inside
+0.7, -0.1485, floor
+0.24, -0.6085, seat
+0.24, -1.8, bore
+""",
+}
+"""Illustrative parts of the size of a small solenoid valve: those of the demo valve."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +62,7 @@ class ValvePlan:
     needle_label, housing_label : str
         Names that uploaded files had.
     needle_table, housing_table : str
-        Rows of a drawing, see :mod:`klack.app.drawing_table`.
+        Rows of a drawing, see :mod:`klack.app.parts`.
     model : str
         ``"half"`` for the half section of turned parts, ``"solid"``.
     needle_contact, housing_contact : str

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from klack.cache.entry import Entry
 from klack.cache.remember import remembered
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.geometry import StepFile
 from klack.errors import InputError
 from klack.mesh.meridian import mesh_meridian

@@ -12,7 +12,7 @@ from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.given_bodies import reduced_from_file
 from klack.assembling.modes import damping_of, elastic_count, mode_pool, selection_of
 from klack.assembling.reduced_pair import hertz_coefficient, impact_system
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.bodies import CaseBody, SurfaceName
 from klack.case.impact_sections import HertzLocalLaw, LinearLocalLaw
 from klack.case.schema import Case

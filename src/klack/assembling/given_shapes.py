@@ -16,7 +16,7 @@ import numpy as np
 
 from klack.cache.entry import Entry
 from klack.cache.remember import remembered
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.bodies import CaseBody, CaseFile
 from klack.case.plausible import MOVING_MASS, SIZE
 from klack.case.schema import Case

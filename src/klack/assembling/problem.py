@@ -18,7 +18,7 @@ from klack.assembling.candidates import Candidates, CondensedSpace
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder, wider_space
 from klack.assembling.rubbing import static_loops
 from klack.assembling.yielding import law_loops, loaded_body
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.schema import Case
 from klack.closing import Closing
 from klack.contact.mortar import ContactSpace, touching_shift

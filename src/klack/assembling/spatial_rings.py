@@ -23,7 +23,7 @@ from klack.assembling.spatial import (
     valve_of_meetings,
 )
 from klack.assembling.stops import StopContact
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.guide import LinearGuideLaw
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles

@@ -23,7 +23,7 @@ from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent

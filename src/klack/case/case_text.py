@@ -18,8 +18,8 @@ from ruamel.yaml.events import AliasEvent, ScalarEvent
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from klack.errors import InputError
-from klack.input.existing_file import instead_of_file
 from klack.input.problem import Key, key_text
+from klack.input.section import instead_of_file
 
 __all__ = ["LARGEST_CASE", "LARGEST_NUMBER", "Lines", "parse", "text_of"]
 

@@ -8,9 +8,8 @@ from pydantic_core import ErrorDetails
 
 from klack.case.origin import ExpandedCase
 from klack.errors import InputError
-from klack.input.computed import Computed
 from klack.input.problem import CaseProblem, Key, key_text, nearest
-from klack.input.section import Section
+from klack.input.section import Computed, Section
 from klack.units import QuantityError
 
 __all__ = ["first_error"]

@@ -5,9 +5,8 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem
-from klack.input.section import Count, Name, Section, Text
+from klack.input.section import Count, InputPath, Name, Section, Text
 from klack.unit_systems import UnitSystemName
 from klack.units import Mass
 

@@ -8,9 +8,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError, refuse
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, Key
-from klack.input.section import Count, Name, Number, Section
+from klack.input.section import Count, InputPath, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
 from klack.units import LENGTH, Angle, Length, LengthUnit, format_si
 

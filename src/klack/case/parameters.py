@@ -12,8 +12,8 @@ from klack.case.case_text import LARGEST_NUMBER
 from klack.errors import InputError
 from klack.expressions.dimension import ANYTHING, NUMBER, Dimension, dimension_of
 from klack.expressions.expression import RESERVED, Expression, ordered
-from klack.input.computed import Computed
 from klack.input.problem import Key
+from klack.input.section import Computed
 from klack.units import KINDS, RATE, RATIO, Kind, format_si, typed
 
 __all__ = [

@@ -8,9 +8,8 @@ from pydantic import BeforeValidator, Field, Strict, model_validator
 from klack.case.levels import Level, Variant
 from klack.case.parameters import as_written
 from klack.errors import refuse
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, one_of
-from klack.input.section import Count, Number, Section, Text
+from klack.input.section import Count, InputPath, Number, Section, Text
 
 __all__ = [
     "CaseStudy",

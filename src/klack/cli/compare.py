@@ -9,10 +9,9 @@ from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
 from klack.errors import InputError
-from klack.terminal.options import Components, imported
+from klack.terminal.options import SHOWN, Components, Shown, imported
 from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import SHOWN, Shown
 
 if TYPE_CHECKING:
     from klack.analyses.impact.record import ImpactStudy

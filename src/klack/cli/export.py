@@ -1,6 +1,7 @@
 """``klack export``: models, decks and results for other programs, through one door."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -8,14 +9,20 @@ from cyclopts import Parameter
 
 from klack.analyses.ending import is_result
 from klack.errors import InputError
-from klack.terminal.options import Components, Out, imported
-from klack.terminal.output import Written, require_folder
-from klack.terminal.wanted import WANTED, Wanted
+from klack.terminal.options import WANTED, Components, Out, Wanted, imported
+from klack.terminal.output import Written, require_folder, staged_folder
+from klack.terminal.progress import show_progress
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import ExportJson
+    from klack.analyses.study.record import StudyRecord
+    from klack.case.any_case import OwnComponents
+    from klack.case.schema import Case
+    from klack.case.valve import ValveCase
+    from klack.exchange.modal_model import ModalModel
 
 __all__ = ["export"]
+
 
 _Source = Annotated[
     Path,
@@ -33,91 +40,146 @@ _Target = Annotated[
         "over time; calculix: a deck of the impact.",
     ),
 ]
-_Part = Annotated[
-    Literal["body", "pair"] | None,
-    Parameter(
-        name="--part",
-        help="body: each linear body alone; pair: all bodies with contacts and films. "
-        "[default: both]",
-    ),
-]
-_Body = Annotated[str | None, Parameter(name="--body", help="One body alone. [default: all]")]
-_Fmi = Annotated[
-    Literal["2", "3"] | None, Parameter(name="--fmi", help="Version of the standard. [default: 2]")
-]
-_Platform = Annotated[
-    list[str] | None,
-    Parameter(
-        name="--platform",
-        consume_multiple=True,
-        negative="",
-        help="linux64, win64; several binaries fit into one FMU. [default: this computer's]",
-    ),
-]
-_Level = Annotated[
-    Literal["reduced", "full"] | None,
-    Parameter(name="--level", help="Whose fields vtk shows. [default: reduced]"),
-]
-_Impact = Annotated[
-    int | None,
-    Parameter(
-        name="--impact",
-        help="Impact of a stroke in three dimensions that vtk shows, as its report numbers it.",
-    ),
-]
-_Variant = Annotated[
-    str | None, Parameter(name="--variant", help="Its variant. [default: the first one]")
-]
-_Frames = Annotated[
-    int | None, Parameter(name="--frames", help="Number of frames for vtk. [default: 50]")
-]
-_Step = Annotated[
-    str | None,
-    Parameter(
-        name="--step",
-        help='Time increment of the calculix deck, "50 ns". [default: full_step of the case]',
-    ),
-]
-_Duration = Annotated[
-    str | None,
-    Parameter(name="--duration", help='Simulated time, "10 us". [default: as in the case]'),
-]
-_Penalty = Annotated[
-    str | None,
-    Parameter(
-        name="--penalty",
-        help='Its contact pressure per overclosure, "1e9 MPa/mm". [default: 300 E* / element size]',
-    ),
-]
-_Run = Annotated[
-    bool, Parameter(name="--run", negative="", help="Run CalculiX too (it must be installed).")
-]
-_TimeLimit = Annotated[
-    str | None, Parameter(name="--time-limit", help='Stop that run after this long, "20 min".')
-]
-
-_Point = Annotated[
-    int | None, Parameter(name="--point", help="Point of a study, as its report numbers it.")
-]
-
 _MODELS = ("mat", "csv", "fmu", "modelica")
 _RESULTS = ("mat", "csv", "netcdf", "mdf", "parquet")
 _USED_BY: Mapping[str, tuple[str, ...]] = {
-    "--part": _MODELS,
-    "--body": _MODELS,
-    "--fmi": ("fmu",),
-    "--platform": ("fmu",),
-    "--level": ("vtk",),
-    "--frames": ("vtk",),
-    "--impact": ("vtk",),
-    "--variant": ("vtk",),
-    "--step": ("calculix",),
-    "--duration": ("calculix",),
-    "--penalty": ("calculix",),
-    "--run": ("calculix",),
-    "--time-limit": ("calculix",),
-    "--point": ("case",),
+    "part": _MODELS,
+    "body": _MODELS,
+    "fmi": ("fmu",),
+    "platform": ("fmu",),
+    "level": ("vtk",),
+    "frames": ("vtk",),
+    "impact": ("vtk",),
+    "variant": ("vtk",),
+    "step": ("calculix",),
+    "duration": ("calculix",),
+    "penalty": ("calculix",),
+    "run": ("calculix",),
+    "time_limit": ("calculix",),
+    "point": ("case",),
 }
+_FRAMES = 50
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Choice:
+    """What of a source is exported, and how; what was not asked for is None."""
+
+    part: Annotated[
+        Literal["body", "pair"] | None,
+        Parameter(
+            name="--part",
+            help="body: each linear body alone; pair: all bodies with contacts and films. "
+            "[default: both]",
+        ),
+    ] = None
+    body: Annotated[str | None, Parameter(name="--body", help="One body alone. [default: all]")] = (
+        None
+    )
+    fmi: Annotated[
+        Literal["2", "3"] | None,
+        Parameter(name="--fmi", help="Version of the standard. [default: 2]"),
+    ] = None
+    platform: Annotated[
+        list[str] | None,
+        Parameter(
+            name="--platform",
+            consume_multiple=True,
+            negative="",
+            help="linux64, win64; several binaries fit into one FMU. [default: this computer's]",
+        ),
+    ] = None
+    level: Annotated[
+        Literal["reduced", "full"] | None,
+        Parameter(name="--level", help="Whose fields vtk shows. [default: reduced]"),
+    ] = None
+    frames: Annotated[
+        int | None, Parameter(name="--frames", help="Number of frames for vtk. [default: 50]")
+    ] = None
+    impact: Annotated[
+        int | None,
+        Parameter(
+            name="--impact",
+            help="Impact of a stroke in three dimensions that vtk shows, as its report numbers it.",
+        ),
+    ] = None
+    variant: Annotated[
+        str | None, Parameter(name="--variant", help="Its variant. [default: the first one]")
+    ] = None
+    step: Annotated[
+        str | None,
+        Parameter(
+            name="--step",
+            help='Time increment of the calculix deck, "50 ns". [default: full_step of the case]',
+        ),
+    ] = None
+    duration: Annotated[
+        str | None,
+        Parameter(name="--duration", help='Simulated time, "10 us". [default: as in the case]'),
+    ] = None
+    penalty: Annotated[
+        str | None,
+        Parameter(
+            name="--penalty",
+            help='Its contact pressure per overclosure, "1e9 MPa/mm". [default: 300 E* / element '
+            "size]",
+        ),
+    ] = None
+    run: Annotated[
+        bool, Parameter(name="--run", negative="", help="Run CalculiX too (it must be installed).")
+    ] = False
+    time_limit: Annotated[
+        str | None, Parameter(name="--time-limit", help='Stop that run after this long, "20 min".')
+    ] = None
+    point: Annotated[
+        int | None, Parameter(name="--point", help="Point of a study, as its report numbers it.")
+    ] = None
+
+    def require_used(self, to: str) -> None:
+        """Refuse what the format has no use for."""
+        for name, users in _USED_BY.items():
+            value = getattr(self, name)
+            if not (value is None or value is False or to in users):
+                option = f"--{name.replace('_', '-')}"
+                raise InputError(
+                    option,
+                    got=f"it with --to {to}",
+                    expected=f"it with --to {' or '.join(users)} only",
+                    hint=f"leave {option} out.",
+                )
+
+    @property
+    def platforms(self) -> tuple[str, ...] | None:
+        """Both "--platform a,b" and "--platform a --platform b"."""
+        if self.platform is None:
+            return None
+        words = (name for item in self.platform for name in item.split(",") if name)
+        return tuple(dict.fromkeys(words))
+
+    @property
+    def frame_count(self) -> int:
+        """Of fields over time."""
+        return _FRAMES if self.frames is None else self.frames
+
+    def deck_numbers(self) -> tuple[float | None, ...]:
+        """Step, duration, penalty and limit of time in SI."""
+        from klack.units import TIME, Kind, parse_quantity
+
+        units = ("MPa/mm", "N/mm^3", "Pa/m")
+        bed = Kind("a pressure per length", "Pa/m", "1e9 MPa/mm", units, largest=1e24)
+        return tuple(
+            None if text is None else parse_quantity(text, kind, option)
+            for text, kind, option in (
+                (self.step, TIME, "--step"),
+                (self.duration, TIME, "--duration"),
+                (self.penalty, bed, "--penalty"),
+                (self.time_limit, TIME, "--time-limit"),
+            )
+        )
+
+
+_CHOICE = Choice()
 
 
 def export(
@@ -125,78 +187,32 @@ def export(
     /,
     *,
     to: _Target,
-    part: _Part = None,
-    body: _Body = None,
-    fmi: _Fmi = None,
-    platform: _Platform = None,
-    level: _Level = None,
-    frames: _Frames = None,
-    impact: _Impact = None,
-    variant: _Variant = None,
-    step: _Step = None,
-    duration: _Duration = None,
-    penalty: _Penalty = None,
-    run: _Run = False,
-    time_limit: _TimeLimit = None,
-    point: _Point = None,
+    choice: Choice = _CHOICE,
     component: Components = None,
     out: Out = None,
     wanted: Wanted = WANTED,
 ) -> int:
     """Write models, results or decks of a case for another program."""
-    threads, quiet = wanted.threads, wanted.quiet
-    _require_used(
-        to,
-        {
-            "--part": part,
-            "--body": body,
-            "--fmi": fmi,
-            "--platform": platform,
-            "--level": level,
-            "--frames": frames,
-            "--impact": impact,
-            "--variant": variant,
-            "--step": step,
-            "--duration": duration,
-            "--penalty": penalty,
-            "--run": run or None,
-            "--time-limit": time_limit,
-            "--point": point,
-        },
-    )
+    choice.require_used(to)
     if to == "case":
-        from klack.cli.export_results import export_point
-
-        name, made = export_point(source, point, out)
-        _tell(name, to, made, wanted)
+        _tell(*_export_point(source, choice.point, out), to, wanted)
         return 0
     if is_result(source):
-        if to == "vtk" and impact is not None:
-            from klack.cli.export_results import StoredImpact, export_stored_impact
-
-            if level is not None:
-                raise _no_level()
-            chosen = StoredImpact(impact, variant, 50 if frames is None else frames)
-            own = imported(component)
-            name, made = export_stored_impact(
-                source, out, chosen, own, threads=threads, quiet=quiet
-            )
+        if to == "vtk" and choice.impact is not None:
+            told = _export_stored_impact(source, out, choice, imported(component), wanted)
         else:
-            name, made = _export_stored(source, to, out, wanted)
-        _tell(name, to, made, wanted)
+            told = _export_stored(source, to, out, wanted)
+        _tell(*told, to, wanted)
         return 0
-    if impact is not None or variant is not None:
+    if choice.impact is not None or choice.variant is not None:
         raise InputError(
             str(source),
             got="a case with --impact or --variant",
             expected="the folder of a stored stroke in three dimensions",
             hint="run klack stroke first, and give the folder that it names at the end.",
         )
-
     if to == "parquet":
-        from klack.cli.export_results import parquet_is_for_studies
-
-        raise parquet_is_for_studies(f"'{source}', which is no stored result")
+        raise _parquet_is_for_studies(f"'{source}', which is no stored result")
 
     from klack.case.any_case import load_any_case
     from klack.case.reader import find_case
@@ -206,40 +222,22 @@ def export(
     require_folder(folder)
     incomplete: Exception | None = None
     if to == "calculix":
-        from klack.cli.export_calculix import DeckNumbers, export_calculix
-
-        numbers = DeckNumbers(step, duration, penalty, time_limit)
-        made = export_calculix(
-            _impact_only(case, to), folder, numbers, run=run, threads=threads or 1, quiet=quiet
-        )
+        numbers = choice.deck_numbers()
+        made = _export_calculix(_impact_only(case, to), folder, numbers, choice.run, wanted)
     elif to in _MODELS:
-        from klack.cli.export_models import ModelChoice, export_models
-
-        choice = ModelChoice(to, part, body, 3 if fmi == "3" else 2, _platforms(platform))
-        made = export_models(case, folder, choice, threads=threads, quiet=quiet)
+        made = _export_models(case, to, folder, choice, wanted)
     elif to == "vtk":
-        from klack.cli.export_results import export_fields
-
-        made = export_fields(
-            _impact_only(case, to),
-            folder,
-            level=level or "reduced",
-            frames=50 if frames is None else frames,
-            threads=threads,
-            quiet=quiet,
-        )
+        made = _export_fields(_impact_only(case, to), folder, choice, wanted)
     else:
-        from klack.cli.export_results import run_and_export
-
-        made, incomplete = run_and_export(case, to, folder, threads=threads, quiet=quiet)
+        made, incomplete = _run_and_export(case, to, folder, wanted)
     wanted.warn(case.input_notes)
-    _tell(case.name, to, made, wanted)
+    _tell(case.name, made, to, wanted)
     if incomplete:
         raise incomplete
     return 0
 
 
-def _tell(case: str, to: str, made: Written, wanted: Wanted) -> None:
+def _tell(case: str, made: Written, to: str, wanted: Wanted) -> None:
     wanted.say("\n".join(made.lines))
     result: ExportJson = {
         "schema": "klack-export/1",
@@ -249,17 +247,6 @@ def _tell(case: str, to: str, made: Written, wanted: Wanted) -> None:
         "files": list(made.files),
     }
     wanted.write(lambda: result)
-
-
-def _require_used(to: str, options: Mapping[str, object]) -> None:
-    for name, value in options.items():
-        if value is not None and to not in _USED_BY[name]:
-            raise InputError(
-                name,
-                got=f"it with --to {to}",
-                expected=f"it with --to {' or '.join(_USED_BY[name])} only",
-                hint=f"leave {name} out.",
-            )
 
 
 def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> tuple[str, Written]:
@@ -273,22 +260,12 @@ def _export_stored(source: Path, to: str, out: Path | None, wanted: Wanted) -> t
         )
     from klack.analyses.catalogue import load_result
     from klack.analyses.incomplete import missing_in
-    from klack.cli.export_results import export_result
 
     folder = out if out is not None else source
     require_folder(folder)
     study = load_result(source)
     wanted.warn(missing_in(study))
-    return study.case, export_result(study, to, folder)
-
-
-def _no_level() -> InputError:
-    return InputError(
-        "--level",
-        got="it with the result of a stroke",
-        expected="no level: the motion is that of the recorded modes",
-        hint="leave --level out.",
-    )
+    return study.case, _export_result(study, to, folder)
 
 
 def _impact_only(case: Any, to: str) -> Any:
@@ -304,8 +281,276 @@ def _impact_only(case: Any, to: str) -> Any:
     return case
 
 
-def _platforms(names: list[str] | None) -> tuple[str, ...] | None:
-    """Both "--platform a,b" and "--platform a --platform b"."""
-    if names is None:
-        return None
-    return tuple(dict.fromkeys(name for item in names for name in item.split(",") if name))
+def _export_calculix(
+    case: "Case", folder: Path, numbers: tuple[float | None, ...], run: bool, wanted: Wanted
+) -> Written:
+    """Write the deck of an impact; with ``run``, let the installed program compute it."""
+    from klack.exchange.calculix_case import calculix_impact, calculix_settings
+    from klack.exchange.calculix_deck import write_deck
+    from klack.exchange.calculix_run import require_calculix, run_calculix
+
+    if run:
+        require_calculix()
+    step, duration, penalty, time_limit = numbers
+    deck = folder / f"{case.name}.inp"
+    with show_progress(wanted.quiet) as progress:
+        impact = calculix_impact(case, progress)
+        settings = calculix_settings(case, impact, step=step, duration=duration, penalty=penalty)
+        progress("deck", 0.0)
+        with staged_folder(folder) as stage:
+            write_deck(impact, settings, stage / deck.name)
+            words = (
+                f"Deck {deck}: {settings.duration / settings.step:.0f} steps of "
+                f"{settings.step * 1e9:.4g} ns, penalty {settings.penalty * 1e-9:.4g} MPa/mm"
+            )
+            made = Written.of(folder, stage, words)
+        then = f"Run it in its folder: ccx -i {deck.stem}"
+        if run:
+            done = run_calculix(
+                deck,
+                duration=settings.duration,
+                threads=wanted.threads or 1,
+                time_limit=time_limit,
+                progress=lambda fraction: progress("CalculiX", fraction),
+            )
+            then = f"CalculiX took {done.wall_time:.0f} s: {done.data}"
+    return replace(made, lines=(*made.lines, then))
+
+
+def _export_models(
+    case: "Case | ValveCase", to: str, folder: Path, choice: Choice, wanted: Wanted
+) -> Written:
+    """Reduce the bodies of a case and write them."""
+    from klack.exchange.case_models import case_models
+
+    if to == "fmu":
+        from klack.exchange.fmu.compiler import require_compilers
+
+        require_compilers(choice.platforms)
+    with show_progress(wanted.quiet) as progress:
+        every = case_models(case, progress, threads=wanted.threads)
+        bodies: tuple[ModalModel, ...] = ()
+        if choice.part != "pair" or choice.body is not None:
+            bodies = every.body_models(choice.body)
+        pair = (every.pair,) if choice.part != "body" and choice.body is None else ()
+        progress(to, 0.0)
+        with staged_folder(folder) as stage:
+            _write_models((*bodies, *pair), to, stage, choice)
+            made = Written.of(folder, stage)
+        progress(to, 1.0)
+    lines = [*map(_described, (*bodies, *pair))]
+    if pair and every.outside:
+        lines.append(f"Not in the models, yours to add: {', '.join(every.outside)}")
+    return replace(made, lines=(*lines, *made.lines))
+
+
+def _write_models(models: Sequence["ModalModel"], to: str, folder: Path, choice: Choice) -> None:
+    """Write models into a folder."""
+    if to == "mat":
+        from klack.exchange.matlab_model import write_matlab
+
+        write_matlab(models, folder)
+    elif to == "csv":
+        from klack.exchange.text_model import write_text
+
+        write_text(models, folder)
+    elif to == "modelica":
+        from klack.exchange.modelica import write_modelica
+
+        write_modelica(models, folder)
+    else:
+        from klack.exchange.fmu.build import build_fmu
+
+        for model in models:
+            path = folder / f"{model.name}.fmu"
+            build_fmu(model, path, fmi=3 if choice.fmi == "3" else 2, platforms=choice.platforms)
+
+
+def _described(model: "ModalModel") -> str:
+    """One line on what a model is."""
+    inputs = ", ".join(item.name for item in model.inputs)
+    highest = model.frequencies.max() / 1e3 if model.mode_count else 0.0
+    words = f"{model.name}: {model.mode_count} modes up to {highest:.4g} kHz, inputs {inputs}"
+    if model.contacts:
+        words += f", contacts {', '.join(contact.name for contact in model.contacts)}"
+    return f"{words}; step {model.step * 1e9:.4g} ns"
+
+
+def _export_result(study: Any, to: str, folder: Path) -> Written:
+    """Write the histories of a stored result, or the points of a study."""
+    from klack.analyses.impact.record import ImpactStudy
+    from klack.analyses.stroke.record import StrokeStudy
+    from klack.analyses.study.record import StudyRecord
+    from klack.exchange.results.study_table import result_table
+
+    if isinstance(study, StudyRecord):
+        return _export_points(study, to, folder)
+    if not isinstance(study, ImpactStudy | StrokeStudy):
+        raise InputError(
+            "the stored result",
+            got=f"a stored {type(study).__name__}",
+            expected="the result of klack impact, stroke, study or optimise",
+            hint="its numbers are in --json of the command that wrote it.",
+        )
+    if to == "parquet":
+        raise _parquet_is_for_studies("a stored result with curves")
+    table = result_table(study)
+    name = f"{study.case}_result"
+    with staged_folder(folder) as stage:
+        if to == "netcdf":
+            from klack.exchange.results.netcdf import write_netcdf
+
+            write_netcdf(table, stage / f"{name}.nc")
+        elif to == "mdf":
+            from klack.exchange.results.mdf import write_mdf
+
+            write_mdf(table, stage / f"{name}.mf4")
+        elif to == "mat":
+            from klack.exchange.results.mat import write_mat
+
+            write_mat(table, stage / f"{name}.mat")
+        else:
+            from klack.exchange.results.csv_files import write_csv
+
+            write_csv(table, stage)
+        return Written.of(folder, stage)
+
+
+def _export_points(study: "StudyRecord", to: str, folder: Path) -> Written:
+    from klack.analyses.study.record import study_table
+
+    if to not in ("csv", "parquet"):
+        raise InputError(
+            f"--to {to}",
+            got="points of a study",
+            expected="--to csv or parquet, or --to case with --point",
+            hint='in Python, klack.load_result("FOLDER").to_xarray().',
+        )
+    table = study_table(study)
+    with staged_folder(folder) as stage:
+        if to == "parquet":
+            table.to_parquet(stage / "points.parquet")
+        else:
+            table.to_csv(stage / "points.csv")
+        return Written.of(folder, stage)
+
+
+def _parquet_is_for_studies(got: str) -> InputError:
+    """The error where Parquet cannot be written."""
+    return InputError(
+        "--to parquet",
+        got=got,
+        expected="the folder of klack study or klack optimise: a row for each point",
+        hint="--to csv or netcdf for curves.",
+    )
+
+
+def _export_point(source: Path, point: int | None, out: Path | None) -> tuple[str, Written]:
+    """Write the case file of a point of a stored study."""
+    from klack.analyses.catalogue import load_result
+    from klack.analyses.ending import is_result
+    from klack.analyses.study.point_case import case_of_point
+    from klack.analyses.study.record import StudyRecord
+
+    study = load_result(source) if is_result(source) else None
+    if not isinstance(study, StudyRecord):
+        raise InputError(
+            str(source),
+            got="no result of a study",
+            expected="the folder of klack study or klack optimise",
+            hint="give the folder that the command names at the end.",
+        )
+    folder = out if out is not None else source
+    require_folder(folder)
+    name, text = case_of_point(study, point, folder)
+    with staged_folder(folder) as stage:
+        (stage / name).write_text(text, encoding="utf-8")
+        return study.case, Written.of(folder, stage)
+
+
+def _run_and_export(
+    case: "Case | ValveCase", to: str, folder: Path, wanted: Wanted
+) -> tuple[Written, Exception | None]:
+    """Run a case, write its result, and pass on why a run ended early."""
+    from klack.analyses.impact.run import run_impact
+    from klack.analyses.incomplete import IncompleteImpactError
+    from klack.analyses.stroke.record import IncompleteStrokeError
+    from klack.analyses.stroke.run import run_stroke
+    from klack.case.schema import Case
+
+    study: Any
+    incomplete: Exception | None = None
+    with show_progress(wanted.quiet) as progress:
+        try:
+            if isinstance(case, Case):
+                study = run_impact(
+                    case,
+                    levels=case.run.levels,
+                    certify=False,
+                    progress=progress,
+                    threads=wanted.threads,
+                )
+            else:
+                study = run_stroke(case, progress=progress, threads=wanted.threads)
+        except (IncompleteImpactError, IncompleteStrokeError) as error:
+            study, incomplete = error.study, error
+    return _export_result(study, to, folder), incomplete
+
+
+def _export_fields(case: "Case", folder: Path, choice: Choice, wanted: Wanted) -> Written:
+    """Write displacement, velocity and stress of an impact over time, for ParaView."""
+    from klack.exchange.results.vtk_series import write_impact_series
+
+    with show_progress(wanted.quiet) as progress, staged_folder(folder) as stage:
+        made = write_impact_series(
+            case,
+            stage,
+            level=choice.level or "reduced",
+            frames=choice.frame_count,
+            progress=progress,
+            threads=wanted.threads,
+        )
+        place = folder / made.relative_to(stage)
+        return Written.of(folder, stage, f"Written: {place}; open it in ParaView")
+
+
+def _export_stored_impact(
+    source: Path, out: Path | None, choice: Choice, own: "OwnComponents", wanted: Wanted
+) -> tuple[str, Written]:
+    """Write the bodies and the line load of an impact of a stored stroke, for ParaView."""
+    from klack.analyses.catalogue import load_result
+    from klack.analyses.stroke.record import StrokeStudy
+    from klack.case.any_case import read_valve_case
+    from klack.exchange.results.spatial_series import write_spatial_series
+
+    if choice.level is not None:
+        raise InputError(
+            "--level",
+            got="it with the result of a stroke",
+            expected="no level: the motion is that of the recorded modes",
+            hint="leave --level out.",
+        )
+    study = load_result(source)
+    if not isinstance(study, StrokeStudy):
+        raise InputError(
+            str(source),
+            got=f"a stored {type(study).__name__} with --impact",
+            expected="the folder of klack stroke",
+            hint="fields of an impact of two bodies come from its case: leave --impact out.",
+        )
+    folder = out if out is not None else source
+    require_folder(folder)
+    case = read_valve_case(study.case_text, Path(f"{study.case}.yaml"), own)
+    with show_progress(wanted.quiet) as progress, staged_folder(folder) as stage:
+        made = write_spatial_series(
+            study,
+            case,
+            stage,
+            impact=choice.impact or 0,
+            variant=choice.variant,
+            frames=choice.frame_count,
+            progress=progress,
+            threads=wanted.threads,
+        )
+        place = folder / made.relative_to(stage)
+        return study.case, Written.of(folder, stage, f"Written: {place}; open it in ParaView")

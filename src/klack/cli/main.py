@@ -19,7 +19,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from klack import __version__
-from klack.cli.stopping import stop_code, terminable
 from klack.cli.surroundings import (
     close_quietly,
     in_words,
@@ -27,6 +26,8 @@ from klack.cli.surroundings import (
     prepare_compiling,
     prepare_streams,
     require_present_folder,
+    stop_code,
+    terminable,
 )
 from klack.errors import (
     AccuracyWarning,
@@ -35,7 +36,7 @@ from klack.errors import (
     KlackError,
     LeftAloneWarning,
 )
-from klack.terminal.printable import printable
+from klack.terminal.tables import printable
 
 if TYPE_CHECKING:
     from cyclopts import CycloptsError
@@ -89,7 +90,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(arguments: list[str], name: str) -> int:
     from cyclopts import CycloptsError
 
-    from klack.cli.commands import app
+    from klack.cli.commands import parser
 
     def note(message: Warning | str, category: type[Warning], *place: Any, **more: Any) -> None:
         if issubclass(category, (AccuracyWarning, CacheWarning, LeftAloneWarning)):
@@ -104,11 +105,11 @@ def _run(arguments: list[str], name: str) -> int:
             if arguments[0] != "warm":  # which says itself that there is no folder
                 prepare_compiling()
         try:
-            code = app(
+            code = parser(
                 arguments, print_error=False, exit_on_error=False, result_action="return_value"
             )
         except CycloptsError as error:
-            shown = name if name.removeprefix("klack").strip() in app else "klack"
+            shown = name if name.removeprefix("klack").strip() in parser else "klack"
             return _complain(f"{name}: {_one_line(error)}\nTry: {shown} --help", EXIT_BAD_INPUT)
     sys.stdout.flush()
     return code if isinstance(code, int) else EXIT_OK

@@ -1,23 +1,25 @@
 """``klack show``: bodies, contacts and network as a picture, without any solution."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from klack.errors import InputError
-from klack.terminal.options import Components, imported
+from klack.terminal.options import SHOWN, Components, Shown, imported
 from klack.terminal.output import require_file_target
-from klack.terminal.wanted import SHOWN, Shown
+from klack.terminal.tables import TextTable, plain_math
 
 if TYPE_CHECKING:
-    from klack.analyses.json_results import ShowJson
+    from klack.analyses.json_results import ComponentsJson, ShowJson
     from klack.case.valve import ValveCase
     from klack.network.component import Component
+    from klack.network.described import DescribedKey, DescribedType
     from klack.viewer.view import View
 
 __all__ = ["show"]
+
 
 _PAGE, _SCHEMATIC = ".html", ".svg"
 _ENDINGS = (_PAGE, _SCHEMATIC)
@@ -88,19 +90,15 @@ def _draw_schematic(
     from klack.analyses.ending import is_result
     from klack.case.any_case import load_valve_case
     from klack.case.reader import find_case
+    from klack.schematic.picture import schematic_svg
 
     if is_result(source):
         return _draw_stored(source, out, wanted)
     case = load_valve_case(find_case(source), own)
-    file = out if out is not None else Path(f"{case.name}.svg")
-    require_file_target("--out", file)
-    _write(file, _schematic(case))
     network = case.network.network()
-    wanted.say(
-        f"{len(network.components)} components, {len(network.nodes)} connections.\nPicture: {file}"
-    )
-    wanted.write(lambda: _numbers(case.name, file, network=case))
-    return 0
+    picture = schematic_svg(network, f"{case.name}: {case.title}".rstrip(": "))
+    words = f"{len(network.components)} components, {len(network.nodes)} connections.\nPicture: "
+    return _end(case.name, out or Path(f"{case.name}.svg"), picture, words, wanted, network=case)
 
 
 def _draw_stored(source: Path, out: Path | None, wanted: Shown) -> int:
@@ -116,12 +114,9 @@ def _draw_stored(source: Path, out: Path | None, wanted: Shown) -> int:
             expected="the result of klack stroke",
             hint="klack show takes the case itself, and other results as .html.",
         )
-    file = out if out is not None else Path(f"{source.absolute().name}.svg")
-    require_file_target("--out", file)
-    _write(file, picture)
-    wanted.say(f"The network of {source}.\nPicture: {file}")
-    wanted.write(lambda: _numbers(source.absolute().name, file, network=None))
-    return 0
+    name = source.absolute().name
+    words = f"The network of {source}.\nPicture: "
+    return _end(name, out or Path(f"{name}.svg"), picture, words, wanted)
 
 
 def _draw_page(
@@ -139,15 +134,13 @@ def _draw_page(
     length = None if unit is None else parse_quantity(f"1 {unit}", LENGTH, "--unit")
     with show_progress(wanted.quiet) as progress:
         view = view_of_source(source, own, unit_length=length, progress=progress)
-    file = out if out is not None else Path(f"{view.name}.html")
-    require_file_target("--out", file)
-    from klack.viewer.page import page_of
+    from klack.viewer.view import page_of
 
     page = page_of(view)
-    _write(file, page)
-    wanted.say(f"{_content(view)}\nPage: {file} ({len(page) / 1e6:.2g} MB); open it in a browser.")
-    wanted.write(lambda: _numbers(view.name, file, network=network, view=view))
-    return 0
+    more = f" ({len(page) / 1e6:.2g} MB); open it in a browser."
+    file = out or Path(f"{view.name}.html")
+    words = f"{_content(view)}\nPage: "
+    return _end(view.name, file, page, words, wanted, more=more, network=network, view=view)
 
 
 def _content(view: "View") -> str:
@@ -180,11 +173,8 @@ def _list(source: Path | None, out: Path | None, component: list[str] | None, wa
 
     types = [described_type(kind) for kind in component_classes()]
     types += [described_type(kind, own=True) for kind in imported(component)]
-
-    from klack.cli.show_components import component_tables, components_json
-
-    wanted.show(component_tables(types))
-    wanted.write(lambda: components_json(types))
+    wanted.show(_component_tables(types))
+    wanted.write(lambda: _components_json(types))
     return 0
 
 
@@ -201,14 +191,21 @@ def _ending(out: Path | None) -> str:
     return ending
 
 
-def _schematic(case: "ValveCase") -> str:
-    from klack.schematic.picture import schematic_svg
-
-    return schematic_svg(case.network.network(), f"{case.name}: {case.title}".rstrip(": "))
-
-
-def _write(file: Path, picture: str) -> None:
+def _end(
+    name: str,
+    file: Path,
+    picture: str,
+    words: str,
+    wanted: Shown,
+    *,
+    more: str = "",
+    network: "ValveCase | None" = None,
+    view: "View | None" = None,
+) -> int:
+    """Write a picture and say so."""
     from klack.whole_file import whole_file
+
+    require_file_target("--out", file)
 
     def refuse(place: Path, error: OSError) -> InputError:
         return InputError(
@@ -220,11 +217,12 @@ def _write(file: Path, picture: str) -> None:
 
     with whole_file(file, refuse) as new:
         new.write_text(picture, encoding="utf-8")
+    wanted.say(f"{words}{file}{more}")
+    wanted.write(lambda: _numbers(name, file, network, view))
+    return 0
 
 
-def _numbers(
-    name: str, file: Path, *, network: "ValveCase | None", view: "View | None" = None
-) -> "ShowJson":
+def _numbers(name: str, file: Path, network: "ValveCase | None", view: "View | None") -> "ShowJson":
     drawn = None if network is None else network.network.network()
     return {
         "schema": "klack-show/1",
@@ -246,4 +244,83 @@ def _numbers(
             }
             for node in drawn.nodes
         ],
+    }
+
+
+_NONE = "-"
+
+
+def _component_tables(types: "Sequence[DescribedType]") -> Iterator[TextTable]:
+    """Ports and keys of every type, then equations and sources; what is optional in brackets."""
+    yield TextTable(
+        title="Component types: what may be left out is in brackets",
+        columns=("type", "what it is", "ports", "keys"),
+        rows=[(item.word, _summary(item), _ports(item), _keys(item.keys)) for item in types],
+        left=4,
+    )
+    yield TextTable(
+        title="Equations and sources",
+        columns=("type", "equation", "source"),
+        rows=[
+            (item.word, plain_math(item.equation) or _NONE, item.source or _NONE)
+            for item in types
+            if item.equation or item.source
+        ],
+        left=3,
+    )
+
+
+def _summary(item: "DescribedType") -> str:
+    return plain_math(item.summary) if "\\" in item.summary else item.summary
+
+
+def _ports(item: "DescribedType") -> str:
+    """``a, b: hydraulic; needle, (body): mechanical``."""
+    if not item.ports:
+        return "its points: mechanical" if "points" in item.keys else _NONE
+    domains = dict.fromkeys(port.domain for port in item.ports.values())
+    return "; ".join(
+        ", ".join(
+            f"({name})" if port.optional else name
+            for name, port in item.ports.items()
+            if port.domain == domain
+        )
+        + f": {domain}"
+        for domain in domains
+    )
+
+
+def _keys(keys: "Mapping[str, DescribedKey]") -> str:
+    """Those that must be given first, with their units."""
+    order = sorted(keys, key=lambda name: not keys[name].required)
+    return ", ".join(
+        _key(name, keys[name]) if keys[name].required else f"({_key(name, keys[name])})"
+        for name in order
+    )
+
+
+def _key(name: str, key: "DescribedKey") -> str:
+    return f"{name} [{key.unit}]" if key.unit not in ("", "-") else name
+
+
+def _components_json(types: "Sequence[DescribedType]") -> "ComponentsJson":
+    """The same for programs, equations as LaTeX."""
+    return {
+        "schema": "klack-show-components/1",
+        "types": {
+            item.word: {
+                "summary": item.summary,
+                "ports": {
+                    name: {"domain": port.domain, "optional": port.optional}
+                    for name, port in item.ports.items()
+                },
+                "keys": {
+                    name: {"unit": key.unit, "required": key.required, "meaning": key.meaning}
+                    for name, key in item.keys.items()
+                },
+                "equation": item.equation,
+                "source": item.source,
+            }
+            for item in types
+        },
     }

@@ -1,21 +1,105 @@
 """``klack verify``: klack against exact and published results."""
 
+import sys
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from klack.cli.verify_text import print_checks, print_groups
+from klack.terminal.options import SHOWN, Shown
 from klack.terminal.output import require_file_target
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import SHOWN, Shown
-from klack.verification.check import GROUPS
+from klack.terminal.tables import print_table
+from klack.verification.check import COVERS, GROUPS
 
 if TYPE_CHECKING:
     from klack.analyses.json_results import CheckJson, VerificationJson
     from klack.verification import Check
 
 __all__ = ["verify"]
+
+
+_COLUMNS = ("group", "verdict", "checks", "failed", "wide", "least headroom", "largest")
+_CLOSEST = 5
+_WIDTH = 100
+
+
+def print_groups() -> None:
+    """One sentence per group."""
+    width = max(map(len, COVERS)) + 2
+    for group, sentence in COVERS.items():
+        indent = " " * width
+        print(fill(sentence, _WIDTH, initial_indent=f"{group:<{width}}", subsequent_indent=indent))
+
+
+def print_checks(checks: Sequence["Check"], *, every: bool = False, to_stderr: bool) -> None:
+    """Print the summary per group, then the failed checks and the closest, or all of them."""
+    from klack.verification.check import summary
+
+    groups = dict.fromkeys(check.group for check in checks)
+    rows = [_row(group, [check for check in checks if check.group == group]) for group in groups]
+    print_table(f"{summary(checks)}\n", _COLUMNS, rows, left=2, to_stderr=to_stderr)
+    stream = sys.stderr if to_stderr else sys.stdout
+    for line in _all_lines(checks) if every else _worst_lines(checks):
+        print(line, file=stream)
+
+
+def _row(group: str, checks: Sequence["Check"]) -> tuple[str, ...]:
+    from klack.verification.check import headroom_text
+
+    failed = sum(not check.passed for check in checks)
+    compared = [check for check in checks if check.tolerance > 0 and check.passed]
+    by_headroom = sorted(compared, key=lambda check: check.headroom)
+    return (
+        group,
+        "FAILED" if failed else "ok",
+        str(len(checks)),
+        str(failed),
+        str(sum(check.is_wide for check in checks)),
+        headroom_text(by_headroom[0]) if by_headroom else "",
+        headroom_text(by_headroom[-1]) if by_headroom else "",
+    )
+
+
+def _all_lines(checks: Sequence["Check"]) -> Iterator[str]:
+    for check in checks:
+        yield from _lines(check)
+
+
+def _worst_lines(checks: Sequence["Check"]) -> Iterator[str]:
+    for check in checks:
+        if not check.passed:
+            yield from _lines(check)
+    close = [check for check in checks if check.passed and check.tolerance > 0]
+    close.sort(key=lambda check: check.headroom)
+    if close:
+        yield "Closest to their tolerance (--all prints every check, --html makes a page):"
+    for check in close[:_CLOSEST]:
+        yield from _lines(check)
+
+
+def _lines(check: "Check") -> Iterator[str]:
+    from klack.verification.check import (
+        deviation_text,
+        headroom_text,
+        number_text,
+        tolerance_text,
+    )
+
+    verdict = "ok" if check.passed else "FAILED"
+    name = f"{check.group}: {check.name}"
+    indent = " " * 8
+    yield fill(name, _WIDTH, initial_indent=f"{verdict:<8}", subsequent_indent=indent)
+    numbers = (
+        f"expected {number_text(check.expected)}, computed {number_text(check.computed)}, "
+        f"deviation {deviation_text(check)}, tolerance {tolerance_text(check)} "
+        f"({headroom_text(check)})"
+    )
+    yield fill(numbers, _WIDTH, initial_indent=indent, subsequent_indent=indent)
+    words = f"source: {check.source}" + (f"; {check.reason}" if check.reason else "")
+    yield fill(words, _WIDTH, initial_indent=indent, subsequent_indent=indent)
 
 
 def verify(

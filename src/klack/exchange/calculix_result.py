@@ -21,7 +21,7 @@ from klack.analyses.comparison.calculix import OtherRun
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.errors import InputError, refuse
 from klack.exchange.calculix_deck import LOWER, UPPER
-from klack.input.existing_file import instead_of_file
+from klack.input.section import instead_of_file
 
 __all__ = ["CalculixResult", "other_run", "read_calculix"]
 

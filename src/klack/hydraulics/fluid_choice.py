@@ -15,9 +15,8 @@ from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
 from klack.hydraulics.liquid import ATMOSPHERE, Murnaghan, TabulatedLiquid
 from klack.hydraulics.pressure_viscosity import PressureViscosity
 from klack.hydraulics.property_table import PropertyTable, read_property_table
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, nearest, one_of
-from klack.input.section import NamedSection, Section, Text
+from klack.input.section import InputPath, NamedSection, Section, Text
 from klack.units import (
     Density,
     DynamicViscosity,

@@ -1,8 +1,11 @@
-"""Base class of all sections of a case: frozen, documented, and strict about their keys."""
+"""Sections of a case, strict about their keys, and what a key may hold: expressions, files."""
 
 import re
+import stat
 from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Protocol, Self
 
 from pydantic import (
     BaseModel,
@@ -13,16 +16,62 @@ from pydantic import (
     Strict,
     StringConstraints,
     ValidationInfo,
+    WithJsonSchema,
     model_validator,
 )
 from pydantic.fields import FieldInfo
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
-from klack.input.computed import plain_number
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 
-__all__ = ["Count", "Name", "NamedSection", "Number", "PlainName", "Section", "Text"]
+__all__ = [
+    "Computed",
+    "Count",
+    "InputPath",
+    "Name",
+    "NamedSection",
+    "Number",
+    "PlainName",
+    "Section",
+    "Text",
+    "instead_of_file",
+    "refuse_lfs_pointer",
+]
+
+
+class _Dimension(Protocol):
+    def fits(self, unit: str) -> bool: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Computed:
+    """Result of an expression in a case.
+
+    Parameters
+    ----------
+    value : float [SI]
+    dimension : object
+        Says by ``fits`` whether the value is a quantity with an SI unit, and in words what it is.
+    text : str
+        The expression.
+    """
+
+    value: float
+    dimension: _Dimension
+    text: str
+
+    def __str__(self) -> str:
+        return f"'{self.text}', which is {self.value:.6g}, {self.dimension}"
+
+
+def plain_number(value: object) -> object:
+    """Number that an expression without unit gave; anything else as it is."""
+    if isinstance(value, Computed) and value.dimension.fits("-"):
+        return value.value
+    return value
+
 
 Number = Annotated[float, Strict(), BeforeValidator(plain_number)]
 Count = Annotated[int, Strict(), Field(ge=1)]
@@ -149,3 +198,77 @@ class NamedSection(Section):
             schema["anyOf"] = [{"required": required}, {"required": ["name"]}]
         schema["type"] = ["string", "object"]
         return schema
+
+
+_LONGEST = 300  # characters of a name that a message repeats
+_LFS_POINTER = b"version https://git-lfs.github.com/spec/"
+
+
+def refuse_lfs_pointer(path: Path) -> None:
+    """Raise for the short text that git leaves in place of a large file.
+
+    A file that does not exist is left to the reader.
+    """
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(len(_LFS_POINTER))
+    except OSError:
+        return
+    if start == _LFS_POINTER:
+        raise InputError(
+            str(path),
+            got="a git-LFS pointer: a placeholder for a file that was not downloaded",
+            expected="the file itself",
+            hint="run 'git lfs pull' in its repository, or download the file by hand.",
+        )
+
+
+def instead_of_file(path: Path) -> str:
+    """Description of what is in place of a file; empty for a file.
+
+    A name may also be too long for the system, or lie in a folder that is closed to this user.
+    """
+    try:
+        if stat.S_ISREG(path.stat().st_mode):
+            return ""
+        return "a folder" if path.is_dir() else "no plain file"
+    except (FileNotFoundError, NotADirectoryError):
+        return "a file that does not exist"
+    except (OSError, ValueError) as error:  # a null character in the name
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        return f"a file that cannot be reached ({reason})"
+
+
+def _existing_file(value: Any, info: ValidationInfo) -> Path:
+    """Resolve a path relative to the folder of the case; it must be a file."""
+    if isinstance(value, Path):
+        value = str(value)
+    if not isinstance(value, str) or not value.strip():
+        got, hint = f"'{value}'", "write the name of a file, relative to the case file."
+        raise CaseProblem((), got=got, expected="a file name", hint=hint)
+    folder = info.context.get("folder", Path()) if info.context else Path()
+    name = value if len(value) <= _LONGEST else f"{value[:_LONGEST]}..."
+    try:
+        path = (folder / Path(value).expanduser()).resolve()
+    except (OSError, RuntimeError) as error:  # the present folder is gone; links in a circle
+        hint = "write the full path of the file."
+        got = f"'{name}', which has no target ({error})"
+        raise CaseProblem((), got=got, expected="an existing file", hint=hint) from None
+    if kind := instead_of_file(path):
+        raise CaseProblem(
+            (),
+            got=f"'{name}', {kind}" + (f" ({path})" if name == value else ""),
+            expected="an existing file, relative to the folder of the case",
+            hint="check the spelling and the folder.",
+        )
+    try:
+        refuse_lfs_pointer(path)
+    except InputError as error:
+        raise CaseProblem((), got=error.got, expected=error.expected, hint=error.hint) from error
+    return path
+
+
+InputPath = Annotated[
+    Path, BeforeValidator(_existing_file), WithJsonSchema({"type": "string", "format": "path"})
+]
+"""Field of a section that names an existing file."""

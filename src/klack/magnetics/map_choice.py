@@ -8,9 +8,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem
-from klack.input.section import Count, Number, Section, Text
+from klack.input.section import Count, InputPath, Number, Section, Text
 from klack.magnetics.map_file import MapTable, read_map, read_matrix
 from klack.units import Length, format_si
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from klack.closing import Closing
 from klack.errors import InputError
-from klack.input.existing_file import refuse_lfs_pointer
+from klack.input.section import refuse_lfs_pointer
 from klack.measurement.time_base import TimeBase, survey_time
 
 __all__ = ["ChannelInfo", "Recording", "left_out", "open_recording", "some_names"]

@@ -16,8 +16,8 @@ from typing import TypeVar
 from klack.control.controlled import Controlled
 from klack.control.law import Law
 from klack.errors import ConvergenceError, InputError
-from klack.input.existing_file import instead_of_file
 from klack.input.problem import nearest, one_of
+from klack.input.section import instead_of_file
 from klack.mechanics.fmu_child import ADVANCE, FORCE, RUN
 from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu, unpack_fmu
 from klack.mechanics.fmu_process import FmuFailed, FmuProcess

@@ -17,7 +17,7 @@ from tempfile import TemporaryDirectory
 from typing import Literal
 
 from klack.errors import InputError, MissingExtraError
-from klack.input.existing_file import refuse_lfs_pointer
+from klack.input.section import refuse_lfs_pointer
 
 __all__ = ["FmuDescription", "FmuVariable", "describe_fmu", "inspect_fmu", "unpack_fmu"]
 

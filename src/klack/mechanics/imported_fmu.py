@@ -6,9 +6,8 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem, nearest, one_of
-from klack.input.section import Number
+from klack.input.section import InputPath, Number
 from klack.mechanics.fmu_coupling import STATES, FmuCoupling
 from klack.mechanics.fmu_file import FmuDescription, FmuVariable, describe_fmu
 from klack.mechanics.fmu_slave import TIME_LIMIT, FmuSlave, FmuWiring

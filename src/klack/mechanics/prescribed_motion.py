@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from klack.errors import InputError
-from klack.input.existing_file import InputPath
 from klack.input.problem import CaseProblem
-from klack.input.section import Name, Text
+from klack.input.section import InputPath, Name, Text
 from klack.network.component import Component
 from klack.network.motion_course import MotionCourse
 from klack.network.port import MOTION, Port

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from klack.errors import InputError
-from klack.input.existing_file import refuse_lfs_pointer
+from klack.input.section import refuse_lfs_pointer
 from klack.model_files.ansys_full import read_ansys_full
 from klack.model_files.coordinate_files import (
     is_matrix_market,

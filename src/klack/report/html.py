@@ -16,7 +16,7 @@ from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
 from klack.cache.entry import bytes_of_entry, entry_of_bytes
 from klack.cache.remember import remembered
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.report.interactive import figure_of
 from klack.report.page import Content
 from klack.report.spoken import spoken

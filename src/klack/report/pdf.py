@@ -18,7 +18,7 @@ import typst
 
 from klack.cache.entry import bytes_of_entry, entry_of_bytes
 from klack.cache.remember import remembered
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.report.chart import AnyChart
 from klack.report.page import Content, Section
 from klack.whole_file import whole_file

@@ -19,8 +19,7 @@ from klack.schematic.drawn_symbols import (
     framed_strokes,
     two_ended_strokes,
 )
-from klack.schematic.lettering import cut, text_width
-from klack.schematic.shapes import Box, Domain, Label, Lead, Point, Stroke, Symbol
+from klack.schematic.shapes import Box, Domain, Label, Lead, Point, Stroke, Symbol, cut, text_width
 from klack.schematic.values import value_lines
 
 __all__ = ["STEP", "Cell", "Pin", "PlannedPort", "Side", "cell_of", "passage"]

@@ -1,31 +1,38 @@
 """Options that several commands share."""
 
-from collections.abc import Sequence
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, TextIO
 
 from cyclopts import Parameter
 
 from klack.errors import InputError, require_positive
+from klack.terminal.output import require_json_target, write_json
+from klack.terminal.tables import Notes, TextTable, print_table
 
 if TYPE_CHECKING:
     from klack.network.component import Component
 
 __all__ = [
+    "SHOWN",
+    "WANTED",
+    "WANTED_RESULT",
     "CaseArgument",
     "CheckSteps",
     "Components",
     "Json",
     "Levels",
     "Out",
-    "Quiet",
-    "Report",
+    "Shown",
     "StudyPath",
-    "Threads",
+    "Wanted",
+    "WantedResult",
     "imported",
     "require_files",
-    "require_threads",
 ]
+
 
 CaseArgument = Annotated[
     Path, Parameter(name="CASE", help="Case file (YAML), or the name of a shipped case.")
@@ -109,3 +116,89 @@ def require_files(option: str, files: Sequence[Path]) -> None:
                 expected="a file",
                 hint="check the spelling; the path is relative to the current folder.",
             )
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """Options ``--json`` and ``--quiet``; the target is checked before the long work begins.
+
+    Raises
+    ------
+    InputError
+        If the target cannot be written.
+    """
+
+    json: Json = None
+    quiet: Quiet = False
+
+    def __post_init__(self) -> None:
+        """Check what was asked for."""
+        require_json_target(self.json)
+
+    @property
+    def to_stderr(self) -> bool:
+        """Whether the standard output is reserved for JSON, or unused."""
+        return self.quiet or str(self.json) == "-"
+
+    @property
+    def _stream(self) -> TextIO:
+        return sys.stderr if self.to_stderr else sys.stdout
+
+    def say(self, text: str) -> None:
+        """Print a line, unless it shall be quiet."""
+        if not self.quiet:
+            print(text, file=self._stream)
+
+    def note(self, notes: Iterable[str]) -> None:
+        """Print what makes a result doubtful or incomplete, also where it shall be quiet."""
+        for note in notes:
+            print(f"Note: {note}", file=self._stream)
+
+    def warn(self, notes: Iterable[str]) -> None:
+        """Print notes on the input of a command, apart from its own output."""
+        for note in notes:
+            print(f"Note: {note}", file=sys.stderr)
+
+    def show(self, items: Iterable[TextTable | Notes | str]) -> None:
+        """Print tables, lines and notes."""
+        for item in items:
+            if isinstance(item, Notes):
+                self.note(item.notes)
+            elif isinstance(item, str):
+                self.say(item)
+            elif not self.quiet:
+                print_table(
+                    item.title, item.columns, item.rows, left=item.left, to_stderr=self.to_stderr
+                )
+
+    def write(self, numbers: Callable[[], Mapping[str, Any]]) -> None:
+        """Write numbers as JSON, if they were asked for."""
+        if self.json is not None:
+            write_json(self.json, numbers())
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class Wanted(Shown):
+    """Options of every command that computes."""
+
+    threads: Threads = None
+
+    def __post_init__(self) -> None:
+        """Check what was asked for."""
+        super().__post_init__()
+        require_threads(self.threads)
+
+
+@Parameter(name="*")
+@dataclass(frozen=True, kw_only=True)
+class WantedResult(Wanted):
+    """Options of every command that leaves a result with a report."""
+
+    report: Report = True
+    out: Out = None
+
+
+SHOWN, WANTED, WANTED_RESULT = Shown(), Wanted(), WantedResult()
+"""Where no option says otherwise."""

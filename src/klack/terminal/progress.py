@@ -12,11 +12,11 @@ from functools import partial
 from math import inf
 from pathlib import Path
 from time import monotonic
-from typing import Any, Protocol
+from typing import Any
 
-from klack.progress import PointCount
+from klack.progress import PointCount, Progress, silent
 
-__all__ = ["PROGRESS_FILE", "Progress", "show_progress"]
+__all__ = ["PROGRESS_FILE", "show_progress"]
 
 PROGRESS_FILE = "KLACK_PROGRESS_FILE"
 """Environment variable with the file that gets the progress instead of the terminal."""
@@ -33,21 +33,13 @@ _KINDS = {
 """Events and their words, the first that is on before the others."""
 
 
-class Progress(Protocol):
-    """Reporter passed to a long calculation."""
-
-    def __call__(self, stage: str, fraction: float) -> None:
-        """Report the current stage; ``fraction`` of it is done, from 0 to 1."""
-        ...
-
-
 @contextmanager
 def show_progress(quiet: bool = False) -> Iterator[Progress]:
     """Give a callback that draws a bar on a terminal and writes a line per stage elsewhere."""
     if file := os.environ.get(PROGRESS_FILE):
         yield _ToFile(Path(file))
     elif quiet:
-        yield lambda stage, fraction: None
+        yield silent
     elif sys.stderr.isatty():
         with _bar() as bar:
             yield bar

@@ -10,7 +10,7 @@ from typing import Any
 
 from numba.core import event
 
-from klack.cache.setting import FOLDER_VARIABLE
+from klack.cache.result_cache import FOLDER_VARIABLE
 from klack.errors import CacheWarning
 from klack.warming.groups import GROUPS
 

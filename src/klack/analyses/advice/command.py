@@ -6,9 +6,8 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.options import WANTED, CaseArgument, Components, Wanted, imported
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED, Wanted
 
 __all__ = ["advise"]
 

@@ -6,8 +6,14 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.terminal.options import CaseArgument, Components, imported, require_files
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
+from klack.terminal.options import (
+    WANTED_RESULT,
+    CaseArgument,
+    Components,
+    WantedResult,
+    imported,
+    require_files,
+)
 
 __all__ = ["calibrate"]
 

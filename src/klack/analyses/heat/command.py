@@ -6,9 +6,8 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["heat"]
 

@@ -24,7 +24,7 @@ from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.thermal import CaseThermal

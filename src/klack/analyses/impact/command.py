@@ -7,9 +7,8 @@ from cyclopts import Parameter
 
 from klack import __version__
 from klack.analyses.ending import Ending
-from klack.terminal.options import CaseArgument, Levels
+from klack.terminal.options import WANTED_RESULT, CaseArgument, Levels, WantedResult
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["impact", "run_case"]
 

@@ -23,7 +23,7 @@ from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_n
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.given_pair import GivenPair, build_given_pair
 from klack.assembling.modes import elastic_count
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.consistency import GIVEN_LEVELS
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory

@@ -86,7 +86,7 @@ from klack.assembling.reduced_pair import (
     static_curve,
 )
 from klack.assembling.structures import impact_structures
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.impact_sections import SubmodelLocalLaw
 from klack.case.levels import Level
 from klack.case.placed_errors import tells_place

@@ -7,9 +7,8 @@ from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
 from klack.errors import InputError
-from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 __all__ = ["linearise"]
 

@@ -29,7 +29,7 @@ from klack.analyses.operating_point.run import PointFound, find_point, valve_at
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.run import variant_network
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.any_case import CaseTree
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place

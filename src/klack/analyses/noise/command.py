@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending, is_result
-from klack.terminal.options import Components, imported
+from klack.terminal.options import WANTED_RESULT, Components, WantedResult, imported
 from klack.terminal.progress import Progress, show_progress
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.analyses.noise.source import NoiseSource

@@ -6,9 +6,8 @@ from pathlib import Path
 from klack.analyses.ending import Ending
 from klack.analyses.operating_point.asked import SteadyAsked
 from klack.errors import InputError
-from klack.terminal.options import Components, imported
+from klack.terminal.options import Components, WantedResult, imported
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WantedResult
 
 __all__ = ["show_operating_points"]
 

@@ -24,7 +24,7 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.run import variant_network
 from klack.analyses.study.strokes import STROKES
 from klack.assembling.valve import Valve, build_valve, filled_network
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.any_case import CaseTree
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place

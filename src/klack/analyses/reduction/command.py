@@ -2,10 +2,9 @@
 
 from pathlib import Path
 
-from klack.terminal.options import CaseArgument, Out
+from klack.terminal.options import WANTED, CaseArgument, Out, Wanted
 from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED, Wanted
 
 __all__ = ["reduce"]
 

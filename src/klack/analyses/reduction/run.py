@@ -21,7 +21,7 @@ from klack.assembling.modes import elastic_count, mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.assembling.yielding import tell_elastic
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.elasticity.eigen import Modes, eigenmodes

@@ -4,9 +4,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from klack.terminal.options import CaseArgument, Components, StudyPath, imported, require_files
+from klack.terminal.options import (
+    WANTED,
+    CaseArgument,
+    Components,
+    StudyPath,
+    Wanted,
+    imported,
+    require_files,
+)
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED, Wanted
 
 __all__ = ["sensitivities"]
 

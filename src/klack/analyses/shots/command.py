@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from klack.analyses.ending import Ending
-from klack.terminal.options import CaseArgument, Components, imported
+from klack.terminal.options import WANTED_RESULT, CaseArgument, Components, WantedResult, imported
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase

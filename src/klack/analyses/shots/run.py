@@ -34,7 +34,7 @@ from klack.analyses.shots.one_shot import (
 )
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.analyses.workers import LoggedWork, answer, grouped_doubts, unwrapped
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case

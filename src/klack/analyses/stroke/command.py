@@ -8,9 +8,15 @@ from cyclopts import Parameter
 from klack.analyses.ending import Ending
 from klack.analyses.operating_point.asked import STEADY, SteadyAsked
 from klack.network.accuracy import Accuracy
-from klack.terminal.options import CaseArgument, CheckSteps, Components, imported
+from klack.terminal.options import (
+    WANTED_RESULT,
+    CaseArgument,
+    CheckSteps,
+    Components,
+    WantedResult,
+    imported,
+)
 from klack.terminal.progress import show_progress
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from klack.case.valve import ValveCase

@@ -28,7 +28,7 @@ from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_ch
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase

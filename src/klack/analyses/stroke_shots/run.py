@@ -33,7 +33,7 @@ from klack.analyses.stroke_shots.record import (
 )
 from klack.analyses.workers import LoggedWork, grouped_doubts
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.setting import result_cache
+from klack.cache.result_cache import result_cache
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase

@@ -11,15 +11,16 @@ from klack.analyses.catalogue import named
 from klack.analyses.ending import Ending
 from klack.errors import require_positive
 from klack.terminal.options import (
+    WANTED_RESULT,
     CaseArgument,
     CheckSteps,
     Components,
     StudyPath,
+    WantedResult,
     imported,
     require_files,
 )
 from klack.terminal.progress import PROGRESS_FILE
-from klack.terminal.wanted import WANTED_RESULT, WantedResult
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

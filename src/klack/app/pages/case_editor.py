@@ -7,22 +7,23 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import groupby
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
 from klack.app.answers import Checked, FormField
 from klack.app.pages.frame import (
-    START_VALUE,
+    address,
     asking,
     button,
+    choice_box,
+    element,
     frame,
     heading,
     link,
     plain,
     show_error,
 )
-from klack.app.pages.study_panel import StudyPanel
+from klack.app.pages.studies import StudyPanel
 from klack.app.state import State
 from klack.errors import KlackError
 from klack.input.problem import Key
@@ -94,9 +95,12 @@ class _Editor:
             button("Discard changes", self._discard)
             self._of_case = ui.element("div").classes("k-tools")
             with self._of_case:
-                link("Show", f"/show?{urlencode({'path': self._case})}")
-                link("New study", f"/new-study?{urlencode({'path': self._case})}")
-                link("Sliders", f"/sliders?{urlencode({'path': self._case})}")
+                for words, page in (
+                    ("Show", "show"),
+                    ("New study", "new-study"),
+                    ("Sliders", "sliders"),
+                ):
+                    link(words, address(page, self._case))
                 button("Run", self._run).props("data-once")
             button("Save", self._save, main=True).props("id=k-save")
         self._message = plain("", "p").classes("k-error").props("role=alert")
@@ -272,8 +276,7 @@ class _Editor:
     def _show_field(self, item: FormField) -> None:
         with ui.element("div").classes("k-field"):
             with ui.element("div"):
-                with ui.element("label") as label:
-                    label.props["for"] = f"f-{item.key}"
+                with element("label", for_=f"f-{item.key}"):
                     plain(item.label.replace(".", ".\u200b"))  # long keys break at their dots
                 words = [item.description]
                 if item.kind:
@@ -284,22 +287,15 @@ class _Editor:
             self._show_entry(item)
 
     def _show_entry(self, item: FormField) -> None:
-        box: ui.element
+        now = _in_a_line(item)
+        common = {"id": f"f-{item.key}", "data-told": now}
         if _kind_of_box(item) == "select":
-            box = ui.element("select")
-            with box:
-                for word in (("",) if not item.written else ()) + item.choices:
-                    option = plain(word or f"({item.default or 'not given'})", "option")
-                    option.props["value"] = word
-                    if word == item.written:
-                        option.props["selected"] = True
-        else:
-            box = ui.element("input").props("type=text maxlength=4000")
-            box.props[START_VALUE] = _in_a_line(item)
-            if not item.written:
-                box.props["placeholder"] = item.default or item.example
-        box.classes("k-input").props["id"] = f"f-{item.key}"
-        box.props["data-told"] = _in_a_line(item)
+            words = {} if item.written else {"": f"({item.default or 'not given'})"}
+            choice_box(words | {word: word for word in item.choices}, item.written, None, **common)
+            return
+        hint = None if item.written else item.default or item.example
+        kind = {"type": "text", "maxlength": "4000", "start": now}
+        element("input", "k-input", placeholder=hint, **kind | common)
 
     async def _changed(self, event: Any) -> None:
         """Write a value of the form into the text; nothing else of it changes."""
@@ -367,19 +363,15 @@ class _Editor:
         if saved == self._text:
             await self._start(saved)
             return
-        with asking("Not saved") as dialog:
+
+        async def save_and_run() -> None:
+            dialog.close()
+            text = self._text
+            if await self._save():
+                await self._start(text)
+
+        with asking("Not saved", "Save and run", save_and_run) as dialog:
             plain("A run takes the file, and the file does not have this text yet.", "p")
-
-            async def save_and_run() -> None:
-                dialog.close()
-                text = self._text
-                if await self._save():
-                    await self._start(text)
-
-            with ui.element("div").classes("k-tools"):
-                button("Cancel", dialog.close)
-                button("Save and run", save_and_run, main=True)
-        dialog.open()
 
     async def _start(self, text: str) -> None:
         """Start the run of a saved text that is a valid case, then show it in the overview."""

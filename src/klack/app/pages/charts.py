@@ -1,14 +1,42 @@
-"""Charts of the pages: the plain data that Plotly draws.  The page colours text and grid."""
+"""Charts of answers as the plain data that Plotly draws, and the page that compares two results.
 
-from collections.abc import Sequence
+The page colours text and grid.
+"""
+
+import asyncio
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from nicegui import ui
 
 from klack.acoustics.third_octave import nominal_label
 from klack.app.answers import Answer, Curve, Floats
+from klack.app.pages.frame import (
+    differing,
+    element,
+    frame,
+    heading,
+    number_text,
+    plain,
+    player,
+    read_first,
+    row,
+    table,
+)
+from klack.app.state import State
+from klack.report.spoken import spoken
 
-__all__ = ["EMPTY", "bands_figure", "curves_figure", "spectrogram_figure"]
+__all__ = [
+    "EMPTY",
+    "TITLES",
+    "DescribedChart",
+    "answer_figures",
+    "comparing_page",
+    "spectrogram_figure",
+]
+
 
 _COLOURS = ("#1f78c8", "#d9742b", "#1b9e77")
 """Blue, orange and green, told apart with any colour vision; on light and dark."""
@@ -28,7 +56,21 @@ EMPTY: dict[str, Any] = {
 """Of a chart whose numbers follow."""
 
 
-def curves_figure(
+TITLES = ("Contact force", "Motion", "Third octaves of the force")
+"""Of the charts of an answer."""
+
+
+def answer_figures(now: Answer, ghost: Answer, names: tuple[str, str]) -> list[dict[str, Any]]:
+    """Charts of an answer before the pinned one: force and motion over time, bands."""
+    time = f"time [{ghost.time_unit}]"
+    return [
+        _curves_figure(now.force, ghost.force, time, "force [N]", names),
+        _curves_figure(now.lift, ghost.lift, time, "lift [um]", names),
+        _bands_figure(now, ghost, names),
+    ]
+
+
+def _curves_figure(
     now: Sequence[Curve], ghost: Sequence[Curve], x: str, y: str, names: tuple[str, str]
 ) -> dict[str, Any]:
     """Lines over time, those of the pinned design dashed and grey behind."""
@@ -44,7 +86,7 @@ def curves_figure(
     return _figure(data, x, y)
 
 
-def bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str, Any]:
+def _bands_figure(now: Answer, ghost: Answer, names: tuple[str, str]) -> dict[str, Any]:
     """Third octaves of the force within 60 dB of the highest, as steps."""
     data = []
     for answer, colour, name, dash in (
@@ -146,3 +188,83 @@ def _figure(data: list[dict[str, Any]], x: str, y: str) -> dict[str, Any]:
         },
         "config": _CONFIG,
     }
+
+
+class DescribedChart:
+    """Heading, chart, and a text that only screen readers have; it is an image to them.
+
+    Parameters
+    ----------
+    title : str
+    figure : dict
+        What Plotly draws.
+    """
+
+    def __init__(self, title: str, figure: dict[str, Any]) -> None:
+        with ui.element("section").classes("k-sheet k-chart"):
+            name = heading(title)
+            self._words = plain(_told(figure), "p").classes("k-sr")
+            self.plot = ui.plotly(figure).classes("k-plot")
+            self.plot.props["role"] = "img"
+            self.plot.props["aria-labelledby"] = f"{name.html_id} {self._words.html_id}"
+
+    def update_figure(self, figure: dict[str, Any]) -> None:
+        """Draw another one, and tell it."""
+        self.plot.update_figure(figure)
+        self._words.set_text(_told(figure))
+
+
+def _told(figure: dict[str, Any]) -> str:
+    return spoken(figure) if figure["data"] else "Nothing is drawn yet."
+
+
+async def comparing_page(state: State, given: Mapping[str, str]) -> None:
+    """The page of two results, ``a`` the one that ``b`` is compared with."""
+    first, second = given.get("a", ""), given.get("b", "")
+
+    async def read() -> tuple[Answer, Answer]:
+        places = [
+            str(await asyncio.to_thread(state.folder.absolute, name)) for name in (first, second)
+        ]
+        found: tuple[Answer, Answer] = await state.reader.call("compare", *places)
+        return found
+
+    with frame(state, "Two results", f"{second} (line) against {first} (dashed)"):
+        read_first("Reading ...", read, lambda found: _show(state, *found, (second, first)))
+
+
+def _show(state: State, ghost: Answer, now: Answer, names: tuple[str, str]) -> None:
+    label = "main numbers of both results"
+    with element("section", "k-section k-sheet k-scroll", tabindex="0", aria_label=label):
+        _show_numbers(now, ghost, names)
+    with ui.element("div").classes("k-grid"):
+        for title, figure in zip(TITLES, answer_figures(now, ghost, names), strict=True):
+            DescribedChart(title, figure)
+        with ui.element("section").classes("k-sheet k-chart"):
+            heading("Hear it")
+            for name, wav in ((names[1], ghost.wav), (names[0], now.wav)):
+                if wav:
+                    with ui.element("figure").style("margin:8px 0"):
+                        src = state.sounds.add(wav)
+                        player(name, src=src, aria_label=f"click of {name}").style("width:100%")
+            plain(
+                f"Both to one scale: {now.scale}." if now.scale else "Nothing radiates.", "p"
+            ).classes("k-note")
+    for name, answer in ((names[1], ghost), (names[0], now)):
+        if answer.doubts:
+            plain(f"{name}: " + "\n".join(answer.doubts), "p").classes("k-note")
+
+
+def _show_numbers(now: Answer, ghost: Answer, names: tuple[str, str]) -> None:
+    ours = {number.key: number for number in now.numbers}
+    then = {number.key: number for number in ghost.numbers}
+    with table("", "", names[1], names[0], "difference"):
+        for known in (ours | then).values():
+            number, other = (
+                side.get(known.key, replace(known, value=None)) for side in (ours, then)
+            )
+            unit = f" [{known.unit}]" if known.unit else ""
+            shown = number_text(other), number_text(number), differing(number, other)
+            row(f"{known.name}{unit}", *shown)
+        same = "the same" if now.run == ghost.run else "not the same"
+        row("level or variant", ghost.run, now.run, same)

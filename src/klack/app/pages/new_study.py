@@ -1,15 +1,24 @@
 """A new study of a case: what varies, what is computed, how many points."""
 
 import asyncio
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 
 from klack.app.answers import MeasureOffer, Slider, StudyChoice, StudyOffer
-from klack.app.pages.frame import START_VALUE, button, dead_end, frame, heading, plain
+from klack.app.pages.frame import (
+    address,
+    button,
+    choice_box,
+    entry_box,
+    frame,
+    heading,
+    plain,
+    read_first,
+    table,
+    tick,
+)
 from klack.app.state import State
 from klack.app.study_files import free_name
 from klack.errors import KlackError
@@ -28,24 +37,19 @@ async def new_study_page(state: State, given: Mapping[str, str]) -> None:
     case = given.get("path", "")
     text = await asyncio.to_thread(state.folder.case_text, case)
     ui.add_head_html('<link rel="stylesheet" href="/static/points.css">')
+
+    async def read() -> StudyOffer:
+        path = str(state.folder.path / case)
+        offer: StudyOffer = await state.reader.call("study_offer", text, path)
+        return offer
+
     with frame(state, "New study", f"of {case}"):
-        waiting = plain("Reading the case ...", "p").props("role=status")
-        body = ui.element("div")
-
-        async def fill() -> None:
-            try:
-                path = str(state.folder.path / case)
-                offer: StudyOffer = await state.reader.call("study_offer", text, path)
-            except KlackError as error:
-                waiting.delete()
-                with body:
-                    dead_end(error)
-                return
-            waiting.set_text(offer.title)
-            with body:
-                _NewStudy(state, case, text, offer).build()
-
-        ui.timer(0.05, fill, once=True)
+        read_first(
+            "Reading the case ...",
+            read,
+            lambda offer: _NewStudy(state, case, text, offer).build(),
+            lambda offer: offer.title,
+        )
 
 
 class _NewStudy:
@@ -92,7 +96,7 @@ class _NewStudy:
                     show(items[_AT_FIRST:])
 
     def _show_parameters(self, sliders: tuple[Slider, ...]) -> None:
-        with _table("", "today", "from", "to"):
+        with table("kp-offer", "", "today", "from", "to"):
             for slider in sliders:
                 low, high = sorted((_LOW * slider.start, _HIGH * slider.start))
                 ends = format_si(low, slider.unit), format_si(high, slider.unit)
@@ -108,18 +112,14 @@ class _NewStudy:
                             self._end(slider, place, word, ends[place])
 
     def _end(self, slider: Slider, place: int, word: str, value: str) -> None:
-        box = ui.element("input").classes("k-input").props("type=text maxlength=60")
-        box.props[START_VALUE], box.props["aria-label"] = value, f"{slider.label}, {word}"
+        def change(value: str) -> None:
+            low, high = self._ranges[slider.key]
+            self._ranges[slider.key] = (low, value[:60]) if place else (value[:60], high)
 
-        def change(event: Any) -> None:
-            ends = list(self._ranges[slider.key])
-            ends[place] = str(event.args)[:60]
-            self._ranges[slider.key] = ends[0], ends[1]
-
-        box.on("input", change, js_handler="(e) => emit(e.target.value)")
+        entry_box(value, change, maxlength="60", aria_label=f"{slider.label}, {word}")
 
     def _show_measures(self, measures: tuple[MeasureOffer, ...]) -> None:
-        with _table("", "objective"):
+        with table("kp-offer", "", "objective"):
             for item in measures:
                 with ui.element("tr"):
                     with ui.element("td"):
@@ -130,53 +130,34 @@ class _NewStudy:
                         self._way(item.name)
 
     def _way(self, name: str) -> None:
-        box = ui.element("select").classes("k-input")
-        box.props["aria-label"] = f"objective of {name}"
-        with box:
-            for word in ("", "minimise", "maximise"):
-                plain(word or "none", "option").props["value"] = word
-
-        def change(event: Any) -> None:
+        def change(way: str) -> None:
             self._ways.pop(name, None)
-            if event.args:
-                self._ways[name] = str(event.args)
+            if way:
+                self._ways[name] = way
 
-        box.on("change", change, js_handler="(e) => emit(e.target.value)")
+        ways = {"": "none", "minimise": "minimise", "maximise": "maximise"}
+        choice_box(ways, None, change, aria_label=f"objective of {name}")
 
     def _tick(self, name: str, label: str, among: set[str], title: str) -> None:
-        with ui.element("label").classes("k-tick") as found:
-            found.props["title"] = title
-            box = ui.element("input").props("type=checkbox")
-            if name in among:
-                box.props["checked"] = True
-            plain(label)
+        def change(is_on: bool) -> None:
+            (among.add if is_on else among.discard)(name)
 
-        def change(event: Any) -> None:
-            (among.add if event.args else among.discard)(name)
-
-        box.on("change", change, js_handler="(e) => emit(e.target.checked)")
+        tick(label, name in among, change, "k-tick").props["title"] = title
 
     def _show_design(self) -> None:
         with ui.element("label"):
             plain("Design").classes("k-soft")
-            box = ui.element("select").classes("k-input")
-            with box:
-                for word, purpose in self._offer.designs.items():
-                    plain(f"{word}: {purpose}", "option").props["value"] = word
-            box.on(
-                "change",
-                lambda event: setattr(self, "_design", str(event.args)),
-                js_handler="(e) => emit(e.target.value)",
-            )
+            words = {word: f"{word}: {of}" for word, of in self._offer.designs.items()}
+            choice_box(words, None, lambda word: setattr(self, "_design", word))
         with ui.element("label"):
             plain("Points").classes("k-soft")
-            count = ui.element("input").classes("k-input")
-            count.props(f"type=number min=1 max={_MOST_POINTS} step=1")
-            count.props[START_VALUE] = self._points
-            count.on(
-                "input",
-                lambda event: setattr(self, "_points", str(event.args)),
-                js_handler="(e) => emit(e.target.value)",
+            entry_box(
+                self._points,
+                lambda text: setattr(self, "_points", text),
+                type="number",
+                min="1",
+                max=str(_MOST_POINTS),
+                step="1",
             )
 
     async def _write(self) -> None:
@@ -205,15 +186,4 @@ class _NewStudy:
         except (KlackError, OSError) as error:
             self._problem.set_text(str(error))
             return
-        ui.navigate.to(f"/case?{urlencode({'path': file})}")
-
-
-@contextmanager
-def _table(*heads: str) -> Iterator[None]:
-    """Table with a head; its rows are made within."""
-    table = ui.element("table").classes("k-table kp-offer")
-    with table, ui.element("thead"), ui.element("tr"):
-        for word in heads:
-            plain(word, "th").props("scope=col")
-    with table, ui.element("tbody"):
-        yield
+        ui.navigate.to(address("case", file))

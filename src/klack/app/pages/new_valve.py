@@ -5,17 +5,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
-from urllib.parse import urlencode
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from klack.app.answers import Finding, PartFacts, Review
 from klack.app.folder import LARGEST_FILE
-from klack.app.pages.faces import FacesStep
-from klack.app.pages.fields import choice_field, text_field
-from klack.app.pages.frame import Handler, button, frame, heading, plain, show_error
-from klack.app.pages.parts import PartsStep
+from klack.app.pages.frame import (
+    Handler,
+    address,
+    button,
+    choice_field,
+    frame,
+    heading,
+    plain,
+    row,
+    set_off,
+    show_error,
+    table,
+    text_field,
+    tick_box,
+)
+from klack.app.pages.parts import FacesStep, PartsStep
 from klack.app.state import State
 from klack.app.valve_plan import BODIES, STEPS, ValvePlan
 from klack.errors import InputError, KlackError
@@ -73,8 +84,7 @@ class _Guide:
             plain("").style("flex:1 1 auto")
             self._over = _leaving("Start over", self._start_over)
         # until there is a step to leave
-        for found in (*self._steps, self._back, self._next, self._over):
-            found.props["disabled"] = True
+        set_off(True, *self._steps, self._back, self._next, self._over)
         with self._body:
             plain("Reading the parts ...", "p").classes("k-soft").props("role=status")
         ui.timer(0.05, self._opened, once=True)
@@ -83,8 +93,7 @@ class _Guide:
         async with self._turn:
             await self._read_parts()
             await self._show()
-        self._over.props.pop("disabled")
-        self._over.update()
+        set_off(False, self._over)
 
     # ----------------------------------------------------------------------- keeping
 
@@ -193,8 +202,7 @@ class _Guide:
             (self._back, self._plan.step == 0),
             (self._next, self._plan.step >= furthest or self._is_checking),
         ):
-            found.props["disabled"] = is_off
-            found.update()
+            set_off(is_off, found)
         self._next.set_visibility(self._plan.step < _LAST)
         missing = ("choose two parts that can be read", "choose both contact faces and a held face")
         stuck = self._plan.step == furthest < 2
@@ -311,14 +319,10 @@ class _Guide:
                     plain(
                         "a bracket of 1.5 mm sheet steel, so that the click can be played", "small"
                     )
-                box = ui.element("input").props("type=checkbox")
-                box.props["aria-label"] = "Assumed mount and plate"
-                if self._plan.noise:
-                    box.props["checked"] = True
-                box.on(
-                    "change",
-                    lambda event: self.keep(replace(self._plan, noise=bool(event.args))),
-                    js_handler="(e) => emit(e.target.checked)",
+                tick_box(
+                    self._plan.noise,
+                    lambda on: self.keep(replace(self._plan, noise=on)),
+                    aria_label="Assumed mount and plate",
                 )
 
     async def _change(self, key: str, value: str) -> None:
@@ -406,9 +410,7 @@ class _Guide:
             if errors:
                 message.set_text("\n".join(f"{f.what}: {f.words}" for f in errors))
             text.set_text(found.text or "No case: see the checks.")
-            for each in (write, *others):
-                each.props["disabled"] = not found.text
-                each.update()
+            set_off(not found.text, write, *others)
 
         ui.timer(0.05, written, once=True)
 
@@ -430,8 +432,7 @@ class _Guide:
         except (KlackError, OSError) as error:
             self._message.set_text(str(error))
             return
-        query = urlencode({"path": f"{name}/case.yaml"})
-        ui.navigate.to("/" if then == "run" else f"/{then}?{query}")
+        ui.navigate.to("/" if then == "run" else address(then, f"{name}/case.yaml"))
 
 
 def _leaving(text: str, handler: Handler, *, main: bool = False) -> TextElement:
@@ -444,20 +445,11 @@ def _leaving(text: str, handler: Handler, *, main: bool = False) -> TextElement:
 def _show_constants(entry: MaterialEntry | None) -> None:
     if entry is None:
         return
-    with ui.element("table").classes("k-table k-sources"):
-        with ui.element("thead"), ui.element("tr"):
-            for word in ("", "value", "source"):
-                plain(word, "th")
-        with ui.element("tbody"):
-            for constant in entry.constants:
-                value = constant.value
-                shown = (
-                    format_si(value, constant.unit)
-                    if isinstance(value, float)
-                    else "over temperature"
-                )
-                with ui.element("tr"):
-                    plain(constant.label, "td")
-                    plain(shown, "td")
-                    mark = "" if constant.verified else " (source not read, or an estimate)"
-                    plain(f"{constant.source}{mark}", "td")
+    with table("k-sources", "", "value", "source", scope=None):
+        for constant in entry.constants:
+            value = constant.value
+            shown = (
+                format_si(value, constant.unit) if isinstance(value, float) else "over temperature"
+            )
+            mark = "" if constant.verified else " (source not read, or an estimate)"
+            row(constant.label, shown, f"{constant.source}{mark}")

@@ -6,7 +6,7 @@ import time
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from functools import partial
 from pathlib import PurePosixPath
-from typing import Any
+from typing import Any, TypeVar
 from urllib.parse import urlencode
 
 from nicegui import ui
@@ -14,19 +14,23 @@ from nicegui import ui
 from klack.app.answers import Checked, ResultCard
 from klack.app.folder import RESULT_NAME, Found
 from klack.app.jobs import OF_STUDIES, Job
-from klack.app.pages.fields import choice_field
 from klack.app.pages.frame import (
-    START_VALUE,
+    address,
     asking,
     button,
+    choice_field,
+    element,
+    entry_box,
     frame,
     heading,
+    is_done,
     link,
     number_text,
     plain,
     show_error,
+    tick,
 )
-from klack.app.pages.study_panel import show_study_run
+from klack.app.pages.studies import show_study_run
 from klack.app.state import LONGEST_NOTE, State
 from klack.errors import InputError, KlackError
 from klack.whole_file import mark_of
@@ -41,6 +45,7 @@ _FEW = 10  # rows that are read first, and found without a search
 _REST = 0.2  # [s] without a key until names are searched
 _NONE = Found((), (), is_whole=True)
 _Row = tuple[str, ui.element]
+_Told = TypeVar("_Told")
 _HEAD = 120  # characters of one that is folded
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,60}")
 _WORDS = {
@@ -170,15 +175,14 @@ class _Overview:
                         plain(job.told, "div").classes("k-error")
             with ui.element("div").classes("k-tools"):
                 if job.state == "running":
-                    button("Cancel", partial(self._cancel, job.name), of=job.out)
+                    button(
+                        "Cancel", partial(is_done, self._state.jobs.cancel, job.name), of=job.out
+                    )
                 else:
                     button("Dismiss", partial(self._forget, job.name), of=job.out)
 
-    async def _cancel(self, name: str) -> None:
-        await _telling(lambda: self._state.jobs.cancel(name))
-
     async def _forget(self, name: str) -> None:
-        await _telling(lambda: self._state.jobs.forget(name))
+        await is_done(self._state.jobs.forget, name)
         self._show_jobs()
 
     def _offer_more(self, count: int) -> None:
@@ -226,17 +230,28 @@ class _Overview:
             if self._found.cases:
                 plain("No case has this in its name.", "p").classes("k-soft")
             return
+        await self._show_rows(cases, self._checked, self._show_case)
+
+    async def _show_rows(
+        self,
+        names: tuple[str, ...],
+        read: Callable[[str], Awaitable[_Told]],
+        show: Callable[[str, _Told], None],
+        then: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Rows that are filled as they are read, the first of them soon."""
         with ui.element("div").classes("k-sheet"):
-            rows = [(case, _reading(case)) for case in cases[: self._most]]
-            self._offer_more(len(cases))
+            rows = [(name, _reading(name)) for name in names[: self._most]]
+            self._offer_more(len(names))
         for some in _parts(rows):
-            found = [await self._checked(case) for case, _ in some]
+            found = [await read(name) for name, _ in some]
             if some[0][1].is_deleted:  # the list is made anew meanwhile, or the page is left
                 return
-            for (case, row), checked in zip(some, found, strict=True):
+            for (name, row), told in zip(some, found, strict=True):
                 row.clear()
                 with row:
-                    self._show_case(case, checked)
+                    show(name, told)
+            then()
 
     async def _checked(self, case: str) -> Checked:
         try:
@@ -249,7 +264,6 @@ class _Overview:
             return Checked(error=str(error))
 
     def _show_case(self, case: str, checked: Checked) -> None:
-        query = urlencode({"path": case})
         with ui.element("div"):
             plain(checked.title or PurePosixPath(case).name, "div").classes("k-title")
             kind = f"{checked.kind}, " if checked.kind else ""
@@ -262,15 +276,15 @@ class _Overview:
             is_study = checked.kind == "study"
             if not checked.error and not is_study:
                 button("Run", partial(self._run, case, checked.kind), of=case).props("data-once")
-                link("Show", f"/show?{query}", of=case)
-                link("Sliders", f"/sliders?{query}", of=case)
-                link("New study", f"/new-study?{query}", of=case)
-            link("Open" if is_study else "Edit", f"/case?{query}", of=case)
+                link("Show", address("show", case), of=case)
+                link("Sliders", address("sliders", case), of=case)
+                link("New study", address("new-study", case), of=case)
+            link("Open" if is_study else "Edit", address("case", case), of=case)
             button("Duplicate", partial(self._ask_copy, case), of=case)
             button("Note", partial(self._ask_note, case), of=case)
 
     async def _run(self, case: str, kind: str) -> None:
-        await _telling(lambda: self._state.jobs.start_case(kind, case))
+        await is_done(self._state.jobs.start_case, kind, case)
         self._show_jobs()
 
     def _ask_new(self) -> None:
@@ -322,39 +336,32 @@ class _Overview:
     ) -> None:
         """Ask for a name, and where there is a choice for what is copied."""
         values = {"source": source, "name": name}
-        with asking(title) as dialog:
+
+        async def done() -> None:
+            try:
+                if not _NAME.fullmatch(values["name"]):
+                    raise InputError(
+                        "name",
+                        got=f"'{values['name'][:80]}'",
+                        expected="letters, digits, - and _",
+                        hint="my-valve",
+                    )
+                make(values["source"], values["name"])
+            except (KlackError, OSError) as error:
+                problem.set_text(str(error))
+                return
+            dialog.close()
+            await self._fill()
+
+        with asking(title, "Make", done) as dialog:
             plain(words, "p").classes("k-soft")
             if sources:
-
-                async def choose(value: str) -> None:
-                    values.update(source=value)
-
-                choice_field("Copy of", {word: word for word in sources}, source, choose)
-            _entry("Name", name, lambda value: values.update(name=value))
+                choices = {word: word for word in sources}
+                choice_field("Copy of", choices, source, lambda word: values.update(source=word))
+            with ui.element("label"):
+                plain("Name").classes("k-soft")
+                entry_box(name, lambda text: values.update(name=text), maxlength="80")
             problem = plain("", "p").classes("k-error")
-
-            async def done() -> None:
-                try:
-                    if not _NAME.fullmatch(values["name"]):
-                        raise InputError(
-                            "name",
-                            got=f"'{values['name'][:80]}'",
-                            expected="letters, digits, - and _",
-                            hint="my-valve",
-                        )
-                    if sources and values["source"] not in sources:
-                        return
-                    make(values["source"], values["name"])
-                except (KlackError, OSError) as error:
-                    problem.set_text(str(error))
-                    return
-                dialog.close()
-                await self._fill()
-
-            with ui.element("div").classes("k-tools"):
-                button("Cancel", dialog.close)
-                button("Make", done, main=True)
-        dialog.open()
 
     # ----------------------------------------------------------------------- results
 
@@ -370,9 +377,6 @@ class _Overview:
             return
         self._chosen = [name for name in self._chosen if name in results]
         self._commands = {}
-        with ui.element("div").classes("k-sheet"):
-            rows = [(name, _reading(name)) for name in results[: self._most]]
-            self._offer_more(len(results))
 
         def chosen() -> None:
             kinds = {self._commands.get(name) for name in self._chosen}
@@ -389,15 +393,9 @@ class _Overview:
                 words[min(len(self._chosen), 3)] if len(kinds) < 2 else "Compare: two of one kind"
             )
 
-        for some in _parts(rows):
-            cards = [await self._card(name) for name, _ in some]
-            if some[0][1].is_deleted:
-                return
-            for (name, row), card in zip(some, cards, strict=True):
-                row.clear()
-                with row:
-                    self._show_result(name, card, chosen)
-            chosen()
+        await self._show_rows(
+            results, self._card, lambda name, card: self._show_result(name, card, chosen), chosen
+        )
 
     async def _card(self, name: str) -> ResultCard | str:
         place = self._state.folder.path / name
@@ -439,31 +437,21 @@ class _Overview:
         with ui.element("div").classes("k-tools"):
             for file, word in (("report.html", "Report"), ("report.pdf", "PDF")):
                 if self._state.folder.exists(f"{name}/{file}"):
-                    target = f"/report?{urlencode({'path': f'{name}/{file}'})}"
-                    link(word, target, new=True, of=name)
+                    link(word, address("report", f"{name}/{file}"), new=True, of=name)
             if not isinstance(card, str) and card.has_points:
-                link("Points", f"/points?{urlencode({'path': name})}", of=name)
+                link("Points", address("points", name), of=name)
             if not isinstance(card, str) and card.compares:
-                link("Show", f"/show?{urlencode({'path': name})}", of=name)
+                link("Show", address("show", name), of=name)
                 self._commands[name] = card.command
                 self._show_choice(name, chosen)
             button("Note", partial(self._ask_note, name), of=name)
 
     def _show_choice(self, name: str, chosen: Callable[[], None]) -> None:
-        def change(event: object) -> None:
-            if name in self._chosen:
-                self._chosen.remove(name)
-            else:
-                self._chosen.append(name)
+        def change(_: bool) -> None:
+            (self._chosen.remove if name in self._chosen else self._chosen.append)(name)
             chosen()
 
-        with ui.element("label").classes("k-btn"):
-            box = ui.element("input").props("type=checkbox")
-            box.props["aria-label"] = f"compare {name}"
-            if name in self._chosen:
-                box.props["checked"] = True
-            box.on("change", change, args=[])
-            plain(" compare")
+        tick(" compare", name in self._chosen, change, aria_label=f"compare {name}")
 
     # ----------------------------------------------------------------------- notes
 
@@ -481,7 +469,17 @@ class _Overview:
 
     def _ask_note(self, of: str) -> None:
         text = {"now": self._state.notes.note(of)}
-        with asking(f"Note on {of}", "k-notes") as dialog:
+
+        async def keep() -> None:
+            try:
+                await asyncio.to_thread(self._state.notes.set_note, of, text["now"])
+            except (KlackError, OSError) as error:  # the text stays in the dialog
+                problem.set_text(str(error))
+                return
+            dialog.close()
+            await self._fill()
+
+        with asking(f"Note on {of}", "Keep", keep, "k-notes") as dialog:
             area = plain(text["now"], "textarea").classes("k-input").props("rows=5")
             area.props["aria-label"] = f"note on {of}"
             area.on(
@@ -492,28 +490,18 @@ class _Overview:
             )
             problem = plain("", "p").classes("k-error").props("role=alert")
 
-            async def keep() -> None:
-                try:
-                    await asyncio.to_thread(self._state.notes.set_note, of, text["now"])
-                except (KlackError, OSError) as error:  # the text stays in the dialog
-                    problem.set_text(str(error))
-                    return
-                dialog.close()
-                await self._fill()
-
-            with ui.element("div").classes("k-tools"):
-                button("Cancel", dialog.close)
-                button("Keep", keep, main=True)
-        dialog.open()
-
 
 def _search_box(find: Callable[[Any], Awaitable[None]]) -> ui.element:
     """Where a part of a name is typed."""
     with ui.element("label").classes("k-search") as label:
         plain("Find ").classes("k-soft")
-        box = ui.element("input").classes("k-input").props("type=search maxlength=200")
-        box.props["placeholder"] = "part of the name of a case or result"
-        box.on("input", find, js_handler="(e) => emit(e.target.value)")
+        element(
+            "input",
+            "k-input",
+            type="search",
+            maxlength="200",
+            placeholder="part of the name of a case or result",
+        ).on("input", find, js_handler="(e) => emit(e.target.value)")
     label.set_visibility(False)
     return label
 
@@ -556,21 +544,3 @@ def _progress_bar(began: str) -> Callable[[Job], None]:
 def _title(text: str) -> None:
     with ui.element("div").classes("k-head"):
         heading(text)
-
-
-def _entry(label: str, value: str, change: Callable[[str], None]) -> None:
-    with ui.element("label"):
-        plain(label).classes("k-soft")
-        box = ui.element("input").classes("k-input").props("type=text maxlength=80")
-        box.props[START_VALUE] = value
-        box.on(
-            "input", lambda event: change(str(event.args)), js_handler="(e) => emit(e.target.value)"
-        )
-
-
-async def _telling(act: Callable[[], object]) -> None:
-    """Do something off the event loop; say on the page what goes wrong."""
-    try:
-        await asyncio.to_thread(act)
-    except (KlackError, OSError) as error:
-        show_error(error)

@@ -1,21 +1,31 @@
-"""The two bodies of a new valve: STEP files or drawings, and what was read in them."""
+"""The two bodies of a new valve: STEP files or drawings, what was read in them, and their faces."""
 
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import PurePosixPath
 from typing import Any
 
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
-from klack.app.answers import PartFacts
-from klack.app.drawing_table import EXAMPLES
+from klack.app.answers import FaceFacts, PartFacts
 from klack.app.guard import LARGEST_UPLOAD
-from klack.app.pages.fields import choice_field
-from klack.app.pages.frame import button, heading, plain
-from klack.app.valve_plan import BODIES, ValvePlan
+from klack.app.pages.frame import (
+    Handler,
+    button,
+    choice_box,
+    choice_field,
+    element,
+    heading,
+    plain,
+    tick,
+)
+from klack.app.pages.scene import Scene
+from klack.app.valve_plan import BODIES, EXAMPLES, ValvePlan
 
-__all__ = ["PartsStep"]
+__all__ = ["FacesStep", "PartsStep"]
+
 
 _WORDS = {"needle": "the moving body, above", "housing": "the body that it hits"}
 _SOURCES = {"step": "STEP files", "table": "drawings of their half sections"}
@@ -100,13 +110,11 @@ class PartsStep:
     def _show_fields(self, bodies: tuple[str, ...]) -> None:
         is_step = self._plan().source == "step"
         self._words.set_text(_OF_STEP if is_step else _OF_TABLE)
+        show = self._show_files if is_step else self._show_table
         for body in bodies:
             self._given[body].clear()
             with self._given[body]:
-                if is_step:
-                    self._show_files(body)
-                else:
-                    self._show_table(body)
+                show(body)
 
     def _show_files(self, body: str) -> None:
         now, label = self._plan().of(body, "file"), self._plan().of(body, "label")
@@ -122,13 +130,11 @@ class PartsStep:
         choice_field(f"STEP file of the {body} in the folder", names, now, change)
         with ui.element("label"):
             plain(f"or from this computer, {LARGEST_UPLOAD // 2**20} MiB at most").classes("k-soft")
-            box = ui.element("input").props("type=file accept=.step,.stp,.STEP,.STP")
-            box.classes("k-input").props["aria-label"] = f"STEP file of the {body}, from here"
-            box.on(
-                "change",
+            box = _file_box(
+                f"STEP file of the {body}, from here",
+                ".step,.stp,.STEP,.STP",
+                f"window.klackUpload(file, {LARGEST_UPLOAD})",
                 lambda event: self._uploaded(body, event.args),
-                js_handler="async (e) => { const file = e.target.files[0]; if (file) emit(await "
-                f"window.klackUpload(file, {LARGEST_UPLOAD})); }}",
             )
         self._refused[body] = plain("", "p").classes("k-error").props("role=alert")
 
@@ -142,17 +148,15 @@ class PartsStep:
             js_handler="(e) => emit(e.target.value)",
         )
         with ui.element("div").classes("k-tools k-left"):
-            fill = button("Fill in the example", lambda: self._fill_in(body, EXAMPLES[body]))
-            fill.props["aria-label"] = f"Fill in the example of the {body}"
+            fill_in = partial(self._fill_in, body, EXAMPLES[body])
+            button("Fill in the example", fill_in, of=f"of the {body}")
             with ui.element("label").classes("k-soft"):
                 plain("or a CSV file ")
-                box = ui.element("input").props("type=file accept=.csv,.txt,text/csv")
-                box.classes("k-input").props["aria-label"] = f"CSV file of the {body}"
-                box.on(
-                    "change",
+                _file_box(
+                    f"CSV file of the {body}",
+                    ".csv,.txt,text/csv",
+                    "file.slice(0, 200000).text()",
                     lambda event: self._fill_in(body, str(event.args or "")),
-                    js_handler="async (e) => { const file = e.target.files[0]; "
-                    "if (file) emit(await file.slice(0, 200000).text()); }",
                 )
 
     # ----------------------------------------------------------------------- what is changed
@@ -233,3 +237,173 @@ class PartsStep:
             choice_field(
                 "Both parts are turned. Compute", _MODELS, self._plan().model, self._change_model
             )
+
+
+def _file_box(label: str, accept: str, content: str, take: Handler) -> ui.element:
+    """A choice of a file of this computer; what the script makes of it is handed on."""
+    box = element("input", "k-input", type="file", accept=accept, aria_label=label)
+    script = f"const file = e.target.files[0]; if (file) emit(await {content});"
+    return box.on("change", take, js_handler=f"async (e) => {{ {script} }}")
+
+
+_ROLES = {"": "–", "contact": "contact", "held": "held", "radiating": "radiates"}
+"""Faces of the housing that are neither held nor in contact radiate where none is chosen."""
+_OF_NEEDLE = {"": "–", "contact": "contact"}
+_CLICKS = {
+    "contact": "contact face",
+    "held": "held face",
+    "radiating": "radiating face",
+}
+
+
+class FacesStep:
+    """Bodies beside the list of their faces; each shows what is chosen or pointed at in the other.
+
+    Parameters
+    ----------
+    faces : mapping of body to faces
+    plan : callable
+        The plan now.
+    keep : callable
+        Keeps another one.
+    """
+
+    def __init__(
+        self,
+        faces: Mapping[str, tuple[FaceFacts, ...]],
+        plan: Callable[[], ValvePlan],
+        keep: Callable[[ValvePlan], Awaitable[None]],
+    ) -> None:
+        self._faces, self._plan, self._keep = faces, plan, keep
+        self._click = self._missing() or "held"
+        self._boxes: dict[str, ui.element] = {}
+        self._rows: dict[str, ui.element] = {}
+        self._scene: Scene | None = None
+        self._hot = ""
+
+    def build(self) -> None:
+        """Make the list, and a place for the bodies."""
+        with ui.element("div").classes("k-pick"):
+            with ui.element("div"):
+                with ui.element("div").classes("k-head"):
+                    plain("A click makes a").classes("k-soft")
+                    self._buttons = {
+                        role: button(words, lambda role=role: self._set_click(role))
+                        for role, words in _CLICKS.items()
+                    }
+                self._place = ui.element("div").classes("k-sheet")
+                with self._place:
+                    self._words = plain("Meshing for the picture ...", "p").classes("k-pad")
+                    self._words.props("role=status")
+                with ui.element("div").classes("k-head k-below"):
+                    tick(" Cut open", False, lambda on: self._in_scene(lambda it: it.cut_open(on)))
+                    for body in BODIES:
+                        tick(f" {body}", True, partial(self._show_body, body))
+                    plain("Orange: contact. Green stripes: held.").classes("k-soft")
+            with ui.element("div").classes("k-sheet k-faces"):
+                for body in BODIES:
+                    heading(body.capitalize(), 3).classes("k-pad")
+                    for face in self._faces[body]:
+                        self._show_face(body, face)
+        self._show_click()
+
+    def draw(self, address: str) -> None:
+        """Show the bodies."""
+        self._words.delete()
+        with self._place:
+            self._scene = Scene(
+                address, on_pick=self._picked, on_hover=self._hovered, has_panel=False
+            )
+        self._scene.set_roles(self._plan().roles)
+
+    def refuse(self, error: str) -> None:
+        """Say why there is no picture; the list still works."""
+        self._words.set_text(f"No picture: {error}")
+        self._words.classes("k-error")
+
+    def _show_face(self, body: str, face: FaceFacts) -> None:
+        name = f"{body}.{face.name}"
+        roles = _OF_NEEDLE if body == "needle" else _ROLES
+        with ui.element("label").classes("k-face") as row:
+            with ui.element("div"):
+                plain(face.name, "div")
+                plain(face.words, "small").classes("k-soft")
+            now = self._plan().roles.get(name, "")
+
+            async def change(role: str) -> None:
+                await self._set_role(body, face.name, role)
+
+            box = choice_box(roles, now, change, aria_label=name)
+        for event, target in (
+            ("focusin", (body, face.name)),
+            ("focusout", ("", "")),
+            ("mouseenter", (body, face.name)),
+            ("mouseleave", ("", "")),
+        ):
+            row.on(event, lambda _, at=target: self._highlight(*at), args=[])
+        self._boxes[name], self._rows[name] = box, row
+
+    def _in_scene(self, act: Callable[[Scene], None]) -> None:
+        """Have the picture do something, once it is there."""
+        if self._scene is not None:
+            act(self._scene)
+
+    def _show_body(self, body: str, on: bool) -> None:
+        self._in_scene(lambda it: it.show_body(body, on))
+
+    def _highlight(self, body: str, face: str) -> None:
+        self._in_scene(lambda it: it.highlight(body, face))
+
+    # ----------------------------------------------------------------------- what is chosen
+
+    def _missing(self) -> str:
+        """The role that is asked for next; empty where nothing needed is missing."""
+        plan = self._plan()
+        if not all(plan.of(body, "contact") for body in BODIES):
+            return "contact"
+        return "" if plan.held else "held"
+
+    def _set_click(self, role: str) -> None:
+        self._click = role
+        self._show_click()
+
+    def _show_click(self) -> None:
+        for role, found in self._buttons.items():
+            is_on = role == self._click
+            found.props["aria-pressed"] = "true" if is_on else "false"
+            found.classes(add="k-main-btn" if is_on else "", remove="" if is_on else "k-main-btn")
+            found.update()
+
+    async def _picked(self, body: str, face: str) -> None:
+        if face not in {found.name for found in self._faces.get(body, ())}:
+            return
+        if body == "needle" and self._click != "contact":
+            return
+        now = self._plan().roles.get(f"{body}.{face}", "")
+        await self._set_role(body, face, "" if now == self._click else self._click)
+
+    async def _set_role(self, body: str, face: str, role: str) -> None:
+        before = self._missing()
+        await self._keep(self._plan().with_role(body, face, role))
+        roles = self._plan().roles
+        for name, box in self._boxes.items():
+            box.client.run_javascript(_set_value(box, roles.get(name, "")))
+        self._in_scene(lambda it: it.set_roles(roles))
+        after = self._missing()
+        if before and after != before:
+            self._set_click(after or "held")
+
+    async def _hovered(self, body: str, face: str) -> None:
+        name = f"{body}.{face}"
+        for other, is_on in ((self._hot, False), (name, True)):
+            if other in self._rows:
+                self._rows[other].classes(
+                    add="k-hot" if is_on else "", remove="" if is_on else "k-hot"
+                )
+        self._hot = name
+
+
+def _set_value(box: ui.element, value: str) -> str:
+    """Script: Vue would leave a choice that the user made before."""
+    assert value in _ROLES
+    return f"(e => {{ if (e) e.value = '{value}'; }})(document.getElementById('c{box.id}'))"

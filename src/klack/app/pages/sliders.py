@@ -5,26 +5,32 @@ from collections.abc import Mapping
 from dataclasses import replace
 from time import perf_counter
 from typing import Any
-from urllib.parse import urlencode
 
 import numpy as np
 from nicegui import ui
 from nicegui.elements.mixins.text_element import TextElement
 
 from klack.app.answers import Answer, Hearing, Judgement, Number, Opened, Slider
-from klack.app.pages.charts import EMPTY, bands_figure, curves_figure, spectrogram_figure
-from klack.app.pages.described_chart import DescribedChart
+from klack.app.pages.charts import (
+    EMPTY,
+    TITLES,
+    DescribedChart,
+    answer_figures,
+    spectrogram_figure,
+)
 from klack.app.pages.frame import (
-    START_VALUE,
+    address,
     asking,
     button,
-    dead_end,
     differing,
+    element,
     frame,
     heading,
     link,
     number_text,
     plain,
+    player,
+    read_first,
     show_error,
 )
 from klack.app.state import State
@@ -47,7 +53,7 @@ async def sliders_page(state: State, given: Mapping[str, str]) -> None:
     case = given.get("path", "")
     text = await asyncio.to_thread(state.folder.case_text, case)
     with frame(state, "Sliders", case):
-        await _Sliders(state, case).build(text)
+        _Sliders(state, case).build(text)
 
 
 class _Sliders:
@@ -62,30 +68,24 @@ class _Sliders:
         self._pinned: Answer | None = None
         self._is_pinned, self._pins = True, False
 
-    async def build(self, text: str) -> None:
+    def build(self, text: str) -> None:
         """Open the case while the page is shown already."""
-        self._waiting = plain(
-            "Meshing, factorising, finding modes: once for these bodies, later from the cache ...",
-            "p",
-        ).props("role=status")
-        self._body = ui.element("div")
         path = str(self._state.folder.path / self._case)
 
-        async def opened() -> None:
-            try:
-                self._take_process()  # here: the browser is connected, and is seen to leave
-                found: Opened = await self._worker.call("open", text, path)
-            except KlackError as error:
-                self._waiting.delete()
-                with self._body:
-                    dead_end(error)
-                return
-            self._waiting.delete()
-            with self._body:
-                self._show(found)
+        async def opened() -> Opened:
+            self._take_process()  # here: the browser is connected, and is seen to leave
+            found: Opened = await self._worker.call("open", text, path)
+            return found
+
+        async def show(found: Opened) -> None:
+            self._show(found)
             await self._follow()
 
-        ui.timer(0.05, opened, once=True)
+        self._body = read_first(
+            "Meshing, factorising, finding modes: once for these bodies, later from the cache ...",
+            opened,
+            show,
+        )
 
     def _take_process(self) -> None:
         state, client = self._state, self._body.client
@@ -130,21 +130,24 @@ class _Sliders:
                             plain(f"{slider.written} ")
                             plain("new mesh").classes("k-tag")
                 with ui.element("div").classes("k-pad"):
-                    link("Change them in the case", f"/case?{urlencode({'path': self._case})}")
+                    link("Change them in the case", address("case", self._case))
         with ui.element("div").classes("k-pad"):
             button("Edit the case with these values", self._write)
 
     def _show_slider(self, slider: Slider) -> None:
         with ui.element("div").classes("k-slider") as row:
-            with ui.element("label") as label:
-                label.props["for"] = f"s-{slider.key}"
-                label.props["title"] = slider.key
+            with element("label", for_=f"s-{slider.key}", title=slider.key):
                 plain(slider.label)
                 shown = plain(format_si(slider.start, slider.unit), "output")
-            bar = ui.element("input").props("type=range")
-            bar.props["id"] = f"s-{slider.key}"
-            bar.props["min"], bar.props["max"] = slider.low, slider.high
-            bar.props["step"], bar.props[START_VALUE] = slider.step, slider.start
+            bar = element(
+                "input",
+                type="range",
+                id=f"s-{slider.key}",
+                min=slider.low,
+                max=slider.high,
+                step=slider.step,
+                start=slider.start,
+            )
             self._rows[slider.key] = row, shown
 
             def move(event: Any) -> None:
@@ -167,9 +170,7 @@ class _Sliders:
         self._figures = ui.element("div").classes("k-figures")
         self._numbers: dict[str, tuple[ui.element, TextElement, TextElement, TextElement]] = {}
         with ui.element("div").classes("k-grid"):
-            self._force = DescribedChart("Contact force", EMPTY)
-            self._lift = DescribedChart("Motion", EMPTY)
-            self._bands = DescribedChart("Third octaves of the force", EMPTY)
+            self._charts = [DescribedChart(title, EMPTY) for title in TITLES]
             self._spectrogram = DescribedChart("Spectrogram of the click", EMPTY)
         with ui.element("section").classes("k-sheet k-pad").style("margin-top:16px"):
             heading("Hear it")
@@ -277,14 +278,8 @@ class _Sliders:
         ghost = self._pinned or answer
         self._is_pinned = ghost is answer
         self._doubts.set_text("\n".join(answer.doubts))
-        unit = ghost.time_unit
-        self._force.update_figure(
-            curves_figure(answer.force, ghost.force, f"time [{unit}]", "force [N]", _NAMES)
-        )
-        self._lift.update_figure(
-            curves_figure(answer.lift, ghost.lift, f"time [{unit}]", "lift [um]", _NAMES)
-        )
-        self._bands.update_figure(bands_figure(answer, ghost, _NAMES))
+        for chart, figure in zip(self._charts, answer_figures(answer, ghost, _NAMES), strict=True):
+            chart.update_figure(figure)
         self._show_numbers(answer, ghost)
         self._sound.set_visibility(bool(answer.wav))
         self._scale.set_text(
@@ -317,12 +312,10 @@ class _Sliders:
         change.set_text(differing(number, then))
 
     def _play(self, name: str, wav: bytes) -> None:
-        player, save = self._players[name]
-        address = self._state.sounds.add(wav)
-        player.props["src"] = address
-        player.update()
-        save.props["href"] = address
-        save.update()
+        source = self._state.sounds.add(wav)
+        for found, where in zip(self._players[name], ("src", "href"), strict=True):
+            found.props[where] = source
+            found.update()
 
     # ----------------------------------------------------------------------- what is asked
 
@@ -354,16 +347,15 @@ class _Sliders:
         if self._state.notes.draft(self._case) in (None, text):
             self._edit(text)
             return
-        with self._body, asking("Replace what is not saved?") as dialog:
+        with (
+            self._body,
+            asking("Replace what is not saved?", "Replace", lambda: self._edit(text)),
+        ):
             plain(
                 "The case has changes that are not saved. These values are put into the file "
                 "as it is saved, and replace those changes.",
                 "p",
             ).classes("k-soft")
-            with ui.element("div").classes("k-tools"):
-                button("Cancel", dialog.close)
-                button("Replace", lambda: self._edit(text), main=True)
-        dialog.open()
 
     def _edit(self, text: str) -> None:
         try:
@@ -371,15 +363,11 @@ class _Sliders:
         except OSError as error:
             show_error(error)
             return
-        ui.navigate.to(f"/case?{urlencode({'path': self._case})}")
+        ui.navigate.to(address("case", self._case))
 
 
 def _player(name: str) -> tuple[ui.element, ui.element]:
     with ui.element("figure"):
-        plain(name, "figcaption").classes("k-soft")
-        player = ui.element("audio").props("controls preload=none")
-        player.props["aria-label"] = f"click, {name}"
-        save = (
-            plain("Save WAV", "a").classes("k-soft k-save-sound").props("download=klack-click.wav")
-        )
-    return player, save
+        made = player(name, aria_label=f"click, {name}")
+        save = plain("Save WAV", "a").classes("k-soft k-save-sound")
+        return made, save.props("download=klack-click.wav")

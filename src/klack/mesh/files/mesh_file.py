@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from klack.errors import AccuracyWarning, InputError
-from klack.input.existing_file import refuse_lfs_pointer
+from klack.input.section import refuse_lfs_pointer
 from klack.mesh.files.catalogue import MESH_FORMATS, format_of
 from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.files.plausible import require_plausible_size
