@@ -31,7 +31,6 @@ from klack.magnetics.event_bracket import LOCATED, between, narrowed
 from klack.magnetics.flux_kernel import (
     assemble,
     circuit_gaps,
-    circuit_heat,
     factorise,
     settle_along,
     solve,
@@ -39,20 +38,20 @@ from klack.magnetics.flux_kernel import (
     weighted_mmf,
 )
 from klack.magnetics.flux_pieces import KEPT
-from klack.magnetics.flux_table import MOST_TUBES, STOPS
-from klack.magnetics.output_stage import STAGE_HEADER, STAGE_ROW, recharged
+from klack.magnetics.flux_table import MOST_TUBES
+from klack.magnetics.output_stage import recharged, stage_path, still_voltage
 from klack.network.step_function import shift
 
 __all__ = [
     "coupled_current",
+    "coupled_discharged",
     "coupled_gaps",
     "coupled_linked",
     "coupled_locate",
     "coupled_settle",
     "coupled_solve",
-    "discharged",
     "magnet_row",
-    "stage_path",
+    "winding_path",
     "winding_row",
     "winding_voltage",
 ]
@@ -73,9 +72,9 @@ def winding_row(par: Any, w: int) -> int:
 
 
 @inner(error_model="numpy", forceinline=True)
-def stage_path(par: Any, row: int, mode: float) -> int:
-    """Where the path of the current in a state of the driver starts."""
-    return int(par[row + 3]) + STAGE_HEADER + STAGE_ROW * int(mode)
+def winding_path(par: Any, row: int, mode: float) -> int:
+    """Where the path of the current of a winding starts, of those in its output stage."""
+    return stage_path(int(par[row + 3]), mode)
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -94,8 +93,7 @@ def winding_voltage(par: Any, row: int, mode: float, charged: Any, time: float) 
     """Voltage [V] at a winding without current, at a time since the start of the cycle."""
     if par[row + 3] == 0.0:
         return state_voltage(par, state_block(par, int(par[row + 2]), int(mode)), time)
-    path = stage_path(par, row, mode)
-    return par[path] - par[path + 1] + par[path + 2] * charged[int(par[row + 4])] - par[path + 3]
+    return still_voltage(par, winding_path(par, row, mode), charged[int(par[row + 4])])
 
 
 @inner(error_model="numpy")
@@ -201,7 +199,7 @@ def coupled_solve(
                 continue
             resistance, k = par[row + 1], 0.0
             if par[row + 3] != 0.0:
-                path = stage_path(par, row, modes[a])
+                path = winding_path(par, row, modes[a])
                 resistance += par[path + 4] + par[path + 5] + par[path + 6]
                 k = par[path + 2]
             induced = coupled_linked(par, row, change) + coupled_linked(par, row, g)
@@ -218,7 +216,7 @@ def coupled_solve(
                     B[a * windings + b] += total * per_time
                 if k != 0.0 and par[other + 3] != 0.0 and par[other + 4] == par[row + 4]:
                     capacitor = int(par[6]) + CAPACITOR_ROW * int(par[row + 4])
-                    along = k * par[stage_path(par, other, modes[b]) + 2]
+                    along = k * par[winding_path(par, other, modes[b]) + 2]
                     B[a * windings + b] += along * 0.5 * size / par[capacitor]
             B[a * windings + a] += resistance
         if not factorise(B, windings):
@@ -262,7 +260,7 @@ def coupled_current(par: Any, row: int, hints: Any, phi: Any, change: Any, final
 
 
 @inner(error_model="numpy")
-def discharged(
+def coupled_discharged(
     par: Any, c: int, modes: Any, charged: float, mean: Any, size: float
 ) -> tuple[float, float]:
     """Return a capacitor after the currents of a piece, and after its converter as well."""
@@ -271,7 +269,7 @@ def discharged(
     for w in range(int(par[1])):
         row = winding_row(par, w)
         if par[row + 3] != 0.0 and int(par[row + 4]) == c:
-            drawn += par[stage_path(par, row, modes[w]) + 2] * mean[w]
+            drawn += par[winding_path(par, row, modes[w]) + 2] * mean[w]
     passed = charged - drawn * size / par[capacitor]
     return passed, recharged(par, capacitor, passed, 0.5 * size)
 
@@ -329,7 +327,7 @@ def coupled_locate(
             return -1.0
         if empties:
             c = int(par[row + 4])
-            _, value = discharged(par, c, modes, charged[c], mean, size)
+            _, value = coupled_discharged(par, c, modes, charged[c], mean, size)
         else:
             value = coupled_current(par, row, hints, phi, change, final)
         f = value - target - rise * (size / length)
@@ -367,8 +365,4 @@ def coupled_settle(
                 ways[count * loops + j] = par[first + j] + 0.0 * phi[6 * m]
             count += 1
     near, here = shift(hints, KEPT * m), shift(phi, 6 * m)
-    released = settle_along(par, at, near, here, shift(final, MOST_TUBES * m), ways, 0, count, move)
-    heat = 0.0 * phi[6 * m]
-    if released > 0.0 and par[at + STOPS] != 0.0:
-        heat = circuit_heat(par, at, near, here, move)
-    return released, heat
+    return settle_along(par, at, near, here, shift(final, MOST_TUBES * m), ways, 0, count, move)

@@ -15,14 +15,14 @@ with the work of each source counted by itself.
 from klack.compiling.constant import constant
 from klack.magnetics.coupled_piece import (
     coupled_current,
+    coupled_discharged,
     coupled_gaps,
     coupled_linked,
     coupled_locate,
     coupled_settle,
     coupled_solve,
-    discharged,
     magnet_row,
-    stage_path,
+    winding_path,
     winding_row,
     winding_voltage,
 )
@@ -36,16 +36,19 @@ from klack.magnetics.flux_kernel import (
     stack,
 )
 from klack.magnetics.flux_pieces import (
+    CAPACITOR_EMPTY,
     DIODE_BLOCKS,
     FIRST_PIECE,
     KEPT,
     LEAST_PIECE,
     MOST_EVENTS,
     NO_SWITCH,
-    SPOTS,
     TELLING,
+    bending,
     first_crossing,
     next_state,
+    read_fluxes,
+    write_fluxes,
 )
 from klack.magnetics.flux_table import MOST_TUBES, STOPS
 from klack.magnetics.output_stage import recharged
@@ -54,7 +57,6 @@ from klack.network.step_function import shift, step_function
 
 __all__ = ["coupled_step"]
 
-_EMPTY = -3  # the capacitor ends the state
 _LATE = 4  # times that a piece is shortened to an event before the one found
 
 
@@ -99,14 +101,10 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         row = magnet_row(par, m)
         at, s = int(par[row]), int(par[row + 3]) + 1
         loops, spots, stops = int(par[at]), 2 * int(par[at + 1]), int(par[at + STOPS])
-        for j in range(loops):
-            phi[6 * m + j] = state[s + j]
-            rate[6 * m + j] = state[s + loops + j]
-            bend[6 * m + j] = state[s + 2 * loops + j]
-        for j in range(spots):
-            hints[KEPT * m + j] = state[s + 3 * loops + j]
-        for j in range(stops):
-            hints[KEPT * m + SPOTS + j] = state[s + 3 * loops + spots + j]
+        read_fluxes(
+            par, at, state, s,
+            shift(phi, 6 * m), shift(rate, 6 * m), shift(bend, 6 * m), shift(hints, KEPT * m),
+        )  # fmt: skip
         largest[m] = state[s + 3 * loops + spots + stops]
         y = 2 + 4 * m
         x0 = par[row + 1] + par[row + 2] * (inp[y] - inp[y + 2])
@@ -141,7 +139,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                     par, block, which, now, entered[w], cycle[w]
                 )
             elif par[row + 3] != 0.0:
-                path = stage_path(par, row, mode[w])
+                path = winding_path(par, row, mode[w])
                 if held[int(par[row + 4])] > par[path + 7]:
                     continue
                 mode[w], entered[w] = par[path + 8], now
@@ -216,7 +214,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             found, first, goal, moves, before, beyond = -1, 2.0, 0.0, 0.0, 0.0, 0.0
             kind = NO_SWITCH
             for c in range(capacitors):
-                _, after[c] = discharged(par, c, mode, charged[c], mean, piece)
+                _, after[c] = coupled_discharged(par, c, mode, charged[c], mean, piece)
             for w in range(windings):
                 if shut[w] == 0.0 or w == event:
                     continue
@@ -237,20 +235,20 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                         found, first, kind, goal, moves = w, share, crossed, target, rise
                         before, beyond = current[w], end[w]
                 if par[row + 3] != 0.0:
-                    c, low = int(par[row + 4]), par[stage_path(par, row, mode[w]) + 7]
-                    empty = event >= 0 and which == _EMPTY
+                    c, low = int(par[row + 4]), par[winding_path(par, row, mode[w]) + 7]
+                    empty = event >= 0 and which == CAPACITOR_EMPTY
                     empty = empty and int(par[winding_row(par, event) + 4]) == c
                     if after[c] < low and not empty:
                         share = (held[c] - low) / (held[c] - after[c])
                         if share < first:
-                            found, first, kind, goal, moves = w, share, _EMPTY, low, 0.0
+                            found, first, kind, goal, moves = w, share, CAPACITOR_EMPTY, low, 0.0
                             before, beyond = held[c], after[c]
             if not stays or found < 0:
                 break
             length = piece
             piece = coupled_locate(
                 par, hints, phi, change, ends, length, mode, cycle, now, held, shut, found,
-                kind == _EMPTY, before, beyond, goal, moves, mean,
+                kind == CAPACITOR_EMPTY, before, beyond, goal, moves, mean,
             )  # fmt: skip
             if piece <= 0.0:
                 failed = True
@@ -259,7 +257,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             coupled_gaps(par, hints, ends, piece, middle, final, slope)
             for c in range(capacitors):
                 charged[c] = recharged(par, caps + CAPACITOR_ROW * c, held[c], 0.5 * piece)
-            if kind == _EMPTY:
+            if kind == CAPACITOR_EMPTY:
                 end[event] = coupled_current(
                     par, winding_row(par, event), hints, phi, change, final
                 )
@@ -275,7 +273,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             continue
         per_time = 1.0 / piece
         for c in range(capacitors):
-            passed, rest = discharged(par, c, mode, charged[c], mean, piece)
+            passed, rest = coupled_discharged(par, c, mode, charged[c], mean, piece)
             half = 0.5 * par[caps + CAPACITOR_ROW * c]
             gained[c] += half * (
                 (charged[c] - held[c]) * (charged[c] + held[c]) + (rest - passed) * (rest + passed)
@@ -301,7 +299,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                 supply[w] += par[row + 1] * square + mean[w] * through
                 continue
             pulse[w] += par[row + 1] * charge + through
-            path = stage_path(par, row, mode[w])
+            path = winding_path(par, row, mode[w])
             supply[w] += par[path] * charge
             switches[w] += par[path + 4] * square
             diodes[w] += par[path + 3] * charge + par[path + 5] * square
@@ -332,11 +330,7 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                             pulse[w] += par[turns + j] * spread[j]
                     elif opens[w] == 0.0:
                         end[w] = coupled_current(par, own, hints, phi, change, final)
-        curve = 0.0
-        if last == piece:
-            curve = per_time
-        elif last > 0.0:
-            curve = 1.0 / ahead
+        curve = bending(last, piece, ahead)
         told = piece > TELLING * h  # of a shorter piece the rate is round-off, and so is a guess
         for j in range(6 * magnets):
             if told:
@@ -353,8 +347,8 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             row = winding_row(par, event)
             if which == DIODE_BLOCKS:
                 shut[event], blocked[event] = 0.0, 1.0
-            elif which == _EMPTY:
-                path = stage_path(par, row, mode[event])
+            elif which == CAPACITOR_EMPTY:
+                path = winding_path(par, row, mode[event])
                 mode[event], entered[event] = par[path + 8], t + done
             else:
                 block = state_block(par, int(par[row + 2]), int(mode[event]))
@@ -394,14 +388,9 @@ def coupled_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         energy = circuit_energy(par, at, near, here, shift(final, MOST_TUBES * m))
         s = o + int(par[row + 3])
         out[s] = par[at + 4] * circuit_flux(par, at, int(par[at + 3]), here)
-        for j in range(loops):
-            out[s + 1 + j] = here[j]
-            out[s + 1 + loops + j] = rate[6 * m + j]
-            out[s + 1 + 2 * loops + j] = bend[6 * m + j]
-        for j in range(spots):
-            out[s + 1 + 3 * loops + j] = near[j]
-        for j in range(stops):
-            out[s + 1 + 3 * loops + spots + j] = near[SPOTS + j]
+        write_fluxes(
+            par, at, out, s + 1, here, shift(rate, 6 * m), shift(bend, 6 * m), near
+        )  # fmt: skip
         out[s + 1 + 3 * loops + spots + stops] = largest[m]
         out[book], out[book + 1] = eddy[m], energy
         book += 2

@@ -23,13 +23,12 @@ from typing import Any
 from klack.compiling.jit import inner, intrinsic
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
-from klack.magnetics.flux_table import MOST_TUBES, SETTLES
+from klack.magnetics.flux_table import MOST_TUBES, SETTLES, STOPS
 from klack.magnetics.stop_kernel import (
     stops_end,
     stops_energy,
     stops_mean,
     stops_move,
-    stops_stiffness,
 )
 
 __all__ = [
@@ -287,7 +286,7 @@ def weighted_mmf(
                 db = par[row] * change[0]
                 for j in range(1, loops):
                     db += par[row + j] * change[j]
-                mmf += stops_end(par, at, at + int(par[p + 6]), hints, first, b - db, db)
+                mmf += stops_end(par, at, at + int(par[p + 6]), hints, first, b - db, db)[0]
             current += weight * mmf
         p += _SIZE + loops
     return current
@@ -481,8 +480,8 @@ def circuit_step(
 @inner(error_model="numpy")
 def circuit_settle(
     par: Any, at: int, hints: Any, phi: Any, end: Any, is_open: bool, move: Any
-) -> float:
-    r"""Let the flux spread among loops without eddy currents; return the energy released [J].
+) -> tuple[float, float]:
+    r"""Let the flux spread among loops without eddy currents; return energies [J].
 
     Such loops balance at every instant.  A step balances their mean only, so that what they lack
     at its start has the opposite sign at its end, and so on: the fluxes ring, and with them the
@@ -490,7 +489,7 @@ def circuit_settle(
     them balance at the reluctances ``end``, at constant linkage, or without current if the coil
     is open.  The stored energy is least there: its change is minus a loss, the mean mmf times
     ``move``, and of the second order in what was lacking.  Zero, and no move, where nothing is
-    gained.
+    gained.  Returns the energy released and the heat of hysteresis.
     """
     table = at + int(par[at + SETTLES])
     count = int(par[table]) + (1 if is_open else 0)
@@ -508,7 +507,7 @@ def settle_along(
     first: int,
     count: int,
     move: Any,
-) -> float:
+) -> tuple[float, float]:
     """Do what :func:`circuit_settle` does along ``count`` directions, ``ways`` from ``first`` on.
 
     A direction is one number for each loop.
@@ -518,7 +517,7 @@ def settle_along(
     for j in range(loops):
         move[j] = 0.0 * phi[j]
     if count == 0:
-        return 0.0
+        return 0.0, 0.0
     most = 1 if int(par[at + 2]) == 1 else _CAREFUL
     for _ in range(most):
         for i in range(count):
@@ -545,8 +544,9 @@ def settle_along(
                 slope += 2.0 * half
             if par[p + 6] != 0.0:
                 stops, kept = at + int(par[p + 6]), _STOPS + int(par[p + 7])
-                mmf += stops_end(par, at, stops, hints, kept, b0, db)
-                slope += stops_stiffness(par, at, stops, hints, kept, b0, db)
+                value, stiff = stops_end(par, at, stops, hints, kept, b0, db)
+                mmf += value
+                slope += stiff
             for i in range(count):
                 g[i] -= along[i] * mmf
                 for j in range(i + 1):
@@ -580,7 +580,10 @@ def settle_along(
     for j in range(loops):
         moved, size = max(moved, abs(move[j])), max(size, abs(phi[j]))
     if released > 0.0 and moved > _ROUND_OFF * size:
-        return released
+        heat = 0.0 * phi[0]
+        if par[at + STOPS] != 0.0:
+            heat = circuit_heat(par, at, hints, phi, move)
+        return released, heat
     for j in range(loops):
         move[j] = 0.0 * phi[j]
-    return 0.0
+    return 0.0, 0.0

@@ -1,27 +1,27 @@
 """Pieces of the step of a coil: from one switching instant to the next.
 
-A piece has a constant voltage at its source and an even motion of the armature.  The general step
-(:mod:`klack.magnetics.flux_step`) and the one behind an output stage
-(:mod:`klack.magnetics.stage_step`) are made of them.
+A piece has a constant voltage at its source and an even motion of the armature.  The step of one
+coil (:mod:`klack.magnetics.flux_step`) and that of several windings
+(:mod:`klack.magnetics.coupled_step`) are made of them.
 """
 
 from typing import Any
 
 from klack.compiling.jit import inner
-from klack.magnetics.drive_kernel import crossed_switch, switch_current
+from klack.magnetics.drive_kernel import crossed_switch, state_voltage, switch_current
 from klack.magnetics.event_bracket import LOCATED, between, narrowed
 from klack.magnetics.flux_kernel import (
     circuit_current,
     circuit_gaps,
-    circuit_heat,
-    circuit_settle,
     circuit_step,
     stack,
 )
 from klack.magnetics.flux_table import MAP, MOST_STOPS, MOST_TUBES, STOPS
 from klack.magnetics.map_kernel import map_current, map_step
+from klack.magnetics.output_stage import recharged, still_voltage
 
 __all__ = [
+    "CAPACITOR_EMPTY",
     "DIODE_BLOCKS",
     "FIRST_PIECE",
     "KEPT",
@@ -30,16 +30,20 @@ __all__ = [
     "NO_SWITCH",
     "SPOTS",
     "TELLING",
+    "bending",
+    "discharged",
     "first_crossing",
     "next_state",
     "piece_advance",
     "piece_current",
     "piece_gaps",
-    "piece_settle",
-    "piece_to_current",
+    "piece_source",
+    "piece_to_event",
+    "read_fluxes",
+    "write_fluxes",
 ]
 
-NO_SWITCH, DIODE_BLOCKS = -1, -2
+NO_SWITCH, DIODE_BLOCKS, CAPACITOR_EMPTY = -1, -2, -3
 """What ends a piece beside the switches of a state."""
 
 SPOTS = 2 * MOST_TUBES
@@ -70,6 +74,22 @@ def piece_gaps(
 
 
 @inner(error_model="numpy")
+def piece_source(
+    par: Any, block: int, stage: int, path: int, charged: float, size: float, time: float
+) -> tuple[float, float]:
+    """Voltage [V] at a coil without current over a piece, and resistance [ohm] of the whole way.
+
+    Behind an output stage ``charged`` is the capacitor after the first half of the converter's
+    work; else ``time`` is that since the start of the cycle.
+    """
+    if stage == 0:
+        return state_voltage(par, block, time), par[1]
+    k = par[path + 2]
+    resistance = par[1] + par[path + 4] + par[path + 5] + par[path + 6]
+    return still_voltage(par, path, charged), resistance + k * k * 0.5 * size / par[stage]
+
+
+@inner(error_model="numpy")
 def piece_advance(
     par: Any,
     at: int,
@@ -79,15 +99,18 @@ def piece_advance(
     middle: Any,
     end: Any,
     per_time: float,
-    voltage: float,
+    source: tuple[float, float],
     conducts: bool,
 ) -> tuple[bool, float]:
-    """Find the change of the fluxes over a piece, and its mean current."""
+    """Find the change of the fluxes over a piece, and its mean current; a source as above."""
+    voltage, resistance = source
     if par[at + MAP] != 0.0:
         return map_step(
-            par, at, phi[0], change, middle[0], end[0], per_time, voltage, par[1], conducts
+            par, at, phi[0], change, middle[0], end[0], per_time, voltage, resistance, conducts
         )
-    return circuit_step(par, at, hints, phi, change, middle, per_time, voltage, par[1], conducts)
+    return circuit_step(
+        par, at, hints, phi, change, middle, per_time, voltage, resistance, conducts
+    )
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -98,27 +121,43 @@ def piece_current(par: Any, at: int, hints: Any, phi: Any, change: Any, end: Any
     return circuit_current(par, at, hints, phi, change, end)
 
 
+@inner(error_model="numpy", forceinline=True)
+def discharged(
+    par: Any, stage: int, path: int, charged: float, mean: float, size: float
+) -> tuple[float, float]:
+    """Return the capacitor after the current of a piece, and after the converter as well."""
+    passed = charged - par[path + 2] * mean * size / par[stage]
+    return passed, recharged(par, stage, passed, 0.5 * size)
+
+
 @inner(error_model="numpy")
-def piece_to_current(
+def piece_to_event(
     par: Any,
     at: int,
+    block: int,
+    stage: int,
+    path: int,
     hints: Any,
     phi: Any,
     change: Any,
     x0: float,
     speed: float,
     length: float,
-    voltage: float,
+    time: float,
+    held: float,
     before: float,
     after: float,
     target: float,
     rise: float,
+    empties: bool,
 ) -> tuple[float, float]:
-    """Length of the piece at whose end the current meets its target, and its mean current.
+    """Length of the piece at whose end current or capacitor meet a target, and its mean current.
 
-    The target is ``target`` now and rises evenly by ``rise`` over ``length``.  The length is
-    negative if that fails.  ``change`` comes with the change over ``length`` and
-    leaves with that of the located piece.
+    ``before`` and ``after`` are their values at both ends of the whole piece, ``held`` is the
+    capacitor at its start, ``time`` the middle of it since the start of the cycle: the voltage of a
+    course is that of the whole piece, straight as it is.  The target is ``target`` now and rises
+    evenly by ``rise`` over ``length``.  The length is negative if that fails; ``change`` comes with
+    the change over ``length`` and leaves with that of the located piece.
     """
     middle, end, slope = stack(phi, MOST_TUBES), stack(phi, MOST_TUBES), stack(phi, MOST_TUBES)
     loops = int(par[at])
@@ -126,19 +165,26 @@ def piece_to_current(
     f_low, f_high = before - target, after - target - rise
     accepted = LOCATED * (abs(target) + abs(before))
     side = 0
-    size = length
+    size, charged = length, held
     for _ in range(100):
         guess = between(low, high, f_low, f_high, length)
         for j in range(loops):
             change[j] *= guess / size
         size = guess
         piece_gaps(par, at, hints, x0, x0 + speed * size, middle, end, slope)
+        if stage > 0:
+            charged = recharged(par, stage, held, 0.5 * size)
+        source = piece_source(par, block, stage, path, charged, size, time)
         found, mean = piece_advance(
-            par, at, hints, phi, change, middle, end, 1.0 / size, voltage, True
+            par, at, hints, phi, change, middle, end, 1.0 / size, source, True
         )
         if not found:
             return -1.0, 0.0
-        f = piece_current(par, at, hints, phi, change, end) - target - rise * (size / length)
+        if empties:
+            _, value = discharged(par, stage, path, charged, mean, size)
+        else:
+            value = piece_current(par, at, hints, phi, change, end)
+        f = value - target - rise * (size / length)
         if abs(f) <= accepted or high - low <= LOCATED * length:
             return size, mean
         low, high, f_low, f_high, side = narrowed(low, high, f_low, f_high, side, size, f)
@@ -183,12 +229,40 @@ def next_state(
 
 
 @inner(error_model="numpy", forceinline=True)
-def piece_settle(
-    par: Any, at: int, hints: Any, phi: Any, end: Any, is_open: bool, move: Any
-) -> tuple[float, float]:
-    """Let fluxes spread among loops without eddy currents: energy released, heat of hysteresis."""
-    released = circuit_settle(par, at, hints, phi, end, is_open, move)
-    heat = 0.0
-    if released > 0.0 and par[at + STOPS] != 0.0:
-        heat = circuit_heat(par, at, hints, phi, move)
-    return released, heat
+def bending(last: float, piece: float, ahead: float) -> float:
+    """Factor [1/s] of a change of rates between the middles of two pieces; 0 without a last one."""
+    if last == piece:
+        return 1.0 / piece
+    return 1.0 / ahead if last > 0.0 else 0.0
+
+
+@inner(error_model="numpy", forceinline=True)
+def read_fluxes(
+    par: Any, at: int, state: Any, s: int, phi: Any, rate: Any, bend: Any, hints: Any
+) -> None:
+    """Read loop fluxes, their rates, how these bend, places in tables, stops: ``state[s]`` on."""
+    loops, spots = int(par[at]), 2 * int(par[at + 1])
+    for j in range(loops):
+        phi[j] = state[s + j]
+        rate[j] = state[s + loops + j]
+        bend[j] = state[s + 2 * loops + j]
+    for j in range(spots):
+        hints[j] = state[s + 3 * loops + j]
+    for j in range(int(par[at + STOPS])):
+        hints[SPOTS + j] = state[s + 3 * loops + spots + j]
+
+
+@inner(error_model="numpy", forceinline=True)
+def write_fluxes(
+    par: Any, at: int, out: Any, s: int, phi: Any, rate: Any, bend: Any, hints: Any
+) -> None:
+    """Write what :func:`read_fluxes` reads."""
+    loops, spots = int(par[at]), 2 * int(par[at + 1])
+    for j in range(loops):
+        out[s + j] = phi[j]
+        out[s + loops + j] = rate[j]
+        out[s + 2 * loops + j] = bend[j]
+    for j in range(spots):
+        out[s + 3 * loops + j] = hints[j]
+    for j in range(int(par[at + STOPS])):
+        out[s + 3 * loops + spots + j] = hints[SPOTS + j]

@@ -13,6 +13,18 @@ identity stays exact:
           + \bar F_a\,\Delta y_a + \bar F_b\,\Delta y_b
 
 (armature a, base b).
+
+Behind an output stage (:mod:`klack.magnetics.output_stage`) the source alone differs.  Within a
+piece of length h and mean current :math:`\bar\imath` the capacitor falls from :math:`U_0` to
+:math:`U_1 = U_0 - k\,\bar\imath\,h/C`, and its mean voltage is exactly that of its energy,
+
+.. math:: \tfrac12 C (U_0^2 - U_1^2) = k\,\tfrac12 (U_0 + U_1)\,\bar\imath\,h ,
+
+so that it acts as a source :math:`k\,U_0` with a resistance :math:`h/2C` in series: the piece stays
+linear in the current, of order two, and its energy balances.  The converter works for half of
+the piece before and half of it after (Strang 1968), each in closed form.  Besides its switches a
+state ends when the capacitor has fallen to a voltage; that instant is located as those of the
+current are.
 """
 
 import numpy as np
@@ -21,41 +33,45 @@ from numpy.typing import ArrayLike, NDArray
 from klack.compiling.constant import constant
 from klack.errors import InputError, require_positive
 from klack.magnetics.circuit import MagneticCircuit
-from klack.magnetics.drive_kernel import due_switch, next_time, state_block, state_voltage
+from klack.magnetics.drive_kernel import due_switch, next_time, state_block
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.flux_kernel import (
     circuit_energy,
     circuit_flux,
     circuit_heat,
     circuit_loss_and_force,
+    circuit_settle,
     linked,
     stack,
 )
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_pieces import (
+    CAPACITOR_EMPTY,
     DIODE_BLOCKS,
     FIRST_PIECE,
     KEPT,
     LEAST_PIECE,
     MOST_EVENTS,
     NO_SWITCH,
-    SPOTS,
     TELLING,
+    bending,
+    discharged,
     first_crossing,
     next_state,
     piece_advance,
     piece_current,
     piece_gaps,
-    piece_settle,
-    piece_to_current,
+    piece_source,
+    piece_to_event,
+    read_fluxes,
+    write_fluxes,
 )
 from klack.magnetics.flux_table import MAP, MOST_TUBES, SETTLES, STOPS, circuit_numbers
 from klack.magnetics.gap_range import GapRange
 from klack.magnetics.map_kernel import map_energy, map_force, map_numbers
-from klack.magnetics.output_stage import START_VOLTAGE
+from klack.magnetics.output_stage import START_VOLTAGE, recharged, stage_path
 from klack.magnetics.quiet_step import DIODE, FRONT, allowed_bend, quiet_step
 from klack.magnetics.remanent_start import remanent_state
-from klack.magnetics.stage_step import STAGE_BOOKS, stage_channels, stage_step
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.rows import GROUND, Book, Channel, LimitRow, Rows
 from klack.network.step_function import step_function
@@ -66,6 +82,7 @@ __all__ = [
     "FAILURES",
     "FLUXES",
     "HYSTERESIS",
+    "STAGE_BOOKS",
     "flux_numbers",
     "flux_rows",
     "flux_state",
@@ -79,6 +96,17 @@ BOOKS = (
     Book("eddy", "loss"),
     Book("magnetic", "store"),
 )
+
+STAGE_BOOKS = (
+    Book("battery", "supply"),
+    *BOOKS[1:],
+    Book("switches", "loss"),
+    Book("diodes", "loss"),
+    Book("clamp", "loss"),
+    Book("converter", "loss"),
+    Book("capacitor", "store"),
+)
+"""Energies of a coil behind an output stage."""
 
 HYSTERESIS = Book("hysteresis", "loss")
 """One entry more, of iron with hysteresis."""
@@ -108,41 +136,33 @@ _MAP_ADVICE = (
     "gap that the stops allow."
 )
 
-_TUBES = MOST_TUBES
-_FRONT, _DIODE = FRONT, DIODE
 FLUXES = FRONT
 """Number of the first loop flux among the states."""
-_MAP = MAP
 _HEADER = 8
 
 
 @step_function
 def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     """Step of a solenoid: ports armature and base; see the module text."""
-    if quiet_step(par, state, inp, out):
+    stage = int(par[7])
+    if stage == 0 and quiet_step(par, state, inp, out):
         return 0
     t, h = inp[0], inp[1]
     x0 = par[2] + par[3] * (inp[2] - inp[4])
     x1 = par[2] + par[3] * (inp[3] - inp[5])
     at, drive, size = int(par[4]), int(par[5]), int(par[6])
-    loops, spots = int(par[at]), 2 * int(par[at + 1])
+    loops, hysteretic = int(par[at]), par[at + STOPS] != 0.0
     mode, entered, cycle = state[0], state[1], state[2]
     is_open, current, last = state[3] != 0.0, state[4], state[7]
     # on the stack, where nothing else can be meant: the compiler keeps what it has read
     phi, rate, bend = stack(out, 6), stack(out, 6), stack(out, 6)
     change, told_of, hints = stack(out, 6), stack(out, 6), stack(out, KEPT)
-    middle, final, slope = stack(out, _TUBES), stack(out, _TUBES), stack(out, _TUBES)
-    for j in range(loops):
-        phi[j] = state[_FRONT + j]
-        rate[j] = state[_FRONT + loops + j]
-        bend[j] = state[_FRONT + 2 * loops + j]
-    for j in range(spots):
-        hints[j] = state[_FRONT + 3 * loops + j]
-    stops = int(par[at + STOPS])
-    for j in range(stops):
-        hints[SPOTS + j] = state[_FRONT + 3 * loops + spots + j]
-
+    middle, final, slope = stack(out, MOST_TUBES), stack(out, MOST_TUBES), stack(out, MOST_TUBES)
+    read_fluxes(par, at, state, FRONT, phi, rate, bend, hints)
     supply = ohmic = eddy = push = pulse = hysteresis = 0.0
+    switches = diodes = clamp = gained = 0.0
+    path, held = 0, state[size - 2]  # of an output stage
+    charged = passed = rest = held
     done = 0.0
     events = 0
     blocked = False  # the diode has blocked at this very instant
@@ -155,7 +175,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     if h <= 0.0 or settles:
         piece_gaps(par, at, hints, x0, x0, middle, final, slope)
     if h > 0.0 and settles:  # at constant linkage: what an open coil lets go went at the end
-        released, heat = piece_settle(par, at, hints, phi, final, False, spread)
+        released, heat = circuit_settle(par, at, hints, phi, final, False, spread)
         eddy += released
         hysteresis += heat
         for j in range(loops):
@@ -164,8 +184,15 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         now = t + done
         block = state_block(par, drive, int(mode))
         which = due_switch(par, block, now, entered, cycle, current, close)
-        if which >= 0:
-            mode, entered, cycle = next_state(par, block, which, now, entered, cycle)
+        if stage > 0:
+            path = stage_path(stage, mode)
+            if which < 0 and held <= par[path + 7]:
+                which = CAPACITOR_EMPTY
+        if which != NO_SWITCH:
+            if which == CAPACITOR_EMPTY:
+                mode, entered = par[path + 8], now
+            else:
+                mode, entered, cycle = next_state(par, block, which, now, entered, cycle)
             last = 0.0  # the rates belong to the voltage before
             blocked = False
             events += 1
@@ -175,7 +202,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         if is_open and par[block + 1] == 0.0:
             is_open = False  # nothing holds the current back
             last = 0.0
-        piece, per_time = h - done, per_step
+        piece = h - done
         due = next_time(par, block, now + close, entered, cycle) - now
         whole = due >= piece - close
         if not whole:
@@ -183,17 +210,18 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
         longest = min(longest, max(2.0 * last if last > 0.0 else FIRST_PIECE * h, LEAST_PIECE * h))
         if longest < piece - close:
             piece, whole = constant(longest), False
-        if piece != h:
-            per_time = 1.0 / piece
+        per_time = 1.0 / piece
         xa = x0 if done == 0.0 else x0 + speed * done
         xb = x1 if whole else x0 + speed * (done + piece)
-        voltage = state_voltage(par, block, now + 0.5 * piece - cycle)
-        ahead = 0.5 * (last + piece)
+        ahead, half_way = 0.5 * (last + piece), now + 0.5 * piece - cycle
         for j in range(loops):
             told_of[j] = change[j] = constant(piece * (rate[j] + bend[j] * ahead))
         piece_gaps(par, at, hints, xa, xb, middle, final, slope)
+        if stage > 0:
+            charged = recharged(par, stage, held, 0.5 * piece)
+        source = piece_source(par, block, stage, path, charged, piece, half_way)
         found, mean = piece_advance(
-            par, at, hints, phi, change, middle, final, per_time, voltage, not is_open
+            par, at, hints, phi, change, middle, final, per_time, source, not is_open
         )
         if not found:
             return 1
@@ -206,15 +234,17 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             continue
         longest = 2.0 * piece
         through = linked(par, at, change)
-        if is_open and not blocked and voltage > through * per_time + _DIODE:
+        if is_open and not blocked and source[0] > through * per_time + DIODE:
             is_open = False
             last = 0.0
             found, mean = piece_advance(
-                par, at, hints, phi, change, middle, final, per_time, voltage, True
+                par, at, hints, phi, change, middle, final, per_time, source, True
             )
             if not found:
                 return 1
             through = linked(par, at, change)
+        if stage > 0:
+            passed, rest = discharged(par, stage, path, charged, mean, piece)
         end = 0.0
         which = NO_SWITCH
         if not is_open:
@@ -223,56 +253,75 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             target, rise, which = first_crossing(
                 par, block, current, end, begin + within, begin + piece - within
             )
+            before, beyond = current, end
+            if stage > 0 and rest < par[path + 7]:
+                low, share = par[path + 7], 2.0
+                if which != NO_SWITCH:
+                    share = (target - current) / (end - current - rise)
+                if (held - low) / (held - rest) < share:
+                    target, rise, which = low, 0.0, CAPACITOR_EMPTY
+                    before, beyond = held, rest
+            if which == DIODE_BLOCKS and current <= 0.0:
+                is_open = blocked = True
+                last = 0.0
+                events += 1
+                if events > MOST_EVENTS:
+                    return 2
+                continue
             if which != NO_SWITCH:
-                if which == DIODE_BLOCKS and current <= 0.0:
-                    is_open = blocked = True
-                    last = 0.0
-                    events += 1
-                    if events > MOST_EVENTS:
-                        return 2
-                    continue
-                length = piece
-                piece, mean = piece_to_current(
-                    par,
-                    at,
-                    hints,
-                    phi,
-                    change,
-                    xa,
-                    speed,
-                    length,
-                    voltage,
-                    current,
-                    end,
-                    target,
-                    rise,
-                )
+                length, empties = piece, which == CAPACITOR_EMPTY
+                piece, mean = piece_to_event(
+                    par, at, block, stage, path, hints, phi, change, xa, speed, length, half_way,
+                    held, before, beyond, target, rise, empties,
+                )  # fmt: skip
                 if piece <= 0.0:
                     return 1
                 per_time = 1.0 / piece
                 whole = False
                 xb = xa + speed * piece
-                end = target + rise * (piece / length)
                 piece_gaps(par, at, hints, xa, xb, middle, final, slope)
                 through = linked(par, at, change)
-            heat = par[1] * mean * mean * piece
-            ohmic += heat
-            supply += heat + mean * through  # u i h, with the very fluxes that are stored
-            pulse += voltage * piece
+                if stage > 0:
+                    charged = recharged(par, stage, held, 0.5 * piece)
+                    passed, rest = discharged(par, stage, path, charged, mean, piece)
+                if empties:
+                    end = piece_current(par, at, hints, phi, change, final)
+                else:
+                    end = target + rise * (piece / length)
+            if stage > 0:
+                charge = mean * piece
+                square = mean * charge
+                supply += par[path] * charge
+                ohmic += par[1] * square
+                switches += par[path + 4] * square
+                diodes += par[path + 3] * charge + par[path + 5] * square
+                clamp += par[path + 1] * charge + par[path + 6] * square
+                pulse += par[1] * charge + through
+            else:
+                heat = par[1] * mean * mean * piece
+                ohmic += heat
+                supply += heat + mean * through  # u i h, with the very fluxes that are stored
+                pulse += source[0] * piece
         else:
             pulse += through
+        if stage > 0:
+            half = 0.5 * par[stage]
+            gained += half * (
+                (charged - held) * (charged + held) + (rest - passed) * (rest + passed)
+            )
+            held = rest
         loss, force = circuit_loss_and_force(par, at, phi, change, slope)
-        if par[at + _MAP] != 0.0:
+        if par[at + MAP] != 0.0:
             force = map_force(par, at, phi[0], change[0], middle[0], final[0])
         eddy += loss * per_time
-        if stops > 0:
+        if hysteretic:
             hysteresis += circuit_heat(par, at, hints, phi, change)
         push += force * piece
         if settles:
             opens = is_open or which == DIODE_BLOCKS
             for j in range(loops):
                 settled[j] = phi[j] + change[j]
-            released, warmed = piece_settle(par, at, hints, settled, final, opens, spread)
+            released, warmed = circuit_settle(par, at, hints, settled, final, opens, spread)
             if released > 0.0:
                 eddy += released
                 hysteresis += warmed
@@ -285,11 +334,7 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
                     for j in range(loops):
                         spread[j] = 0.0 * spread[j]
                     end = piece_current(par, at, hints, settled, spread, final)
-        curve = 0.0
-        if last == piece:
-            curve = per_time
-        elif last > 0.0:
-            curve = 1.0 / ahead
+        curve = bending(last, piece, ahead)
         told = piece > TELLING * h  # of a shorter piece the rate is round-off, and so is a guess
         for j in range(loops):
             phi[j] += change[j]
@@ -305,14 +350,15 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
             last = 0.0
             if which == DIODE_BLOCKS:
                 is_open = blocked = True
+            elif which == CAPACITOR_EMPTY:
+                mode, entered = par[path + 8], t + done
             else:
                 mode, entered, cycle = next_state(par, block, which, t + done, entered, cycle)
             events += 1
             if events > MOST_EVENTS:
                 return 2
-
     force = push * per_step
-    if par[at + _MAP] != 0.0:
+    if par[at + MAP] != 0.0:
         energy = map_energy(par, at, phi[0], final[0])
     else:
         energy = circuit_energy(par, at, hints, phi, final)
@@ -322,18 +368,17 @@ def magnet_step(par, state, inp, out):  # type: ignore[no-untyped-def]
     out[6], out[7] = current, pulse * per_step
     out[8] = par[at + 4] * circuit_flux(par, at, int(par[at + 3]), phi)
     out[9] = last
-    for j in range(loops):
-        out[2 + _FRONT + j] = phi[j]
-        out[2 + _FRONT + loops + j] = rate[j]
-        out[2 + _FRONT + 2 * loops + j] = bend[j]
-    for j in range(spots):
-        out[2 + _FRONT + 3 * loops + j] = hints[j]
-    for j in range(stops):
-        out[2 + _FRONT + 3 * loops + spots + j] = hints[SPOTS + j]
+    write_fluxes(par, at, out, 2 + FRONT, phi, rate, bend, hints)
     books = 2 + size
     out[books - 1] = largest
     out[books], out[books + 1], out[books + 2], out[books + 3] = supply, ohmic, eddy, energy
-    if stops > 0:
+    if stage > 0:
+        drawn = gained / par[stage + 4]
+        out[books - 2], out[books] = held, supply + drawn
+        out[books + 4], out[books + 5], out[books + 6] = switches, diodes, clamp
+        out[books + 7], out[books + 8] = drawn - gained, 0.5 * par[stage] * held * held
+        books += 5
+    if hysteretic:
         out[books + 4] = hysteresis
     return 0
 
@@ -350,7 +395,7 @@ def flux_numbers(
     require_positive("coil resistance", resistance, "ohm")
     numbers = map_numbers(plant) if isinstance(plant, FluxMap) else circuit_numbers(plant)
     program = driver.numbers()
-    size = _FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1]) + int(numbers[STOPS]) + 1
+    size = FRONT + 3 * int(numbers[0]) + 2 * int(numbers[1]) + int(numbers[STOPS]) + 1
     stage, at = driver.stage_numbers(), 0
     if driver.stage is not None:
         size, at = size + 1, _HEADER + numbers.size + program.size
@@ -374,7 +419,7 @@ def flux_state(
     state[3] = 1.0 if current == 0.0 else 0.0
     state[4] = current
     phi = np.array(fluxes, dtype=float).ravel()
-    state[_FRONT : _FRONT + phi.size] = phi
+    state[FRONT : FRONT + phi.size] = phi
     kept = np.array(stops, dtype=float).ravel()
     staged = parameters[7] > 0.0  # behind an output stage: its capacitor stands before the last one
     last = state.size - (2 if staged else 1)
@@ -451,17 +496,18 @@ def flux_rows(
     rows.coils[rows.handles.get("terminals", GROUND)] = (len(rows.elements), 5)
     staged = driver.stage is not None
     books = STAGE_BOOKS if staged else BOOKS
+    capacitor = (Channel("capacitor voltage", "V", state.size - 2),) if staged else ()
     rows.element(
-        stage_step if staged else magnet_step,
+        magnet_step,
         ports=(armature, base),
         parameters=parameters,
         state=state,
-        at_rest=at_rest if np.any(state[_FRONT:]) else None,
+        at_rest=at_rest if np.any(state[FRONT:]) else None,
         books=(*books, HYSTERESIS) if parameters[_HEADER + STOPS] else books,
-        channels=(*(stage_channels(state.size) if staged else CHANNELS), *channels),
+        channels=(*CHANNELS, *capacitor, *channels),
         failures=FAILURES,
         state_names={
-            _FRONT + j: (f"flux of loop {j + 1}", "Wb")
+            FRONT + j: (f"flux of loop {j + 1}", "Wb")
             for j in range(int(parameters[int(parameters[4])]))
         },
     )

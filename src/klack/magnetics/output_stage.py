@@ -36,6 +36,8 @@ __all__ = [
     "OutputStage",
     "StagePath",
     "recharged",
+    "stage_path",
+    "still_voltage",
 ]
 
 STAGE_HEADER = 6
@@ -163,3 +165,15 @@ def recharged(par: Any, stage: int, voltage: float, time: float) -> float:
     # increments, so that nothing is lost over a short time
     square = 2.0 * power * left / capacitance
     return min(voltage + square / (sqrt(voltage * voltage + square) + voltage), nominal)
+
+
+@inner(error_model="numpy", forceinline=True)
+def stage_path(stage: int, mode: float) -> int:
+    """Where the path of the current in a state of the driver starts."""
+    return stage + STAGE_HEADER + STAGE_ROW * int(mode)
+
+
+@inner(error_model="numpy", forceinline=True)
+def still_voltage(par: Any, path: int, charged: float) -> float:
+    """Voltage [V] along a path at a coil without current."""
+    return par[path] - par[path + 1] + par[path + 2] * charged - par[path + 3]

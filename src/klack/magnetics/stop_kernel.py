@@ -14,7 +14,7 @@ from typing import Any
 
 from klack.compiling.jit import inner
 
-__all__ = ["stops_end", "stops_energy", "stops_mean", "stops_move", "stops_stiffness"]
+__all__ = ["stops_end", "stops_energy", "stops_mean", "stops_move"]
 
 
 @inner(error_model="numpy", forceinline=True)
@@ -75,36 +75,25 @@ def stops_mean(
 
 
 @inner(error_model="numpy")
-def stops_end(par: Any, at: int, table: int, kept: Any, first: int, b0: float, db: float) -> float:
-    """Sum of the stops of a tube [A] after a change of its flux."""
-    total = 0.0
+def stops_end(
+    par: Any, at: int, table: int, kept: Any, first: int, b0: float, db: float
+) -> tuple[float, float]:
+    """Sum of the stops of a tube [A] after a change of its flux, and stiffness of the elastic ones.
+
+    The stiffness is in [A/Wb].
+    """
+    total = stiffness = 0.0
     q = table + 1
     for _ in range(int(par[table])):
         n, w1 = int(par[q]), _width(par, at + int(par[q + 1]), b0 + db)
         q += 2
         for _ in range(n):
             total += _end(par[q], par[q + 1] * w1, kept[first], db)
-            q += 2
-            first += 1
-    return total
-
-
-@inner(error_model="numpy")
-def stops_stiffness(
-    par: Any, at: int, table: int, kept: Any, first: int, b0: float, db: float
-) -> float:
-    """Stiffness [A/Wb] of the stops of a tube that are elastic after a change of its flux."""
-    total = 0.0
-    q = table + 1
-    for _ in range(int(par[table])):
-        n, w1 = int(par[q]), _width(par, at + int(par[q + 1]), b0 + db)
-        q += 2
-        for _ in range(n):
             if abs(kept[first] + par[q] * db) < par[q + 1] * w1:
-                total += par[q]
+                stiffness += par[q]
             q += 2
             first += 1
-    return total
+    return total, stiffness
 
 
 @inner(error_model="numpy")

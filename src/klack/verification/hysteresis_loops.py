@@ -48,7 +48,7 @@ def _follow(table: np.ndarray, kept: np.ndarray, course: np.ndarray, out: np.nda
     for k in range(course.size - 1):
         b, db = course[k], course[k + 1] - course[k]
         before = stops_energy(table, 0, kept, 0)
-        out[k, 0] = stops_end(table, 0, 0, kept, 0, b, db)
+        out[k, 0] = stops_end(table, 0, 0, kept, 0, b, db)[0]
         out[k, 1] = stops_mean(table, 0, 0, kept, 0, b, db)[0] * db
         out[k, 2] = stops_move(table, 0, 0, kept, 0, b, db)
         out[k, 3] = stops_energy(table, 0, kept, 0) - before

@@ -12,9 +12,8 @@ from scipy.optimize import brentq
 from klack.errors import ConvergenceError
 from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.magnetics.circuit import MagneticCircuit
-from klack.magnetics.flux_step import flux_numbers, flux_state
+from klack.magnetics.flux_step import STAGE_BOOKS, flux_numbers, flux_state, magnet_step
 from klack.magnetics.peak_hold import PeakHold
-from klack.magnetics.stage_step import STAGE_BOOKS, stage_step
 from klack.magnetics.steady_coil import steady_fluxes
 from klack.network.step_function import evaluate
 from klack.verification.check import Check, check
@@ -105,13 +104,13 @@ def run_stage(
         fluxes = steady_fluxes(plant, current=current, gap=_GAP)
     state = flux_state(par, fluxes, (), current)
     size, books = state.size, len(STAGE_BOOKS)
-    _, out = evaluate(stage_step, par, state, [0.0, 0.0, y[0], y[0], 0.0, 0.0], 2 + size + books)
+    _, out = evaluate(magnet_step, par, state, [0.0, 0.0, y[0], y[0], 0.0, 0.0], 2 + size + books)
     before, sums, work = out[2 + size :].copy(), np.zeros(books), 0.0
     log_of = np.zeros((steps + 1, 4))
     log_of[0] = state[4], state[-2], state[0], state[1]
     for k in range(steps):
         status, out = evaluate(
-            stage_step, par, state, [k * step, step, y[k], y[k + 1], 0.0, 0.0], 2 + size + books
+            magnet_step, par, state, [k * step, step, y[k], y[k + 1], 0.0, 0.0], 2 + size + books
         )
         if status != 0:
             raise ConvergenceError(f"stage: status {status} at {k * step:g} s.")
