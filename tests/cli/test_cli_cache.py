@@ -1,12 +1,24 @@
-"""``klack cache``: truth = the folder as it is, and the exit codes that the command promises."""
+"""``klack cache`` and ``klack warm``.
+
+``klack cache``: truth = the folder as it is, and the exit codes that the command promises.
+
+``klack warm``: truth = the number of functions that a command compiles after it.
+"""
 
 import json
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
 from klack.cache.entry import Entry
 from klack.cache.result_cache import result_cache
+from klack.case.any_case import load_valve_case
 from klack.cli.main import main
+from klack.errors import KlackError
+from klack.network.step_function import is_step_function
+from klack.warming.groups import GROUPS, all_steps
 
 
 @pytest.fixture
@@ -71,3 +83,99 @@ def test_a_wrong_size_is_bad_input(monkeypatch, capsys):
     assert main(["cache"]) == 2
 
     assert "KLACK_CACHE_SIZE: got 'plenty'" in capsys.readouterr().err
+
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+# an output stage with capacitor, gas, several free volumes at the start, three dimensions
+STROKES = (
+    *("demo-stroke", "measured"),
+    *(
+        HOW_TO / f"{name}.yaml"
+        for name in ("boost_driver", "pneumatic_valve", "common_rail", "half_section_stroke")
+    ),
+)
+COUNT = """
+import json, sys
+from klack.warming.run import counted
+from klack.cli.main import main
+for words in json.loads(sys.argv[1]):
+    with counted() as count:
+        code = main(words)
+    print(code, count.functions, *words)
+"""
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory):
+    """Run it once, with whatever the store of this machine holds already."""
+    file = tmp_path_factory.mktemp("warm") / "warm.json"
+    command = [sys.executable, "-m", "klack", "warm", "--json", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return json.loads(file.read_text()), done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_every_step_of_the_valves_of_the_how_to_pages_is_in_a_group():
+    """Wherever its file is; steps of the user's own and of other programs are compiled by none."""
+    known, found = all_steps(), set()
+    for path in sorted(HOW_TO.glob("*.yaml")):
+        try:
+            rows = load_valve_case(path).network.network().rows()
+        except KlackError:  # a study, an impact, or a valve with bodies
+            continue
+        found |= {row.step for row in (*rows.elements, *rows.branches)}
+
+    found = {step for step in found if is_step_function(step)}
+    assert len(found) > 15
+    assert found <= known
+
+
+@pytest.mark.slow
+def test_it_says_what_was_compiled_and_where(warm):
+    numbers, said = warm
+
+    assert numbers["schema"] == "klack-warm/1"
+    assert numbers["folder"] in said
+    assert numbers["count"] > 150
+    assert numbers["size_B"] > 1e6
+    assert set(numbers["groups"]) == set(GROUPS)
+
+
+@pytest.mark.slow
+def test_a_second_time_compiles_nothing(warm, capsys):
+    assert main(["warm", "--json", "-"]) == 0
+
+    again = json.loads(capsys.readouterr().out)
+    assert not any(group["compiled"] for group in again["groups"].values())
+    assert again["count"] >= warm[0]["count"]  # other processes may add to the store
+
+
+@pytest.mark.slow
+def test_commands_compile_nothing(warm, tmp_path):
+    """Strokes of shipped cases, an impact at two levels, and derivatives, in one new process."""
+    valve, parameter = HOW_TO / "small_valve.yaml", "network.components.spring.preload"
+    kept = ["--quiet", "--no-report", "--out", str(tmp_path / "out")]
+    commands = [
+        *(["stroke", str(case), "--duration", "0.1 ms", *kept] for case in STROKES),
+        ["impact", "two-rods", "--level", "reduced,interface", *kept],
+        ["linearise", str(valve), *kept],
+        ["sensitivities", str(valve), "--parameter", parameter, "--quiet"],
+    ]
+    program = [sys.executable, "-c", COUNT, json.dumps(commands)]
+    done = subprocess.run(program, capture_output=True, text=True, check=True)
+
+    expected = [" ".join(["0 0", *words]) for words in commands]
+    assert [line for line in done.stdout.splitlines() if line] == expected, done.stderr
+
+
+def test_no_folder_is_a_clear_error(tmp_path, monkeypatch, capsys):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+
+    assert main(["warm"]) == 2
+
+    problem = capsys.readouterr().err
+    assert str(tmp_path / "file") in problem
+    assert "NUMBA_CACHE_DIR" in problem

@@ -1,30 +1,43 @@
-"""What a mesh alone cannot tell of its contact: width, sharp edges, ends of the named surface.
+"""What is doubted about a contact: its mesh, its yield stress.
+
+What a mesh alone cannot tell of its contact: width, sharp edges, ends of the named surface.
 
 Truth: Hertz's laws (Johnson 1985, 4.22 and 4.45) and the contact of a mesh that resolves it; angles
 and names of the drawing.
+
+What a contact says of its yield; truth: yield stresses of steels, 0.2 to 2.4 GPa.
+
+What leaves out the yield stress of a material says so.
 """
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
 from doubts import doubts
 
+from klack.analyses.contact_doubts import elastic_above
 from klack.analyses.impact.contact_check import (
     FEWEST_POINTS,
     ContactCheck,
     check_contact,
     ends_reached,
 )
+from klack.analyses.impact.recovered_motion import recovered_motion
 from klack.analyses.impact.run import run_impact
+from klack.analyses.noise.source import impact_sources
+from klack.analyses.reduction.run import run_reduce
 from klack.assembling.problem import build_problem
-from klack.case import read_case
+from klack.assembling.yielding import tell_elastic
+from klack.case import load_case, read_case
 from klack.case.schema import Case
 from klack.contact.statics import COARSE
 from klack.contact.surface_edges import surface_edges
 from klack.errors import AccuracyWarning
+from klack.exchange.case_models import case_models
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing
@@ -304,3 +317,64 @@ def test_a_set_of_faces_in_a_mesh_is_known_by_its_name():
     surfaces = MappingProxyType(dict(named.surfaces))
     ends = surface_edges(replace(named, surfaces=surfaces), named.surface("tip"))
     assert ends.neighbour == ("SET-2",)
+
+
+@pytest.mark.parametrize(
+    ("needed", "words"),
+    [
+        (0.4e9, "stay elastic from a yield stress of about 400 MPa on"),
+        (5.5e9, "would yield: elastic ones need a yield stress of 5.5 GPa, and hardened steel has"),
+        (float("nan"), ""),
+    ],
+)
+def test_a_yield_stress_that_no_steel_has_is_no_comfort(needed, words):
+    contact = SimpleNamespace(surfaces="needle.tip on housing.seat", needed_yield=needed)
+
+    said = elastic_above(contact)  # type: ignore[arg-type]
+
+    assert words in said
+    assert ("Try: 'yield'" in said) == (needed > 2.5e9)
+
+
+SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
+
+
+def _quiet(*_):
+    pass
+
+
+@pytest.mark.slow
+def test_reduced_bodies_exports_and_recovered_motion_say_that_they_are_elastic():
+    case = load_case(SPHERES)
+    with pytest.warns(AccuracyWarning, match="reduced bodies are those of elastic .* 'steel'"):
+        run_reduce(case)
+    with pytest.warns(AccuracyWarning, match="exported models are those of elastic bodies"):
+        case_models(case)
+    with pytest.warns(AccuracyWarning, match="recovered motion is that of elastic bodies"):
+        list(recovered_motion(build_problem(case, _quiet), [0], _quiet))
+
+
+def test_elastic_materials_say_nothing():
+    text = SPHERES.read_text("utf-8")
+    given = ", yield: 280 MPa, hardening: {isotropic: 1 GPa}"
+    assert given in text
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        tell_elastic(read_case(text.replace(given, ""), SPHERES), "these are")
+
+
+@pytest.mark.slow
+def test_noise_of_an_impact_says_that_its_faces_were_new():
+    """Truth: the share of the energy in the balance of the impact."""
+    study = run_impact(load_case(SPHERES), levels=["reduced"], certify=False)
+    energies = study.levels["reduced"].energies
+    share = energies["plastic"] / energies["initial kinetic"]
+
+    (source,) = impact_sources(study)
+
+    told = [note for note in source.notes if "first on new faces" in note]
+    assert len(told) == 1
+    assert f"takes {100 * share:.2g} % of the energy" in told[0]
+    worn = replace(study.levels["reduced"], energies=energies | {"plastic": 0.0})
+    (after,) = impact_sources(replace(study, levels={"reduced": worn}))
+    assert not any("new faces" in note for note in after.notes)

@@ -1,4 +1,9 @@
-"""Truth: closed formulas of spool edges, fittings and pipes, and of elastic walls."""
+"""Edges of spools, notches, fittings and pipes.
+
+Truth: closed formulas of spool edges, fittings and pipes, and of elastic walls.
+
+Truth: limits of notched spool edges, and what is refused; areas are checks of `klack verify`.
+"""
 
 from math import cos, log10, pi, radians, sqrt
 
@@ -11,6 +16,7 @@ from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
 from klack.hydraulics.line_friction import laminar_resistance
+from klack.hydraulics.notch import Notch, notch_opening
 from klack.hydraulics.pipe_friction import PipeFriction
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_loss import PressureLoss
@@ -21,10 +27,12 @@ from klack.network.network import Network
 from klack.network.rows import Ambient, Rows
 from klack.network.step_function import evaluate
 from klack.simulation.network_run import simulate_network
+from klack.verification.benches import RHO_OIL as RHO
+from klack.verification.benches import branch_of, branch_step
 
 AMBIENT = Ambient()
 OIL = library_fluid("ISO VG 46").at(313.15)
-RHO = float(OIL.density(AMBIENT.pressure))
+RHO_EDGES = float(OIL.density(AMBIENT.pressure))
 MU = float(OIL.viscosity(AMBIENT.pressure))
 HANDLES = {"a": 1, "b": 2, "spool": 0, "body": -1}
 EDGE = {"diameter": 6e-3, "radial_clearance": 4e-6, "overlap": 50e-6, "cavitation": None}
@@ -37,7 +45,11 @@ def step(part, p_a, p_b, y=0.0, body=0.0):
     ports = (y, y, body, body) if row.ports else ()
     size = 3 + len(row.ports) + row.state.size
     status, out = evaluate(
-        row.step, row.parameters, row.state, [0.0, 1e-6, p_a, p_b, RHO, RHO, *ports], size
+        row.step,
+        row.parameters,
+        row.state,
+        [0.0, 1e-6, p_a, p_b, RHO_EDGES, RHO_EDGES, *ports],
+        size,
     )
     assert status == 0
     return out
@@ -56,7 +68,7 @@ def test_area_of_an_open_edge_is_that_of_the_aslant_slot(direction, sign, openin
     area = (width or pi * 6e-3) * sqrt(opening**2 + (4e-6) ** 2)
     assert out[5] == pytest.approx(opening, abs=1e-15)
     assert out[6] == pytest.approx(area, rel=1e-9)
-    assert out[0] == pytest.approx(0.7 * area * sqrt(2 * RHO * 30e5), rel=1e-8)
+    assert out[0] == pytest.approx(0.7 * area * sqrt(2 * RHO_EDGES * 30e5), rel=1e-8)
 
 
 @pytest.mark.parametrize("covered", [0.2e-3, 1e-3, 5e-3])
@@ -68,8 +80,8 @@ def test_leakage_of_a_closed_edge_is_that_of_its_annulus(covered, eccentricity):
     slot = pi * 6e-3 * (4e-6) ** 3 / (12 * MU * covered) * (1 + 1.5 * eccentricity**2)
     # the edge in series takes lambda_c c/(96 C_q L) of the drop, and something of the turbulent one
     edge = 100 * 4e-6 / (96 * 0.7 * covered) * (1 + 1.5 * eccentricity**2)
-    assert out[0] / RHO == pytest.approx(slot * 30e5, rel=1.2 * edge)
-    assert out[0] / RHO < slot * 30e5
+    assert out[0] / RHO_EDGES == pytest.approx(slot * 30e5, rel=1.2 * edge)
+    assert out[0] / RHO_EDGES < slot * 30e5
 
 
 @pytest.mark.slow
@@ -116,10 +128,10 @@ def test_pressure_loss_is_that_of_hooper(drop):
     )
     out = step(part, 20e5 + drop, 20e5)
 
-    speed = abs(out[0]) / RHO / (pi / 4 * 1e-4)
-    reynolds = RHO * speed * 10e-3 / MU
+    speed = abs(out[0]) / RHO_EDGES / (pi / 4 * 1e-4)
+    reynolds = RHO_EDGES * speed * 10e-3 / MU
     zeta = 800 / reynolds + (0.25 if drop > 0 else 0.6)
-    assert zeta * RHO / 2 * speed**2 == pytest.approx(abs((20e5 + drop) - 20e5), rel=1e-12)
+    assert zeta * RHO_EDGES / 2 * speed**2 == pytest.approx(abs((20e5 + drop) - 20e5), rel=1e-12)
     assert np.sign(out[0]) == np.sign(drop)
     up, down = (step(part, 20e5 + drop * s, 20e5)[0] for s in (1 + 1e-4, 1 - 1e-4))
     assert out[1] == pytest.approx((up - down) / (2e-4 * abs(drop)) * np.sign(drop), rel=1e-4)
@@ -131,10 +143,10 @@ def test_a_sudden_expansion_recovers_what_borda_and_carnot_leave():
     zeta = (1 - small / large) ** 2
     out = step(PressureLoss(area=small, coefficient=zeta, laminar_coefficient=1e-6), 3e5, 1e5)
 
-    v1 = out[0] / RHO / small
+    v1 = out[0] / RHO_EDGES / small
     v2 = v1 * small / large
     # momentum over the step, less Bernoulli: rho/2 (v1 - v2)^2
-    assert RHO / 2 * (v1 - v2) ** 2 == pytest.approx(2e5, rel=1e-9)
+    assert RHO_EDGES / 2 * (v1 - v2) ** 2 == pytest.approx(2e5, rel=1e-9)
 
 
 # ---- pipe friction --------------------------------------------------------------------------
@@ -154,12 +166,12 @@ def test_pipe_friction_is_that_of_hagen_poiseuille_and_colebrook(reynolds, rough
             xtol=1e-16,
             rtol=1e-14,
         )
-    speed = reynolds * MU / (RHO * D)
-    drop = f * L / D * RHO / 2 * speed**2
+    speed = reynolds * MU / (RHO_EDGES * D)
+    drop = f * L / D * RHO_EDGES / 2 * speed**2
     part = PipeFriction(length=L, diameter=D, roughness=roughness)
     for sign in (1.0, -1.0):
         out = step(part, sign * drop, 0.0)
-        assert out[0] == pytest.approx(sign * RHO * speed * pi / 4 * D**2, rel=1e-10)
+        assert out[0] == pytest.approx(sign * RHO_EDGES * speed * pi / 4 * D**2, rel=1e-10)
         assert out[3] == pytest.approx(reynolds, rel=1e-10)
         up, down = (step(part, sign * drop * s, 0.0)[0] for s in (1 + 1e-5, 1 - 1e-5))
         assert out[1] == pytest.approx(sign * (up - down) / (2e-5 * drop), rel=1e-7)
@@ -180,7 +192,9 @@ def test_flow_of_a_pipe_rises_through_the_transition_without_a_jump():
 def test_laminar_resistance_is_that_of_lines():
     out = step(PipeFriction(length=2.0, diameter=3e-3), 10.0, 0.0)
 
-    assert 10.0 / (out[0] / RHO) == pytest.approx(laminar_resistance(2.0, 3e-3, MU), rel=1e-14)
+    assert 10.0 / (out[0] / RHO_EDGES) == pytest.approx(
+        laminar_resistance(2.0, 3e-3, MU), rel=1e-14
+    )
 
 
 # ---- walls ----------------------------------------------------------------------------------
@@ -295,6 +309,113 @@ def test_a_hose_slows_the_waves_of_a_line():
     ],
 )
 def test_wrong_numbers_are_refused_in_words(build, text):
+    with pytest.raises(InputError, match=r"(?s)Try: ") as caught:
+        build()
+
+    assert text in str(caught.value)
+
+
+EDGE_NOTCHES = {"diameter": 6e-3, "radial_clearance": 4e-6, "overlap": 1e-3, "cavitation": None}
+SIZES = {
+    "rectangular": {"width": 1e-3, "length": 0.8e-3, "depth": 0.3e-3},
+    "triangular": {"width": 1e-3, "length": 0.8e-3, "depth": 0.3e-3},
+    "round": {"width": 1e-3, "length": 0.8e-3, "depth": 0.3e-3},
+    "hole": {"width": 0.6e-3, "length": 0.8e-3},
+}
+
+
+def notch(shape, **changed):
+    return {"shape": shape, "count": 4, **SIZES[shape], **changed}
+
+
+def edge(*notches, **changed):
+    return SpoolEdge(**{**EDGE_NOTCHES, "direction": "opening", "notches": notches, **changed})
+
+
+def steps(part, displacements, p_a=50e5, p_b=20e5):
+    row = branch_of(part)
+    return np.array([branch_step(row, p_a, p_b, ports=(y, y, 0.0, 0.0)) for y in displacements])
+
+
+@pytest.mark.parametrize("shape", SIZES)
+def test_flow_rises_without_a_jump_from_covered_to_open(shape):
+    y = np.linspace(-0.2e-3, 1.4e-3, 4001)
+    flow = steps(edge(notch(shape)), y)[:, 0]
+
+    assert np.all(np.diff(flow) > 0.0)
+    # 0.4 um more opens 0.4 um of the whole edge at most
+    fully = 0.7 * pi * 6e-3 * 0.4e-6 * sqrt(2 * RHO * 30e5)
+    assert np.max(np.diff(flow)) < 1.01 * fully
+
+
+@pytest.mark.parametrize("shape", SIZES)
+def test_slopes_are_those_of_the_flow(shape):
+    part, h = edge(notch(shape), cavitation=0.62), 10.0
+    for y in (0.1e-3, 0.4e-3, 1.1e-3):
+        for p_a, p_b in ((50e5, 20e5), (20e5, 50e5)):
+            out = steps(part, [y], p_a, p_b)[0]
+            by_a = (steps(part, [y], p_a + h, p_b)[0][0] - steps(part, [y], p_a - h, p_b)[0][0]) / (
+                2 * h
+            )
+            by_b = (steps(part, [y], p_a, p_b + h)[0][0] - steps(part, [y], p_a, p_b - h)[0][0]) / (
+                2 * h
+            )
+            assert out[1] == pytest.approx(by_a, rel=1e-5, abs=0.0)  # round-off over 10 Pa
+            assert out[2] == pytest.approx(by_b, rel=1e-5, abs=0.0)
+
+
+@pytest.mark.parametrize("length", [0.2e-3, 0.5e-3])
+def test_a_round_notch_cut_by_the_edge_is_a_segment_of_its_circle(length):
+    numbers = np.array(Notch(**notch("round", length=length, depth=2e-3)).numbers)
+    area, r = notch_opening(numbers, 0, 0.0, 4e-6, 4e-6)[1], 0.5e-3
+    half = np.arccos((r - length) / r)
+
+    assert area == pytest.approx(r * r * (half - np.sin(half) * np.cos(half)), rel=1e-13, abs=0.0)
+    assert numbers[5] == pytest.approx(2 * r * np.sin(half), rel=1e-13, abs=0.0)
+
+
+def test_holes_alone_open_no_edge():
+    out = steps(edge(notch("hole"), width=0.0), [5e-3])[0]
+
+    assert out[6] == pytest.approx(4 * pi / 4 * 0.36e-6, rel=1e-12, abs=0.0)
+
+
+def test_a_port_limits_notches_and_edge_together():
+    part = edge(notch("rectangular"), notch("hole"), largest_area=1e-6)
+
+    assert steps(part, [3e-3])[0][6] == pytest.approx(1e-6, rel=1e-15, abs=0.0)
+
+
+def test_the_length_of_the_column_counts_the_flow_of_the_notches():
+    part = edge(
+        notch("rectangular"), flow_force={"velocity_coefficient": 0.0, "damping_length": 1e-2}
+    )
+    row = branch_of(part)
+    ports = (0.8e-3, 0.8e-3, 0.0, 0.0)
+    known = branch_step(row, 50e5, 20e5, ports=ports)[8] - 1e-4
+    state = [0.0, 0.0, 0.0, known, 1.0]
+    out = branch_step(row, 50e5, 20e5, h=1e-6, state=state, ports=ports)
+
+    assert out[3] == pytest.approx(-1e-2 * 1e-4 / 1e-6, rel=1e-9)
+    assert out[4] == -out[3]
+
+
+@pytest.mark.parametrize(
+    ("build", "text"),
+    [
+        (lambda: edge(notch("rectangular", depth=3e-6)), "between the clearance of 0.004 mm"),
+        (lambda: edge(notch("rectangular", depth=4e-3)), "the radius of the spool, 3 mm"),
+        (lambda: edge(notch("triangular", count=40)), "notches of 40 mm in all"),
+        (lambda: edge(notch("hole", count=40)), "notches of 24 mm in all"),
+        (lambda: edge(notch("round"), width=3e-3), "at most the 3 mm of the edge"),
+        (lambda: edge(notch("hole", length=0.5e-3)), "at least its diameter"),
+        (lambda: edge(notch("hole", depth=1e-3)), "it goes through"),
+        (lambda: edge({"shape": "round", "count": 1, "width": 1e-3, "length": 1e-3}), "depth"),
+        (lambda: edge(width=0.0), "0 mm without notches"),
+        (lambda: edge(notch("rectangular", count=0)), "count"),
+    ],
+)
+def test_wrong_notches_are_refused_in_words(build, text):
     with pytest.raises(InputError, match=r"(?s)Try: ") as caught:
         build()
 

@@ -1,9 +1,20 @@
-"""Nonlinear spring, surge, rubber, LuGre friction, lever: their formulas, ends and errors."""
+"""Mechanical components: formulas, forces, one of one's own.
+
+Nonlinear spring, surge, rubber, LuGre friction, lever: their formulas, ends and errors.
+
+Forces of the mechanical components against their formulas, at the scale of a valve.
+
+The component of the how-to page slows down as its formula says, compiled and in Python.
+"""
 
 import re
 import warnings
+from collections.abc import Iterator
+from importlib import import_module
 from itertools import pairwise
+from math import cos, pi
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
@@ -17,6 +28,9 @@ from klack.control.pid import PidController
 from klack.control.sensor import Sensor
 from klack.errors import AccuracyWarning, InputError
 from klack.mechanics.controlled_force import ControlledForce
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.force_over_stroke import ForceOverStroke
+from klack.mechanics.gravity import STANDARD_GRAVITY, Gravity
 from klack.mechanics.lever import Lever
 from klack.mechanics.lugre_friction import LuGreFriction
 from klack.mechanics.nonlinear_spring import NonlinearSpring
@@ -33,6 +47,7 @@ from klack.network.step_function import evaluate
 from klack.simulation.network_run import simulate_network
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
+
 
 _H = 20e-9
 
@@ -389,3 +404,130 @@ def test_components_shown_on_the_page_are_valid(tmp_path):
     for block in shown:
         for keys in yaml.safe_load(block).values():
             component_class(keys.pop("type")).model_validate(keys, context={"folder": tmp_path})
+
+
+H = 20e-9  # [s]
+
+
+def force_of(part: Component, y0: float, y1: float, t: float = 0.0, h: float = H) -> float:
+    """Mean force [N] on a needle of 3 g that moves from y0 to y1."""
+    parts = {"needle": RigidMass(mass=3e-3), "part": part}
+    row = Network(parts, [["needle.body", f"part.{next(iter(part.port_kinds()))}"]]).rows()
+    element = row.elements[0]
+    inputs = [t, h, *[y0, y1] + [0.0, 0.0] * (len(element.ports) - 1)]
+    status, out = evaluate(element.step, element.parameters, element.state, inputs, 8)
+    assert status == 0
+    return float(out[0])
+
+
+def test_return_spring_closes_with_preload_and_rate():
+    spring = Spring(stiffness=5e3, preload=20.0)
+
+    assert force_of(spring, 0.0, 0.0) == -20.0
+    assert force_of(spring, 80e-6, 80e-6) == pytest.approx(-20.4, rel=1e-15)
+    assert force_of(spring, 40e-6, 120e-6) == pytest.approx(-20.4, rel=1e-15)
+
+
+def test_spring_damping_is_that_of_the_mean_speed():
+    spring = Spring(stiffness=5e3, preload=0.0, damping=0.5)
+
+    force = force_of(spring, -5e-9, 5e-9)  # 0.5 m/s through zero
+
+    assert force == pytest.approx(-0.25, rel=1e-14)
+
+
+def test_constant_force_is_constant():
+    assert force_of(ConstantForce(force=-15.0), 1.0, 2.0) == -15.0
+
+
+@pytest.mark.parametrize("h", [20e-9, 3e-6, 40e-6])
+def test_force_over_time_has_the_exact_impulse_for_any_step(h):
+    time, force = np.array([2e-6, 5e-6, 5.001e-6, 30e-6]), np.array([1.0, 1.0, 40.0, -10.0])
+    part = ForceOverTime(time=tuple(time), force=tuple(force))
+    parts = {"needle": RigidMass(mass=3e-3), "part": part}
+    row = Network(parts, [["needle.body", "part.end"]]).rows().elements[0]
+
+    impulse, state, count = 0.0, row.state, int(np.ceil(42e-6 / h))
+    for k in range(count):
+        _, out = evaluate(row.step, row.parameters, state, [k * h, h, 0.0, 0.0], 3)
+        impulse, state = impulse + out[0] * h, out[1:2]
+
+    end = count * h
+    exact = 1.0 * 2e-6 + np.trapezoid(force, time) - 10.0 * (end - 30e-6)
+    assert impulse == pytest.approx(exact, rel=1e-12)  # 2100 sums
+
+
+def test_force_over_stroke_reads_its_lines_and_stays_constant_beyond():
+    latch = ForceOverStroke(stroke=(0.0, 30e-6, 80e-6), force=(-12.0, 3.0, 40.0))
+
+    assert force_of(latch, 10e-6, 10e-6) == pytest.approx(-7.0, rel=1e-14)
+    assert force_of(latch, 5e-6, 15e-6) == pytest.approx(-7.0, rel=1e-14)
+    assert force_of(latch, -50e-6, -20e-6) == -12.0
+    assert force_of(latch, 90e-6, 200e-6) == 40.0
+
+
+@pytest.mark.parametrize("way", [(10e-6, 60e-6), (60e-6, 10e-6), (-40e-6, 140e-6)])
+def test_force_over_stroke_is_the_mean_over_the_way(way):
+    x, force = np.array([0.0, 30e-6, 80e-6]), np.array([-12.0, 3.0, 40.0])
+    latch = ForceOverStroke(stroke=tuple(x), force=tuple(force))
+    fine = np.unique(np.concatenate([np.clip(x, min(way), max(way)), way]))
+
+    mean = np.trapezoid(np.interp(fine, x, force), fine) / (fine[-1] - fine[0])
+
+    assert force_of(latch, *way) == pytest.approx(mean, rel=1e-13)
+
+
+def test_weight_counts_the_inclination():
+    upright, lying = Gravity(), Gravity(inclination=pi / 2)
+
+    assert force_of(upright, 0.0, 0.0) == pytest.approx(-3e-3 * STANDARD_GRAVITY, rel=1e-15)
+    assert force_of(Gravity(inclination=0.5), 0.0, 0.0) == pytest.approx(
+        -3e-3 * STANDARD_GRAVITY * cos(0.5), rel=1e-15
+    )
+    assert force_of(lying, 0.0, 0.0) == pytest.approx(0.0, abs=1e-17)
+
+
+def test_a_rigid_mass_moves_by_newton_and_starts_with_its_speed():
+    rows = Network({"needle": RigidMass(mass=3e-3, speed=-0.5, points=("tip", "top"))}, []).rows()
+
+    body = rows.bodies[0].body
+    assert body.port_shapes.T @ body.port_shapes == pytest.approx(1 / 3e-3, rel=1e-15)
+    assert rows.bodies[0].speed * (body.port_shapes.T @ body.rigid_axial) == pytest.approx(-0.5)
+
+
+HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
+
+
+@pytest.fixture(scope="module")
+def example() -> Iterator[ModuleType]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(HOW_TO)
+        yield import_module("eddy_brake")
+
+
+def test_the_brake_slows_down_by_its_formula(example):
+    speed, residual = example.slow_down(example.EddyBrake(damping=2.0, critical_speed=0.5))
+
+    # second order: (h/tau)^2 with tau = m/c = 1.5 ms
+    assert example.time_to(speed, 2.0, 0.5) == pytest.approx(2e-3, rel=1e-7)
+    assert residual < 1e-12
+
+
+def test_plain_python_gives_the_same(example):
+    settings = {"damping": 2.0, "critical_speed": 0.5}
+
+    compiled = example.slow_down(example.EddyBrake(**settings))
+    plain = example.slow_down(example.PlainEddyBrake(**settings))
+
+    assert plain[0] == pytest.approx(compiled[0], rel=1e-12)  # order of operations
+
+
+def test_the_page_shows_the_code_that_runs():
+    source = (HOW_TO / "eddy_brake.py").read_text()
+    page = (HOW_TO / "add-a-component.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+
+    assert len(blocks) == 4
+    lines = {line.split("#")[0].strip() for line in source.splitlines()}
+    for block in blocks[:3]:
+        assert {line.strip() for line in block.splitlines()} <= lines

@@ -1,10 +1,16 @@
-"""Friction in a guide that sticks, in the time loop of networks."""
+"""Friction in a guide, and its entry in the energy balance.
+
+Friction in a guide that sticks, in the time loop of networks.
+
+Friction as an entry of the energy balance (exact).
+"""
 
 from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
 
+from klack.contact.history import BodyEnergy, EnergyLedger
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.force import ForceOverTime
 from klack.mechanics.friction import GuideFriction
@@ -14,6 +20,7 @@ from klack.network.network import Network
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.simulation.slider_step import largest_friction, slider_force
+from klack.transient.interface_result import InterfaceEnergy
 
 MASS = 2e-3
 BALANCE = 1e-12
@@ -249,3 +256,35 @@ def test_the_force_of_a_step_never_gives_energy():
             turned = way * (speed - D * viscous / h * way / (1 + G * viscous / h)) <= 0.0
             still = min(abs(slip) / abs(way), abs(after) / (abs(speed) + D))
             assert turned or still < 1e-9
+
+
+BODY = BodyEnergy(name="needle", translation=0.7, vibration=0.05, strain=0.01)
+
+
+def test_friction_is_a_loss_like_the_others():
+    ledger = EnergyLedger(
+        initial=1.0, bodies=(BODY,), contact_dissipation=0.02, damping=0.03, friction=0.2
+    )
+    assert ledger.residual == pytest.approx(0.0, abs=1e-15)
+    assert ledger.lost == pytest.approx(0.25)
+    assert ledger.parts()["friction"] == 0.2
+    assert ledger.least_loss == 0.02
+
+
+def test_a_gain_by_friction_is_a_negative_loss():
+    ledger = EnergyLedger(initial=1.0, bodies=(BODY,), damping=0.3, friction=-0.05)
+    assert ledger.least_loss == pytest.approx(-0.05)
+
+
+def test_so_it_is_at_the_interface_level():
+    energy = InterfaceEnergy(
+        initial=1.0, final=0.9, damping=0.1, guide=0.02, work=0.0, debt=0.0, friction=-0.02
+    )
+    assert energy.residual == pytest.approx(0.0, abs=1e-15)
+    assert energy.least_loss == pytest.approx(-0.02)
+
+
+def test_without_friction_there_is_no_entry_for_it():
+    ledger = EnergyLedger(initial=1.0, bodies=(BODY,), contact_dissipation=0.02, damping=0.03)
+    assert "friction" not in ledger.parts()
+    assert ledger.least_loss == 0.02

@@ -1,18 +1,34 @@
-"""Files of the browser application: only below the folder, whole, bounded."""
+"""Files and runs of the browser application.
+
+Files of the browser application: only below the folder, whole, bounded.
+
+The application writes and deletes only its own files, and waits for no odd one of others.
+
+Runs of the browser application: found again, cancelled, told apart.
+"""
 
 import asyncio
 import errno
+import json
 import os
+import socket
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import chdir
 from pathlib import Path
 
+import psutil
 import pytest
 
 from klack.analyses import store
 from klack.app import folder as app_folder
+from klack.app import jobs as jobs_module
 from klack.app.folder import LARGEST_CASE, OpenFolder, result_names
-from klack.app.state import Notes, Sounds, State
+from klack.app.jobs import Job, Jobs
+from klack.app.state import Notes, Sounds, State, Uploads
+from klack.app.valve_plan import Plans, ValvePlan
 from klack.case import case_text
 from klack.errors import InputError
 
@@ -242,3 +258,378 @@ def test_a_full_disk_is_named_as_such(folder, monkeypatch):
     with pytest.raises(InputError, match="No space left on device, expected room") as refused:
         folder.write("case.yaml", "typed")
     assert "reload" not in str(refused.value)  # the text is in the page alone
+
+
+NAME = "20260101-000000-01234567"
+
+
+@pytest.fixture
+def outside(tmp_path: Path) -> Path:
+    """A folder of the user's beside the opened one, with more STEP files than are kept."""
+    place = tmp_path / "outside"
+    for inner in ("uploads", f"jobs/{NAME}", "run"):
+        (place / inner).mkdir(parents=True)
+    for number in range(20):
+        for folder in (place, place / "uploads"):
+            (folder / f"{number:024x}.step").write_text("ISO-10303-21;")
+    for name in ("notes.json", "new-valve.json"):
+        (place / name).write_text('{"case.yaml": "of another"}')
+    (place / "jobs" / NAME / "job.json").write_text(
+        '{"command": "impact", "case": "case.yaml", "out": "x", "started": 1.0}'
+    )
+    return place
+
+
+@pytest.fixture
+def folder_own(tmp_path: Path) -> OpenFolder:
+    """An opened folder with a case."""
+    (tmp_path / "cases").mkdir()
+    (tmp_path / "cases" / "case.yaml").write_text("klack: 1\n")
+    return OpenFolder(tmp_path / "cases")
+
+
+def _content(place: Path) -> dict[str, bytes]:
+    return {
+        path.relative_to(place).as_posix(): path.read_bytes() if path.is_file() else b""
+        for path in place.rglob("*")
+    }
+
+
+def _upload(folder: OpenFolder) -> str:
+    async def parts():
+        yield b"ISO-10303-21;"
+
+    return asyncio.run(Uploads(folder).take(parts()))
+
+
+def _start(folder: OpenFolder) -> object:
+    return Jobs(folder).start("impact", "case.yaml", "klack-results/case")
+
+
+@pytest.mark.parametrize(
+    ("planted", "act"),
+    [
+        (".klack-app", _upload),
+        (".klack-app/uploads", _upload),
+        (".klack-app", lambda folder: Notes(folder).set_note("case.yaml", "mine")),
+        (".klack-app", lambda folder: Notes(folder).set_draft("case.yaml", "mine")),
+        (".klack-app", lambda folder: Plans(folder).keep(ValvePlan())),
+        (".klack-app", lambda folder: Plans(folder).forget()),
+        (".klack-app", _start),
+        (".klack-app/jobs", _start),
+        ("klack-results", _start),
+        ("klack-results/case", _start),
+    ],
+)
+def test_what_is_behind_a_planted_link_stays_as_it_was(planted, act, folder_own, outside):
+    before = _content(outside)
+    link = folder_own.path / planted
+    link.parent.mkdir(exist_ok=True)
+    link.symlink_to(outside, target_is_directory=True)
+
+    with pytest.raises(InputError, match="a link"):
+        act(folder_own)
+    assert _content(outside) == before
+
+
+_WAITING = """
+import pathlib, sys, time
+while not pathlib.Path("go").exists():
+    time.sleep(0.02)
+from klack.cli.job_process import run
+sys.exit(run(sys.argv[1:]))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="folders are named by handles on Linux")
+def test_a_run_writes_nothing_behind_a_link_that_takes_the_place_of_its_folder(
+    folder_own, outside, monkeypatch
+):
+    """Exact: what is behind the link stays, and the folder that was moved gets the ending."""
+    real = subprocess.Popen
+    monkeypatch.setattr(
+        jobs_module.subprocess,
+        "Popen",
+        lambda words, **more: real([*words[:2], "-c", _WAITING, *words[4:]], **more),
+    )
+    jobs, before = Jobs(folder_own), _content(outside)
+    jobs.start("impact", "case.yaml", "klack-results/case")
+    (place,) = (folder_own.path / ".klack-app" / "jobs").iterdir()
+    place.rename(folder_own.path / "moved")
+    place.symlink_to(outside, target_is_directory=True)
+    (folder_own.path / "go").touch()
+    for _ in range(1200):
+        if (folder_own.path / "moved" / "ending.json").exists():
+            break
+        time.sleep(0.05)
+
+    assert (folder_own.path / "moved" / "ending.json").exists()
+    assert _content(outside) == before
+
+
+def test_runs_and_notes_behind_a_link_are_not_there(folder_own, outside):
+    (folder_own.path / ".klack-app").symlink_to(outside, target_is_directory=True)
+    jobs, before = Jobs(folder_own), _content(outside)
+
+    assert Notes(folder_own).note("case.yaml") == ""
+    assert jobs.all() == []
+    jobs.forget(NAME)
+    jobs.cancel(NAME)
+    assert _content(outside) == before
+
+
+def test_uploads_beyond_the_most_go_and_files_of_other_names_stay(folder_own):
+    place = folder_own.path / ".klack-app" / "uploads"
+    place.mkdir(parents=True)
+    strange = [f"part {number}.step" for number in range(20)]
+    for name in strange:
+        (place / name).write_text("ISO-10303-21;")
+        os.utime(place / name, (1.0, 1.0))
+    own = [_upload(folder_own).rpartition("/")[2] for _ in range(14)]
+
+    assert {path.name for path in place.iterdir()} == {*strange, *own[2:]}
+
+
+# --------------------------------------------------------------------------- odd entries
+
+
+@pytest.fixture
+def odd(folder_own: OpenFolder) -> OpenFolder:
+    """The opened folder, with entries of all kinds that are no plain files."""
+    os.mkfifo(folder_own.path / "pipe.yaml")
+    (folder_own.path / "endless.yaml").symlink_to("/dev/zero")
+    with socket.socket(socket.AF_UNIX) as own, chdir(folder_own.path):
+        own.bind("socket.step")
+    for name in (b"caf\xe9.yaml", b"caf\xe9.step"):
+        Path(os.fsdecode(os.fsencode(folder_own.path) + b"/" + name)).write_text("klack: 1\n")
+    return folder_own
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names that are no text are of Linux")
+def test_the_list_names_odd_entries_and_waits_for_none(odd):
+    found = odd.look()
+
+    assert (found.cases, found.steps, found.is_whole) == (("case.yaml",), (), True)
+    assert found.odd == (
+        "caf\\xe9.step (a name that is not UTF-8)",
+        "caf\\xe9.yaml (a name that is not UTF-8)",
+        "endless.yaml (a symbolic link)",
+        "pipe.yaml (a named pipe)",
+        "socket.step (a socket)",
+    )
+    for text in found.odd:
+        text.encode()  # else no page of it reaches the browser
+
+
+def test_a_file_that_becomes_a_pipe_while_it_is_listed_does_not_block(odd):
+    assert not app_folder._is_case(odd.path / "pipe.yaml")
+    assert not app_folder._is_case(odd.path / "endless.yaml")
+    assert app_folder._is_case(odd.path / "case.yaml")
+
+
+def test_a_result_with_a_pipe_in_it_is_refused_before_it_is_read(folder_own):
+    result = folder_own.path / "run" / "result.zarr" / "inner"
+    result.mkdir(parents=True)
+    (result / "plain").write_text("")
+    folder_own.require_plain("run/result.zarr")
+    os.mkfifo(result / "zarr.json")
+
+    with pytest.raises(InputError, match=r"run/result\.zarr/inner/zarr\.json.*\n?.*a named pipe"):
+        folder_own.require_plain("run/result.zarr")
+
+
+def test_names_that_are_no_text_are_refused_in_words(folder_own, tmp_path):
+    with pytest.raises(InputError, match="not below the folder"):
+        folder_own.read("\udce9.yaml")
+    strange = tmp_path / os.fsdecode(b"\xe9")
+    strange.mkdir()
+    with pytest.raises(InputError, match="not UTF-8"):
+        OpenFolder(strange)
+
+
+def test_ten_thousand_entries_hide_no_case(folder_own):
+    for number in range(10_000):
+        (folder_own.path / f"{number}.yaml").symlink_to("case.yaml")
+    (folder_own.path / "z").mkdir()
+    (folder_own.path / "z" / "case.yaml").write_text("klack: 1\n")
+    found = folder_own.look()
+
+    assert (found.cases, found.is_whole) == (("case.yaml", "z/case.yaml"), True)
+    assert len(found.odd) == 10_000
+
+
+@pytest.fixture
+def folder_jobs(tmp_path: Path) -> OpenFolder:
+    (tmp_path / "bad.yaml").write_text("klack: 1\nnothing: here\n")
+    return OpenFolder(tmp_path)
+
+
+@pytest.fixture
+def sleeping(monkeypatch):
+    """Start processes that sleep instead of computing."""
+    started = []
+    real = subprocess.Popen
+
+    def sleep(arguments, **more):
+        child = real([sys.executable, "-c", "import time; time.sleep(60)"], **more)
+        started.append(child)
+        return child
+
+    monkeypatch.setattr(jobs_module.subprocess, "Popen", sleep)
+    yield started
+    for child in started:
+        child.kill()
+        child.wait()
+
+
+def ended(jobs: Jobs) -> Job:
+    for _ in range(1200):
+        (job,) = jobs.all()
+        if job.state != "running":
+            return job
+        time.sleep(0.05)
+    raise AssertionError("it still runs")
+
+
+@pytest.mark.slow
+def test_a_run_tells_what_went_wrong_in_the_words_of_klack(folder_jobs):
+    jobs = Jobs(folder_jobs)
+    jobs.start("impact", "bad.yaml", "klack-results/bad")
+
+    job = ended(jobs)
+
+    assert (job.state, job.code) == ("failed", 2)
+    assert "nothing" in job.told
+    assert "Try:" in job.told
+
+
+def test_another_server_finds_a_run_and_cancels_it(folder_jobs, sleeping):
+    Jobs(folder_jobs).start("impact", "bad.yaml", "out")
+    other = Jobs(folder_jobs)  # the first one was killed
+
+    (job,) = other.all()
+    assert job.state == "running"
+    with pytest.raises(InputError, match="beside another"):
+        other.start("impact", "bad.yaml", "out")
+    other.cancel(job.name)
+    sleeping[0].wait(10)
+
+    assert ended(other).state == "cancelled"
+    other.forget(job.name)
+    assert other.all() == []
+
+
+def test_a_run_that_was_killed_is_lost_and_its_number_may_be_given_out_again(folder_jobs, sleeping):
+    jobs = Jobs(folder_jobs)
+    job = jobs.start("impact", "bad.yaml", "out")
+    sleeping[0].kill()
+    sleeping[0].wait(10)
+    assert ended(jobs).state == "lost"
+
+    file = folder_jobs.path / ".klack-app" / "jobs" / job.name / "process.json"
+    own = psutil.Process()
+    file.write_text(json.dumps({"pid": own.pid, "begun": own.create_time() - 100.0}))
+
+    assert ended(jobs).state == "lost"
+    jobs.cancel(job.name)  # this process goes on
+
+
+def test_progress_is_read_from_the_folder(folder_jobs, sleeping):
+    jobs = Jobs(folder_jobs)
+    place = folder_jobs.path / ".klack-app" / "jobs" / jobs.start("impact", "bad.yaml", "out").name
+    (place / "progress.json").write_text('{"stage": "modes", "fraction": 0.25}')
+
+    (found,) = jobs.all()
+
+    assert (found.stage, found.fraction) == ("modes", 0.25)
+
+
+@pytest.mark.parametrize("name", ["..", "../../x", "20260101-000000-0123456g", ""])
+def test_names_of_runs_lead_nowhere_else(folder_jobs, name):
+    for use in (Jobs(folder_jobs).cancel, Jobs(folder_jobs).forget):
+        with pytest.raises(InputError):
+            use(name)
+
+
+def test_what_is_started_is_bounded(folder_jobs, sleeping):
+    jobs = Jobs(folder_jobs)
+    for bad in ("rm", "cache", "app"):
+        with pytest.raises(InputError, match="one of"):
+            jobs.start(bad, "bad.yaml", "out")
+    with pytest.raises(InputError):
+        jobs.start("impact", "../bad.yaml", "out")
+    for k in range(4):
+        jobs.start("impact", "bad.yaml", f"out{k}")
+    with pytest.raises(InputError, match="at most 4"):
+        jobs.start("impact", "bad.yaml", "out9")
+
+
+def test_damaged_files_of_a_run_are_no_run(folder_jobs):
+    place = folder_jobs.path / ".klack-app" / "jobs" / "20260101-000000-01234567"
+    place.mkdir(parents=True)
+    for text in ("", "[]", "{}", '{"command": 1}', "{"):
+        (place / "job.json").write_text(text)
+        assert Jobs(folder_jobs).all() == []
+
+
+def test_a_run_that_cannot_be_written_down_is_not_left_running(folder_jobs, sleeping, monkeypatch):
+    def write(held, name, values):
+        if name == "process.json":
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(jobs_module, "_write", write)
+
+    with pytest.raises(InputError, match="No space left on device, expected room"):
+        Jobs(folder_jobs).start("impact", "bad.yaml", "klack-results/bad")
+    assert [child.poll() is not None for child in sleeping] == [True]
+    assert list((folder_jobs.path / ".klack-app" / "jobs").iterdir()) == []
+
+
+def test_a_run_that_misses_the_first_request_to_stop_is_asked_again(folder_jobs, monkeypatch):
+    deaf = """
+import signal, time
+def drop(*_):
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    print("dropped", flush=True)
+signal.signal(signal.SIGTERM, drop)
+print("listens", flush=True)
+time.sleep(60)
+"""
+    real = subprocess.Popen
+    monkeypatch.setattr(
+        jobs_module.subprocess,
+        "Popen",
+        lambda arguments, **more: real([sys.executable, "-c", deaf], **more),
+    )
+    jobs = Jobs(folder_jobs)
+    name = jobs.start("impact", "bad.yaml", "klack-results/bad").name
+    place = folder_jobs.path / ".klack-app" / "jobs" / name
+
+    def says(word):
+        while word not in (place / "stdout").read_text():
+            time.sleep(0.01)
+
+    says("listens")
+    jobs.cancel(name)
+    (job,) = jobs.all()
+    assert (job.state, job.stage) == ("running", "stopping")
+    says("dropped")  # two requests at once would be one
+    os.utime(place / "cancelled", (0, 0))  # asked long ago
+
+    assert ended(jobs).state == "cancelled"
+
+
+def test_a_double_click_starts_one_run(folder_jobs, sleeping):
+    jobs = Jobs(folder_jobs)
+
+    def start(_):
+        try:
+            return jobs.start("impact", "bad.yaml", "klack-results/bad")
+        except InputError:
+            return None
+
+    with ThreadPoolExecutor(4) as threads:
+        found = [job for job in threads.map(start, range(4)) if job is not None]
+
+    assert len(found) == len(sleeping) == 1

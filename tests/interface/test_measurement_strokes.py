@@ -1,4 +1,9 @@
-"""Truth: recordings made here, whose triggers, strokes and defects are known."""
+"""Recordings of strokes.
+
+Truth: recordings made here, whose triggers, strokes and defects are known.
+
+Truth: a valve that stays closed until it opens has touched nothing before.
+"""
 
 import numpy as np
 import pytest
@@ -9,6 +14,7 @@ from klack.errors import InputError
 from klack.measurement.channels import Trigger
 from klack.measurement.cutting import Piece, common_axis, cut_strokes, onto_axis, trigger_level
 from klack.measurement.loading import find_outliers, load_stroke_set
+from klack.measurement.stop_levels import SmoothLift, find_touches
 from klack.signals import TimeSeries
 
 STEP = 2e-6  # [s]
@@ -252,3 +258,22 @@ def test_recordings_whose_trigger_jitters_are_aligned(tmp_path):
     assert np.abs(lift - np.median(lift, axis=0)).max() < 0.6e-6 + 2e-6 * 80e-6 / 300e-6
     starts = np.array([stroke.start for stroke in found.strokes])
     np.testing.assert_allclose(np.diff(starts), 37.3e-6, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("end", [slice(0, 3), slice(-3, None)])
+def test_the_noisy_ends_of_a_smoothed_record_make_no_impacts(end):
+    lift = np.zeros(400)
+    lift[150:250] = 80e-6
+    lift[end] = 5e-6  # above twice the least height
+    smooth = SmoothLift(
+        lift=lift,
+        velocity=np.gradient(lift, 1e-6),
+        noise=1e-6,
+        lift_noise=0.3e-6,
+        velocity_noise=0.03,
+        half=10,
+        least_height=1.5e-6,
+    )
+    touches = find_touches(smooth, {"seat": 0.0})
+
+    assert [(touch.index, touch.rebounds) for touch in touches] == [(250, False)]

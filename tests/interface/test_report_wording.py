@@ -1,20 +1,42 @@
-"""Numbers as text, by hand."""
+"""Words and pictures of reports.
+
+Numbers as text, by hand.
+
+Charts in words: the numbers are those of the data that the chart draws.
+
+The answer to 'how good is the reduced level?'; the truth is the made-up study.
+
+The schematic in reports: truth = the stored picture, and the pages that it is shown on.
+"""
 
 import json
+import re
+import zlib
+from base64 import b64encode
+from contextlib import suppress
 from dataclasses import replace
 
 import pytest
+from schematic_rules import random_network
 
 from klack.analyses.impact.analysis import (
     IMPACT,
     answer_line,
     contact_doubt,
+    estimate_lines,
     study_told,
 )
 from klack.analyses.impact.content import report_content
 from klack.analyses.impact.record import ImpactStudy
-from klack.analyses.impact.wording import answer
+from klack.analyses.impact.wording import ESTIMATE_COLUMNS, answer, estimate_rows, estimate_sentence
+from klack.analyses.page import schematic_section
+from klack.contact.restitution import Deviation
+from klack.report.html import render_html
+from klack.report.page import Content, Section, Table
+from klack.report.pdf import render_pdf
+from klack.report.spoken import spoken
 from klack.report.wording import listed, quantity, share, signed, signed_share
+from klack.schematic.picture import schematic_svg
 
 
 def plain(text: str) -> str:
@@ -150,3 +172,209 @@ def test_restitution_refers_to_the_speed_at_first_touch(lonely_study: ImpactStud
     assert "0.8 m/s at first touch, 0.5 m/s at the start" in answer(study)
     assert "at the start" not in answer(lonely_study)
     assert IMPACT.to_json(study)["levels"]["reduced"]["approach_speed_m_s"] == 0.8
+
+
+AXES = {"xaxis": {"title": {"text": "time [us]"}}, "yaxis": {"title": {"text": "force [N]"}}}
+
+
+def line(name: str, y: list[float | None], **more: object) -> dict[str, object]:
+    return {"type": "scatter", "name": name, "x": list(range(len(y))), "y": y, **more}
+
+
+def test_each_named_curve_is_told_with_its_extremes_and_gaps_are_left_out():
+    told = spoken(
+        {
+            "data": [
+                line("now &amp; <b>then</b>", [0.0, None, 123.456, 5.0]),
+                line("", [1.0], showlegend=False),
+                line("flat", [2.0, 2.0]),
+                line("area", [1.0, 2.0], mode="none"),
+            ],
+            "layout": AXES,
+        }
+    )
+
+    assert told == (
+        "force [N] over time [us]. now & then: highest 123.5 at 2, lowest 0 at 0, at the end 5. "
+        "flat: 2 throughout."
+    )
+
+
+def test_bars_maps_and_parallel_axes_are_told():
+    bar = {"type": "bar", "name": "film", "y": ["needle", "stop"], "x": [1.5, None]}
+    heat = {"type": "heatmap", "z": [[1.0, 2.0], [-60.0, None]]}
+    axis = {"label": "lift [um]", "low": 85.0, "high": 115.0, "values": [85.0, 90.0, 115.0]}
+
+    assert spoken({"data": [bar], "layout": {}}) == "film: needle 1.5."
+    assert spoken({"data": [heat], "layout": {}}) == "values: from -60 to 2."
+    assert spoken({"axes": [axis]}) == (
+        "Parallel axes of 1 quantities for 3 points. lift [um]: from 85 to 115."
+    )
+
+
+@pytest.mark.parametrize("y", [[], [None, None]])
+def test_a_curve_without_values_is_left_out(y):
+    assert spoken({"data": [line("empty", y)], "layout": AXES}) == "force [N] over time [us]."
+
+
+def test_long_lists_end_with_how_many_are_left_out():
+    told = spoken({"data": [line(f"c{i}", [1.0, 2.0]) for i in range(11)], "layout": AXES})
+
+    assert told.count("highest") == 8
+    assert told.endswith("and 3 more.")
+
+
+def deviation(peak: float, restitution: float = 0.0) -> Deviation:
+    return Deviation(
+        peak_force=peak,
+        contact_time=-0.001,
+        impulse=0.0,
+        restitution=restitution,
+        history_l2=0.002,
+        third_octave_max_dB=0.1,
+        third_octave_up_to_Hz=2e5,
+    )
+
+
+def certified(study: ImpactStudy, estimate: Deviation) -> ImpactStudy:
+    basis = "interface level, 80 + 80 modes, 834 contact points"
+    return replace(
+        study, estimates={"reduced": estimate}, estimate_margins={}, estimate_basis=basis
+    )
+
+
+def plain_estimate(text: str) -> str:
+    return text.replace("\N{NO-BREAK SPACE}", " ")
+
+
+def test_the_true_deviation_stands_beside_the_estimate(impact_study: ImpactStudy) -> None:
+    study = certified(impact_study, deviation(0.0031))
+
+    (row,) = estimate_rows(study)
+
+    assert len(row) == len(ESTIMATE_COLUMNS)
+    true = 100 * impact_study.deviations["reduced"].peak_force
+    assert plain_estimate(row[1]) == f"+0.31 %\ntrue: {true:+.2f} %"
+    sentence = estimate_sentence(study)
+    assert "834 contact points" in sentence
+    assert "the full order, which was run too" in sentence
+
+
+def test_without_the_full_order_there_is_no_truth(impact_study: ImpactStudy) -> None:
+    levels = {"reduced": impact_study.levels["reduced"]}
+    study = replace(impact_study, levels=levels, reference="reduced", deviations={})
+    study = certified(study, deviation(0.0031))
+
+    assert "true" not in "".join(estimate_rows(study)[0])
+    assert "full order" not in estimate_sentence(study)
+    assert "Estimated error of this level: +0.31 % in peak force" in plain_estimate(answer(study))
+
+
+def test_an_estimate_stands_with_how_far_it_may_be_off(impact_study: ImpactStudy) -> None:
+    margin = replace(deviation(0.0004, restitution=0.0002), contact_time=0.02)
+    study = certified(impact_study, deviation(0.0031))
+    study = replace(study, estimate_margins={"reduced": margin})
+
+    assert plain_estimate(estimate_rows(study)[0][1]).startswith("+0.31 % ± 0.04 %\n")
+    (line,) = estimate_lines(study)
+    assert "peak force +0.31 ± 0.04 %, contact time -0.10 ± 2.00 %" in line
+    assert "restitution +0.0000 ± 0.0002 (" in line
+    # 0.1 % of the contact time would be good, 2.1 % are not
+    assert "not for the last per cent" in estimate_sentence(study)
+
+
+def test_the_full_order_alone_tells_what_its_steps_do(impact_study: ImpactStudy) -> None:
+    study = replace(
+        certified(impact_study, deviation(0.0031)), estimates={"full": deviation(-2e-3)}
+    )
+
+    assert plain_estimate(estimate_sentence(study)).startswith(
+        "The steps of the full order put it off by"
+    )
+    assert (
+        plain_estimate(estimate_sentence(study)).count("-0.20 %".replace("-", "\N{MINUS SIGN}"))
+        == 1
+    )
+    assert report_content(study).sections[0].title == "Accuracy of the full order"
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (deviation(0.009), "good enough to rely on"),
+        (deviation(-0.03), "not for the last per cent"),
+        (deviation(0.0, restitution=-0.17), "use the interface level"),
+        (deviation(float("nan"), restitution=0.0), "good enough to rely on"),
+    ],
+)
+def test_the_largest_error_decides(impact_study: ImpactStudy, error: Deviation, words: str) -> None:
+    assert words in estimate_sentence(certified(impact_study, error))
+
+
+def test_nothing_is_good_while_the_contact_is_in_doubt(impact_study: ImpactStudy) -> None:
+    """Two levels that share one row of elements agree with each other, whatever is true."""
+    doubtful = replace(impact_study.contact, doubts=("it lies on a sharp edge",))
+    study = certified(replace(impact_study, contact=doubtful), deviation(0.0001))
+
+    assert "good enough" not in estimate_sentence(study)
+    assert "cannot be relied on, because it lies on a sharp edge" in estimate_sentence(study)
+
+
+@pytest.mark.slow
+def test_the_report_answers_first(impact_study: ImpactStudy) -> None:
+    content = report_content(certified(impact_study, deviation(0.0031)))
+
+    assert content.sections[0].title == "Accuracy of the reduced level"
+    assert "estimated error" in dict(content.definitions)
+    titles = [section.title for section in report_content(impact_study).sections]
+    assert "Accuracy of the reduced level" not in titles
+
+
+def content(*sections: Section) -> Content:
+    return Content(
+        title="t",
+        subtitle="s",
+        description="",
+        answer="a",
+        numbers=Table(columns=("", "x"), rows=(("y", "1"),)),
+        warnings=(),
+        sections=sections,
+        definitions=(),
+        limits=(),
+        case_text="",
+        versions="",
+    )
+
+
+def test_the_page_shows_the_picture_of_the_result():
+    picture = schematic_svg(random_network(3))
+
+    page = render_html(content(schematic_section(picture)))
+
+    assert b64encode(picture.encode()).decode() in page
+    assert '<figure class="wide">' in page
+
+
+def widths_of_pages(paper: bytes) -> set[int]:
+    """Widths [pt] of the pages of a PDF, 595 upright and 842 on its side."""
+    plain = paper
+    for packed in re.findall(rb"stream\r?\n(.*?)\r?\nendstream", paper, re.DOTALL):
+        with suppress(zlib.error):
+            plain += zlib.decompress(packed)
+    boxes = re.findall(rb"/MediaBox\s*\[\s*0 0 ([\d.]+) [\d.]+\s*\]", plain)
+    return {round(float(width)) for width in boxes}
+
+
+def test_paper_has_a_page_for_it_that_lies_only_for_a_wide_picture():
+    wide, high = schematic_svg(random_network(3)), schematic_svg(random_network(9))
+
+    assert widths_of_pages(render_pdf(content(schematic_section(wide)))) == {595, 842}
+    assert widths_of_pages(render_pdf(content(schematic_section(high)))) == {595}
+
+
+def test_an_older_result_has_no_schematic_and_a_damaged_one_says_so():
+    assert schematic_section("").picture is None
+    damaged = schematic_section("<svg><g></svg>")
+
+    assert damaged.picture is None
+    assert "klack show" in damaged.paragraphs[0]

@@ -1,14 +1,29 @@
-"""Grids and series of VTK: truth = what was written, read by meshio and by VTK itself."""
+"""Fields as VTK, and sound files.
 
+Grids and series of VTK: truth = what was written, read by meshio and by VTK itself.
+
+Fields on the way of a full-order run: truth = the run that nobody looked at.
+
+Sound files: content read back by soundfile, stated level, and errors.
+"""
+
+from io import BytesIO
 from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
+import soundfile
 
+from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes, write_wav
+from klack.errors import InputError
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.mesh.mesh import ElementBlock, Mesh
+from klack.signals import TimeSeries
+from klack.transient.full_order import simulate_full_order
+from klack.transient.result import FullOrderResult, MotionOfBody, Snapshots
 from klack.verification.lattice import lattice_mesh
+from klack.verification.transient import STEEL, rod_body, rod_contact
 from klack.whole_file import whole_files
 
 SOLIDS = ("tet4", "tet10", "hex8", "hex20", "wedge6", "wedge15")
@@ -151,3 +166,91 @@ def test_a_folder_of_grids_is_replaced_whole_or_stays(tmp_path: Path):
 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["film"]
     assert (tmp_path / "film" / "a.vtu").read_text() == "second"
+
+
+AREA, STEP, SPEED, GAP = 1e-4, 0.1e-6, 0.5, 1e-6
+
+
+def impact(snapshots: Snapshots | None) -> FullOrderResult:
+    rod = rod_body("rod", STEEL, area=AREA, length=0.02, elements=20)
+    space = rod_contact(rod, None, area=AREA, gap=GAP)
+    return simulate_full_order(
+        rod, None, space, speed=SPEED, duration=4e-6, step=STEP, snapshots=snapshots
+    )
+
+
+def test_looking_changes_nothing_and_shows_the_run():
+    seen: list[tuple[float, tuple[MotionOfBody, ...]]] = []
+
+    plain = impact(None)
+    watched = impact(
+        Snapshots(steps=range(0, 41, 8), receive=lambda time, motion: seen.append((time, motion)))
+    )
+
+    np.testing.assert_array_equal(watched.history.force, plain.history.force)
+    time = [item[0] for item in seen]
+    np.testing.assert_allclose(time, plain.history.start + 8 * STEP * np.arange(6), rtol=1e-12)
+    (first,), (last,) = seen[0][1], seen[-1][1]
+    assert first.name == "rod"
+    # the flight to just before the first touch at 2 us is skipped, but counted
+    assert plain.history.start == pytest.approx(GAP / SPEED, abs=2 * STEP)
+    np.testing.assert_allclose(first.displacement, -SPEED * plain.history.start, rtol=1e-12)
+    np.testing.assert_array_equal(first.velocity, -SPEED)
+    np.testing.assert_array_equal(last.displacement, plain.fields[0].end_displacement)
+    # every step is seen, so that mean velocities add up to the way
+    every: list[MotionOfBody] = []
+    impact(Snapshots(steps=range(41), receive=lambda _, motion: every.append(motion[0])))
+    way = STEP * np.sum([body.velocity for body in every[1:]], axis=0)
+    np.testing.assert_allclose(way, last.displacement - first.displacement, rtol=0, atol=1e-18)
+
+
+RATE = 48_000
+
+
+def sound(amplitude, *, rate=RATE):
+    t = np.arange(rate // 10) / rate
+    values = amplitude * np.sin(2e3 * np.pi * t)
+    return TimeSeries(step=1.0 / rate, values=values, unit="Pa", name="tone")
+
+
+def test_what_is_written_is_read_back(tmp_path):
+    pressure = sound(0.02)
+    write_wav(tmp_path / "tone.wav", pressure, full_scale=0.05)
+    values, rate = soundfile.read(tmp_path / "tone.wav")
+
+    assert rate == RATE
+    np.testing.assert_allclose(values * 0.05, pressure.values, atol=0.05 * 2.0**-23)
+
+
+def test_the_file_says_how_loud_it_is(tmp_path):
+    write_wav(tmp_path / "tone.wav", sound(0.02), full_scale=0.05)
+    with soundfile.SoundFile(tmp_path / "tone.wav") as file:
+        assert (file.subtype, file.channels, file.title) == ("PCM_24", 1, "tone")
+        assert file.comment == level_statement(0.05)
+    # 20 lg(0.05 / 20e-6) = 67.96, a sine 3.01 less
+    assert "0.05 Pa peak (68.0 dB peak re 20 uPa" in level_statement(0.05)
+    assert "64.9 dB SPL" in level_statement(0.05)
+
+
+def test_sounds_share_a_full_scale():
+    loud, quiet = sound(0.02), sound(0.001)
+    full_scale = full_scale_of(loud, quiet)
+    peak = np.abs(loud.values).max()
+
+    assert 20.0 * np.log10(peak / full_scale) == pytest.approx(-6.0, abs=1e-9)
+    assert full_scale_of(sound(0.0)) == 20e-6
+    played = [
+        np.abs(soundfile.read(BytesIO(wav_bytes(p, full_scale=full_scale)))[0]).max()
+        for p in (loud, quiet)
+    ]
+    assert played[0] / played[1] == pytest.approx(20.0, rel=1e-3)
+
+
+def test_clipping_and_other_rates_are_refused():
+    for given, scale, words in (
+        (sound(0.1), 0.05, "full_scale_of"),
+        (sound(0.01, rate=44_100), 0.05, "48000 Hz"),
+        (sound(0.01), 0.0, "full_scale"),
+    ):
+        with pytest.raises(InputError, match=words):
+            wav_bytes(given, full_scale=scale)

@@ -1,4 +1,11 @@
-"""Quantities: truth = definitions of the units (SI brochure; NIST SP 811 for inch and psi)."""
+"""Quantities, numbers and equations as text.
+
+Quantities: truth = definitions of the units (SI brochure; NIST SP 811 for inch and psi).
+
+Numbers of a text: all of them, or none where anything else stands among them.
+
+Equations as text; truth: the equations themselves, written by hand.
+"""
 
 import math
 import subprocess
@@ -11,6 +18,10 @@ from draws import each
 
 from klack import units
 from klack.errors import InputError
+from klack.input.plain_numbers import plain_numbers
+from klack.network.catalogue import component_classes
+from klack.network.described import described_type
+from klack.terminal.tables import plain_math
 from klack.units import base_powers, format_si, parse_quantity
 
 # kind, text, SI value; exact definitions, so the tolerance is round-off
@@ -176,3 +187,51 @@ def test_every_kind_has_a_coherent_unit():
 def test_powers_need_a_coherent_unit(unit):
     with pytest.raises(InputError, match="SI unit"):
         base_powers(unit)
+
+
+@pytest.mark.parametrize("text", [b"1 2,3", b"1.5D+03", b"2x", b"1 two", b"1e", b"0x10", b"1-3"])
+def test_anything_else_is_no_list_of_numbers(text: bytes) -> None:
+    """What other readers take for 1.5, 2 and 0."""
+    assert plain_numbers(text) is None
+
+
+@pytest.mark.parametrize("text", [b"", b" \n\t "])
+@pytest.mark.parametrize("kind", [int, float])
+def test_nothing_is_no_number(text: bytes, kind: type) -> None:
+    found = plain_numbers(text, kind)
+    assert found is not None
+    assert found.shape == (0,)
+    assert found.dtype == kind
+
+
+def test_whole_numbers_stay_exact() -> None:
+    found = plain_numbers(b"9007199254740993\n-7", int)
+    assert found is not None
+    assert found.tolist() == [9007199254740993, -7]
+
+
+@pytest.mark.parametrize(
+    ("latex", "text"),
+    [
+        (r"m \ddot y = \sum_p F_p", "m y'' = Σ_p F_p"),
+        (r"\frac{dm}{dt} = \sum \dot m, \qquad V \varrho(p) = m", "dm/dt = Σ m',  V ρ(p) = m"),
+        (r"C_\infty \tanh\frac{2\lambda}{\lambda_c}", "C_∞ tanh(2λ/λ_c)"),
+        (r"\frac{\pi d c^3}{12 \mu l}\,(1 + \tfrac32 e)", "(π d c^3)/(12 µ l) (1 + 3/2 e)"),
+        (r"e^{-(v/v_s)^2}", "e^(-(v/v_s)^2)"),
+        (r"\sqrt{\frac{2 |p|}{\varrho}}", "sqrt((2 |p|)/ρ)"),
+        (r"y_\text{end} - y_\text{base}", "y_end - y_base"),
+        (r"\frac{\partial p}{\partial t}", "∂p/∂t"),
+    ],
+)
+def test_equations_read_as_they_are_spoken(latex, text):
+    assert plain_math(latex) == text
+
+
+def test_no_equation_of_a_component_keeps_a_mark_of_latex():
+    found = [described_type(kind) for kind in component_classes()]
+
+    assert sum(bool(item.equation) for item in found) >= 17
+    for item in found:
+        assert not set(plain_math(item.equation)) & set("\\{}$"), item.word
+        assert item.summary.endswith("."), item.word
+        assert "`" not in item.summary + item.source, item.word

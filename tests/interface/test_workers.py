@@ -1,4 +1,15 @@
-"""Worker processes: what they answer, and what is said of those that die."""
+"""Worker processes, cores, the second process that compiles, and machines without a compiler.
+
+Worker processes: what they answer, and what is said of those that die.
+
+Cores of this process; truth = what the scheduler was told.
+
+The second process that compiles while the first one does.
+
+Truth: the processes that are started, and how they end.
+
+A machine without a compiler leaves out the tests of the C core, and the run says so.
+"""
 
 import os
 import subprocess
@@ -6,10 +17,17 @@ import sys
 import time
 from operator import neg
 from pathlib import Path
+from types import SimpleNamespace
 
+import c_compiler
 import pytest
+from numba.core import event
 
 from klack.analyses.workers import WorkerPool
+from klack.compiling import ahead
+from klack.compiling.ahead import compiling_ahead
+from klack.cores import available_cores
+from klack.errors import InputError
 
 DYING = """
 import os, signal, sys, threading, time
@@ -125,3 +143,118 @@ def test_what_is_not_wanted_any_more_is_not_waited_for():
             assert item == 0.0
             break
     assert time.monotonic() - begin < 60
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="binds this process to one core")
+def test_a_process_bound_to_one_core_has_one():
+    before = os.sched_getaffinity(0)
+    assert available_cores() == len(before)
+    os.sched_setaffinity(0, {min(before)})
+    try:
+        assert available_cores() == 1
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def test_where_the_scheduler_does_not_say_the_machine_counts(monkeypatch):
+    monkeypatch.delattr(os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: None)
+    assert available_cores() == 1
+    monkeypatch.setattr(os, "cpu_count", lambda: 8)
+    assert available_cores() == 8
+
+
+def compile_one(module="klack.simulation.network_kernel"):
+    """What numba tells of a function that it compiles."""
+    function = SimpleNamespace(py_func=SimpleNamespace(__module__=module))
+    with event.trigger_event("numba:compile", data={"dispatcher": function}):
+        pass
+
+
+@pytest.fixture
+def started(monkeypatch, tmp_path):
+    """Processes that sleep instead of compiling."""
+    processes = []
+
+    def start(command, **options):
+        assert command[0] == sys.executable
+        assert command[-4:] == ["-m", "klack.warming", "loop", "rest"]
+        processes.append(real([sys.executable, "-c", "import time; time.sleep(600)"], **options))
+        return processes[-1]
+
+    real = subprocess.Popen
+    monkeypatch.setattr(ahead.subprocess, "Popen", start)
+    monkeypatch.setattr(ahead, "available_cores", lambda: 2)
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    return processes
+
+
+def test_one_process_is_started_with_the_first_function_and_ends_with_the_block(started):
+    with compiling_ahead(("loop", "rest")):
+        assert started == []
+        compile_one()
+        compile_one()
+        assert [process.poll() for process in started] == [None]
+    assert len(started) == 1
+    assert started[0].poll() is not None
+    compile_one()
+    assert len(started) == 1
+
+
+def test_it_ends_when_the_work_fails(started):
+    def work():
+        with compiling_ahead(("loop", "rest")):
+            compile_one()
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    assert started[0].poll() is not None
+
+
+def test_none_is_started_for_functions_of_others_nor_on_one_core(started):
+    with compiling_ahead(("loop", "rest")):
+        compile_one("numba.np.arrayobj")
+    with compiling_ahead(("loop", "rest"), threads=1):
+        compile_one()
+    assert started == []
+
+
+def test_none_is_started_without_a_store(started, monkeypatch, tmp_path):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file"))
+    with compiling_ahead(("loop", "rest")):
+        compile_one()
+    assert started == []
+
+
+def test_the_process_ends_when_the_one_that_started_it_has_gone(tmp_path):
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-m", "klack.warming", "loop"],
+        stdin=subprocess.PIPE,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
+    )
+    assert process.stdin is not None
+    process.stdin.close()
+    assert process.wait(timeout=120) == 0
+    assert not list(tmp_path.rglob("run_network*"))
+
+
+def test_a_missing_compiler_is_reported(monkeypatch):
+    def none(platforms):
+        raise InputError("x", got="no C compiler for it", expected="one", hint="install one.")
+
+    monkeypatch.setattr(c_compiler, "require_compilers", none)
+    monkeypatch.setattr(c_compiler.shutil, "which", lambda name: None)
+
+    first, second = c_compiler.untested()
+
+    assert first.startswith("C core not tested: no C compiler")
+    assert "gcc is not installed" in second
+
+
+def test_nothing_is_reported_where_all_is_there(monkeypatch):
+    monkeypatch.setattr(c_compiler, "require_compilers", lambda platforms: None)
+    monkeypatch.setattr(c_compiler.shutil, "which", lambda name: "/usr/bin/gcc")
+
+    assert c_compiler.untested() == []

@@ -1,17 +1,22 @@
-"""Ways into a case other than one profile: CAD, several materials, a position as drawn.
+"""Ways into a case, and solvers without MKL.
+
+Ways into a case other than one profile: CAD, several materials, a position as drawn.
 
 Truth: the mass of the drawing (Pappus), the same impact from another description of the same bodies
 (tolerances say how coarse the CAD mesh is), momentum.
+
+The whole impact without MKL: the same numbers from the solvers that take over.
 """
 
+import sys
 from pathlib import Path
 
 import pytest
 
 from klack.analyses.impact.run import run_impact
 from klack.assembling.bodies import build_bodies
-from klack.case import load_case, shipped_cases
-from klack.case.reader import read_case
+from klack.case import load_case, read_case, shipped_cases
+from klack.elasticity.factorization import available_backends
 from klack.errors import InputError
 from klack.mesh.solid import write_step_revolved
 from klack.progress import silent
@@ -141,3 +146,20 @@ def test_run_that_ends_before_the_touch_is_refused():
     case = read_case(WELDED.replace("gap: 0 um", "gap: 40 um"), Path("late.yaml"))
     with pytest.raises(InputError, match="first touch at 100 us"):
         run_impact(case, levels=("reduced",))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("missing", [("pypardiso",), ("pypardiso", "ngsolve")])
+def test_impact_without_mkl(missing: tuple[str, ...], monkeypatch: pytest.MonkeyPatch):
+    case = load_case(shipped_cases()["demo-valve-axisymmetric"])
+    levels = ("reduced", "full")
+    expected = run_impact(case, levels=levels, certify=False)
+    for module in missing:
+        monkeypatch.setitem(sys.modules, module, None)
+    assert "pardiso" not in available_backends()
+    study = run_impact(case, levels=levels, certify=False)
+    for level in levels:
+        a, b = study.levels[level].measures, expected.levels[level].measures
+        # round-off of another factorisation, grown over the iterations of the modes
+        assert a.peak_force == pytest.approx(b.peak_force, rel=1e-6)
+        assert a.restitution == pytest.approx(b.restitution, abs=1e-6)

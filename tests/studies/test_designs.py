@@ -1,4 +1,9 @@
-"""Designs of points; truth: their definitions, and points as computed by several SciPy versions."""
+"""Designs of points, and their evenness.
+
+Designs of points; truth: their definitions, and points as computed by several SciPy versions.
+
+Evenness of points; truth: its mean over random points is 1, exactly.
+"""
 
 import warnings
 from hashlib import sha256
@@ -8,12 +13,7 @@ import pytest
 from scipy.stats import qmc
 
 from klack.errors import InputError
-from klack.studies.designs import (
-    balanced,
-    even_levels,
-    latin_hypercube,
-    sobol_sequence,
-)
+from klack.studies.designs import balanced, even_levels, latin_hypercube, sobol_sequence, unevenness
 
 
 def test_even_levels():
@@ -126,3 +126,19 @@ def test_points_are_those_of_other_versions(design, digest):
 def test_what_is_no_design_is_one_error(call, said):
     with pytest.raises(InputError, match=said):
         call()
+
+
+@pytest.mark.parametrize(("count", "parameters"), [(20, 1), (30, 3), (64, 6)])
+def test_random_points_have_one_on_average(count, parameters):
+    random = np.random.default_rng(1)
+    found = [unevenness(random.random((count, parameters))) for _ in range(400)]
+    assert np.mean(found) == pytest.approx(1.0, abs=4 * np.std(found) / 20)
+
+
+def test_even_points_have_less_and_clusters_more():
+    even = sobol_sequence(64, 3, 1)
+    assert unevenness(even) < 0.2
+    assert unevenness(even * np.array([0.5, 1.0, 1.0])) > 4
+    star = np.full((30, 3), 0.5)
+    star[np.arange(30), np.arange(30) % 3] = np.linspace(0.0, 1.0, 30)
+    assert unevenness(star) > 4
