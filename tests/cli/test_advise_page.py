@@ -5,9 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-
-from klack.case.reader import load_case
-from klack.cli.main import main
+from klack_names import load_case, main
 
 PAGE = (Path(__file__).parents[2] / "docs/how-to/advise.md").read_text(encoding="utf-8")
 

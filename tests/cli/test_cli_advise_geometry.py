@@ -8,9 +8,7 @@ import json
 from pathlib import Path
 
 import pytest
-
-from klack.case.reader import load_case
-from klack.cli.main import main
+from klack_names import load_case, main
 
 pytestmark = pytest.mark.slow
 

@@ -10,9 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from klack.analyses.stroke.analysis import STROKE
-from klack.cli.main import main
+from klack_names import STROKE, main
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 STROKES, NOISE, RATE = 3, 0.2e-6, 400e3

@@ -11,10 +11,7 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from klack.case.any_case import load_any_case, load_valve_case, read_case_tree
-from klack.cli.main import main
-from klack.errors import InputError
+from klack_names import InputError, load_any_case, load_valve_case, main, read_case_tree
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = """

@@ -7,11 +7,10 @@ is nobody's mistake.
 from pathlib import Path
 
 import pytest
+from klack_names import load_case, run_impact
 
 from klack import energy_balance
 from klack.analyses.impact import interface_level
-from klack.analyses.impact.run import run_impact
-from klack.case.reader import load_case
 from klack.transient import interface_run
 
 pytestmark = pytest.mark.slow

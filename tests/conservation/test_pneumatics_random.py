@@ -7,6 +7,7 @@ pressures, moving faces, and steps from nanoseconds to a second.
 import numpy as np
 import pytest
 from draws import each
+from klack_names import Ambient, evaluate
 
 from klack.network.gas_rows import (
     GasBranchRow,
@@ -15,8 +16,6 @@ from klack.network.gas_rows import (
     GasSourceRow,
     GasWallRow,
 )
-from klack.network.rows import Ambient
-from klack.network.step_function import evaluate
 from klack.pneumatics.flow_law import GAP, VALVE
 from klack.pneumatics.gas_element import GasNetwork
 from klack.pneumatics.gas_library import GASES

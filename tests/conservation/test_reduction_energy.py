@@ -2,19 +2,22 @@
 
 import numpy as np
 import pytest
+from klack_names import (
+    Flexibility,
+    LossFactor,
+    Material,
+    ModalDamping,
+    eigenmodes,
+    elastic_body,
+    full_order_receptance,
+    lattice_mesh,
+    reduce_body,
+)
 from numpy.testing import assert_allclose
 
-from klack.elasticity.body import elastic_body
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.materials import Material
-from klack.reduction.damping import LossFactor, ModalDamping
-from klack.reduction.full_order import full_order_receptance
 from klack.reduction.ports import Observer, node_observer, surface_port
 from klack.reduction.receptance import reduced_receptance
-from klack.reduction.reduce import reduce_body
 from klack.reduction.selection import ByCount, ByParticipation
-from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 AXIS = np.geomspace(2e3, 1e6, 300)

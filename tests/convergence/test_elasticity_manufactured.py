@@ -13,16 +13,17 @@ B = A b^2.  The finite elements are solved, so the error of the displacements is
 
 import numpy as np
 import pytest
+from klack_names import (
+    Material,
+    StressField,
+    assemble,
+    factorize,
+    lattice_mesh,
+    quadrature,
+    shape_functions,
+    traction_load,
+)
 from scipy.sparse.linalg import spsolve
-
-from klack.elasticity.assembly import assemble
-from klack.elasticity.factorization import factorize
-from klack.elasticity.loads import traction_load
-from klack.elasticity.quadrature import quadrature
-from klack.elasticity.shape_functions import shape_functions
-from klack.elasticity.stress import StressField
-from klack.materials import Material
-from klack.verification.lattice import lattice_mesh
 
 MATERIAL = Material(name="unit", young=1.0, poisson=0.3, density=1.0)
 LAMBDA, MU = MATERIAL.lame_lambda, MATERIAL.shear_modulus

@@ -34,6 +34,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
+from klack_names import Flexibility, ImpactHistory, InputError, Pose, lattice_mesh, silent
 from scipy.sparse import csr_array
 
 import klack
@@ -44,7 +45,6 @@ from klack.assembling.problem import build_problem, place_bodies
 from klack.case import find_case, load_case
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.gap_update import RigidGaps
-from klack.contact.history import ImpactHistory
 from klack.contact.mortar import (
     ContactSpace,
     contact_space,
@@ -61,10 +61,6 @@ from klack.contact.statics import (
 )
 from klack.elasticity.condensation import condensed_inverse
 from klack.elasticity.loads import NearLoads
-from klack.elasticity.statics import Flexibility
-from klack.errors import InputError
-from klack.mesh.rigid import Pose
-from klack.progress import silent
 from klack.verification.contact import (
     STEEL,
     half_spaces,
@@ -72,7 +68,6 @@ from klack.verification.contact import (
     sphere_on_cone,
     uniform_compression,
 )
-from klack.verification.lattice import lattice_mesh
 
 
 def pointwise(family, layers, xi, **size):

@@ -5,19 +5,14 @@ They are polynomials of degree two in r and z, which quadratic elements have: ro
 
 import numpy as np
 import pytest
+from klack_names import Flexibility, InputError, Material, Mesh, elastic_body, lattice_mesh
 from scipy.sparse import csr_array, eye_array, kron
 
 from klack.elasticity.assembly import assemble, assemble_order
-from klack.elasticity.body import elastic_body
 from klack.elasticity.eigen import eigenmodes, rigid_frequencies
 from klack.elasticity.fourier_body import FourierBody, displacement_rows, fourier_body, rows_around
 from klack.elasticity.loads import order_load
-from klack.elasticity.statics import Flexibility
-from klack.errors import InputError
 from klack.gauges.fourier_field import field_rows
-from klack.materials import Material
-from klack.mesh.mesh import Mesh
-from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 RADIUS, LENGTH, BOTTOM = 2e-3, 30e-3, 10e-3

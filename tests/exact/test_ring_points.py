@@ -26,23 +26,26 @@ from math import cos, pi, sin
 
 import numpy as np
 import pytest
+from klack_names import (
+    AccuracyWarning,
+    Flexibility,
+    InputError,
+    Material,
+    MeshSizing,
+    build_bodies,
+    eigenmodes,
+    elastic_body,
+    mesh_meridian,
+    silent,
+    sweep,
+)
 from scipy.sparse import csr_array
 
-from klack.assembling.bodies import build_bodies
 from klack.assembling.touch_ring import goes_round
 from klack.case import find_case, read_case
-from klack.elasticity.body import elastic_body
-from klack.elasticity.eigen import eigenmodes
 from klack.elasticity.ring_points import RingPoints, RingRows, resolved_orders, share_of_order
-from klack.elasticity.statics import Flexibility
-from klack.errors import AccuracyWarning, InputError
-from klack.materials import Material
-from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
 from klack.mesh.rigid import Pose, rotation_matrix
-from klack.mesh.sizing import MeshSizing
-from klack.mesh.swept import sweep
-from klack.progress import silent
 from klack.transient.guide import _section
 from klack.transient.revolved_guide import turned_sections
 from klack.verification.interface import gaps_of_sphere_over_cone

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from klack_names import Jobs, OpenFolder, read_case_tree, study_of
 from made_study import made_study
 
 pytest.importorskip("playwright.sync_api")
@@ -16,11 +17,7 @@ from served_app import Served
 
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.run import run_study
-from klack.app.folder import OpenFolder
-from klack.app.jobs import Jobs
-from klack.case.any_case import read_case_tree
 from klack.case.reader import find_case
-from klack.case.study_source import study_of
 
 __all__ = ["page", "server"]  # fixtures
 

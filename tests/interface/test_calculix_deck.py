@@ -9,13 +9,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from klack_names import (
+    AccuracyWarning,
+    ElasticBody,
+    InputError,
+    Material,
+    Mesh,
+    Surface,
+    build_bodies,
+    elastic_body,
+    lattice_mesh,
+    needle_over_seat,
+    read_abaqus,
+    silent,
+)
 
-from klack.assembling.bodies import build_bodies
 from klack.case import find_case, load_case
 from klack.case.guide import CaseGuide
 from klack.contact.pairing import axial_distance, face_geometry, project_to_surface
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.errors import AccuracyWarning, InputError
 from klack.exchange import calculix_case
 from klack.exchange.calculix_case import calculix_impact, calculix_settings
 from klack.exchange.calculix_deck import (
@@ -26,13 +37,7 @@ from klack.exchange.calculix_deck import (
     start_of_flight,
     write_deck,
 )
-from klack.materials import Material
-from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
-from klack.mesh.mesh import Mesh, Surface
-from klack.progress import silent
-from klack.verification.lattice import lattice_mesh
-from klack.verification.transient import needle_over_seat
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=105e9, poisson=0.34, density=8400.0)

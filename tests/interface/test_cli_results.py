@@ -7,9 +7,7 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
-
-from klack.analyses.impact.analysis import IMPACT
-from klack.cli.main import main
+from klack_names import IMPACT, main
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
 

@@ -4,20 +4,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from klack.contact.restitution import measure_impact
-from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.errors import ConvergenceError, InputError
-from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
-from klack.transient.interface_run import simulate_interface
-from klack.verification.interface_bodies import (
+from klack_names import (
+    ConvergenceError,
+    Flexibility,
+    InputError,
+    Modes,
+    eigenmodes,
     free_rod,
+    measure_impact,
     modal_model,
+    needle_over_seat,
     rigid_body,
     rod_between_stops,
+    simulate_interface,
 )
-from klack.verification.transient import needle_over_seat
+
+from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
 
 
 class Distorted(Flexibility):

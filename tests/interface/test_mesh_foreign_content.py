@@ -12,12 +12,15 @@ import numpy as np
 import pytest
 import scipy.io
 from doubts import doubts
+from klack_names import (
+    AccuracyWarning,
+    InputError,
+    corner_volume,
+    main,
+    open_recording,
+    read_mesh_file,
+)
 
-from klack.cli.main import main
-from klack.errors import AccuracyWarning, InputError
-from klack.measurement.recording import open_recording
-from klack.mesh.files.mesh_file import read_mesh_file
-from klack.mesh.quality import corner_volume
 from klack.model_files.matrices import read_matrix
 
 MM = 1e-3

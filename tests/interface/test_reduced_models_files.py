@@ -14,12 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
+from klack_names import InputError, StateSpace
 from scipy.sparse import coo_array, csc_array
 
-from klack.errors import InputError
 from klack.model_files.modal_data import read_modal_data
 from klack.model_files.reduced_models import FileStateSpace, read_reduced_matrices, read_state_space
-from klack.reduction.reduced_body import StateSpace
 from klack.simulation.bodies import rod_body
 
 ROD = rod_body(

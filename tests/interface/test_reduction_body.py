@@ -2,24 +2,27 @@
 
 import numpy as np
 import pytest
+from klack_names import (
+    ConvergenceError,
+    Flexibility,
+    InputError,
+    ReducedBody,
+    ResultCache,
+    eigenmodes,
+    full_order_receptance,
+    lattice_mesh,
+    reduce_body,
+)
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_array
 
-from klack.cache.result_cache import ResultCache
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.errors import ConvergenceError, InputError
 from klack.reduction import attachment, dynamic_stiffness
 from klack.reduction.attachment import shift_at
 from klack.reduction.damping import LossFactor, ModalDamping, RayleighDamping
-from klack.reduction.full_order import full_order_receptance
 from klack.reduction.ports import Port, node_observer, pressure_port, surface_port
 from klack.reduction.receptance import reduced_receptance
-from klack.reduction.reduce import reduce_body
-from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, select
 from klack.reduction.transfer import compare_receptances, mean_level_deviation
-from klack.verification.lattice import lattice_mesh
 from klack.verification.reduction import rod
 
 

@@ -13,11 +13,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from klack_names import IMPACT, ImpactStudy, InputError
 
-from klack.analyses.impact.analysis import IMPACT
-from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.store import RESULT_NAME
-from klack.errors import InputError
 from klack.reduction.reduced_body import read_arrays
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))

@@ -9,11 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from klack_names import build_problem, find_calculix, load_case
 from scipy.sparse import csr_array
 
-from klack.assembling.problem import build_problem
-from klack.case.reader import load_case
-from klack.exchange.calculix_run import find_calculix
 from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.yielding_body import YieldingBody
 
