@@ -27,7 +27,7 @@ imports at first use, so arrows that begin there are not counted."""
 
 FLOORS: tuple[tuple[str, ...], ...] = (
     # ground: errors, units, files that are whole or not there
-    ("errors", "closing", "cores", "swapped_names", "progress"),
+    ("errors", "arrays", "closing", "cores", "swapped_names", "progress"),
     ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance", "hardening"),
     (
         "units",

@@ -23,13 +23,12 @@ from math import pi, sqrt
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.errors import ConvergenceError
 
 __all__ = ["AsperityLayer", "press", "summit_integral"]
 
-Floats = NDArray[np.float64]
 
 _HIGHEST = 4.0  # summits over sigma above their mean
 _DEEPEST = -3.0  # separation over sigma at the end of the curve

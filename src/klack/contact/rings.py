@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Floats
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, around_rows, tangent_rows
 from klack.errors import InputError
@@ -20,7 +21,6 @@ from klack.units import format_si
 
 __all__ = ["RingFriction", "RingSpace"]
 
-Floats = NDArray[np.float64]
 
 _CENTRAL = 3.0
 """Element sizes from the axis up to which a hat is no ring."""

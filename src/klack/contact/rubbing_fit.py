@@ -19,15 +19,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.contact.laws import TableLaw
 from klack.contact.local_law import LocalLaw
 from klack.contact.rubbing_law import RubbingLaw
 
 __all__ = ["Loop", "RubbingFit", "rubbing_fit"]
 
-Vector = NDArray[np.float64]
 
 _SPRINGS = 64
 _NO_LOSS = 1e-4  # share of the work below which a loop is that of round-off and increments

@@ -34,15 +34,14 @@ comes back where *H* is the same share of *N* at every depth.  :math:`R \le 1` n
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Vector
 from klack.contact.laws import FlatLaw
 from klack.contact.step_constants import LAW_RUBBING
 from klack.errors import InputError, require_positive
 
 __all__ = ["RubbingLaw"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -20,15 +20,15 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Floats
 from klack.contact.laws import FlatLaw
 from klack.contact.step_constants import LAW_YIELDING
 from klack.errors import InputError
 
 __all__ = ["YieldingLaw"]
 
-Floats = NDArray[np.float64]
 
 _LEAST_LOSS = -1e-6  # share of the work by which the loss may fall between two states
 

@@ -8,12 +8,9 @@ depends on them adds a :class:`SideLaw` to its rows.  A motion along the axis do
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from klack.arrays import Vector
 
 __all__ = ["OffAxisPart", "SideInputs", "SideLaw"]
-
-Vector = NDArray[np.float64]
 
 
 class SideInputs(NamedTuple):

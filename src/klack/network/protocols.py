@@ -6,6 +6,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from klack.arrays import Floats
+
 __all__ = [
     "InterfaceLaw",
     "LawNumbers",
@@ -14,8 +16,6 @@ __all__ = [
     "PressureBounds",
     "RunningController",
 ]
-
-Values = NDArray[np.float64]
 
 
 class PressureBounds(Protocol):
@@ -69,23 +69,23 @@ class NetworkFluid(Protocol):
     @property
     def pressure_range(self) -> PressureBounds: ...  # noqa: D102
 
-    def density(self, pressure: ArrayLike) -> Values:
+    def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
         ...
 
-    def bulk_modulus(self, pressure: ArrayLike) -> Values:
+    def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``rho dp/drho`` [Pa]."""
         ...
 
-    def sound_speed(self, pressure: ArrayLike) -> Values:
+    def sound_speed(self, pressure: ArrayLike) -> Floats:
         """Speed of pressure waves in an unbounded fluid [m/s]."""
         ...
 
-    def viscosity(self, pressure: ArrayLike) -> Values:
+    def viscosity(self, pressure: ArrayLike) -> Floats:
         """Dynamic viscosity [Pa s]."""
         ...
 
-    def specific_volume(self, pressure: ArrayLike) -> tuple[Values, Values]:
+    def specific_volume(self, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """Volume per mass [m^3/kg] and its slope [m^3/(kg Pa)]."""
         ...
 
@@ -116,7 +116,7 @@ class LawNumbers(Protocol):
     @property
     def kind(self) -> int: ...  # noqa: D102
     @property
-    def parameters(self) -> Values: ...  # noqa: D102
+    def parameters(self) -> Floats: ...  # noqa: D102
     @property
     def dissipation(self) -> float: ...  # noqa: D102
 
@@ -124,15 +124,15 @@ class LawNumbers(Protocol):
 class InterfaceLaw(Protocol):
     """Force of a contact over its indentation."""
 
-    def force(self, indentation: ArrayLike) -> Values:
+    def force(self, indentation: ArrayLike) -> Floats:
         """Return the force [N] at the given indentation [m]."""
         ...
 
-    def tangent_stiffness(self, indentation: ArrayLike) -> Values:
+    def tangent_stiffness(self, indentation: ArrayLike) -> Floats:
         """Return the tangent stiffness [N/m] at the given indentation [m]."""
         ...
 
-    def potential(self, indentation: ArrayLike) -> Values:
+    def potential(self, indentation: ArrayLike) -> Floats:
         """Return the stored energy [J] at the given indentation [m]."""
         ...
 

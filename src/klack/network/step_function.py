@@ -40,6 +40,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.compiling.jit import intrinsic, njit
 from klack.compiling.marked import Marked
 
@@ -193,9 +194,6 @@ def address_of(step: StepFunction) -> int:
     result = _compiled(step)
     name = result.fndesc.llvm_cfunc_wrapper_name
     return int(result.library.get_pointer_to_function(name))
-
-
-Vector = NDArray[np.float64]
 
 
 @njit

@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import check_state
@@ -27,7 +28,6 @@ from klack.plasticity.yielding_body import Answer, YieldingBody
 
 __all__ = ["LoadingState", "YieldingContact"]
 
-Floats = NDArray[np.float64]
 
 _ROUNDS = 20  # of one step
 _HALVED = 12  # steps that are halved on the way to one approach

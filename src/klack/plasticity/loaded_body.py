@@ -6,13 +6,12 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.materials import Material
 
 __all__ = ["LoadedBody"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

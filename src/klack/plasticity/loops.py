@@ -21,8 +21,8 @@ from math import sqrt
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.contact.pressure_limit import PressureLimit
@@ -32,7 +32,6 @@ from klack.plasticity.ladder import LoadingState, YieldingContact
 
 __all__ = ["Opening", "YieldingLoops", "opening", "yielding_loops"]
 
-Floats = NDArray[np.float64]
 
 _STATES = 32
 """Of one opening curve."""

@@ -30,11 +30,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.hardening import Hardening
 
 __all__ = ["PlasticState", "Returned", "radial_return", "von_mises_of_strain"]
 
-Floats = NDArray[np.float64]
 
 _ON_SURFACE = 1e-6  # of the yield stress
 _TWICE = np.array([1.0, 1.0, 1.0, 2.0])

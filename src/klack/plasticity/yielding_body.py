@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Floats
 from klack.elasticity.factorization import factorize
 from klack.errors import ConvergenceError
 from klack.hardening import Hardening
@@ -21,7 +21,6 @@ from klack.plasticity.zone import PlasticZone, StrainPoints, plastic_zone, strai
 
 __all__ = ["Answer", "YieldingBody"]
 
-Floats = NDArray[np.float64]
 
 _WIDER, _TRIES = 1.5, 4
 _BEGUN = 1e-3  # of the contact force of a point: smaller plastic forces need not be exact

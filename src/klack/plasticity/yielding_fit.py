@@ -6,15 +6,14 @@ alike: the share is linear, so that it drops out of every loop.
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
 from klack.plasticity.loops import YieldingLoops
 
 __all__ = ["yielding_law"]
 
-Floats = NDArray[np.float64]
 
 _STATES, _PLACES = 129, 65
 """Of the tables: the elastic curve within 1e-4 of the force, the loss within 1e-4 of itself."""

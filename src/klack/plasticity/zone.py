@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
+from klack.arrays import Floats, Ints
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.factorization import factorize
 from klack.elasticity.quadrature import quadrature
@@ -43,8 +44,6 @@ from klack.mesh.mesh import Mesh
 
 __all__ = ["PlasticZone", "StrainPoints", "plastic_zone", "strain_points"]
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
 
 _LINEAR = {"tri6": "tri3", "quad8": "quad4"}
 """Second-order elements, and the strain that their plastic flow follows."""

@@ -14,8 +14,8 @@ would be lost.  Laws arrive as flat numbers, see :class:`klack.contact.laws.Flat
 from math import sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     FORCE_LEFT,
@@ -36,8 +36,6 @@ from klack.simulation.rubbing_step import rubbing_mean, rubbing_store
 from klack.simulation.yielding_step import yielding_mean, yielding_store
 
 __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
-
-Vector = NDArray[np.float64]
 
 
 @njit(inline="always")

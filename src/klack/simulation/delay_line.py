@@ -29,8 +29,9 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from klack.arrays import Ints, Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.errors import InputError
 from klack.network.rows import LineRow
@@ -51,9 +52,6 @@ __all__ = [
     "start_lines",
 ]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 LINE_LOSSES = ("friction", "interpolation", "cavity collapse")
 """Columns of the losses in :func:`lines_commit`."""
@@ -119,17 +117,17 @@ class Lines(NamedTuple):
     step: float
     coarse: int
     near: int
-    node: Integers
+    node: Ints
     impedance: Vector
     resistance: Vector
     vapour: Vector
-    first_segment: Integers
-    depth: Integers
+    first_segment: Ints
+    depth: Ints
     fraction: Vector
-    start: Integers
-    room: Integers
-    first_term: Integers
-    first_memory: Integers
+    start: Ints
+    room: Ints
+    first_term: Ints
+    first_memory: Ints
     impedance_of_term: Matrix
     decay: Matrix
     heat: Matrix
@@ -161,13 +159,13 @@ class LineState(NamedTuple):
     """
 
     samples: Vector
-    head: Integers
+    head: Ints
     memory: Vector
     cavity: Vector
     incoming: Matrix
     scatter: Vector
     fastest: Vector
-    moment: Integers
+    moment: Ints
 
 
 def compile_lines(
@@ -309,7 +307,7 @@ def _segment_steps(row: LineRow, step: float, coarse: int) -> Vector:
     return np.diff(np.append(marks, total))
 
 
-def _offsets(counts: Integers) -> Integers:
+def _offsets(counts: Ints) -> Ints:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 

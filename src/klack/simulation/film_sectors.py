@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.hydraulics.tilted_film import (
     SectorFilm,
     film_pressure,
@@ -30,7 +31,6 @@ from klack.simulation.spatial_impact import FilmLand, FilmMoments
 
 __all__ = ["SectorPressure", "sector_pressure"]
 
-Floats = NDArray[np.float64]
 
 _HELD = 1e-6  # of the tension: a sector that is no closer to it does not cavitate
 

@@ -7,8 +7,8 @@ the started state itself.
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.contact.step_constants import NO_LAW
 from klack.network.rows import BranchRow, ElementRow
 from klack.simulation.contact_step import mean_force
@@ -17,8 +17,6 @@ from klack.simulation.network_arrays import StepRows
 from klack.simulation.network_compile import CompiledNetwork
 
 __all__ = ["values_now"]
-
-Vector = NDArray[np.float64]
 
 
 def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vector, Vector]:

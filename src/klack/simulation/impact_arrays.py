@@ -3,13 +3,10 @@
 from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
+
+from klack.arrays import Index, Matrix, Vector
 
 __all__ = ["Contacts", "Losses", "Record", "StepMatrices", "Watched"]
-
-Vector = NDArray[np.float64]  # one axis
-Matrix = NDArray[np.float64]  # two axes
-Index = NDArray[np.int64]
 
 
 class StepMatrices(NamedTuple):

@@ -19,15 +19,14 @@ from dataclasses import replace
 from math import exp, floor, isfinite, log, log10, pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.network.accuracy import PROMISED
 from klack.simulation.network_result import ImpactEvent, InterfaceRecord
 from klack.units import format_si
 
 __all__ = ["impact_doubts", "late_by_swinging", "missing_peak"]
 
-Vector = NDArray[np.float64]
 
 _PEAK, _LATE = PROMISED["normal"]  # of a peak force, and of the time [s] of a first impact
 _AIM = 0.7  # of that, for the step that is advised

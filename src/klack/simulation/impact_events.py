@@ -10,8 +10,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.compiling.jit import inner, njit
 from klack.network.rows import GROUND, BodyRow, Rows
 from klack.simulation.network_interfaces import FORCE_ROUND_OFF
@@ -20,7 +20,6 @@ from klack.simulation.rest import effective_mass, longest_period, mobility, rest
 
 __all__ = ["ImpactFinder"]
 
-Vector = NDArray[np.float64]
 
 _PAUSE_STEPS = 100  # a film is not recorded while its force passes through zero: so many fine steps
 _PAUSE_SHARE = 0.04  # or this share of the time to rest, whichever is longer

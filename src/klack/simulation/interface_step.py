@@ -32,8 +32,8 @@ order 1.
 from math import log
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     FILM_NEWTON_LIMIT,
@@ -51,7 +51,6 @@ from klack.simulation.contact_step import law_potential, mean_force, solve_linea
 
 __all__ = ["film_force", "interface_store", "open_film", "solve_interface"]
 
-Vector = NDArray[np.float64]
 Step = tuple[float, float, float, float, int, float, float]
 
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
 from klack.simulation.contact_step import law_potential, solve_step
@@ -26,8 +27,6 @@ __all__ = [
     "run_steps",
 ]
 
-Vector = NDArray[np.float64]  # one axis
-Matrix = NDArray[np.float64]  # two axes
 
 STATUS_FINE, STATUS_CONTACTS = 0, 1
 FAST = {"contract", "reassoc", "nsz", "arcp"}  # lets the sums over modes use vector registers

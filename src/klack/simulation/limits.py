@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.errors import AccuracyWarning, ConvergenceError
 from klack.network.ranges import limits_of, range_text, value_text
 from klack.network.rows import LimitRow
@@ -17,9 +18,6 @@ from klack.simulation.network_compile import CompiledNetwork
 from klack.units import format_si
 
 __all__ = ["Limits"]
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,8 +15,8 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, NO_LAW
 from klack.errors import InputError
 from klack.network.rows import BranchRow, ElementRow, LineRow, Rows
@@ -30,8 +30,6 @@ from klack.units import format_si, percent_text
 
 __all__ = ["LinearNetwork", "linear_network"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _DOUBT = 1e-3  # between the laws of two steps
 _KINK = 0.2  # between those to both sides; densities of two pressures differ by less

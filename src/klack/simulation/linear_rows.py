@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 from numba.core.errors import NumbaError
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.compiling.jit import njit
 from klack.errors import ConvergenceError, InputError
 from klack.network.rows import BranchRow, ElementRow
@@ -33,8 +33,6 @@ from klack.simulation.tangent_loop import LANES, lanes_of, tangent_address
 
 __all__ = ["LinearRow", "RowPoint", "linear_row"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _MOVED = 1e-13  # [m] by which the point is left to both sides: laws may have a kink there
 _SPEED = 1e-8  # [m/s] the same

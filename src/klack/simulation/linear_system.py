@@ -21,12 +21,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.errors import InputError
 
 __all__ = ["LinearSystem", "Mode", "Signal", "modes", "rational", "transfer"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 ORDER = 5

@@ -15,9 +15,6 @@ for each number of ports, because a loop over ports inside the loop over modes w
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from klack.compiling.jit import inner, njit
 from klack.simulation.kernel import FAST
 
@@ -44,7 +41,6 @@ __all__ = [
     "watch",
 ]
 
-Vector = NDArray[np.float64]
 
 ROW = 128
 """Modes per block; fewer are filled up with zeros."""

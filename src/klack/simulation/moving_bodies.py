@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.spatial_impact import SpatialImpact
@@ -13,7 +14,6 @@ from klack.simulation.spatial_path import SpatialPath
 
 __all__ = ["MovingBodies"]
 
-Vector = NDArray[np.float64]
 Changing = NDArray[np.generic]
 
 

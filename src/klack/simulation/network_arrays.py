@@ -3,8 +3,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Cube, Index, Matrix, Vector
 from klack.simulation.delay_line import Lines, LineState
 from klack.simulation.wave_rows import Waves
 
@@ -70,10 +70,6 @@ __all__ = [
     "scratch_memory",
 ]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Cube = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 STORE, SUPPLY, LOSS = 0, 1, 2
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Index, Vector
 from klack.contact.step_constants import LAW_YIELDING, NO_LAW
 from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
@@ -64,8 +64,6 @@ __all__ = [
     "modal_state",
 ]
 
-Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _FLIGHT_SPEED = 0.5  # [m/s] over the stroke: a film force is judged by what it moves in this time
 _FILM_SMALL = 1.64e-2  # [m/s] mean speed of a gap under a small force: 0.5 N on a needle of 3 g

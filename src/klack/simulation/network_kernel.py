@@ -21,9 +21,7 @@ with elements and fluid in each of them, repeated until nothing moves any more.
 
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from klack.arrays import Index, Matrix, Vector
 from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
@@ -142,9 +140,6 @@ __all__ = [
     "run_network",
 ]
 
-Index = NDArray[np.int64]
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 CLOCK = 8
 """Time in fine steps, size of the last step, then

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.hydraulics.fluid import Fluid
 from klack.memory import require_memory
 from klack.network.rows import BranchRow, Channel, ElementRow, Rows
@@ -24,8 +25,6 @@ from klack.simulation.network_result import ChannelData, InterfaceRecord
 
 __all__ = ["Recorder", "recorded_columns"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _MOST_FINE = 1_000_000  # recorded steps per interface that are kept
 _FINE = 6  # numbers of a recorded step

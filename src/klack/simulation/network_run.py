@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack import energy_balance
+from klack.arrays import Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_positive
@@ -82,7 +83,6 @@ __all__ = [
     "simulate_network",
 ]
 
-Vector = NDArray[np.float64]
 State = Mapping[str, NDArray[np.generic]]
 Changing = NDArray[np.generic]
 Kept = Sequence[tuple[Changing, Changing]]

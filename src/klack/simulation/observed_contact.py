@@ -16,8 +16,8 @@ round-off.  Bodies are taken without damping, springs and constant forces.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.contact.laws import LinearLaw
 from klack.errors import InputError, require_positive
 from klack.reduction.reduced_body import ReducedBody
@@ -25,8 +25,6 @@ from klack.simulation.contact_step import solve_step
 from klack.simulation.propagator import modal_propagator
 
 __all__ = ["ObservedImpact", "observed_impact"]
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.network.rows import Rows
 from klack.network.travel import Travel
 from klack.simulation.first_record import values_now
@@ -37,9 +38,6 @@ __all__ = [
     "steady_rows",
     "without_guesses",
 ]
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

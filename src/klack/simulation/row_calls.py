@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.compiling.jit import njit
 from klack.network.step_function import call, first, pointers, shift
 from klack.simulation.network_arrays import FINE, StepRows
@@ -23,7 +23,6 @@ __all__ = [
     "take_states",
 ]
 
-Vector = NDArray[np.float64]
 
 SHARE_OF_STEP = 1e-6
 """Of a fine step: over so short a time sources and states are asked for their value at its end."""

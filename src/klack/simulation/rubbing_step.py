@@ -13,9 +13,7 @@ are taken back.  Trying a force leaves them where they are; :func:`slide` takes 
 step is accepted.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
+from klack.arrays import Vector
 from klack.compiling.jit import inner, njit
 
 __all__ = [
@@ -29,7 +27,6 @@ __all__ = [
     "take_back_sliders",
 ]
 
-Vector = NDArray[np.float64]
 
 _STRAIGHT = 1e-4  # way over the indentation below which the slope is half that of the law
 _STILL = 1e-15  # way over the indentation that is none

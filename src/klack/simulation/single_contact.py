@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Cube, Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     LAW_LINEAR,
@@ -28,9 +29,6 @@ from klack.simulation.yielding_step import press
 
 __all__ = ["run_one_contact"]
 
-Vector = NDArray[np.float64]  # one axis
-Matrix = NDArray[np.float64]  # two axes
-Cube = NDArray[np.float64]  # three axes
 
 CHUNK = 64  # modes; the distances of the packed columns below are multiples of it
 _LANES = 8  # modes that a pass over them takes at once

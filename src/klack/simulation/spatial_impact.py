@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from klack.arrays import Floats
 
 __all__ = ["FilmLand", "FilmMoments", "ModalMoments", "SpatialImpact"]
 
-Floats = NDArray[np.float64]
 
 _RING = 0.25  # spread of the force over its mean radius, below which it lies on a ring
 

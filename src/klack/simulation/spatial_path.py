@@ -4,11 +4,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+
+from klack.arrays import Vector
 
 __all__ = ["SpatialPath"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(eq=False)

@@ -7,9 +7,7 @@ each of their steps, short or long, is what a macro step is in
 takes over.
 """
 
-import numpy as np
-from numpy.typing import NDArray
-
+from klack.arrays import Vector
 from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import lines_commit, lines_incoming
@@ -62,8 +60,6 @@ from klack.simulation.step_status import STATUS_DONE, STATUS_REFUSED, STATUS_REP
 from klack.simulation.wave_rows import waves_commit, waves_incoming
 
 __all__ = ["answer_step", "begin_step", "end_step"]
-
-Vector = NDArray[np.float64]
 
 
 @njit(_nrt=False, error_model="numpy")

@@ -4,8 +4,8 @@ A law with memory is on its closing curve: the faces have slipped up and hold no
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Index, Vector
 from klack.compiling.jit import njit
 from klack.contact.step_constants import LAW_RUBBING, NO_LAW
 from klack.simulation.contact_step import mean_force
@@ -13,8 +13,6 @@ from klack.simulation.rubbing_step import closing_force
 
 __all__ = ["contacts_at_rest"]
 
-Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _MOST_NEWTON = 60
 

@@ -5,13 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Index, Matrix, Vector
 from klack.compiling.jit import njit
 
 __all__ = ["Balance", "Couplings", "last_change", "least_share", "newton_system"]
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 
 class Couplings(NamedTuple):

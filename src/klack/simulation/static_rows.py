@@ -3,8 +3,8 @@
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Index, Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.step_function import first, pointers
@@ -13,9 +13,6 @@ from klack.simulation.row_calls import call_rows, push_ports, push_walls
 
 __all__ = ["at_rest", "fluids_at", "slopes_at_rest"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _PRESS = 1e-9  # change of a pressure to see what follows from it, over the pressure
 

@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Index, Matrix, Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
@@ -70,9 +71,6 @@ from klack.units import format_si
 
 __all__ = ["RestState", "SteadySlopes", "begin_at_rest", "begin_steady"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _FIRST, _LONGEST, _SHORTEST = 2e2, 2e13, 2e-5  # steps of pseudo-time over the step of the run
 _GROWTH = 8.0  # from one to the next

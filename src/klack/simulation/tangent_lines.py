@@ -7,8 +7,8 @@ that was sent ``a`` steps ago is one of an earlier time, ``- a c h`` of its slop
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.simulation.delay_line import Lines, LineState, start_lines
 
 __all__ = [
@@ -19,8 +19,6 @@ __all__ = [
     "steady_waves",
     "waves_under_way",
 ]
-
-Vector = NDArray[np.float64]
 
 
 def delay_slopes(lines: Lines) -> Vector:

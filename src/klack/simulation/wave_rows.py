@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Index, Vector
 from klack.compiling.jit import inner
 from klack.errors import InputError
 from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE, WaveRow
@@ -27,8 +27,6 @@ __all__ = [
     "waves_incoming",
 ]
 
-Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _A_WHOLE = 1e-9  # [-] a step this little too long is round-off
 _FEWEST = 4  # cells of a line

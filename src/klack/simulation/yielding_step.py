@@ -18,9 +18,7 @@ Behind the two sizes of its tables, the numbers of the law are the largest inden
 
 from math import sqrt
 
-import numpy as np
-from numpy.typing import NDArray
-
+from klack.arrays import Vector
 from klack.compiling.jit import inner, njit
 
 __all__ = [
@@ -35,7 +33,6 @@ __all__ = [
     "yielding_store",
 ]
 
-Vector = NDArray[np.float64]
 
 _SMALL = 1e-6  # way over the indentation below which the force is that of its middle
 

@@ -16,8 +16,8 @@ has to shrink what the equations are missed by.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner
 from klack.simulation.kernel import FAST
 from klack.simulation.phase import phase
@@ -25,8 +25,6 @@ from klack.transient.interface_arrays import Closed
 
 __all__ = ["admit", "dismiss", "invert", "keep_what", "multiply", "multiply_even", "soften"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _SINGULAR = 1e-10
 """Share of its diagonal entry below which the rest of a bordered row counts as zero."""

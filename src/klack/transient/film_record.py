@@ -1,15 +1,11 @@
 """Where the land of a squeeze film is over a step, as the film was solved: for records."""
 
-import numpy as np
-from numpy.typing import NDArray
-
+from klack.arrays import Vector
 from klack.compiling.jit import inner
 from klack.transient.interface_arrays import Films, State
 from klack.transient.tilting_films import contact_resultant, film_state
 
 __all__ = ["tell_land"]
-
-Vector = NDArray[np.float64]
 
 
 @inner

@@ -15,14 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.elasticity.eigen import Modes
 from klack.transient.full_body import FullBody
 
 __all__ = ["KnownBody", "open_gaps"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,18 +36,18 @@ class KnownBody:
     """
 
     modes: Modes
-    compliance: Array
+    compliance: Floats
 
 
 def open_gaps(
     bodies: Sequence[FullBody],
     known: Sequence[KnownBody],
-    at_rest: Array,
-    y: Array,
+    at_rest: Floats,
+    y: Floats,
     *,
     steps: int,
     slack: float,
-) -> Array | None:
+) -> Floats | None:
     """Gaps of bodies on which no force acts, now and after each further step, if none closes.
 
     Parameters
@@ -76,7 +74,7 @@ def open_gaps(
     return gaps if np.all(gaps > (most + slack)[:, None]) else None
 
 
-def _course(body: FullBody, known: KnownBody, y: Array, steps: int) -> tuple[Array, Array]:
+def _course(body: FullBody, known: KnownBody, y: Floats, steps: int) -> tuple[Floats, Floats]:
     """Share of one body in the gaps, shape (nc, steps + 1), and bound of its rest, (nc,) [m]."""
     rigid, shapes = body.body.rigid_modes[body.free], known.modes.shapes[body.free]
     omega, since = known.modes.omega, body.step * np.arange(steps + 1)

@@ -12,12 +12,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from klack.arrays import Matrix, Vector
 
 __all__ = ["GapCourse", "gap_course"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _WAY = 1e-6  # [m] of central differences
 _STEEPEST = 20.0  # ways: a gap that changes by more has lost or found a face

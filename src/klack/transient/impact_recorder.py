@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Vector
 from klack.hydraulics.tilted_film import SectorFilm
 from klack.simulation.spatial_impact import FilmLand, FilmMoments, ModalMoments, SpatialImpact
 from klack.transient.impact_rows import (
@@ -34,8 +35,6 @@ from klack.transient.ring_sectors import SECTORS, sector_shares
 from klack.transient.tilting_film import TiltingFilm
 
 __all__ = ["ImpactRecorder", "film_lands"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,6 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Cube, Matrix, Vector
 from klack.compiling.jit import inner, njit
 
 __all__ = [
@@ -28,9 +29,6 @@ __all__ = [
     "follow",
 ]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Cube = NDArray[np.float64]
 
 RESTING, APART, SQUEEZED, PRESSED = 0, 1, 2, 3
 """What a stop is doing: carries since long, nothing, its film is felt, an impact is recorded."""

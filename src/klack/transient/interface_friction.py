@@ -24,8 +24,8 @@ compiled.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.compiling.jit import inner
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import (
@@ -50,7 +50,6 @@ __all__ = [
     "tell_friction",
 ]
 
-Vector = NDArray[np.float64]
 
 _SHARE = 1e-2
 """Of a force that counts as zero, what the law may be missed by.

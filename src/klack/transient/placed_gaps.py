@@ -1,15 +1,14 @@
 """Gaps of the contact points of a needle that moves: taken from the geometry, then followed."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.transient.gap_course import GapCourse, gap_course
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps
 
 __all__ = ["FRESH", "PlacedGaps"]
 
-Vector = NDArray[np.float64]
 
 FRESH = 0.04e-6
 """Gaps that may be wrong by less are as good as new [m]."""

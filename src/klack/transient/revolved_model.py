@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from klack.arrays import Floats
 from klack.cache.result_cache import ResultCache
 from klack.contact.face_friction import lifted_offset
 from klack.contact.rings import RingFriction, RingSpace
@@ -27,7 +28,6 @@ from klack.transient.revolved_points import RevolvedPoints, reduce_revolved
 
 __all__ = ["RevolvedBody", "RingContact", "model_of_reduced", "reduced_bodies", "revolved_model"]
 
-Floats = NDArray[np.float64]
 
 _COPIES = 8  # of the compliance, for each body, their sum, and a factor of it
 

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 from threadpoolctl import threadpool_limits
 
+from klack.arrays import Floats
 from klack.cache.result_cache import ResultCache
 from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.fourier_body import FourierBody
@@ -34,7 +35,6 @@ from klack.transient.interface_model import PointBody
 
 __all__ = ["RevolvedPoints", "reduce_revolved"]
 
-Floats = NDArray[np.float64]
 
 _AT_ONCE = 6  # pairs of modes of an order that are looked for first
 

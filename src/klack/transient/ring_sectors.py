@@ -1,12 +1,12 @@
 """Contact points round a ring, and the equal sectors that share their forces."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
+
+from klack.arrays import Vector
 
 __all__ = ["SECTORS", "sector_shares"]
 
-Vector = NDArray[np.float64]
 
 SECTORS = 36
 _SAME_ANGLE = 1e-6  # [rad]

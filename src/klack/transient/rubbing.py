@@ -34,8 +34,8 @@ not be unique (jam), or taking turns may find none.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Ints, Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.simulation.kernel import FAST
 from klack.simulation.phase import phase
@@ -52,9 +52,6 @@ from klack.transient.interface_arrays import Closed
 
 __all__ = ["OPEN", "SLIP", "STICK", "solve_rubbing"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-States = NDArray[np.int64]
 
 OPEN, STICK, SLIP = 0, 1, 2
 """What a point does."""
@@ -116,7 +113,7 @@ def _judge(
     mu: Vector,
     lam: Vector,
     w: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     stiffer: Vector,
 ) -> float:
@@ -169,7 +166,7 @@ def _has(closed: Closed, d: int, s: int) -> int:
 
 @phase
 def _as_before(
-    closed: Closed, d: int, lam: Vector, doing: States, along: Matrix, stiffer: Vector
+    closed: Closed, d: int, lam: Vector, doing: Ints, along: Matrix, stiffer: Vector
 ) -> None:
     """Let points that carried do what they did, as the inverse has it."""
     for s in range(closed.counts[0]):
@@ -195,7 +192,7 @@ def _place(
     mu: Vector,
     lam: Vector,
     w: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     least: float,
     change: Vector,
@@ -259,7 +256,7 @@ def _start_afresh(
     closed: Closed,
     d: int,
     mu: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     stiffer: Vector,
     fine: bool,
@@ -284,7 +281,7 @@ def _follow(
     closed: Closed,
     d: int,
     mu: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     stiffer: Vector,
     slow: bool,
@@ -325,7 +322,7 @@ def _missed(
     d: int,
     lam: Vector,
     w: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     stiffer: Vector,
     missed: Vector,
@@ -353,7 +350,7 @@ def _change(
     closed: Closed,
     d: int,
     mu: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     found: Vector,
     change: Vector,
@@ -413,7 +410,7 @@ def _rounds(
     mu: Vector,
     lam: Vector,
     w: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     stiffer: Vector,
     tolerance: float,
@@ -477,7 +474,7 @@ def _settle(
     mu: Vector,
     lam: Vector,
     w: Vector,
-    doing: States,
+    doing: Ints,
     along: Matrix,
     stiffer: Vector,
     tolerance: float,
@@ -513,7 +510,7 @@ def _settle(
 
 @inner
 def _solve_closed(
-    closed: Closed, q: Vector, mu: Vector, lam: Vector, doing: States, tolerance: float
+    closed: Closed, q: Vector, mu: Vector, lam: Vector, doing: Ints, tolerance: float
 ) -> int:
     """Forces of the closed points alone; returns as :func:`solve_rubbing`."""
     n, m = len(closed.points), closed.counts[0]
@@ -543,7 +540,7 @@ def solve_rubbing(
     closed: Closed,
     lam: Vector,
     w: Vector,
-    doing: States,
+    doing: Ints,
     tolerance: float,
 ) -> int:
     """Forces of contact points with friction; returns the rounds, negative where some took turns.

@@ -23,8 +23,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.rubbing_fit import Loop
@@ -35,8 +35,6 @@ from klack.transient.rubbing import solve_rubbing
 
 __all__ = ["LockedError", "RubbingContact", "rubbing_contact"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 TURNS = (0.5, 0.75, 1.0)
 """Approaches from which the contact opens again, over the highest one."""

@@ -10,8 +10,8 @@ way of a repair in it.
 import warnings
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.errors import AccuracyWarning, ConvergenceError
 from klack.network.across import SideInputs
 from klack.network.rows import SideRow
@@ -22,7 +22,6 @@ from klack.units import format_si
 
 __all__ = ["SideForces"]
 
-Vector = NDArray[np.float64]
 
 _LEFT_OUT = 0.02  # of the reluctance of these gaps: about as much of the axial force
 

@@ -16,6 +16,7 @@ At rest the faces start without tangential forces, as frictionless ones would li
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.transient.interface_arrays import Rubbing
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.rubbing import OPEN, STICK
@@ -27,8 +28,6 @@ __all__ = [
     "repair_offsets",
     "rubbing_arrays",
 ]
-
-Vector = NDArray[np.float64]
 
 
 def rubbing_arrays(rubbing: Rubbing) -> dict[str, NDArray[np.generic]]:

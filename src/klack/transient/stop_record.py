@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_compile import CompiledNetwork
 from klack.transient.interface_arrays import Record
@@ -12,9 +12,6 @@ from klack.transient.interface_model import InterfaceModel
 from klack.transient.ring_arcs import ArcWatch
 
 __all__ = ["StopRecord"]
-
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 
 class StopRecord:

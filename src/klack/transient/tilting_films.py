@@ -16,8 +16,8 @@ film is found before the contact, with the contact forces of the step before.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.tilted_film import Land, film_pressure, film_slopes
 from klack.transient.interface_arrays import Films, Modes, State
@@ -34,8 +34,6 @@ __all__ = [
     "squeeze",
 ]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _ROUNDS, _SEARCHES = 60, 40
 _ENOUGH = 0.2  # of the slope of the potential: found along a change
