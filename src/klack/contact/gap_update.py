@@ -21,17 +21,19 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.contact.face_form import FaceForm
-from klack.contact.mortar import COVERED, ContactSpace, hat_quadrature
-from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
-from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
-from klack.contact.ring_gaps import RingGaps
+from klack.contact.mortar import ContactSpace, hat_quadrature
+from klack.contact.ring_gaps import (
+    ListedFaces,
+    RingGaps,
+    carried,
+    mean_gaps,
+    slave_and_master,
+)
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
 __all__ = ["PlacedGaps", "RigidGaps"]
-
-_LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of faces holds
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,11 +47,8 @@ class RigidGaps:
     position, normal : array, shape (p, 3) [m], [-]
         Integration points of the slave side.
     weight : sparse array, shape (nc, p) [m^2]
-    faces : CurvedFaces
+    near : ListedFaces
         Of the master side.
-    first, listed : int array
-        Faces near each line, up to a motion of ``within`` [m].
-    within : float [m]
     centre : array, shape (3,) [m]
         Point that a rotation leaves in place.
     slave_moves : bool
@@ -63,10 +62,7 @@ class RigidGaps:
     position: NDArray[np.float64]
     normal: NDArray[np.float64]
     weight: csr_array
-    faces: CurvedFaces
-    first: NDArray[np.int64]
-    listed: NDArray[np.int64]
-    within: float
+    near: ListedFaces
     centre: NDArray[np.float64]
     slave_moves: bool
     form: NDArray[np.float64]
@@ -108,32 +104,18 @@ class RigidGaps:
                 expected="solids",
                 hint="a motion along the axis is ContactSpace.shifted; take 'model: swept' else.",
             )
-        moves = space.slave == "a"
-        slave, master = (mesh_a, surface_a), (mesh_b, surface_b)
-        if not moves:
-            slave, master = master, slave
+        slave, master, away = slave_and_master(space, (mesh_a, surface_a), (mesh_b, surface_b))
         hats = hat_quadrature(space, *slave)
-        faces = curved_faces(*master)
-        within = _LISTED_WITHIN * space.reach
         lines = (hats.position, hats.normal)
-        met, _, _ = cut_nearest(*lines, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
-        first, listed = list_near(*lines, met, faces.centre, faces.axes, faces.half, within)
-        extents = [
-            np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0))
-            for mesh, surface in (slave, master)
-        ]
         return cls(
             position=hats.position,
             normal=hats.normal,
             weight=hats.weight,
-            faces=faces,
-            first=first,
-            listed=listed,
-            within=within,
+            near=ListedFaces.of(master, *lines, space.reach),
             centre=np.array(centre, dtype=float),
-            slave_moves=moves,
+            slave_moves=space.slave == "a",
             form=np.zeros(len(hats.position)) if form is None else form.gaps(*lines),
-            away=float(sum(extents)),
+            away=away,
         )
 
     def __call__(self, placement: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -148,24 +130,12 @@ class RigidGaps:
         -------
         array, shape (nc,) [m]
         """
-        shift, R = np.asarray(placement[:3]), rotation_matrix(placement[3:])
-        arm = self.position - self.centre
-        if self.slave_moves:
-            position, normal = arm @ R.T + self.centre + shift, self.normal @ R.T
-        else:
-            position, normal = (arm - shift) @ R + self.centre, self.normal @ R
-        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
+        position, normal = carried(
+            self.position, self.normal, placement, self.centre, slave_moves=self.slave_moves
+        )
         moved = float(np.max(np.linalg.norm(position - self.position, axis=1)))
-        if moved <= self.within:
-            gap = cut_listed(self.first, self.listed, position, normal, *master, *limits)
-        else:
-            _, _, gap = cut_nearest(position, normal, *master, *limits)
-        met = np.isfinite(gap)
-        covered = self.weight @ met.astype(float)
-        full = self.weight @ np.ones(len(gap))
-        facing = covered > COVERED * full
-        mean = self.weight @ np.where(met, gap + self.form, 0.0) / np.where(facing, covered, 1.0)
-        return np.where(facing, mean, self.away)
+        gap = self.near.gaps(position, normal, near=moved <= self.near.within)
+        return mean_gaps(self.weight, gap, self.form, self.away)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

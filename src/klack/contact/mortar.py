@@ -25,8 +25,9 @@ Written by hand: the packages for mortar weights are in C++ and Julia and part o
 none was found that Python could call on two free meshes.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -365,13 +366,12 @@ def _build(
     """Contact points up to a gap: ``gaps`` are those of the faces of the slave side."""
     mesh, surface = sides[slave]
     near = np.isfinite(gaps) & (gaps <= limit)
-    other_mesh, other_surface = sides["b" if slave == "a" else "a"]
     inner = _part(surface, near).nodes
     ring = _faces_at(surface, inner)
     sums = _Sums(mesh.dimension, mesh.node_count)
-    for block in _part(surface, ring).blocks:
-        for piece in _pieces(block.family):
-            _integrate(sums, mesh, block, piece, other_mesh, other_surface, form)
+    master = sides["b" if slave == "a" else "a"]
+    for part in _facing(mesh, _part(surface, ring), master):
+        _integrate(sums, mesh, part, master[1], form)
     closest = _closest_face(mesh, surface, gaps)
     return _assemble(sides, slave, sums, inner, ring, closest, limit, floor)
 
@@ -402,38 +402,61 @@ def _faces_at(surface: Surface, nodes: NDArray[np.int64]) -> NDArray[np.bool_]:
     return np.concatenate(parts)
 
 
+class _Facing(NamedTuple):
+    """One piece of every face of a block, at its integration points (f, q) and hats (f, hats)."""
+
+    faces: FaceBlock
+    piece: _Piece
+    at: FaceGeometry
+    hats: NDArray[np.int64]
+    whole: NDArray[np.float64]
+    met: Projection
+
+    @property
+    def share(self) -> NDArray[np.float64]:
+        """psi_k dA where the other side is met, shape (f, q, hats) [m^2]."""
+        return np.where(self.met.met.reshape(*self.whole.shape[:2], 1), self.whole, 0.0)
+
+    @property
+    def gap(self) -> NDArray[np.float64]:
+        """Gap of the meshes, shape (f, q) [m]; zero where nothing is met."""
+        return np.where(self.met.met, self.met.gap, 0.0).reshape(self.whole.shape[:2])
+
+
+def _facing(mesh: Mesh, surface: Surface, master: tuple[Mesh, Surface]) -> Iterator[_Facing]:
+    """Pieces of the faces of the slave side, with what they meet on the master."""
+    for block in surface.blocks:
+        for piece in _pieces(block.family):
+            at, hats, share = _shares(mesh, block, piece)
+            lines = (x.reshape(-1, mesh.dimension) for x in (at.position, at.normal))
+            met = project_to_surface(*lines, *master)
+            yield _Facing(block, piece, at, hats, share, met)
+
+
 def _integrate(
-    sums: _Sums,
-    mesh: Mesh,
-    faces: FaceBlock,
-    piece: _Piece,
-    other_mesh: Mesh,
-    other_surface: Surface,
-    form: FaceForm | None,
+    sums: _Sums, mesh: Mesh, part: _Facing, master: Surface, form: FaceForm | None
 ) -> None:
     """Add the integrals of one piece of every face."""
-    at, hats, share = _shares(mesh, faces, piece)
+    at, hats, share = part.at, part.hats, part.share
     f, q, d = at.position.shape
     position, normal = at.position.reshape(f * q, d), at.normal.reshape(f * q, d)
-    met = project_to_surface(position, normal, other_mesh, other_surface)
-    np.add.at(sums.full, hats, share.sum(axis=1))
-    share = np.where(met.met.reshape(f, q, 1), share, 0.0)
+    np.add.at(sums.full, hats, part.whole.sum(axis=1))
     np.add.at(sums.covered, hats, share.sum(axis=1))
-    gap = np.nan_to_num(met.gap) + (0.0 if form is None else form.gaps(position, normal))
+    gap = np.nan_to_num(part.met.gap) + (0.0 if form is None else form.gaps(position, normal))
     gap = gap.reshape(f, q, 1)
     np.add.at(sums.gap, hats, (share * gap).sum(axis=1))
-    narrow = share * piece.hats
+    narrow = share * part.piece.hats
     square = np.sum((at.position[:, :, None] - mesh.points[hats][:, None]) ** 2, axis=3)
     np.add.at(sums.narrow, hats, narrow.sum(axis=1))
     np.add.at(sums.narrow_gap, hats, (narrow * gap).sum(axis=1))
     np.add.at(sums.spread, hats, (share * square).sum(axis=1))
     np.add.at(sums.narrow_spread, hats, (narrow * square).sum(axis=1))
-    N, _ = shape_functions(faces.family, piece.xi)
+    N, _ = shape_functions(part.faces.family, part.piece.xi)
     value = -np.einsum("fqk,qn,fqd->fknd", share, N, at.normal)
-    _store(sums.slave, sums.dimension, hats[:, :, None], faces.connectivity[:, None, :], value)
-    rows = np.repeat(hats, q, axis=0)
+    _store(sums.slave, d, hats[:, :, None], part.faces.connectivity[:, None, :], value)
     flat = share.reshape(f * q, -1)
-    _integrate_master(sums, rows, flat, normal, met, other_surface)
+    along = np.broadcast_to(normal[:, None], (*flat.shape, d))
+    _store_master(sums.master, np.repeat(hats, q, axis=0), flat, along, part.met, master)
 
 
 def _shares(
@@ -443,6 +466,13 @@ def _shares(
     at = face_geometry(mesh.points, faces, piece.xi)
     weight = at.stretch * piece.weight  # dA
     return at, faces.connectivity[:, piece.nodes], weight[:, :, None] * piece.hats
+
+
+def _numbers(count: int, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Hat at each of ``count`` nodes; -1 where there is none."""
+    number = np.full(count, -1)
+    number[nodes] = np.arange(len(nodes))
+    return number
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -468,8 +498,7 @@ class HatQuadrature:
 
 def hat_quadrature(space: ContactSpace, mesh: Mesh, surface: Surface) -> HatQuadrature:
     """Integration points of the hats of ``space``; mesh and surface are those of its slave side."""
-    number = np.full(mesh.node_count, -1)
-    number[space.nodes] = np.arange(space.count)
+    number = _numbers(mesh.node_count, space.nodes)
     positions, normals, entries, count = [], [], [], 0
     for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
         for piece in _pieces(block.family):
@@ -488,6 +517,21 @@ def hat_quadrature(space: ContactSpace, mesh: Mesh, surface: Surface) -> HatQuad
         normal=np.concatenate(normals),
         weight=coo_array((value, (row, column)), shape=(space.count, count)).tocsr(),
     )
+
+
+def _numbered(
+    space: ContactSpace, sides: dict[str, tuple[Mesh, Surface]]
+) -> tuple[str, float, Iterator[tuple[_Facing, NDArray[np.int64]]]]:
+    """Side of the master, sign of the slave (+: a), pieces of its faces and their hats (f, hats).
+
+    Hats are numbered as in ``space``, -1 where it has none.
+    """
+    other = "b" if space.slave == "a" else "a"
+    mesh, surface = sides[space.slave]
+    number = _numbers(mesh.node_count, space.nodes)
+    near = _part(surface, _faces_at(surface, space.nodes))
+    parts = ((part, number[part.hats]) for part in _facing(mesh, near, sides[other]))
+    return other, 1.0 if space.slave == "a" else -1.0, parts
 
 
 def tangent_rows(
@@ -519,42 +563,25 @@ def tangent_rows(
         All points in the first direction, then in the second one.
     """
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
-    other = "b" if space.slave == "a" else "a"
-    mesh, surface = sides[space.slave]
-    other_mesh, other_surface = sides[other]
-    sign = 1.0 if space.slave == "a" else -1.0
-    number = np.full(mesh.node_count, -1)
-    number[space.nodes] = np.arange(space.count)
+    other, sign, parts = _numbered(space, sides)
+    mesh = sides[space.slave][0]
     central = np.linalg.norm(space.points[:, :-1], axis=1) < _CENTRAL * space.size
     entries: dict[str, list[_Entries]] = {space.slave: [], other: []}
-    for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
-        for piece in _pieces(block.family):
-            at, hats, share = _shares(mesh, block, piece)
-            f, q, d = at.position.shape
-            normal = at.normal.reshape(f * q, d)
-            met = project_to_surface(
-                at.position.reshape(f * q, d), normal, other_mesh, other_surface
-            )
-            share = np.where(met.met.reshape(f, q, 1), share, 0.0)
-            N, dN = shape_functions(block.family, piece.xi)
-            gap = np.where(met.met, met.gap, 0.0).reshape(f, q)
-            base = _dual_tangents(mesh, block, dN)
-            rows = number[hats]
-            towards = _away_from_axis(at.position[:, :, None], central[rows][:, None])
-            for way, t in enumerate(_tangents(at.normal[:, :, None], towards)):
-                value = sign * np.einsum("fqk,qn,fqkd->fknd", share, N, t)
-                turned = np.einsum("qni,fqid,fqkd->fqkn", dN, base, t)
-                value -= sign * np.einsum("fqk,fq,fqkn,fqd->fknd", share, gap, turned, at.normal)
-                own = np.where(rows < 0, -1, rows + way * space.count)
-                _store(entries[space.slave], d, own[:, :, None], block.connectivity[:, None], value)
-                _store_master(
-                    entries[other],
-                    np.repeat(own, q, axis=0),
-                    -sign * share.reshape(f * q, -1),
-                    t.reshape(f * q, -1, d),
-                    met,
-                    other_surface,
-                )
+    for part, rows in parts:
+        at, share, nodes = part.at, part.share, part.faces.connectivity[:, None]
+        q, d = at.position.shape[1:]
+        N, dN = shape_functions(part.faces.family, part.piece.xi)
+        base = _dual_tangents(mesh, part.faces, dN)
+        towards = _away_from_axis(at.position[:, :, None], central[rows][:, None])
+        for way, t in enumerate(_tangents(at.normal[:, :, None], towards)):
+            value = sign * np.einsum("fqk,qn,fqkd->fknd", share, N, t)
+            turned = np.einsum("qni,fqid,fqkd->fqkn", dN, base, t)
+            value -= sign * np.einsum("fqk,fq,fqkn,fqd->fknd", share, part.gap, turned, at.normal)
+            own = np.where(rows < 0, -1, rows + way * space.count)
+            _store(entries[space.slave], d, own[:, :, None], nodes, value)
+            own, flat = np.repeat(own, q, axis=0), -sign * share.reshape(-1, share.shape[2])
+            along = t.reshape(len(flat), -1, d)
+            _store_master(entries[other], own, flat, along, part.met, sides[other][1])
     area = np.tile(space.area, mesh.dimension - 1)
     T_a, T_b = (_scaled(entries[side], area, sides[side][0].dof_count) for side in ("a", "b"))
     if mesh.dimension == 2:
@@ -589,46 +616,29 @@ def around_rows(
         Rows on V, and rows on U and W that count n times, each of a and of b.
     """
     sides = {"a": (mesh_a, surface_a), "b": (mesh_b, surface_b)}
-    other = "b" if space.slave == "a" else "a"
-    mesh, surface = sides[space.slave]
-    other_mesh, other_surface = sides[other]
-    sign = 1.0 if space.slave == "a" else -1.0
-    number = np.full(mesh.node_count, -1)
-    number[space.nodes] = np.arange(space.count)
+    other, sign, parts = _numbered(space, sides)
+    (mesh, _), (other_mesh, other_surface) = sides[space.slave], sides[other]
     around: dict[str, list[_Entries]] = {space.slave: [], other: []}
     turned: list[_Entries] = []
-    for block in _part(surface, _faces_at(surface, space.nodes)).blocks:
-        for piece in _pieces(block.family):
-            at, hats, share = _shares(mesh, block, piece)
-            f, q, d = at.position.shape
-            normal = at.normal.reshape(f * q, d)
-            met = project_to_surface(
-                at.position.reshape(f * q, d), normal, other_mesh, other_surface
-            )
-            share = np.where(met.met.reshape(f, q, 1), share, 0.0)
-            N, _ = shape_functions(block.family, piece.xi)
-            radius = np.maximum(at.position[..., 0], np.finfo(float).tiny)
-            bend = np.where(met.met, met.gap, 0.0).reshape(f, q) / radius
-            away = np.broadcast_to(np.eye(d)[0], at.normal.shape)
-            (first,) = _tangents(at.normal, away)
-            # normal x first, as of a solid: along +theta or against it
-            sense = at.normal[..., 1] * first[..., 0] - at.normal[..., 0] * first[..., 1]
-            share = sign * sense[..., None] * share
-            own = share * (1.0 + bend * at.normal[..., 0])[..., None]
-            rows = number[hats][:, :, None]
-            nodes = block.connectivity[:, None]
-            value = np.einsum("fqk,qn->fkn", own, N)[..., None]
-            _store(around[space.slave], 1, rows, nodes, value)
-            value = np.einsum("fqk,fq,qn,fqd->fknd", share, bend, N, at.normal)
-            _store(turned, d, rows, nodes, value)
-            _store_master(
-                around[other],
-                np.repeat(number[hats], q, axis=0),
-                -share.reshape(f * q, -1),
-                np.ones((f * q, share.shape[2], 1)),
-                met,
-                other_surface,
-            )
+    for part, rows in parts:
+        at, share, nodes = part.at, part.share, part.faces.connectivity[:, None]
+        q, d = at.position.shape[1:]
+        N, _ = shape_functions(part.faces.family, part.piece.xi)
+        bend = part.gap / np.maximum(at.position[..., 0], np.finfo(float).tiny)
+        away = np.broadcast_to(np.eye(d)[0], at.normal.shape)
+        (first,) = _tangents(at.normal, away)
+        # normal x first, as of a solid: along +theta or against it
+        sense = at.normal[..., 1] * first[..., 0] - at.normal[..., 0] * first[..., 1]
+        share = sign * sense[..., None] * share
+        own = share * (1.0 + bend * at.normal[..., 0])[..., None]
+        value = np.einsum("fqk,qn->fkn", own, N)[..., None]
+        _store(around[space.slave], 1, rows[:, :, None], nodes, value)
+        value = np.einsum("fqk,fq,qn,fqd->fknd", share, bend, N, at.normal)
+        _store(turned, d, rows[:, :, None], nodes, value)
+        flat = -share.reshape(-1, share.shape[2])
+        along = np.ones((*flat.shape, 1))
+        rows = np.repeat(rows, q, axis=0)
+        _store_master(around[other], rows, flat, along, part.met, other_surface)
     V = {side: _scaled(around[side], space.area, sides[side][0].node_count) for side in sides}
     UW = {
         space.slave: _scaled(turned, space.area, mesh.dof_count),
@@ -678,18 +688,6 @@ def _scaled(parts: list[_Entries], area: NDArray[np.float64], columns: int) -> c
     kept = row >= 0
     scaled = value[kept] / area[row[kept]]
     return coo_array((scaled, (row[kept], column[kept])), shape=(len(area), columns)).tocsr()
-
-
-def _integrate_master(
-    sums: _Sums,
-    rows: NDArray[np.int64],
-    share: NDArray[np.float64],
-    normal: NDArray[np.float64],
-    met: Projection,
-    surface: Surface,
-) -> None:
-    along = np.broadcast_to(normal[:, None], (*share.shape, normal.shape[1]))
-    _store_master(sums.master, rows, share, along, met, surface)
 
 
 def _store_master(
@@ -744,8 +742,7 @@ def _assemble(
     if not np.any(candidate):  # the nearest hat alone, on a mesh far coarser than the reach
         candidate = inside & facing & (gap <= np.min(gap[inside & facing], initial=np.inf))
     nodes = np.flatnonzero(candidate)
-    number = np.full(mesh.node_count, -1)
-    number[nodes] = np.arange(len(nodes))
+    number = _numbers(mesh.node_count, nodes)
     area = sums.covered[nodes]
     matrices = {}
     for side, parts in ((slave, sums.slave), ("b" if slave == "a" else "a", sums.master)):

@@ -11,13 +11,15 @@ from where it stands, again and again: the curve bends by the square of the smal
 line and the plane, so that two or three rounds are exact.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
+from klack.arrays import Floats
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, HatQuadrature, hat_quadrature
 from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
@@ -25,13 +27,79 @@ from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
-__all__ = ["RingGaps"]
+__all__ = ["ListedFaces", "RingGaps", "carried", "mean_gaps", "slave_and_master"]
 
-Floats = NDArray[np.float64]
 
 _ROUNDS = 8
 _SETTLED = 1e-14  # [m]
 _LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of faces holds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ListedFaces:
+    """Faces of the master side, and which of them are near each line of the slave side.
+
+    Parameters
+    ----------
+    faces : CurvedFaces
+    first, listed : int array
+        Faces near each line, up to a motion of ``within`` [m].
+    within : float [m]
+    """
+
+    faces: CurvedFaces
+    first: NDArray[np.int64]
+    listed: NDArray[np.int64]
+    within: float
+
+    @classmethod
+    def of(
+        cls, master: tuple[Mesh, Surface], position: Floats, normal: Floats, reach: float
+    ) -> Self:
+        """Those near lines from contact points of this reach [m]."""
+        faces, within = curved_faces(*master), _LISTED_WITHIN * reach
+        met, _, _ = cut_nearest(position, normal, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
+        near = list_near(position, normal, met, faces.centre, faces.axes, faces.half, within)
+        return cls(faces, *near, within)
+
+    def gaps(self, position: Floats, normal: Floats, *, near: bool) -> Floats:
+        """Gap along each line [m], nan where nothing is met; ``near``: the lists hold."""
+        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
+        if near:
+            return cut_listed(self.first, self.listed, position, normal, *master, *limits)
+        return cut_nearest(position, normal, *master, *limits)[2]
+
+
+def slave_and_master(
+    space: ContactSpace, a: tuple[Mesh, Surface], b: tuple[Mesh, Surface]
+) -> tuple[tuple[Mesh, Surface], tuple[Mesh, Surface], float]:
+    """Side that carries the hats, the other one, and the extent of both [m]."""
+    slave, master = (a, b) if space.slave == "a" else (b, a)
+    extents = [
+        np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0))
+        for mesh, surface in (slave, master)
+    ]
+    return slave, master, float(sum(extents))
+
+
+def carried(
+    position: Floats, normal: Floats, placement: Floats, centre: Floats, *, slave_moves: bool
+) -> tuple[Floats, Floats]:
+    """Lines of the slave side in the frame of the master, at a rigid placement of body a."""
+    shift, R = np.asarray(placement[:3]), rotation_matrix(placement[3:])
+    arm = position - centre
+    if slave_moves:
+        return arm @ R.T + centre + shift, normal @ R.T
+    return (arm - shift) @ R + centre, normal @ R
+
+
+def mean_gaps(weight: csr_array, gap: Floats, form: Floats, away: float) -> Floats:
+    """Means over the hats of gaps of lines, shape (p, ...); ``away`` where a hat faces nothing."""
+    met = np.isfinite(gap)
+    covered = weight @ met.astype(float)
+    facing = covered > COVERED * (weight @ np.ones(gap.shape))
+    opened = weight @ np.where(met, gap + form, 0.0)
+    return np.where(facing, opened / np.where(facing, covered, 1.0), away)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -43,11 +111,8 @@ class RingGaps:
     hats : HatQuadrature
         On the half section of the slave side.
     angle : array, shape (n,) [rad]
-    faces : CurvedFaces
-        Of the half section of the other side.
-    first, listed : int array
-        Faces near the line of each point at each angle, up to a motion of ``within`` [m].
-    within : float [m]
+    near : ListedFaces
+        Of the half section of the other side, for each point at each angle.
     centre : array, shape (3,) [m]
         Point that a rotation leaves in place.
     slave_moves : bool
@@ -60,10 +125,7 @@ class RingGaps:
 
     hats: HatQuadrature
     angle: Floats
-    faces: CurvedFaces
-    first: NDArray[np.int64]
-    listed: NDArray[np.int64]
-    within: float
+    near: ListedFaces
     centre: Floats
     slave_moves: bool
     form: Floats
@@ -96,32 +158,24 @@ class RingGaps:
         form : FaceForm, optional
             That ``section`` was built with, of revolution.
         """
-        moves = section.slave == "a"
-        slave, master = (mesh_a, surface_a), (mesh_b, surface_b)
-        if not moves:
-            slave, master = master, slave
+        slave, master, away = slave_and_master(section, (mesh_a, surface_a), (mesh_b, surface_b))
         hats = hat_quadrature(section, *slave)
-        extents = [
-            np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0))
-            for mesh, surface in (slave, master)
-        ]
-        flat = np.zeros(len(hats.position))
-        faces, within = curved_faces(*master), _LISTED_WITHIN * section.reach
         lines = (_in_half_plane(hats.position), _in_half_plane(hats.normal))
-        met, _, _ = cut_nearest(*lines, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
-        first, listed = list_near(*lines, met, faces.centre, faces.axes, faces.half, within)
-        near = [np.tile(listed[a:b], len(angle)) for a, b in pairwise(first)]
+        near = ListedFaces.of(master, *lines, section.reach)
+        listed = [np.tile(near.listed[a:b], len(angle)) for a, b in pairwise(near.first)]
+        flat = np.zeros(len(hats.position))
         return cls(
             hats=hats,
             angle=angle,
-            faces=faces,
-            first=np.append(0, np.cumsum(np.repeat(np.diff(first), len(angle)))),
-            listed=np.concatenate(near),
-            within=within,
+            near=replace(
+                near,
+                first=np.append(0, np.cumsum(np.repeat(np.diff(near.first), len(angle)))),
+                listed=np.concatenate(listed),
+            ),
             centre=np.array(centre, dtype=float),
-            slave_moves=moves,
+            slave_moves=section.slave == "a",
             form=flat if form is None else form.gaps(hats.position, hats.normal),
-            away=float(sum(extents)),
+            away=away,
         )
 
     def __call__(self, placement: Floats) -> Floats:
@@ -137,30 +191,18 @@ class RingGaps:
         array, shape (nc, n) [m]
             Of every hat at every angle.
         """
-        shift, R = np.asarray(placement[:3]), rotation_matrix(placement[3:])
-        position = _around(self.hats.position, self.angle)
-        normal = _around(self.hats.normal, self.angle)
-        arm = position - self.centre
-        if self.slave_moves:
-            position, normal = arm @ R.T + self.centre + shift, normal @ R.T
-        else:
-            position, normal = (arm - shift) @ R + self.centre, normal @ R
+        lines = (_around(x, self.angle) for x in (self.hats.position, self.hats.normal))
+        position, normal = carried(*lines, placement, self.centre, slave_moves=self.slave_moves)
         gap = self._along(position.reshape(-1, 3), normal.reshape(-1, 3))
         gap = gap.reshape(len(self.hats.position), -1)
-        met = np.isfinite(gap)
-        W = self.hats.weight
-        covered = W @ met.astype(float)
-        facing = covered > COVERED * (W @ np.ones(len(gap)))[:, None]
-        opened = np.where(met, gap + self.form[:, None], 0.0)
-        return np.where(facing, (W @ opened) / np.where(facing, covered, 1.0), self.away)
+        return mean_gaps(self.hats.weight, gap, self.form[:, None], self.away)
 
     def _along(self, position: Floats, normal: Floats) -> Floats:
         """Distance along each line to the revolved surface [m]; nan where it is not met."""
         s = np.zeros(len(position))
-        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
         moved = np.column_stack([np.hypot(*position[:, :2].T), position[:, 2]])
         moved -= np.repeat(self.hats.position, len(self.angle), axis=0)
-        near = bool(np.max(np.sum(moved**2, axis=1)) <= self.within**2)
+        near = bool(np.max(np.sum(moved**2, axis=1)) <= self.near.within**2)
         for _ in range(_ROUNDS):
             x, y, z = (position + s[:, None] * normal).T
             rho = np.hypot(x, y)
@@ -170,11 +212,7 @@ class RingGaps:
                 _in_half_plane(np.column_stack([rho, z])),
                 _in_half_plane(way / length[:, None]),
             )
-            if near:
-                gap = cut_listed(self.first, self.listed, *lines, *master, *limits)
-            else:
-                _, _, gap = cut_nearest(*lines, *master, *limits)
-            more = gap / length
+            more = self.near.gaps(*lines, near=near) / length
             s += more
             if not np.any(np.abs(more) > _SETTLED):  # none of those that met nothing
                 break
