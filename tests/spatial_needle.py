@@ -20,7 +20,7 @@ from klack.network.rows import Rows
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.transient.guide import Guide
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.interface_bodies import lateral_guide, modal_model

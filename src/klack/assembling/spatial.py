@@ -31,7 +31,8 @@ from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
 from klack.transient.gap_course import gap_course
-from klack.transient.guide import Guide, guide_of_shaft
+from klack.transient.guide import guide_of_shaft
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import (
     InterfaceBody,
     InterfaceContact,

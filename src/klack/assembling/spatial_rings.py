@@ -37,7 +37,8 @@ from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
 from klack.reduction.reduced_body import ReducedBody
-from klack.transient.guide import Guide, guide_at_sections
+from klack.transient.guide import guide_at_sections
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_guide import shaft_sections, turned_sections
 from klack.transient.revolved_model import (

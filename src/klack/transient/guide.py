@@ -16,8 +16,7 @@ Limits: the bore does not move; drag acts along the axis only; no fluid film in 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,59 +24,16 @@ from numpy.typing import NDArray
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.errors import InputError, require_nonnegative, require_positive
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 
-__all__ = ["Guide", "ShaftSection", "guide_at_sections", "guide_of_shaft", "require_within"]
+__all__ = ["ShaftSection", "guide_at_sections", "guide_of_shaft", "require_within"]
 
 _ROUND = 1e-2
 """Largest deviation of a guided surface from a round one, over its width."""
 
 _AT_HEIGHT = 1e-7
 """Nodes so near are at the height itself [m]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Guide:
-    """Clearance contacts of the moving body with a bore along z.
-
-    Parameters
-    ----------
-    heights : array, shape (k,) [m]
-        z of the sections, at the placement of the moving body.
-    clearance : array, shape (k,) [m]
-        Radial.
-    offset : array, shape (k, 2) [m]
-        Position of the sections across the axis of the bore (z), at the placement.
-    traces : array, shape (k, 2, M) [1/sqrt(kg)]
-        Displacement of the section along x and y per unit modal coordinate.
-    slide : array, shape (k, M) [1/sqrt(kg)]
-        The same along z.
-    turn : array, shape (k, 3, M) [1/(m sqrt(kg))]
-        Rotation of the section about x, y, z per unit modal coordinate.
-    radius : array, shape (k,) [m]
-        Of the shaft.
-    compliance : array, shape (k, 2, 2) [m/N]
-        Of bore and shaft, without that of the kept modes.
-    friction : array, shape (k,) [-]
-    viscous : array, shape (k,) [N s/m]
-        Drag at each height.
-    """
-
-    heights: NDArray[np.float64]
-    clearance: NDArray[np.float64]
-    offset: NDArray[np.float64]
-    traces: NDArray[np.float64]
-    slide: NDArray[np.float64]
-    turn: NDArray[np.float64]
-    radius: NDArray[np.float64]
-    compliance: NDArray[np.float64]
-    friction: NDArray[np.float64]
-    viscous: NDArray[np.float64]
-
-    def with_friction(self, coefficient: float) -> Self:
-        """Return the same guide with another Coulomb coefficient [-] at all heights."""
-        require_nonnegative("guide: friction", coefficient, "-")
-        return replace(self, friction=np.full(len(self.heights), coefficient))
 
 
 def guide_of_shaft(
@@ -220,7 +176,7 @@ def guide_at_sections(
     return Guide(
         heights=centre[:, 2],
         clearance=np.full(count, clearance),
-        offset=centre[:, :2],
+        offset=np.ascontiguousarray(centre[:, :2]),
         traces=np.ascontiguousarray(motion[:, :2]),
         slide=np.ascontiguousarray(motion[:, 2]),
         turn=np.ascontiguousarray(motion[:, 3:]),

@@ -6,23 +6,21 @@ film yet.  Where the wall holds it no film is squeezed across, only along the wa
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner
 from klack.hydraulics.guide_film import guide_film_step
-from klack.transient.interface_arrays import Bore, Films, Modes, State
+from klack.transient.interface_arrays import Films, Guide, Modes, State
 
 __all__ = ["count_bearing", "shaft_place", "squeeze_guide"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 _ROUNDS, _HALVINGS = 40, 12
 _FOUND, _NEARLY = 1e-11, 1e-6  # places that do not fit, over the clearance
 
 
 @inner
-def shaft_place(bore: Bore, k: int, q: Vector) -> Vector:
+def shaft_place(bore: Guide, k: int, q: Vector) -> Vector:
     """Place of the shaft across the axis at a height [m], shape (2,)."""
     place = bore.offset[k].copy()
     for c in range(2):
@@ -40,7 +38,7 @@ def _within(place: Vector, clearance: float) -> float:
 
 @inner
 def _bearings(
-    films: Films, bore: Bore, before: Matrix, after: Matrix, step: float, slides: bool
+    films: Films, bore: Guide, before: Matrix, after: Matrix, step: float, slides: bool
 ) -> tuple[Vector, Matrix]:
     """Forces of all heights over a step, shape (2 g,), and their slopes with the places after.
 
@@ -72,7 +70,7 @@ def _bearings(
 
 @inner
 def squeeze_guide(
-    films: Films, modes: Modes, bore: Bore, state: State, q: Vector, kick: Vector
+    films: Films, modes: Modes, bore: Guide, state: State, q: Vector, kick: Vector
 ) -> float:
     """Change of the modal force of the films at all heights over the step that leads to ``q``.
 
@@ -113,7 +111,7 @@ def squeeze_guide(
 @inner
 def _search(
     films: Films,
-    bore: Bore,
+    bore: Guide,
     before: Matrix,
     free: Vector,
     soft: Matrix,
@@ -150,7 +148,7 @@ def _search(
 
 
 @inner
-def count_bearing(k: int, bore: Bore, state: State, q: Vector) -> None:
+def count_bearing(k: int, bore: Guide, state: State, q: Vector) -> None:
     """Add the loss of the film at a height over the step that leads to ``q``."""
     for c in range(2):
         for i in range(len(q)):

@@ -33,17 +33,14 @@ turns round; the payment of the energy debt of the seat comes last, some 1e-6 of
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Cube, Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
-from klack.transient.interface_arrays import Bore, Modes, Step
+from klack.transient.interface_arrays import Guide, Modes, Step
 
 __all__ = ["GuideRub", "begin_rub", "no_rub", "rub_guide", "stopping_force"]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Cube = NDArray[np.float64]
 Four = tuple[float, float, float, float]
 
 _NEWTON = 60
@@ -129,7 +126,7 @@ def stopping_force(
 
 
 @phase
-def begin_rub(bore: Bore, before: Matrix, after: Matrix, rub: GuideRub) -> bool:
+def begin_rub(bore: Guide, before: Matrix, after: Matrix, rub: GuideRub) -> bool:
     """Take the normal forces at both ends of a step; returns whether any height rubs."""
     rubs = False
     for k in range(len(rub.most)):

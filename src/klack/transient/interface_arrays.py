@@ -5,6 +5,9 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Cube, Matrix, Vector
+from klack.errors import require_nonnegative
+
 __all__ = [
     "CONTACT_STEPS",
     "DAMPING",
@@ -19,11 +22,11 @@ __all__ = [
     "ROUNDS",
     "WORK",
     "ActiveSet",
-    "Bore",
     "Closed",
     "ContactPoints",
     "Films",
     "Grip",
+    "Guide",
     "Layer",
     "Limit",
     "Modes",
@@ -36,9 +39,6 @@ __all__ = [
     "Worn",
 ]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-Cube = NDArray[np.float64]
 
 DAMPING = 0
 WORK = 1  # of the constant force
@@ -124,28 +124,32 @@ class ContactPoints(NamedTuple):
         return self._replace(A=self.A[:0, :0], traces=self.traces[:0], gap=self.gap[:0])
 
 
-class Bore(NamedTuple):
-    """Guide at k heights of the shaft."""
+class Guide(NamedTuple):
+    """Clearance contacts of the moving body with a bore along z, at k heights of its shaft."""
 
-    traces: Cube  # (k, 2, M) displacement of the shaft across the axis
-    slide: Matrix  # (k, M) the same along it
-    turn: Cube  # (k, 3, M) rotation of the section
-    offset: Matrix  # (k, 2) [m] position across the axis at q = 0
+    heights: Vector  # (k,) [m] z of the sections, at the placement of the moving body
+    clearance: Vector  # (k,) [m] radial
+    offset: Matrix  # (k, 2) [m] position across the axis of the bore (z), at q = 0
+    traces: Cube  # (k, 2, M) [1/sqrt(kg)] displacement of the section across the axis
+    slide: Matrix  # (k, M) [1/sqrt(kg)] the same along it
+    turn: Cube  # (k, 3, M) [1/(m sqrt(kg))] rotation of the section about x, y, z
     radius: Vector  # (k,) [m] of the shaft
-    clearance: Vector  # (k,) [m]
-    compliance: Cube  # (k, 2, 2) [m/N]
+    compliance: Cube  # (k, 2, 2) [m/N] of bore and shaft, without that of the kept modes
     friction: Vector  # (k,) [-]
-    viscous: Vector  # (k,) [N s/m]
+    viscous: Vector  # (k,) [N s/m] drag at each height
 
     @classmethod
     def none(cls, modes: int) -> Self:
         """Return a guide without a height."""
-        empty = np.zeros(0)
+        none = np.zeros(0)
         across, along, turn = np.zeros((0, 2, modes)), np.zeros((0, modes)), np.zeros((0, 3, modes))
-        return cls(
-            *(across, along, turn, np.zeros((0, 2)), empty, empty),
-            *(np.zeros((0, 2, 2)), empty, empty),
-        )
+        place, compliance = np.zeros((0, 2)), np.zeros((0, 2, 2))
+        return cls(none, none, place, across, along, turn, none, compliance, none, none)
+
+    def with_friction(self, coefficient: float) -> Self:
+        """Return the same guide with another Coulomb coefficient [-] at all heights."""
+        require_nonnegative("guide: friction", coefficient, "-")
+        return self._replace(friction=np.full(len(self.heights), coefficient))
 
 
 class Films(NamedTuple):

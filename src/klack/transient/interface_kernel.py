@@ -47,6 +47,7 @@ step.  For one point on a rigid body this is the mean pressure of the layer betw
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
@@ -65,10 +66,10 @@ from klack.transient.interface_arrays import (
     PLASTIC,
     ROUNDS,
     WORK,
-    Bore,
     ContactPoints,
     Films,
     Grip,
+    Guide,
     Layer,
     Limit,
     Modes,
@@ -101,8 +102,6 @@ __all__ = [
     "safe_flight",
 ]
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
 
 FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
 """Why :func:`march` returned.
@@ -157,7 +156,7 @@ def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
 
 
 @phase
-def _push_by_films(films: Films, bore: Bore | None, state: State, step: Step) -> None:
+def _push_by_films(films: Films, bore: Guide | None, state: State, step: Step) -> None:
     """Modal force of all films as in the step before."""
     for i in range(len(step.kick)):
         step.kick[i] = 0.0
@@ -285,7 +284,7 @@ def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, flo
 
 
 @inner
-def _start(modes: Modes, outside: Outside, bore: Bore | None, n: int, rubs: int) -> Step:
+def _start(modes: Modes, outside: Outside, bore: Guide | None, n: int, rubs: int) -> Step:
     """Room for a step, the answer of the spring, and how much drag brakes the shaft."""
     M, guides = len(modes.push), 0
     if bore is not None:
@@ -338,7 +337,7 @@ def _potential(points: ContactPoints, state: State) -> float:
 
 
 @phase
-def _begin(modes: Modes, outside: Outside, bore: Bore | None, state: State, step: Step) -> float:
+def _begin(modes: Modes, outside: Outside, bore: Guide | None, state: State, step: Step) -> float:
     """Forces known before the step, the guide's as they were; returns its drag [N]."""
     for i in range(len(modes.push)):
         step.known[i] = modes.push[i] * outside.constant
@@ -379,7 +378,7 @@ def _move(modes: Modes, state: State, step: Step) -> float:
 
 
 @phase
-def _press(modes: Modes, bore: Bore, step: Step, k: int) -> float:
+def _press(modes: Modes, bore: Guide, step: Step, k: int) -> float:
     """Keep the shaft in a disc of clearance around the axis; returns what the spring adds [N]."""
     step.normal[k, 0] = 0.0
     step.normal[k, 1] = 0.0
@@ -647,7 +646,7 @@ def _tell_forces(
 
 @phase
 def _count(
-    modes: Modes, outside: Outside, bore: Bore | None, state: State, step: Step, axial: float
+    modes: Modes, outside: Outside, bore: Guide | None, state: State, step: Step, axial: float
 ) -> None:
     """Add the step to the sums of energy; ``axial`` is the force from outside [N]."""
     books, q, v, loss = state.books, state.q, state.v, modes.loss
@@ -713,7 +712,7 @@ def march(
     modes: Modes,
     outside: Outside,
     points: ContactPoints,
-    bore: Bore | None,
+    bore: Guide | None,
     films: Films | None,
     state: State,
     record: Record,

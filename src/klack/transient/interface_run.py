@@ -21,7 +21,6 @@ from klack.contact.statics import ReachError
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
-from klack.transient.guide import Guide
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
     DAMPING,
@@ -36,9 +35,9 @@ from klack.transient.interface_arrays import (
     ROUNDS,
     WORK,
     ActiveSet,
-    Bore,
     ContactPoints,
     Grip,
+    Guide,
     Layer,
     Limit,
     Modes,
@@ -64,9 +63,16 @@ from klack.transient.interface_result import (
     InterfaceResult,
     RigidMotion,
 )
+from klack.transient.placed_bodies import (
+    SCALE,
+    modal_energy,
+    rigid_coordinates,
+    shaft_pressed,
+    surely_unguided,
+)
 from klack.transient.rough_points import layer_energy, solve_rough
 
-__all__ = ["Gaps", "bore_arrays", "contact_points", "modes_of_step", "simulate_interface"]
+__all__ = ["Gaps", "contact_points", "modes_of_step", "simulate_interface"]
 
 Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 """Exact gaps, shape (nc,) [m], at a rigid placement of the moving body, shape (6,) [m], [rad]."""
@@ -309,7 +315,7 @@ class _Run:
         self.clearance = max(
             0.0, float(np.min(model.gap[below] / model.axial[below], initial=np.inf))
         )
-        self.bore = bore_arrays(guide, M)
+        self.bore = Guide.none(M) if guide is None else guide
         yields = model.limit is not None
         rough = model.layer is not None
         heights = len(self.bore.clearance)
@@ -363,23 +369,10 @@ class _Run:
         self.v[: self.rigid_count] = self.coordinates(motion)
         # the spring counts from q = 0 in the kernel
         self.constant += self.spring * self.start_lift
-        self.press()
+        shaft_pressed(self.bore, self.state)
         self.settle()
         self.start_energy = self.energy()
         self.keep_motion()
-
-    def press(self) -> None:
-        """Let the bore hold a shaft that is placed against it."""
-        for k in range(len(self.bore.clearance)):
-            place, C = self.bore.offset[k] + self.bore.traces[k] @ self.q, self.bore.compliance[k]
-            distance = float(np.hypot(*place))
-            if distance > self.bore.clearance[k]:
-                n = place / distance
-                self.state.guide_force[k] = -(distance - self.bore.clearance[k]) / (n @ C @ n) * n
-        held = np.einsum(
-            "kc,kcd,kd", self.state.guide_force, self.bore.compliance, self.state.guide_force
-        )
-        self.books[GUIDE_STRAIN] = 0.5 * float(held)
 
     def settle(self) -> None:
         """Press the layer of faces that are placed into each other."""
@@ -401,15 +394,15 @@ class _Run:
     def coordinates(self, rigid: NDArray[np.float64]) -> NDArray[np.float64]:
         """Rigid modal coordinates of a translation and rotation vector."""
         R = self.model.rigid[:, : self.rigid_count]
-        q, *_ = np.linalg.lstsq(R / _SCALE[:, None], rigid / _SCALE, rcond=1e-12)
-        if np.max(np.abs(R @ q - rigid) / _SCALE) > 1e-9 * max(1.0, np.max(np.abs(rigid / _SCALE))):
+        q = rigid_coordinates(R, rigid)
+        if np.max(np.abs(R @ q - rigid) / SCALE) > 1e-9 * max(1.0, np.max(np.abs(rigid / SCALE))):
             raise InputError(
                 "simulate_interface: offset or velocity",
                 got="a motion across the axis, or a rotation",
                 expected="motion along z only, for bodies of revolution",
                 hint="model the bodies as swept or solid to tilt or shift them.",
             )
-        return np.asarray(q)
+        return q
 
     def rigid_state(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return self.model.rigid @ self.q, self.model.rigid @ self.v
@@ -470,7 +463,7 @@ class _Run:
                 self.take_gaps()
                 continue
             doublings = min(int(np.log2(safe / self.step)), _DOUBLINGS)
-            if not self.unguided(safe):
+            if not surely_unguided(self.model, self.bore, self.state, safe):
                 safe, doublings = _WARY_SHARE * safe, _GUIDED_DOUBLINGS
             length = self.step * 2.0**doublings
             steps = max(1, int(min(safe, _FLIGHT_CHUNK) / length))
@@ -497,23 +490,6 @@ class _Run:
         return float(
             safe_flight(gap, self.model.traces, self.model.omega, self.q, self.v, force, horizon)
         )
-
-    def unguided(self, time: float) -> bool:
-        """Whether the shaft surely stays clear of its guide for this time."""
-        if self.guide is None:
-            return True
-        if np.any(self.state.guide_force):
-            return False
-        elastic = self.model.omega > 0
-        swing = np.zeros(self.model.mode_count)
-        swing[elastic] = np.hypot(
-            self.q[elastic], self.v[elastic] / self.model.omega[elastic]
-        ) + np.abs(self.q[elastic])
-        rigid = np.where(elastic, 0.0, self.v)
-        position = self.guide.offset + self.guide.traces @ self.q
-        reach = np.linalg.norm(self.guide.traces @ rigid, axis=1) * time
-        reach = reach + np.linalg.norm(np.abs(self.guide.traces) @ swing, axis=1)
-        return bool(np.all(np.linalg.norm(position, axis=1) + reach < self.guide.clearance))
 
     def impact(self, duration: float, wait: int, progress: Callable[[float], None] | None) -> None:
         """Fine steps through one impact, or to the end of the run."""
@@ -602,17 +578,16 @@ class _Run:
         return float(0.5 * self.spring * (self.push @ self.q) ** 2)
 
     def energy(self) -> float:
-        modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
         return (
-            float(modal)
+            modal_energy(self.model, self.q, self.v)
             + self.contact_energy()
             + self.spring_energy()
             + float(self.books[GUIDE_STRAIN])
         )
 
     def ledger_start(self) -> tuple[float, float, NDArray[np.float64]]:
-        modal = 0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2)
-        return float(modal), self.spring_energy(), self.books.copy()
+        modal = modal_energy(self.model, self.q, self.v)
+        return modal, self.spring_energy(), self.books.copy()
 
     def body_energies(self) -> tuple[BodyEnergy, ...]:
         model, entries = self.model, []
@@ -765,24 +740,3 @@ class _Run:
             approach=self.approach(),
             wall_time=wall_time,
         )
-
-
-_SCALE = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
-"""A millimetre of translation weighs like a radian over a metre: lengths of valves."""
-
-
-def bore_arrays(guide: Guide | None, modes: int) -> Bore:
-    """Guide as the compiled step takes it."""
-    if guide is None:
-        return Bore.none(modes)
-    return Bore(
-        np.ascontiguousarray(guide.traces),
-        np.ascontiguousarray(guide.slide),
-        np.ascontiguousarray(guide.turn),
-        np.ascontiguousarray(guide.offset),
-        guide.radius,
-        guide.clearance,
-        np.ascontiguousarray(guide.compliance),
-        guide.friction,
-        guide.viscous,
-    )

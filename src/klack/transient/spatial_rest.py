@@ -23,14 +23,15 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Vector
 from klack.contact.complementarity import solve_lcp
 from klack.errors import AccuracyWarning
-from klack.transient.interface_arrays import GUIDE_STRAIN, Bore, State
+from klack.transient.interface_arrays import Guide, State
 from klack.transient.interface_model import InterfaceModel
+from klack.transient.placed_bodies import rigid_coordinates, shaft_pressed
 
-__all__ = ["settle_at_rest", "shaft_pressed"]
+__all__ = ["settle_at_rest"]
 
-Vector = NDArray[np.float64]
 
 _SOFTER = 1e4  # a proximal step than the contact points
 _MOST = 100
@@ -45,7 +46,7 @@ def settle_at_rest(
     model: InterfaceModel,
     state: State,
     gaps: Callable[[], Vector],
-    bore: Bore,
+    bore: Guide,
     force: Vector,
 ) -> None:
     """Bring the bodies to rest under a constant modal force, in place.
@@ -58,7 +59,7 @@ def settle_at_rest(
         In: where they are; out: at rest, but for the set of points that carry.
     gaps : callable
         Gaps at q = 0, shape (nc,) [m], where ``state.q`` is now.
-    bore : Bore
+    bore : Guide
     force : array, shape (M,)
 
     Raises
@@ -122,10 +123,9 @@ def settle_at_rest(
 
 def _spin(model: InterfaceModel, rigid: NDArray[np.bool_]) -> Vector:
     """Modal direction of the rotation about the axis, of length 1; zero without one."""
-    scale = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
-    about = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e3])
     mine = rigid & (model.owner == 0)
-    q, *_ = np.linalg.lstsq(model.rigid[:, mine] / scale[:, None], about, rcond=1e-12)
+    q = rigid_coordinates(model.rigid[:, mine], turn)
     spin = np.zeros(model.mode_count)
     spin[mine] = q / (float(np.linalg.norm(q)) or 1.0)
     return spin
@@ -151,7 +151,7 @@ class _Walls:
         keep = np.flatnonzero(force > 0.0)
         return type(self)(self.height[keep], self.normal[keep])
 
-    def with_present(self, bore: Bore, q: Vector) -> Self:
+    def with_present(self, bore: Guide, q: Vector) -> Self:
         """These and, at each height, the one nearest to the shaft.
 
         A shaft in the middle of the bore has no nearest one; any does.
@@ -169,7 +169,7 @@ class _Walls:
             np.concatenate([self.height, new]), np.concatenate([self.normal, normal[new]])
         )
 
-    def missed(self, bore: Bore, q: Vector, force: Vector, rows: NDArray[np.float64]) -> float:
+    def missed(self, bore: Guide, q: Vector, force: Vector, rows: NDArray[np.float64]) -> float:
         """Largest modal force by which the round bore pushes unlike these walls."""
         missed = 0.0
         for k in range(len(bore.clearance)):
@@ -185,7 +185,7 @@ class _Walls:
 
 
 def _rows(
-    model: InterfaceModel, bore: Bore, gap: Vector, walls: _Walls
+    model: InterfaceModel, bore: Guide, gap: Vector, walls: _Walls
 ) -> tuple[NDArray[np.float64], Vector, NDArray[np.float64]]:
     """Traces, gaps at q = 0 and local compliance of contact points, then of walls."""
     k, normal = walls.height, walls.normal
@@ -199,16 +199,3 @@ def _rows(
     local[:n, :n] = model.compliance
     local[n:, n:] = held
     return rows, np.concatenate([gap, free]), local
-
-
-def shaft_pressed(bore: Bore, state: State) -> None:
-    """Let the bore hold a shaft that is placed against it."""
-    for k in range(len(bore.clearance)):
-        place, C = bore.offset[k] + bore.traces[k] @ state.q, bore.compliance[k]
-        distance = float(np.hypot(*place))
-        state.guide_force[k] = 0.0
-        if distance > bore.clearance[k]:
-            n = place / distance
-            state.guide_force[k] = -(distance - bore.clearance[k]) / (n @ C @ n) * n
-    held = np.einsum("kc,kcd,kd", state.guide_force, bore.compliance, state.guide_force)
-    state.books[GUIDE_STRAIN] = 0.5 * float(held)

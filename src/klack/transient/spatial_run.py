@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from klack.arrays import Index, Vector
 from klack.contact.step_constants import NO_LAW
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.simulation.modal_step import ROW, ROW_Q, ROW_V
@@ -53,7 +54,6 @@ from klack.simulation.step_status import (
     STATUS_REPEAT,
 )
 from klack.transient.gap_course import GapCourse
-from klack.transient.guide import Guide
 from klack.transient.impact_recorder import ImpactRecorder, film_lands
 from klack.transient.interface_arrays import (
     DAMPING,
@@ -62,6 +62,7 @@ from klack.transient.interface_arrays import (
     GUIDE,
     GUIDE_STRAIN,
     ActiveSet,
+    Guide,
     Modes,
     Outside,
     Record,
@@ -70,11 +71,17 @@ from klack.transient.interface_arrays import (
 )
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
-from klack.transient.interface_run import Gaps, bore_arrays, contact_points, modes_of_step
+from klack.transient.interface_run import Gaps, contact_points, modes_of_step
+from klack.transient.placed_bodies import (
+    modal_energy,
+    rigid_coordinates,
+    shaft_pressed,
+    surely_unguided,
+)
 from klack.transient.placed_gaps import FRESH, PlacedGaps
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
-from klack.transient.spatial_rest import settle_at_rest, shaft_pressed
+from klack.transient.spatial_rest import settle_at_rest
 from klack.transient.spatial_rubbing import (
     across_energy,
     forget_inverse,
@@ -89,8 +96,6 @@ from klack.units import format_si
 
 __all__ = ["SpatialValve"]
 
-Vector = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 _AWAY = 1.0  # [m] added to the gaps of the axial interfaces, which then never act
 _CLOSING = 1e-6  # gaps that count where others are asked for anew [m]
@@ -232,7 +237,7 @@ class _Moving:
         self.points = contact_points(model, self.fine.B1, h)
         self.resting = contact_points(model, self.whole.B1, sizes.coarse * h)
         self.nothing = self.points.away()
-        self.bore = bore_arrays(valve.guide, model.mode_count)
+        self.bore = Guide.none(model.mode_count) if valve.guide is None else valve.guide
         wet = {row.component: row.film for row in network.rows.interfaces if row.film is not None}
         self.squeezed = [film for film in valve.films if film.stop in wet]
         series = {row.component: row.series_compliance for row in network.rows.interfaces}
@@ -281,8 +286,9 @@ class _Moving:
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         """Place the needle, and let it settle under the forces of the network."""
         self.read()
-        self.q[: self.rigid_count] += self.coordinates(self.valve.placement)
-        self.v[: self.rigid_count] += self.coordinates(self.valve.velocity)
+        shapes = self.model.rigid[:, : self.rigid_count]
+        self.q[: self.rigid_count] += rigid_coordinates(shapes, self.valve.placement)
+        self.v[: self.rigid_count] += rigid_coordinates(shapes, self.valve.velocity)
         self.take_gaps()
         self.sides.place(self.q)
         rests = balance is not None and not np.any(self.v)
@@ -398,8 +404,7 @@ class _Moving:
         for i, name in enumerate(("x", "y")):
             told[f"{needle} {name}"] = ChannelData(unit="m", values=place[:, i])
             told[f"{needle} tilt {name}"] = ChannelData(unit="rad", values=slope[:, i])
-        heights = () if self.valve.guide is None else self.valve.guide.heights
-        for k, height in enumerate(heights):
+        for k, height in enumerate(self.bore.heights):
             force = np.interp(time, path.time, path.guide_force[:, k])
             told[f"guide {k + 1} force"] = ChannelData(unit="N", values=force)
             arm = float(height - self.model.centre[2])
@@ -558,19 +563,19 @@ class _Moving:
         fly = min(most, _LONGEST, int(safe * _SURE / span * (1.0 + 1e-9)))
         if self.films is not None or self.sides.acts:  # they act wherever the needle is
             fly = 0
-        while fly and not self._unguided(fly * span):
+        while fly and not surely_unguided(self.model, self.bore, self.state, fly * span):
             fly //= 2
         return fly, safe * _SURE < span
 
     def _fly(self, run: _Run, done: int, looks: int) -> int:
         """Free flight, in the loop of the axial network."""
         here = slice(0, self.ports)
-        before, work = self._modal_energy(), float(np.sum(self.at[WORK:][here]))
+        before, work = modal_energy(self.model, self.q, self.v), float(np.sum(self.at[WORK:][here]))
         status = self._loop(run, done, looks)
         self.read()
         if np.any(self.model.damping > 0.0):
             given = float(np.sum(self.at[WORK:][here])) - work
-            self.flags[_LOST] += given - (self._modal_energy() - before)
+            self.flags[_LOST] += given - (modal_energy(self.model, self.q, self.v) - before)
         self.fresh = True
         return status
 
@@ -714,7 +719,9 @@ class _Moving:
         longest = 1
         films = self.films
         wet = films is not None and len(films.room) > 0
-        clear = points or (self._off_the_wall(H) if wet else self._unguided(H))
+        clear = points or (
+            self._off_the_wall(H) if wet else surely_unguided(self.model, self.bore, self.state, H)
+        )
         if films is None and self.sides.acts and not points and clear:
             longest = steps
         if not points and films is not None and (wet or clear):
@@ -876,13 +883,6 @@ class _Moving:
         self.network.bodies.laid_out[self.place_q] = self.q
         self.network.bodies.laid_out[self.place_v] = self.v
 
-    def coordinates(self, rigid: Vector) -> Vector:
-        """Rigid modal coordinates of a translation and rotation vector of the needle."""
-        R = self.model.rigid[:, : self.rigid_count]
-        scale = np.array([1.0, 1.0, 1.0, 1e3, 1e3, 1e3])
-        q, *_ = np.linalg.lstsq(R / scale[:, None], rigid / scale, rcond=1e-12)
-        return np.asarray(q)
-
     def take_gaps(self, *, careful: bool = False) -> None:
         """Take the gaps from the geometry at the present placement."""
         if self.gaps.take(self.q, careful=careful):
@@ -906,28 +906,9 @@ class _Moving:
     def _clear(self) -> bool:
         """Whether no point and no height of the guide has closed."""
         open_by = self.gap0 + self.model.traces @ self.q
-        return bool(np.min(open_by) > 0.0) and self._unguided(0.0)
-
-    def _unguided(self, time: float) -> bool:
-        """Whether the shaft surely stays clear of its guide for this time."""
-        guide, model = self.valve.guide, self.model
-        if guide is None:
-            return True
-        if np.any(self.state.guide_force):
-            return False
-        elastic = model.omega > 0
-        swing, drift = np.zeros(model.mode_count), np.where(elastic, 0.0, self.v)
-        if time > 0.0:
-            swing[elastic] = np.hypot(
-                self.q[elastic], self.v[elastic] / model.omega[elastic]
-            ) + np.abs(self.q[elastic])
-        position = self.bore.offset + self.bore.traces @ self.q
-        reach = np.linalg.norm(self.bore.traces @ drift, axis=1) * time
-        reach = reach + np.linalg.norm(np.abs(self.bore.traces) @ swing, axis=1)
-        return bool(np.all(np.linalg.norm(position, axis=1) + reach < guide.clearance))
-
-    def _modal_energy(self) -> float:
-        return float(0.5 * self.v @ self.v + 0.5 * np.sum((self.model.omega * self.q) ** 2))
+        return bool(np.min(open_by) > 0.0) and surely_unguided(
+            self.model, self.bore, self.state, 0.0
+        )
 
     def _keep(self) -> _Kept:
         contact = self.state.contact

@@ -5,17 +5,14 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
+from klack.arrays import Floats
 from klack.hydraulics.tilted_film import SectorFilm
 from klack.network.rows import FilmRow
-from klack.transient.guide import Guide
-from klack.transient.interface_arrays import Films
+from klack.transient.interface_arrays import Films, Guide
 from klack.transient.interface_model import InterfaceModel
 
 __all__ = ["BearingFilm", "TiltingFilm", "film_arrays"]
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -42,8 +39,8 @@ class TiltingFilm:
     land: SectorFilm | None
     cubic: float
     slope: float
-    fit: Array
-    base: Array
+    fit: Floats
+    base: Floats
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +58,7 @@ class BearingFilm:
     length: float
     cut_off: float
 
-    def arrays(self, guide: Guide, viscosity: float) -> tuple[Array, Array]:
+    def arrays(self, guide: Guide, viscosity: float) -> tuple[Floats, Floats]:
         """``mu L^3 R / c^2`` [N s] and clearance with the cut-off [m] at each height."""
         room = guide.clearance + self.cut_off
         return viscosity * self.length**3 * guide.radius / room**2, room
@@ -72,8 +69,8 @@ def film_arrays(
     films: Sequence[TiltingFilm],
     rows: Mapping[str, FilmRow],
     series: Mapping[str, float],
-    bearing: Array,
-    room: Array,
+    bearing: Floats,
+    room: Floats,
 ) -> Films:
     """Arrays of films for the compiled step, at the gaps of the model.
 
@@ -95,7 +92,7 @@ def film_arrays(
     slope = np.array([film.slope for film in films])
     M, n = model.mode_count, model.count
 
-    def each(values: list[Array], *shape: int) -> Array:
+    def each(values: list[Floats], *shape: int) -> Floats:
         return np.array(values) if values else np.zeros((0, *shape))
 
     return Films(
@@ -118,7 +115,7 @@ def film_arrays(
     )
 
 
-def _arms(model: InterfaceModel, film: TiltingFilm) -> Array:
+def _arms(model: InterfaceModel, film: TiltingFilm) -> Floats:
     """Lift and tilts at the contact points of the stop of a film, zero at others, shape (n, 3)."""
     arms = np.zeros((model.count, 3))
     for name, first, last in model.contacts:
@@ -127,7 +124,7 @@ def _arms(model: InterfaceModel, film: TiltingFilm) -> Array:
     return arms
 
 
-def _bulk(model: InterfaceModel, film: TiltingFilm, series: float) -> Array:
+def _bulk(model: InterfaceModel, film: TiltingFilm, series: float) -> Floats:
     """Compliance of the bulk for a force and moments, as of an elastic bed under the touching ring.
 
     Along the axis it is ``series``; a bed of the same stiffness under a ring of radius r has the
@@ -154,7 +151,7 @@ def _sizes(land: SectorFilm | None) -> list[int]:
     return [land.sectors, land.circles, points, functions, land.shared]
 
 
-def _laid_out(land: SectorFilm | None) -> Array:
+def _laid_out(land: SectorFilm | None) -> Floats:
     if land is None:
         return np.zeros(0)
     parts = (land.rows(), land.between, land.along, land.around, land.load, land.area)

@@ -21,8 +21,7 @@ from klack.elasticity import eigen
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
-from klack.transient.guide import Guide
-from klack.transient.interface_arrays import Modes, Outside, Record, State
+from klack.transient.interface_arrays import Guide, Modes, Outside, Record, State
 from klack.transient.interface_kernel import march
 from klack.transient.interface_model import (
     InterfaceBody,

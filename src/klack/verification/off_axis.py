@@ -29,12 +29,10 @@ from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import State as NetworkState
 from klack.simulation.network_run import simulate_network
-from klack.transient.guide import Guide
-from klack.transient.interface_arrays import DEBT, Films, Outside, Record, State
+from klack.transient.interface_arrays import DEBT, Films, Guide, Outside, Record, State
 from klack.transient.interface_kernel import FAILED, march
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import (
-    bore_arrays,
     contact_points,
     modes_of_step,
     simulate_interface,
@@ -194,7 +192,7 @@ def fly_in_films(
         {"contact": series},
         *(bearing or (none, none)),
     )
-    bore = bore_arrays(guide, model.mode_count)
+    bore = Guide.none(model.mode_count) if guide is None else guide
     state = State.still(
         *(model.mode_count, model.count, len(bore.clearance)),
         films=len(films.lowest),

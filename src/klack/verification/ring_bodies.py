@@ -31,7 +31,8 @@ from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.transient.guide import Guide, guide_at_sections
+from klack.transient.guide import guide_at_sections
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.revolved_guide import shaft_sections, turned_sections

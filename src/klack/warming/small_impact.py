@@ -12,7 +12,7 @@ from klack.contact.pressure_limit import PressureLimit
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import ContactPair, ReducedSystem
-from klack.transient.guide import Guide
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel, StaticChecks
 from klack.transient.interface_run import simulate_interface
 

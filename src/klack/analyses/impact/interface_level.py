@@ -32,7 +32,8 @@ from klack.mesh.mesh import Mesh, Surface
 from klack.reduction.damping import RayleighDamping
 from klack.reduction.ports import Port
 from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
-from klack.transient.guide import Guide, guide_of_shaft
+from klack.transient.guide import guide_of_shaft
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import (
     InterfaceBody,
     InterfaceContact,

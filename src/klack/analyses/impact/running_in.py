@@ -29,7 +29,7 @@ from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, InputError
 from klack.input.problem import Key
 from klack.plasticity.loops import YieldingLoops
-from klack.transient.guide import Guide
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.units import format_si
 

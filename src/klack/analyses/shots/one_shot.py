@@ -16,7 +16,7 @@ from klack.contact.gap_update import RigidGaps
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.mesh.rigid import rigid_placement
 from klack.stages import collected_warnings
-from klack.transient.guide import Guide
+from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.interface_run import simulate_interface
