@@ -19,7 +19,7 @@ from klack.elasticity.statics import Flexibility
 from klack.hardening import Hardening
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
-from klack.plasticity.loaded_body import LoadedBody
+from klack.plasticity.yielding_body import LoadedBody
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding
 from klack.verification.transient import STEEL

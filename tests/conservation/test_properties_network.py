@@ -31,7 +31,7 @@ from property_profiles import examples, log_range
 
 from klack.mechanics.force_over_stroke import ForceOverStroke, stroke_force_step
 from klack.mechanics.spring import Spring
-from klack.simulation.slider_step import largest_friction, slider_force
+from klack.simulation.network_sliders import largest_friction, slider_force
 from klack.units import RATIO
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")

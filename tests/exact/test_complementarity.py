@@ -22,7 +22,7 @@ from klack.contact import complementarity
 from klack.contact.complementarity import ComplementaritySolver, solve_lcp
 from klack.errors import ConvergenceError, InputError
 from klack.hardening import Hardening
-from klack.plasticity.line_search import lowest_share
+from klack.plasticity.ladder import lowest_share
 from klack.plasticity.radial_return import PlasticState, radial_return
 from klack.transient.active_set import solve_active
 from klack.transient.interface_arrays import ActiveSet

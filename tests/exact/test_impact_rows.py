@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from klack.transient.impact_rows import (
+from klack.transient.impact_recorder import (
     FILM_ROWS,
     LOAD_ROWS,
     MODE_ROWS,

@@ -19,7 +19,7 @@ from klack_names import IncompleteRunError, VoltageStep, lateral_guide
 from klack.hydraulics.off_axis_seat import SeatFace, flow_area, pressure_load
 from klack.magnetics.off_axis_gap import eccentric_ring, guide_ring, tilted_ring_face
 from klack.magnetics.solenoid_parts import ArmatureBore
-from klack.transient.gap_course import gap_course
+from klack.transient.placed_gaps import gap_course
 from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm
 from klack.verification.off_axis import (

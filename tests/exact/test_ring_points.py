@@ -46,8 +46,7 @@ from klack.case import find_case, read_case
 from klack.elasticity.ring_points import RingPoints, RingRows, resolved_orders, share_of_order
 from klack.mesh.profile import Line, Profile
 from klack.mesh.rigid import Pose, rotation_matrix
-from klack.transient.guide import _section
-from klack.transient.revolved_guide import turned_sections
+from klack.transient.guide import _section, turned_sections
 from klack.verification.interface import gaps_of_sphere_over_cone
 from klack.verification.ring_bodies import NeedleOnRing, RingStroke
 from klack.verification.transient import STEEL

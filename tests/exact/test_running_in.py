@@ -41,7 +41,7 @@ from klack.assembling.pressure_limit import meridian_case
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.worn_faces import WornFaces, opened_by
 from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
+from klack.plasticity.loops import loops_of_entry, loops_to_entry
 from klack.terminal.options import WantedResult
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding

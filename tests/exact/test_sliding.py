@@ -21,7 +21,7 @@ from klack_names import (
 
 from klack.contact.history import BodyEnergy, EnergyLedger
 from klack.mechanics.spring import Spring
-from klack.simulation.slider_step import largest_friction, slider_force
+from klack.simulation.network_sliders import largest_friction, slider_force
 from klack.transient.interface_result import InterfaceEnergy
 
 MASS = 2e-3

@@ -47,7 +47,7 @@ from klack.exchange.matlab_model import write_matlab
 from klack.exchange.modal_model import ModalModel, Provenance, pair_model
 from klack.exchange.modelica import modelica_text
 from klack.network.step_function import first, pointers
-from klack.simulation.mass_balance import solve_mass_balance
+from klack.simulation.network_gas import solve_mass_balance
 
 STEP = 40e-9  # [s]
 PLAIN = (-1, 0, 1, 2)  # kinds of a law: such numbers stand for other things as well

@@ -47,8 +47,7 @@ from klack.assembling.reduced_pair import impact_system
 from klack.contact.yielding_law import YieldingLaw
 from klack.exchange.modal_model import _without_memory
 from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loaded_body import LoadedBody
-from klack.plasticity.yielding_body import YieldingBody
+from klack.plasticity.yielding_body import LoadedBody, YieldingBody
 from klack.plasticity.zone import plastic_zone
 from klack.simulation.compile import propose_step
 

@@ -52,9 +52,15 @@ from ruamel.yaml import YAML
 import klack
 from klack.input.problem import CaseProblem
 from klack.mechanics.spring import Spring
-from klack.network.catalogue import COMPONENTS, component_class, component_classes, type_words
+from klack.network.catalogue import (
+    COMPONENTS,
+    component_class,
+    component_classes,
+    component_word,
+    import_component,
+    type_words,
+)
 from klack.network.declaration import NetworkSection, read_component
-from klack.network.own_component import component_word, import_component
 from klack.network.port import ELEMENT, Port
 from klack.network.protocols import InterfaceLaw, LawNumbers, NetworkFluid
 from klack.verification.network import whole_valve

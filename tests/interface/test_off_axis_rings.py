@@ -25,7 +25,7 @@ from klack_names import (
 
 from klack.assembling.off_axis import off_axis_model, ring_contacts, turning_body
 from klack.contact.rings import RingSpace
-from klack.transient.ring_sectors import sector_shares
+from klack.transient.impact_recorder import sector_shares
 
 CASE = Path(__file__).parents[2] / "docs/how-to/guided_needle.yaml"
 

@@ -24,7 +24,7 @@ from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.stroke_shots.run import compute_strokes, run_stroke_shots, stroke_setup
 from klack.assembling.spatial import placement_of
 from klack.mesh.rigid import rigid_placement
-from klack.simulation.spatial_path import SpatialPath
+from klack.simulation.spatial_impact import SpatialPath
 
 pytestmark = pytest.mark.slow
 

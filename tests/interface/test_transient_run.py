@@ -18,10 +18,15 @@ from klack_names import (
 from scipy.sparse import csr_array, eye_array
 
 from klack.transient import full_order
-from klack.transient.free_flight import KnownBody, open_gaps
-from klack.transient.full_body import FullBody
+from klack.transient.full_body import (
+    FullBody,
+    InverseMass,
+    KnownBody,
+    massless_nodes,
+    open_gaps,
+    scalar_mass,
+)
 from klack.transient.full_order import recommended_step, simulate_full_order
-from klack.transient.inertia import InverseMass, massless_nodes, scalar_mass
 from klack.transient.interface_solve import SplitSolve, WholeSolve
 from klack.verification.transient import STEEL, rod_body, rod_contact, sphere_over_cylinder
 

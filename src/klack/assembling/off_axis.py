@@ -19,9 +19,8 @@ from klack.case.bodies import CaseFile
 from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.contact.gap_update import PlacedGaps, RigidGaps
+from klack.contact.gap_update import PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace, contact_space
-from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes

@@ -32,8 +32,8 @@ from klack.elasticity.eigen import mode_memory
 from klack.elasticity.statics import Flexibility
 from klack.mesh.mesh import Surface
 from klack.mesh.rigid import Pose
-from klack.plasticity.loaded_body import LoadedBody
 from klack.plasticity.loops import YieldingLoops
+from klack.plasticity.yielding_body import LoadedBody
 from klack.progress import Progress, remark
 from klack.transient.rubbing_ladder import RubbingContact
 

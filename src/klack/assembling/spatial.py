@@ -16,9 +16,8 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
-from klack.contact.gap_update import PlacedGaps, RigidGaps
+from klack.contact.gap_update import PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace
-from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingSpace
 from klack.contact.statics import contact_compliance, extended_compliance
 from klack.elasticity.body import ElasticBody
@@ -30,7 +29,6 @@ from klack.hydraulics.tilted_film import SectorFilm, sector_film
 from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
-from klack.transient.gap_course import gap_course
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import (
@@ -39,6 +37,7 @@ from klack.transient.interface_model import (
     InterfaceModel,
     interface_model,
 )
+from klack.transient.placed_gaps import gap_course
 from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_film import BearingFilm, TiltingFilm
 from klack.units import format_si

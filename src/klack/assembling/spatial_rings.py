@@ -1,6 +1,6 @@
 """From a case of a valve of half sections to bodies that move in three dimensions.
 
-Each body moves in all Fourier orders (:mod:`klack.transient.revolved_points`); ports of the network
+Each body moves in all Fourier orders (:mod:`klack.transient.revolved_model`); ports of the network
 push along the axis, so that only modes of order 0 have a share in them.
 """
 
@@ -27,7 +27,7 @@ from klack.cache.result_cache import result_cache
 from klack.case.guide import LinearGuideLaw
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
-from klack.contact.ring_gaps import RingGaps
+from klack.contact.gap_update import RingGaps
 from klack.contact.rings import RingSpace
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
@@ -37,17 +37,16 @@ from klack.mesh.rigid import rigid_placement
 from klack.reduction.ports import Port
 from klack.reduction.reduce import kept_modes
 from klack.reduction.reduced_body import ReducedBody
-from klack.transient.guide import guide_at_sections
+from klack.transient.guide import guide_at_sections, shaft_sections, turned_sections
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
-from klack.transient.revolved_guide import shaft_sections, turned_sections
 from klack.transient.revolved_model import (
     RevolvedBody,
+    RevolvedPoints,
     RingContact,
     model_of_reduced,
     reduced_bodies,
 )
-from klack.transient.revolved_points import RevolvedPoints
 from klack.transient.ring_arcs import RingArcs
 from klack.transient.spatial_run import SpatialValve
 

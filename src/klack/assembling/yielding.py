@@ -24,10 +24,8 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loaded_body import LoadedBody
-from klack.plasticity.loops import YieldingLoops, yielding_loops
-from klack.plasticity.stored_loops import loops_of_entry, loops_to_entry
-from klack.plasticity.yielding_body import YieldingBody
+from klack.plasticity.loops import YieldingLoops, loops_of_entry, loops_to_entry, yielding_loops
+from klack.plasticity.yielding_body import LoadedBody, YieldingBody
 from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn

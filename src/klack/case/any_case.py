@@ -10,8 +10,8 @@ from klack.case.reader import Lines, parse, schema_of, text_of, validated
 from klack.case.schema import Case
 from klack.case.valve import ValveCase, require_valve
 from klack.input.problem import Key
+from klack.network.catalogue import component_word
 from klack.network.component import Component
-from klack.network.own_component import component_word
 
 __all__ = [
     "AnyCase",

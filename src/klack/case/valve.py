@@ -15,7 +15,7 @@ from klack.case.valve_consistency import check_thermal, check_valve
 from klack.case.valve_sections import ValveSections
 from klack.errors import InputError, refuse
 from klack.input.problem import nearest, one_of
-from klack.network.own_component import source_digests
+from klack.network.catalogue import source_digests
 
 __all__ = ["ValveCase", "require_valve"]
 
@@ -35,7 +35,7 @@ class ValveCase(ValveSections):
     def own_components(self) -> Mapping[str, str]:
         """Components that are not part of klack, with a digest of their code.
 
-        See :func:`klack.network.own_component.source_digests`.
+        See :func:`klack.network.catalogue.source_digests`.
         """
         return source_digests(self.network.components.values())
 

@@ -11,29 +11,242 @@ frame of the unmoved master:
 To first order this is :math:`g_0 + G_a u_a`.  The difference is of the second order in the motion
 over the radius of curvature: a body that comes back one micrometre aside of where it left meets
 gaps that are wrong by a nanometre in first order, one that comes back ten aside by a hundred.
+
+Gaps round a ring after a body of revolution has left its axis, on the curved surfaces.
+
+The hats of the half section (:mod:`klack.contact.mortar`) stand at equal angles of the ring.  Their
+lines are carried into the frame of the other body, whose surface is the revolved meridian.  A line
+:math:`x + s n` has the radius :math:`\rho(s) = |(x + s n)_\perp|`; in the half plane
+:math:`(\rho, z)` it is a curve, and where it meets the meridian is found with its tangent,
+
+.. math:: \frac{d \rho}{d s} = \frac{(x + s n)_\perp \cdot n_\perp}{\rho} ,
+
+from where it stands, again and again: the curve bends by the square of the small angle between the
+line and the plane, so that two or three rounds are exact.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from klack.arrays import Floats
 from klack.contact.face_form import FaceForm
-from klack.contact.mortar import ContactSpace, hat_quadrature
-from klack.contact.ring_gaps import (
-    ListedFaces,
-    RingGaps,
-    carried,
-    mean_gaps,
-    slave_and_master,
-)
+from klack.contact.mortar import COVERED, ContactSpace, HatQuadrature, hat_quadrature
+from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
+from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
 
-__all__ = ["PlacedGaps", "RigidGaps"]
+__all__ = ["PlacedGaps", "RigidGaps", "RingGaps"]
+
+
+_ROUNDS = 8
+_SETTLED = 1e-14  # [m]
+_LISTED_WITHIN = 10.0  # reaches by which a line may move while its list of faces holds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ListedFaces:
+    """Faces of the master side, and which of them are near each line of the slave side.
+
+    Parameters
+    ----------
+    faces : CurvedFaces
+    first, listed : int array
+        Faces near each line, up to a motion of ``within`` [m].
+    within : float [m]
+    """
+
+    faces: CurvedFaces
+    first: NDArray[np.int64]
+    listed: NDArray[np.int64]
+    within: float
+
+    @classmethod
+    def of(
+        cls, master: tuple[Mesh, Surface], position: Floats, normal: Floats, reach: float
+    ) -> Self:
+        """Those near lines from contact points of this reach [m]."""
+        faces, within = curved_faces(*master), _LISTED_WITHIN * reach
+        met, _, _ = cut_nearest(position, normal, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
+        near = list_near(position, normal, met, faces.centre, faces.axes, faces.half, within)
+        return cls(faces, *near, within)
+
+    def gaps(self, position: Floats, normal: Floats, *, near: bool) -> Floats:
+        """Gap along each line [m], nan where nothing is met; ``near``: the lists hold."""
+        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
+        if near:
+            return cut_listed(self.first, self.listed, position, normal, *master, *limits)
+        return cut_nearest(position, normal, *master, *limits)[2]
+
+
+def slave_and_master(
+    space: ContactSpace, a: tuple[Mesh, Surface], b: tuple[Mesh, Surface]
+) -> tuple[tuple[Mesh, Surface], tuple[Mesh, Surface], float]:
+    """Side that carries the hats, the other one, and the extent of both [m]."""
+    slave, master = (a, b) if space.slave == "a" else (b, a)
+    extents = [
+        np.linalg.norm(np.ptp(mesh.points[surface.nodes], axis=0))
+        for mesh, surface in (slave, master)
+    ]
+    return slave, master, float(sum(extents))
+
+
+def carried(
+    position: Floats, normal: Floats, placement: Floats, centre: Floats, *, slave_moves: bool
+) -> tuple[Floats, Floats]:
+    """Lines of the slave side in the frame of the master, at a rigid placement of body a."""
+    shift, R = np.asarray(placement[:3]), rotation_matrix(placement[3:])
+    arm = position - centre
+    if slave_moves:
+        return arm @ R.T + centre + shift, normal @ R.T
+    return (arm - shift) @ R + centre, normal @ R
+
+
+def mean_gaps(weight: csr_array, gap: Floats, form: Floats, away: float) -> Floats:
+    """Means over the hats of gaps of lines, shape (p, ...); ``away`` where a hat faces nothing."""
+    met = np.isfinite(gap)
+    covered = weight @ met.astype(float)
+    facing = covered > COVERED * (weight @ np.ones(gap.shape))
+    opened = weight @ np.where(met, gap + form, 0.0)
+    return np.where(facing, opened / np.where(facing, covered, 1.0), away)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RingGaps:
+    """Gaps at points on rings as a function of the rigid placement of body a.
+
+    Parameters
+    ----------
+    hats : HatQuadrature
+        On the half section of the slave side.
+    angle : array, shape (n,) [rad]
+    near : ListedFaces
+        Of the half section of the other side, for each point at each angle.
+    centre : array, shape (3,) [m]
+        Point that a rotation leaves in place.
+    slave_moves : bool
+        True if body a carries the hats.
+    form : array, shape (p,) [m]
+        Growth of the gaps by the form of the faces.
+    away : float [m]
+        Gap of a hat that no longer faces the master.
+    """
+
+    hats: HatQuadrature
+    angle: Floats
+    near: ListedFaces
+    centre: Floats
+    slave_moves: bool
+    form: Floats
+    away: float
+
+    @classmethod
+    def of(
+        cls,
+        section: ContactSpace,
+        mesh_a: Mesh,
+        surface_a: Surface,
+        mesh_b: Mesh,
+        surface_b: Surface,
+        *,
+        angle: Floats,
+        centre: Floats,
+        form: FaceForm | None = None,
+    ) -> Self:
+        """Prepare the contact points of a half section, built from these meshes and surfaces.
+
+        Parameters
+        ----------
+        section : ContactSpace
+        mesh_a, surface_a : the body that will be moved
+        mesh_b, surface_b : the other one
+        angle : array, shape (n,) [rad]
+            Of the points of every ring.
+        centre : array, shape (3,) [m]
+            Point that a rotation leaves in place, usually the centre of mass of a.
+        form : FaceForm, optional
+            That ``section`` was built with, of revolution.
+        """
+        slave, master, away = slave_and_master(section, (mesh_a, surface_a), (mesh_b, surface_b))
+        hats = hat_quadrature(section, *slave)
+        lines = (_in_half_plane(hats.position), _in_half_plane(hats.normal))
+        near = ListedFaces.of(master, *lines, section.reach)
+        listed = [np.tile(near.listed[a:b], len(angle)) for a, b in pairwise(near.first)]
+        flat = np.zeros(len(hats.position))
+        return cls(
+            hats=hats,
+            angle=angle,
+            near=replace(
+                near,
+                first=np.append(0, np.cumsum(np.repeat(np.diff(near.first), len(angle)))),
+                listed=np.concatenate(listed),
+            ),
+            centre=np.array(centre, dtype=float),
+            slave_moves=section.slave == "a",
+            form=flat if form is None else form.gaps(hats.position, hats.normal),
+            away=away,
+        )
+
+    def __call__(self, placement: Floats) -> Floats:
+        """Gaps at a rigid placement of body a.
+
+        Parameters
+        ----------
+        placement : array, shape (6,) [m], [rad]
+            Translation of ``centre`` and rotation vector, from where the section was built.
+
+        Returns
+        -------
+        array, shape (nc, n) [m]
+            Of every hat at every angle.
+        """
+        lines = (_around(x, self.angle) for x in (self.hats.position, self.hats.normal))
+        position, normal = carried(*lines, placement, self.centre, slave_moves=self.slave_moves)
+        gap = self._along(position.reshape(-1, 3), normal.reshape(-1, 3))
+        gap = gap.reshape(len(self.hats.position), -1)
+        return mean_gaps(self.hats.weight, gap, self.form[:, None], self.away)
+
+    def _along(self, position: Floats, normal: Floats) -> Floats:
+        """Distance along each line to the revolved surface [m]; nan where it is not met."""
+        s = np.zeros(len(position))
+        moved = np.column_stack([np.hypot(*position[:, :2].T), position[:, 2]])
+        moved -= np.repeat(self.hats.position, len(self.angle), axis=0)
+        near = bool(np.max(np.sum(moved**2, axis=1)) <= self.near.within**2)
+        for _ in range(_ROUNDS):
+            x, y, z = (position + s[:, None] * normal).T
+            rho = np.hypot(x, y)
+            way = np.column_stack([(x * normal[:, 0] + y * normal[:, 1]) / rho, normal[:, 2]])
+            length = np.linalg.norm(way, axis=1)
+            lines = (
+                _in_half_plane(np.column_stack([rho, z])),
+                _in_half_plane(way / length[:, None]),
+            )
+            more = self.near.gaps(*lines, near=near) / length
+            s += more
+            if not np.any(np.abs(more) > _SETTLED):  # none of those that met nothing
+                break
+        return s
+
+
+def _in_half_plane(x: Floats) -> Floats:
+    """Columns (r, z) become (r, 0, z)."""
+    return np.ascontiguousarray(np.insert(x, 1, 0.0, axis=1))
+
+
+def _around(vectors: Floats, angle: Floats) -> Floats:
+    """Vectors (r, z) of the half section at every angle, shape (p, n, 3)."""
+    r, z = vectors.T
+    out = np.empty((len(vectors), len(angle), 3))
+    out[..., 0] = r[:, None] * np.cos(angle)
+    out[..., 1] = r[:, None] * np.sin(angle)
+    out[..., 2] = z[:, None]
+    return out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -2,7 +2,7 @@
 
 Every hat of the half section (:mod:`klack.contact.mortar`) becomes N points at equal angles, each
 with an N-th of the area of the ring.  The bodies are those of the centred position; the gaps are
-those of the surfaces where they are (:mod:`klack.contact.ring_gaps`).
+those of the surfaces where they are (:mod:`klack.contact.gap_update`).
 """
 
 from dataclasses import dataclass

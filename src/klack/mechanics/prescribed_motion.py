@@ -13,9 +13,8 @@ from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import InputPath, Name, Text
 from klack.network.component import Component
-from klack.network.motion_course import MotionCourse
 from klack.network.port import MOTION, Port
-from klack.network.rows import Rows
+from klack.network.rows import MotionCourse, Rows
 from klack.reduction.reduced_body import ReducedBody
 from klack.units import LENGTH, TIME, Length, Time, parse_quantity
 

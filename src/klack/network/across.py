@@ -45,19 +45,15 @@ class SideLaw(Protocol):
 
         Their work on a small change of ``now.axis`` is the scalar product of both.
         """
-        ...
 
     def room(self, now: SideInputs) -> float:
         """Distance [m] that is left until the faces meet, where the law ends."""
-        ...
 
     def left_out(self, now: SideInputs) -> float:
         """Share of what acts along the axis that the position changes and the row does not [-]."""
-        ...
 
     def placement(self, axis: Vector) -> Vector:
         """Numbers that the step function of the row takes of the position of the axis."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,8 +15,8 @@ from typing import Any, get_args
 from pydantic import BeforeValidator
 from pydantic.fields import FieldInfo
 
+from klack.network.catalogue import component_word
 from klack.network.component import Component
-from klack.network.own_component import component_word
 from klack.network.port import Port
 from klack.units import Kind
 

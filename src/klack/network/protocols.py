@@ -71,23 +71,18 @@ class NetworkFluid(Protocol):
 
     def density(self, pressure: ArrayLike) -> Floats:
         """Density [kg/m^3] at the absolute pressure [Pa]."""
-        ...
 
     def bulk_modulus(self, pressure: ArrayLike) -> Floats:
         """``rho dp/drho`` [Pa]."""
-        ...
 
     def sound_speed(self, pressure: ArrayLike) -> Floats:
         """Speed of pressure waves in an unbounded fluid [m/s]."""
-        ...
 
     def viscosity(self, pressure: ArrayLike) -> Floats:
         """Dynamic viscosity [Pa s]."""
-        ...
 
     def specific_volume(self, pressure: ArrayLike) -> tuple[Floats, Floats]:
         """Volume per mass [m^3/kg] and its slope [m^3/(kg Pa)]."""
-        ...
 
 
 class NetworkGas(Protocol):
@@ -126,19 +121,15 @@ class InterfaceLaw(Protocol):
 
     def force(self, indentation: ArrayLike) -> Floats:
         """Return the force [N] at the given indentation [m]."""
-        ...
 
     def tangent_stiffness(self, indentation: ArrayLike) -> Floats:
         """Return the tangent stiffness [N/m] at the given indentation [m]."""
-        ...
 
     def potential(self, indentation: ArrayLike) -> Floats:
         """Return the stored energy [J] at the given indentation [m]."""
-        ...
 
     def flat(self) -> LawNumbers:
         """Return the law as plain numbers."""
-        ...
 
 
 class RunningController(Protocol):

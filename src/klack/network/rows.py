@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 from klack.errors import InputError
 from klack.network.across import SideLaw
 from klack.network.gas_rows import GasRows
-from klack.network.motion_course import MotionCourse
 from klack.network.protocols import InterfaceLaw, NetworkFluid, NetworkGas, RunningController
 from klack.network.step_function import StepFunction
 
@@ -39,6 +38,7 @@ __all__ = [
     "InterfaceRow",
     "LimitRow",
     "LineRow",
+    "MotionCourse",
     "NodeRow",
     "Rows",
     "SideRow",
@@ -47,6 +47,31 @@ __all__ = [
     "WallRow",
     "WaveRow",
 ]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MotionCourse:
+    """Displacement over time, cubic between points, constant beyond them.
+
+    Parameters
+    ----------
+    time : array, shape (n,) [s]
+        Rising.
+    displacement, slope : array, shape (n,) [m], [m/s]
+        At each of them; both slopes of a jump of the speed are given by two intervals of
+        ``slope_after`` and ``slope_before``.
+    """
+
+    time: NDArray[np.float64]
+    displacement: NDArray[np.float64]
+    slope_after: NDArray[np.float64]
+    slope_before: NDArray[np.float64]
+
+    def numbers(self) -> NDArray[np.float64]:
+        """Flat course: ``n | times | displacements | slopes after | slopes before``."""
+        arrays = (self.time, self.displacement, self.slope_after, self.slope_before)
+        return np.concatenate(([float(len(self.time))], *arrays))
+
 
 GROUND = -1
 """Handle of the immovable ground as a mechanical port."""
@@ -297,7 +322,7 @@ class InterfaceRow:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SliderRow:
-    """Dry and viscous friction between two ports: see :mod:`klack.simulation.slider_step`.
+    """Dry and viscous friction between two ports: see :mod:`klack.simulation.network_sliders`.
 
     Parameters
     ----------

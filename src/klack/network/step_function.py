@@ -41,8 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Vector
-from klack.compiling.jit import intrinsic, njit
-from klack.compiling.marked import Marked
+from klack.compiling.jit import Marked, intrinsic, njit
 
 __all__ = [
     "StepFunction",

@@ -11,7 +11,7 @@ bodies falls.  Once the load falls the plastic gap stays as it is: the contact o
 on the deformed faces, which :func:`klack.contact.statics.static_contact` solves.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,10 +23,34 @@ from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import check_state
 from klack.errors import ConvergenceError
-from klack.plasticity.line_search import lowest_share
 from klack.plasticity.yielding_body import Answer, YieldingBody
 
-__all__ = ["LoadingState", "YieldingContact"]
+__all__ = ["LoadingState", "YieldingContact", "lowest_share"]
+
+
+_ENOUGH = 0.5  # of the first slope: a whole step is taken
+_EXACT = 1e-4  # of the step
+
+
+def lowest_share(slope: Callable[[float], float], noise: float) -> float:
+    """Share of a step, at most 1, at which a convex function is lowest.
+
+    Parameters
+    ----------
+    slope : callable
+        Of the function along the step, which rises with the share.
+    noise : float
+        Slopes below it are round-off, and the whole step is taken.
+
+    Returns
+    -------
+    float [-]
+        Within 1e-4, or 1 where the slope there is at most half of the first one.
+    """
+    first, last = slope(0.0), slope(1.0)
+    if last <= _ENOUGH * abs(first) or max(abs(first), last) <= noise or first >= 0.0:
+        return 1.0
+    return float(scipy.optimize.brentq(slope, 0.0, 1.0, xtol=_EXACT))
 
 
 _ROUNDS = 20  # of one step

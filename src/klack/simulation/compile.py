@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from klack.contact.yielding_law import YieldingLaw
 from klack.network.protocols import InterfaceLaw
 from klack.reduction.reduced_body import ReducedBody
-from klack.simulation.impact_arrays import Contacts, Losses, StepMatrices, Watched
+from klack.simulation.kernel import Contacts, Losses, StepMatrices, Watched
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.simulation.system import ReducedSystem
 

@@ -15,8 +15,7 @@ from klack.errors import ConvergenceError, InputError, require_positive
 from klack.finite import require_finite
 from klack.simulation.compile import BodyBlock, FlatSystem, flatten, propose_step
 from klack.simulation.contact_step import law_potential
-from klack.simulation.impact_arrays import Record
-from klack.simulation.kernel import STATUS_FINE, run_steps
+from klack.simulation.kernel import STATUS_FINE, Record, run_steps
 from klack.simulation.single_contact import run_one_contact
 from klack.simulation.system import ReducedSystem
 from klack.simulation.yielding_step import pressed_state

@@ -1,4 +1,4 @@
-r"""What a finished run says of its steps: peaks of first impacts that they do not resolve.
+"""What a finished run says of its steps: peaks of first impacts that they do not resolve.
 
 A peak force is the largest mean of a step.  Two things make it too low:
 
@@ -21,11 +21,14 @@ from math import exp, floor, isfinite, log, log10, pi, sqrt
 import numpy as np
 
 from klack.arrays import Vector
+from klack.hydraulics.pipe_friction import LAMINAR, laminar_doubts
 from klack.network.accuracy import PROMISED
+from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.network_result import ImpactEvent, InterfaceRecord
+from klack.simulation.wave_rows import wave_store
 from klack.units import format_si
 
-__all__ = ["impact_doubts", "late_by_swinging", "missing_peak"]
+__all__ = ["impact_doubts", "late_by_swinging", "line_doubts", "missing_peak"]
 
 
 _PEAK, _LATE = PROMISED["normal"]  # of a peak force, and of the time [s] of a first impact
@@ -248,3 +251,16 @@ def _rounded_down(step: float) -> float:
     """Next shorter one of 1, 2 and 5 times a power of ten."""
     decade = 10.0 ** floor(log10(step))
     return max(n for n in (1.0, 2.0, 5.0) if n <= step / decade * (1.0 + 1e-9)) * decade
+
+
+def line_doubts(network: CompiledNetwork, begin: float) -> Iterator[str]:
+    """Sentences on all lines of a run that began at this time [s]."""
+    rows, lines, state = network.rows, network.lines, network.line_state
+    for k, row in enumerate(rows.lines):
+        reynolds = LAMINAR * float(state.fastest[k]) / row.laminar_flow
+        time = begin + lines.step * float(state.moment[k, 0])
+        drop = row.resistance * float(state.fastest[k])
+        yield from laminar_doubts(row.component, reynolds, time, drop)
+    for k, wave in enumerate(rows.waves):
+        _, _, reynolds, time = wave_store(network.waves, rows.waves, k)
+        yield from wave.doubts(network.accounts.waves[k], float(reynolds), float(time))

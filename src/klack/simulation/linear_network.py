@@ -24,8 +24,7 @@ from klack.simulation.linear_rows import LinearRow, RowPoint, linear_row
 from klack.simulation.linear_system import LinearSystem, Signal
 from klack.simulation.network_arrays import Y0, StepRows
 from klack.simulation.network_compile import CompiledNetwork
-from klack.simulation.static_contacts import contacts_at_rest
-from klack.simulation.static_rows import fluids_at
+from klack.simulation.static_rows import contacts_at_rest, fluids_at
 from klack.units import format_si, percent_text
 
 __all__ = ["LinearNetwork", "linear_network"]

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from klack.arrays import Vector
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_result import ChannelData, StaticStart
-from klack.simulation.spatial_impact import SpatialImpact
-from klack.simulation.spatial_path import SpatialPath
+from klack.simulation.spatial_impact import SpatialImpact, SpatialPath
 
 __all__ = ["MovingBodies"]
 
@@ -43,35 +42,27 @@ class MovingBodies(Protocol):
         report: Vector,
     ) -> int:
         """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
-        ...
 
     def changing(self) -> dict[str, Changing]:
         """All arrays that a step changes and the next one begins with."""
-        ...
 
     def stores(self) -> dict[str, float]:
         """Energies [J] that they hold beside that of their modes."""
-        ...
 
     def supplies(self) -> dict[str, float]:
         """Energies [J] from sources of their own since the start of the run."""
-        ...
 
     def losses(self) -> dict[str, float]:
         """Energies [J] lost since the start of the run."""
-        ...
 
     def forget_losses(self) -> None:
         """Begin a new energy balance."""
 
     def recorded_impacts(self, end: float) -> tuple[SpatialImpact, ...]:
         """What was recorded of the impacts up to a moment [s], in order of their first touch."""
-        ...
 
     def gap(self) -> Vector:
         """Add this to a recorded gap to have the true one, of each interface [m]."""
-        ...
 
     def channels(self, time: Vector) -> dict[str, ChannelData]:
         """Quantities that no axial motion has, at these moments."""
-        ...

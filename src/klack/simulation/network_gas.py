@@ -13,6 +13,7 @@ at equilibrium.  The next step begins with these shares.
 from math import expm1
 from typing import Any
 
+from klack.compiling.jit import inner
 from klack.errors import InputError
 from klack.hydraulics.fluid_store import fluid_store_step
 from klack.hydraulics.fluid_table import fluid_at
@@ -24,7 +25,6 @@ from klack.hydraulics.gas_release import (
     share_moved,
 )
 from klack.network.rows import Rows
-from klack.simulation.mass_balance import solve_mass_balance
 from klack.simulation.network_arrays import Nodes, NodeState
 from klack.simulation.phase import compiled
 
@@ -37,7 +37,38 @@ __all__ = [
     "pressure_of_mixture",
     "require_chambers",
     "settle_gas",
+    "solve_mass_balance",
 ]
+
+
+@inner(error_model="numpy", _nrt=False, forceinline=True)
+def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
+    """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
+
+    What leaves a volume fills another: beside the diagonal ``A`` is below zero, and its column sums
+    are what a pressure changes in all volumes together, above zero.  Pivots follow from these sums
+    (Grassmann, Taksar & Heyman 1985), the diagonal is not looked at.  So a wide channel between two
+    almost empty volumes, whose storage is less than the round-off of its flow, is solved as well.
+    """
+    for k in range(n):
+        pivot = own[k]
+        for i in range(k + 1, n):
+            pivot -= A[i * n + k]
+        A[k * n + k] = pivot
+        inverse = 1.0 / pivot
+        share = own[k] * inverse
+        for j in range(k + 1, n):
+            own[j] -= A[k * n + j] * share
+        for i in range(k + 1, n):
+            if A[i * n + k] != 0.0:
+                c = A[i * n + k] * inverse
+                for j in range(k + 1, n):
+                    A[i * n + j] -= c * A[k * n + j]
+                r[i] -= c * r[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            r[k] -= A[k * n + j] * r[j]
+        r[k] /= A[k * n + k]
 
 
 def require_chambers(rows: Rows) -> None:

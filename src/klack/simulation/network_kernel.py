@@ -25,7 +25,6 @@ from klack.arrays import Index, Matrix, Vector
 from klack.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
-from klack.simulation.driven_bodies import drive_bodies
 from klack.simulation.network_arrays import (
     ANSWER,
     COARSE,
@@ -48,14 +47,6 @@ from klack.simulation.network_arrays import (
     Step,
     StepRows,
 )
-from klack.simulation.network_elements import end_elements, push_by_elements
-from klack.simulation.network_far_films import (
-    end_far_films,
-    far_ones_stay,
-    mark_far_ones,
-    mark_none_far,
-    push_by_far_films,
-)
 from klack.simulation.network_interfaces import (
     FORCE_ROUND_OFF,
     begin_cut_contacts,
@@ -64,11 +55,16 @@ from klack.simulation.network_interfaces import (
     coarse_step_holds,
     contacts_hold,
     cost_of_catching_up,
+    end_far_films,
     end_interfaces,
     end_macro_interfaces,
+    far_ones_stay,
     keep_dissipation,
+    mark_far_ones,
+    mark_none_far,
     may_fly,
     may_touch,
+    push_by_far_films,
     push_by_guess,
     smooth_films,
     solve_interfaces,
@@ -81,6 +77,7 @@ from klack.simulation.network_ports import (
     begin_ports,
     bring,
     catch_up,
+    drive_bodies,
     end_ports,
     end_sub_step,
     finite,
@@ -120,13 +117,15 @@ from klack.simulation.network_sliders import (
     sliders_hold,
     take_back_sliders,
 )
-from klack.simulation.phase import phase, unfolded
-from klack.simulation.step_status import (
+from klack.simulation.phase import (
     STATUS_DONE,
     STATUS_FORCES,
     STATUS_MET,
     STATUS_REFUSED,
+    phase,
+    unfolded,
 )
+from klack.simulation.row_calls import end_elements, push_by_elements
 from klack.simulation.wave_rows import Waves, waves_commit, waves_incoming
 
 __all__ = [

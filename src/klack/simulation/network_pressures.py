@@ -7,7 +7,6 @@ import numpy as np
 from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.network.step_function import shift
-from klack.simulation.mass_balance import solve_mass_balance
 from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.network_gas import (
     begin_gas,
@@ -15,8 +14,15 @@ from klack.simulation.network_gas import (
     end_gas,
     look_up_mixture,
     pressure_of_mixture,
+    solve_mass_balance,
 )
-from klack.simulation.phase import phase
+from klack.simulation.phase import (
+    STATUS_BRANCH,
+    STATUS_DONE,
+    STATUS_PRESSURES,
+    STATUS_REFUSED,
+    phase,
+)
 from klack.simulation.row_calls import (
     ask_again,
     ask_branch,
@@ -24,12 +30,6 @@ from klack.simulation.row_calls import (
     push_ports,
     push_walls,
     take_states,
-)
-from klack.simulation.step_status import (
-    STATUS_BRANCH,
-    STATUS_DONE,
-    STATUS_PRESSURES,
-    STATUS_REFUSED,
 )
 
 __all__ = [

@@ -4,9 +4,8 @@ from typing import Any, NamedTuple
 
 from klack.compiling.jit import njit
 from klack.network.step_function import pointers
-from klack.simulation.driven_bodies import drive_force
 from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
-from klack.simulation.network_ports import port_speed
+from klack.simulation.network_ports import drive_force, port_speed
 from klack.simulation.phase import phase
 
 __all__ = ["Moment", "moment_of", "record_means", "record_moment", "record_points"]

@@ -7,8 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError
-from klack.simulation.spatial_impact import SpatialImpact
-from klack.simulation.spatial_path import SpatialPath
+from klack.simulation.spatial_impact import SpatialImpact, SpatialPath
 from klack.simulation.step_sizes import StepSizes
 
 __all__ = [

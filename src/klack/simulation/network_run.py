@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from time import perf_counter
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,11 +20,10 @@ from klack.network.accuracy import Accuracy
 from klack.network.rows import BranchRow, ElementRow, Rows
 from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
-from klack.simulation.first_record import values_now
-from klack.simulation.impact_doubts import impact_doubts
+from klack.simulation.impact_doubts import impact_doubts, line_doubts
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
-from klack.simulation.line_doubts import line_doubts
+from klack.simulation.moving_bodies import MovingBodies
 from klack.simulation.network_arrays import (
     AHEAD,
     EXCESS,
@@ -42,14 +41,10 @@ from klack.simulation.network_arrays import (
     Scratch,
     scratch_memory,
 )
-from klack.simulation.network_compile import (
-    CompiledNetwork,
-    compile_network,
-    modal_state,
-)
+from klack.simulation.network_compile import CompiledNetwork, compile_network, modal_state
 from klack.simulation.network_energy import balance_since, energy_stores, reset_accounts
 from klack.simulation.network_kernel import CLOCK, run_network
-from klack.simulation.network_recorder import Recorder
+from klack.simulation.network_recorder import Recorder, values_now
 from klack.simulation.network_result import (
     IncompleteRunError,
     NetworkResult,
@@ -57,22 +52,17 @@ from klack.simulation.network_result import (
     StaticStart,
     StepCounts,
 )
+from klack.simulation.phase import STATUS_BRANCH, STATUS_DONE, STATUS_ELEMENT, STATUS_PRESSURES
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
 from klack.simulation.rubbing_step import slider_places
-from klack.simulation.spatial_motion import SpatialMotion
 from klack.simulation.static_start import RestState, begin_at_rest
 from klack.simulation.step_sizes import StepSizes, largest_divisor, step_sizes
-from klack.simulation.step_status import (
-    STATUS_BRANCH,
-    STATUS_DONE,
-    STATUS_ELEMENT,
-    STATUS_PRESSURES,
-)
 from klack.simulation.yielding_step import pressed_state
 from klack.units import format_si
 
 __all__ = [
     "Grid",
+    "SpatialMotion",
     "everything",
     "grid_of",
     "has_python_steps",
@@ -82,6 +72,7 @@ __all__ = [
     "saved_state",
     "simulate_network",
 ]
+
 
 State = Mapping[str, NDArray[np.generic]]
 Changing = NDArray[np.generic]
@@ -93,6 +84,17 @@ _GUIDED = 1e-3  # a loss in three dimensions: of a guide it is known as well, as
 _CHUNK = 250_000  # fine steps of a chunk: about 0.1 s
 _PYTHON_CHUNK = 2_500  # the same with step functions in Python, some of which cannot step back
 _LOOK = 1.5e-6  # [s] longest time between two looks of the search for impacts
+
+
+class SpatialMotion(Protocol):
+    """Bodies of a valve that meet point by point.
+
+    All other bodies of a network meet at interfaces along the axis, in the loop of
+    :mod:`klack.simulation.network_kernel`.
+    """
+
+    def of(self, network: CompiledNetwork, sizes: StepSizes) -> MovingBodies:
+        """Return them in a network."""
 
 
 def simulate_network(

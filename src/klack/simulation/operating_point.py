@@ -17,12 +17,11 @@ from numpy.typing import NDArray
 from klack.arrays import Matrix, Vector
 from klack.network.rows import Rows
 from klack.network.travel import Travel
-from klack.simulation.first_record import values_now
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
 from klack.simulation.network_compile import CompiledNetwork, compile_network
 from klack.simulation.network_kernel import CLOCK
-from klack.simulation.network_recorder import Recorder
+from klack.simulation.network_recorder import Recorder, values_now
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import read_rows, restore_state, saved_state
 from klack.simulation.row_calls import SHARE_OF_STEP

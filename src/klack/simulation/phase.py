@@ -2,7 +2,19 @@
 
 from klack.compiling.jit import inner, njit
 
-__all__ = ["compiled", "phase"]
+__all__ = [
+    "STATUS_BRANCH",
+    "STATUS_DONE",
+    "STATUS_ELEMENT",
+    "STATUS_FORCES",
+    "STATUS_MET",
+    "STATUS_PRESSURES",
+    "STATUS_REFUSED",
+    "STATUS_REPEAT",
+    "compiled",
+    "phase",
+]
+
 
 phase = inner(_nrt=False, error_model="numpy", forceinline=True)
 """Compile a function into the compiled ones that call it; it makes no array.
@@ -19,3 +31,15 @@ compiled = inner
 unfolded = njit(inline="always")
 """Write a function out in the one that calls it: for those made of phases, which would else be
 optimised once for each of them that contains the other."""
+
+
+STATUS_DONE, STATUS_ELEMENT, STATUS_BRANCH, STATUS_PRESSURES, STATUS_FORCES = 0, 1, 2, 3, 4
+
+STATUS_REFUSED = -1
+"""Of a macro step: elements and fluid need fine steps."""
+
+STATUS_MET = -2
+"""Of a step that met a touch or a release: bodies need finer ones."""
+
+STATUS_REPEAT = -3
+"""Of a step whose guess of the forces of elements and fluid missed too much."""

@@ -7,17 +7,17 @@ import numpy as np
 from klack.arrays import Vector
 from klack.compiling.jit import njit
 from klack.network.step_function import call, first, pointers, shift
-from klack.simulation.network_arrays import FINE, StepRows
-from klack.simulation.phase import phase
-from klack.simulation.step_status import STATUS_REFUSED
+from klack.simulation.network_arrays import ANSWER, FINE, SEEN, STORE, Y1, Step, StepRows
+from klack.simulation.phase import STATUS_DONE, STATUS_ELEMENT, STATUS_REFUSED, phase
 
 __all__ = [
     "SHARE_OF_STEP",
     "ask_again",
     "ask_branch",
-    "ask_element",
     "call_rows",
+    "end_elements",
     "failed_at",
+    "push_by_elements",
     "push_ports",
     "push_walls",
     "take_states",
@@ -141,3 +141,32 @@ def call_rows(
         if status != 0:
             return k, status
     return -1, 0
+
+
+@phase
+def push_by_elements(elements: Any, S: Any, step: Step, report: Any) -> int:
+    """Forces of all elements for the displacements of this step."""
+    seen, end, force = shift(S, SEEN), shift(S, Y1), shift(S, ANSWER)
+    for k in range(elements.rows):
+        status = ask_element(elements, k, step.t, step.H, seen, end)
+        if status != 0:
+            report[0], report[1], report[2] = k, status, step.t
+            return failed_at(step.level, status, STATUS_ELEMENT)
+        push_ports(elements, k, force)
+    return STATUS_DONE
+
+
+@phase
+def end_elements(elements: Any, H: float, accounts: Any, kind: Any, sums: Any) -> None:
+    """Take over states and accounts of all elements."""
+    for k in range(elements.rows):
+        o0, q0 = elements.output0[k], elements.port0[k]
+        for j in range(q0, elements.port0[k + 1]):
+            sums[j] += H * elements.outputs[o0 + j - q0]
+        o0 = take_states(elements, k)
+        for j in range(elements.accounts[k]):
+            account = elements.account0[k] + j
+            if kind[account] == STORE:
+                accounts.rows[account] = elements.outputs[o0 + j]
+            else:
+                accounts.rows[account] += elements.outputs[o0 + j]

@@ -21,8 +21,18 @@ from klack.contact.step_constants import (
     SEPARATED,
 )
 from klack.simulation.contact_step import solve_linear, solve_step
-from klack.simulation.impact_arrays import Contacts, Losses, Record, StepMatrices, Watched
-from klack.simulation.kernel import FAST, STATUS_FINE, Damped, add_release, push_on
+from klack.simulation.kernel import (
+    FAST,
+    STATUS_FINE,
+    Contacts,
+    Damped,
+    Losses,
+    Record,
+    StepMatrices,
+    Watched,
+    add_release,
+    push_on,
+)
 from klack.simulation.phase import compiled, phase
 from klack.simulation.rubbing_step import slide
 from klack.simulation.yielding_step import press

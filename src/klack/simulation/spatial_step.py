@@ -1,6 +1,6 @@
 """What elements and fluid of a network do in a step of bodies that others move.
 
-Bodies that meet point by point are moved by :class:`klack.simulation.spatial_motion.MovingBodies`;
+Bodies that meet point by point are moved by :class:`klack.simulation.network_run.MovingBodies`;
 each of their steps, short or long, is what a macro step is in
 :mod:`klack.simulation.network_kernel`: :func:`begin_step` guesses forces, the bodies act,
 :func:`answer_step` asks elements and fluid for the way that the ports went, and :func:`end_step`
@@ -30,7 +30,6 @@ from klack.simulation.network_arrays import (
     Scratch,
     Step,
 )
-from klack.simulation.network_elements import end_elements
 from klack.simulation.network_kernel import (
     FEW_REPEATS,
     SETTLED,
@@ -56,7 +55,8 @@ from klack.simulation.network_pressures import (
     guess_pressures,
 )
 from klack.simulation.network_record import record_means
-from klack.simulation.step_status import STATUS_DONE, STATUS_REFUSED, STATUS_REPEAT
+from klack.simulation.phase import STATUS_DONE, STATUS_REFUSED, STATUS_REPEAT
+from klack.simulation.row_calls import end_elements
 from klack.simulation.wave_rows import waves_commit, waves_incoming
 
 __all__ = ["answer_step", "begin_step", "end_step"]

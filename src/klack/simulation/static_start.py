@@ -56,15 +56,17 @@ from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
 from klack.simulation.rubbing_step import begin_sliders
-from klack.simulation.static_contacts import contacts_at_rest
-from klack.simulation.static_newton import (
+from klack.simulation.static_rows import (
     Balance,
     Couplings,
+    at_rest,
+    contacts_at_rest,
+    fluids_at,
     last_change,
     least_share,
     newton_system,
+    slopes_at_rest,
 )
-from klack.simulation.static_rows import at_rest, fluids_at, slopes_at_rest
 from klack.simulation.wave_rows import start_wave
 from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si

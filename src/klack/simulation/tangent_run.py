@@ -44,11 +44,10 @@ from klack.simulation.network_result import (
     StepCounts,
 )
 from klack.simulation.network_run import grid_of, has_python_steps
+from klack.simulation.phase import STATUS_DONE
 from klack.simulation.rest import effective_mass, longest_period
 from klack.simulation.static_start import begin_at_rest
 from klack.simulation.step_sizes import StepSizes, step_sizes
-from klack.simulation.step_status import STATUS_DONE
-from klack.simulation.tangent_lines import begin_stretch, end_stretch, waves_under_way
 from klack.simulation.tangent_loop import (
     LANES,
     lanes_of,
@@ -60,11 +59,14 @@ from klack.simulation.tangent_numbers import (
     STRETCH,
     Direction,
     arrays_of,
+    begin_stretch,
+    end_stretch,
     lifted,
     mode_places,
     numbers_at_rest,
     set_stretch,
     state_arrays,
+    waves_under_way,
 )
 from klack.units import format_si
 

@@ -95,7 +95,7 @@ def imported(words: Sequence[str] | None) -> "tuple[type[Component], ...]":
     if not words:
         return ()
 
-    from klack.network.own_component import import_component
+    from klack.network.catalogue import import_component
 
     return tuple(import_component(word) for word in words)
 

@@ -65,8 +65,7 @@ from klack.elasticity.factorization import Backend, Precision
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
 from klack.finite import require_finite
 from klack.transient.body_damping import BodyDamping
-from klack.transient.free_flight import KnownBody, open_gaps
-from klack.transient.full_body import FullBody, Scheme
+from klack.transient.full_body import FullBody, KnownBody, Scheme, open_gaps
 from klack.transient.result import (
     EnergyRecord,
     FieldsOfBody,
@@ -76,7 +75,7 @@ from klack.transient.result import (
     Snapshots,
     SolverStatistics,
 )
-from klack.transient.rubbing_points import RubbingPoints
+from klack.transient.rubbing import RubbingPoints
 
 __all__ = ["Scheme", "recommended_step", "simulate_full_order"]
 
@@ -176,7 +175,7 @@ def simulate_full_order(
         End the run early when no point has carried a force for this long after a contact.
     known : sequence of KnownBody, optional
         Of body a and, unless it is a rigid wall, body b: with it the steps end where these bodies
-        have parted for good (:mod:`klack.transient.free_flight`), and the rest of the record is
+        have parted for good (:mod:`klack.transient.full_body`), and the rest of the record is
         their free flight: no force, constant velocities of the centres of mass, gaps without what
         the known modes leave.  Not with damping, spring, axial force, friction, snapshots or the
         massless scheme: there every step is taken.

@@ -51,7 +51,6 @@ from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
-from klack.transient.film_record import tell_land
 from klack.transient.guide_films import count_bearing, squeeze_guide
 from klack.transient.guide_friction import begin_rub, no_rub, rub_guide
 from klack.transient.interface_arrays import (
@@ -89,7 +88,14 @@ from klack.transient.interface_friction import (
     tell_friction,
 )
 from klack.transient.rough_points import layer_energy, solve_rough
-from klack.transient.tilting_films import begin_films, bend_faces, bulk_work, count_squeeze, squeeze
+from klack.transient.tilting_films import (
+    begin_films,
+    bend_faces,
+    bulk_work,
+    count_squeeze,
+    squeeze,
+    tell_land,
+)
 from klack.transient.yielding_points import let_yield, solve_yielding
 
 __all__ = [

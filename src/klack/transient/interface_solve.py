@@ -42,23 +42,18 @@ class InterfaceSolve(Protocol):
 
     def learn(self, points: NDArray[np.int64]) -> None:
         """Work out the response to new contact points, shape (k,)."""
-        ...
 
     def select(self, points: NDArray[np.int64]) -> None:
         """Contact points that the next calls speak about, shape (ns,); all learned before."""
-        ...
 
     def predict(self, b: NDArray[np.float64]) -> None:
         """Take the right-hand side without contact forces, shape (n,)."""
-        ...
 
     def response(self) -> NDArray[np.float64]:
         """G S^-1 b at the selected points, shape (ns,)."""
-        ...
 
     def complete(self, lam: NDArray[np.float64]) -> NDArray[np.float64]:
         """S^-1 (b + G^T lam) for forces at the selected points; may be called more than once."""
-        ...
 
 
 def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolve:

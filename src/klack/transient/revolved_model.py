@@ -1,32 +1,309 @@
-"""Interface model of bodies of revolution that meet off their axis: no mesh of three dimensions."""
+"""Interface model of bodies of revolution that meet off their axis: no mesh of three dimensions.
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+Bodies of revolution at the points of rings: modes and statics of all Fourier orders.
+
+A body that is hit on one side of its seat moves in every order.  Its orders do not couple
+(:mod:`klack.elasticity.fourier_body`), so it is taken apart: rigid motions and modes of the lowest
+frequencies, whatever their order, and of every order that the points resolve the static compliance.
+Orders without a mode are there with their statics alone.
+
+What comes out, :class:`RevolvedPoints`, is what the interface level takes of a solid body, without
+a mesh of it: :func:`klack.transient.interface_model.model_at_points` puts two or three together.
+"""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
+from threadpoolctl import threadpool_limits
 
 from klack.arrays import Floats
 from klack.cache.result_cache import ResultCache
 from klack.contact.face_friction import lifted_offset
 from klack.contact.rings import RingFriction, RingSpace
-from klack.elasticity.eigen import Modes
+from klack.elasticity.eigen import Modes, eigenmodes
 from klack.elasticity.fourier_body import FourierBody
-from klack.elasticity.ring_points import RingPoints, RingRows, RingSections
+from klack.elasticity.ring_points import (
+    RingPoints,
+    RingRows,
+    RingSections,
+    resolved_orders,
+    share_of_order,
+)
+from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.memory import require_memory
 from klack.transient.interface_model import (
     InterfaceModel,
+    PointBody,
     PointContact,
     model_at_points,
     row_places,
     uneven_loads,
 )
-from klack.transient.revolved_points import RevolvedPoints, reduce_revolved
 
-__all__ = ["RevolvedBody", "RingContact", "model_of_reduced", "reduced_bodies", "revolved_model"]
+__all__ = [
+    "RevolvedBody",
+    "RevolvedPoints",
+    "RingContact",
+    "model_of_reduced",
+    "reduced_bodies",
+    "revolved_model",
+]
+
+
+_AT_ONCE = 6  # pairs of modes of an order that are looked for first
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class RevolvedPoints:
+    """A body of revolution at points on rings.
+
+    Parameters
+    ----------
+    body : PointBody
+        Modes: rigid ones, those of order 0, then pairs of the orders above, lowest frequency first.
+    order : int array, shape (m,)
+        Of each mode.
+    compliance : array, shape (p, p) [m/N]
+        Static compliance of the whole body, of a free one with inertia relief.
+    answers : array, shape (p, k) [m]
+        What the loads move the points by, solved apart from ``compliance``.
+    sections : array, shape (s, 6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
+        Displacement and rotation vector of sections of the body per unit modal coordinate.
+    section_compliance : array, shape (s,) [m/N]
+        Static one of each section across the axis, of a free body with inertia relief.
+    """
+
+    body: PointBody
+    order: NDArray[np.int64]
+    compliance: Floats
+    answers: Floats
+    sections: Floats
+    section_compliance: Floats
+
+    @property
+    def residual(self) -> Floats:
+        """Static compliance without that of the elastic modes, shape (p, p) [m/N]."""
+        elastic = self.body.omega > 0
+        shares = self.body.traces[:, elastic] / self.body.omega[elastic]
+        return self.compliance - shares @ shares.T
+
+    def among(self, place: NDArray[np.int64], rows: int) -> "RevolvedPoints":
+        """The same body among ``rows`` rows of a model, of which it acts on those at ``place``."""
+        traces = np.zeros((rows, self.body.traces.shape[1]))
+        compliance, answers = np.zeros((rows, rows)), np.zeros((rows, self.answers.shape[1]))
+        traces[place], answers[place] = self.body.traces, self.answers
+        compliance[np.ix_(place, place)] = self.compliance
+        static = np.zeros((len(self.body.observed), rows))
+        body = replace(self.body, traces=traces, observed_static=static)
+        return replace(self, body=body, compliance=compliance, answers=answers)
+
+
+def reduce_revolved(
+    in_order: Callable[[int], FourierBody],
+    rows: RingRows,
+    points: RingPoints,
+    *,
+    axial: Modes,
+    others: int | None,
+    damping: Callable[[Floats], Floats],
+    loads: Floats,
+    below: float = inf,
+    sections: RingSections | None = None,
+    cache: ResultCache | None = None,
+) -> RevolvedPoints:
+    """Modes and static compliance of a body of revolution at points on rings.
+
+    Parameters
+    ----------
+    in_order : callable
+        Body in an order.
+    rows : RingRows
+        Of all its contacts.
+    points : RingPoints
+        Points of all its contacts, and the rows that read them.
+    axial : Modes
+        Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
+    others : int or None
+        Modes of the orders above that are kept, both motions of an order counted: those with the
+        lowest frequencies; None: all with ``below``.
+    damping : callable
+        Ratios of modes with these angular frequencies.
+    loads : array, shape (p, k) [N]
+        For ``answers``.
+    below : float [rad/s]
+        Highest angular frequency of these others.
+    sections : RingSections, optional
+        That are read as well.
+    cache : ResultCache, optional
+        As of :class:`klack.elasticity.statics.Flexibility`.
+    """
+    sums = _Orders(rows, points, loads, sections)
+    pairs = _Pairs(others, below, (points.count - 1) // 2)
+    for order in resolved_orders(points.count):
+        body = in_order(order)
+        with (
+            threadpool_limits(limits=1, user_api="blas"),  # small matrices, many of them
+            Flexibility(body, threads=1, cache=cache) as flexibility,
+        ):
+            sums.add(order, flexibility)
+            if order < 2 and body.rigid_modes.shape[1]:
+                sums.add_rigid(body)
+            pairs.look(order, body, flexibility, sums.read[order])
+        if order == 0:
+            first = body
+    shapes = np.repeat(axial.shapes[::2] / 2.0, 3, axis=0)  # a = b = U / 2
+    shapes[2::3] = axial.shapes[1::2]
+    blocks = [(0, omega, trace) for omega, trace in _columns(axial.omega, sums.read[0] @ shapes)]
+    blocks += pairs.lowest()
+    orders, omega, traces, moved = sums.modes(blocks)
+    return RevolvedPoints(
+        body=PointBody(
+            name=first.name,
+            mass=first.mass if sums.rigid else inf,
+            centre=np.array([0.0, 0.0, first.centre_of_mass]),
+            rigid=np.array(sums.rigid).reshape(-1, 6).T,
+            omega=omega,
+            damping=np.concatenate([np.zeros(len(sums.rigid)), damping(omega[len(sums.rigid) :])]),
+            traces=traces,
+            observed=np.zeros((0, len(omega))),
+            observed_static=np.zeros((0, len(points.row))),
+        ),
+        order=orders,
+        compliance=points.compliance(np.array(sums.spectrum)),
+        answers=sums.answers,
+        sections=moved,
+        section_compliance=sums.across,
+    )
+
+
+def _columns(omega: Floats, traces: Floats) -> Iterator[tuple[float, Floats]]:
+    return zip((float(w) for w in omega), traces.T, strict=True)
+
+
+class _Orders:
+    """Statics and rigid modes, order by order."""
+
+    def __init__(
+        self, rows: RingRows, points: RingPoints, loads: Floats, sections: RingSections | None
+    ) -> None:
+        self.rows, self.points, self.loads, self.sections = rows, points, loads, sections
+        self.read: dict[int, csr_array] = {}  # rows of the points, then those of the sections
+        self.spectrum: list[Floats] = []
+        self.answers = np.zeros(loads.shape)
+        self.across = np.zeros(0 if sections is None else sections.count)
+        self.rigid: list[Floats] = []
+        self._rigid: list[tuple[int, int, Floats]] = []  # order, way and what is read
+
+    def add(self, order: int, flexibility: Flexibility) -> None:
+        """Static compliance of the rows, and the answer to the loads."""
+        S = self.read[order] = self.rows.of_order(order)
+        self.spectrum.append(flexibility.condensed(S))
+        share = share_of_order(order, self.points.count)
+        forces = self.points.forces(order, self.loads)
+        moved = S @ flexibility.solve(S.T @ np.hstack(forces))
+        for factor, part in zip(self.points.factors(order), np.hsplit(moved, 2), strict=True):
+            self.answers += share * factor[:, None] * part[self.points.row]
+        if self.sections is not None:
+            P = self.sections.of_order(order)
+            self.read[order] = csr_array(vstack([S, P]))
+            if order == 1:
+                across = P[: self.sections.count].toarray().T
+                self.across = np.einsum("ik,ik->k", across, flexibility.deflections(across))
+
+    def add_rigid(self, body: FourierBody) -> None:
+        """Rigid modes of order 0 or 1, as motions of the centre of mass."""
+        R, r = body.rigid_modes, body.mesh.points[:, 0]
+        shapes = body.amplitudes(R)
+        read = self.read[body.order] @ R
+        for k in range(R.shape[1]):
+            u, v, w = shapes[:, :, k].T
+            for way in range(min(body.order, 1) + 1):
+                motion = np.zeros(6)
+                if body.order == 0:
+                    motion[2], motion[5] = body.nodal_mass @ w / body.mass, (v @ r) / (r @ r)
+                else:
+                    # about +y where the body bends towards x, about -x towards y
+                    motion[way] = body.nodal_mass @ (u - v) / (2.0 * body.mass)
+                    motion[4 - way] = (-1.0) ** way * -(w @ r) / (r @ r)
+                self.rigid.append(motion)
+                self._rigid.append((body.order, way, read[:, k]))
+
+    def modes(
+        self, elastic: list[tuple[int, float, Floats]]
+    ) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
+        """Of rigid and elastic modes: orders, angular frequencies, traces, motions of sections."""
+        ways = [(n, way, read) for n, _, read in elastic for way in range(1 if n == 0 else 2)]
+        omega = [w for n, w, _ in elastic for _ in range(1 if n == 0 else 2)]
+        all_modes = [*self._rigid, *ways]
+        rows = self.rows.count
+        traces = [
+            self.points.factors(n)[way] * read[:rows][self.points.row] for n, way, read in all_modes
+        ]
+        moved = np.zeros((len(self.across), 6, len(all_modes)))
+        for i, (n, way, read) in enumerate(all_modes):
+            shift, turn = np.split(read[rows:], 2)
+            if n == 0:
+                moved[:, 2, i], moved[:, 5, i] = shift, turn
+            elif n == 1:
+                moved[:, way, i], moved[:, 4 - way, i] = shift, (-1.0) ** way * turn
+        columns = np.array(traces).reshape(-1, len(self.points.row)).T
+        return (
+            np.array([n for n, *_ in all_modes], dtype=np.int64),
+            np.array([0.0] * len(self._rigid) + omega),
+            np.ascontiguousarray(columns),
+            moved,
+        )
+
+
+class _Pairs:
+    """The lowest pairs of modes of the orders above 0, found order by order."""
+
+    def __init__(self, others: int | None, below: float, highest: int) -> None:
+        self.count = sys.maxsize if others is None else others // 2
+        self.below, self.highest = below, highest
+        self.found: list[tuple[int, float, Floats]] = []
+        self.lowest_before = inf
+        self.is_complete = self.count == 0
+
+    def look(
+        self, order: int, body: FourierBody, flexibility: Flexibility, rows: csr_array
+    ) -> None:
+        """Add the modes of an order that belong to the lowest ones.
+
+        Complete when the lowest mode of an order is above them and frequencies rise with the
+        order: the lowest of a thin shell may belong to order 4 or so.
+        """
+        if order == 0 or order > self.highest or self.is_complete:
+            return
+        most = min(self.count, len(body.free) - body.rigid_modes.shape[1])
+        number = min(_AT_ONCE, most)
+        while True:
+            modes = eigenmodes(body, count=number, flexibility=flexibility)
+            if number == most or modes.omega[-1] > self._cut(modes.omega):
+                break
+            number = min(2 * number, most)
+        if modes.omega[0] > self._cut([]) and modes.omega[0] > self.lowest_before:
+            self.is_complete = True
+            return
+        self.lowest_before = float(modes.omega[0])
+        self.found += [(order, *one) for one in _columns(modes.omega, rows @ modes.shapes)]
+
+    def lowest(self) -> list[tuple[int, float, Floats]]:
+        """The pairs that are kept, lowest first."""
+        low = [one for one in self.found if one[1] <= self.below]
+        return sorted(low, key=lambda one: one[:2][::-1])[: self.count]
+
+    def _cut(self, more: "Floats | list[float]") -> float:
+        """Angular frequency of the last pair that is kept, with the modes found so far."""
+        known = sorted([*(omega for _, omega, _ in self.found), *more])
+        last = float(known[self.count - 1]) if len(known) >= self.count else inf
+        return min(last, self.below)
 
 
 _COPIES = 8  # of the compliance, for each body, their sum, and a factor of it

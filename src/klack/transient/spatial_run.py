@@ -41,19 +41,17 @@ from klack.simulation.network_kernel import MACRO_REPEATS, MOST_REPEATS, run_net
 from klack.simulation.network_record import moment_of, record_moment
 from klack.simulation.network_result import ChannelData, StaticStart
 from klack.simulation.network_run import everything, put_back
-from klack.simulation.propagator import modal_propagator
-from klack.simulation.rest import longest_period
-from klack.simulation.spatial_impact import SpatialImpact
-from klack.simulation.spatial_path import SpatialPath
-from klack.simulation.spatial_step import answer_step, begin_step, end_step
-from klack.simulation.step_sizes import StepSizes
-from klack.simulation.step_status import (
+from klack.simulation.phase import (
     STATUS_DONE,
     STATUS_FORCES,
     STATUS_REFUSED,
     STATUS_REPEAT,
 )
-from klack.transient.gap_course import GapCourse
+from klack.simulation.propagator import modal_propagator
+from klack.simulation.rest import longest_period
+from klack.simulation.spatial_impact import SpatialImpact, SpatialPath
+from klack.simulation.spatial_step import answer_step, begin_step, end_step
+from klack.simulation.step_sizes import StepSizes
 from klack.transient.impact_recorder import ImpactRecorder, film_lands
 from klack.transient.interface_arrays import (
     DAMPING,
@@ -69,6 +67,13 @@ from klack.transient.interface_arrays import (
     Rubbing,
     State,
 )
+from klack.transient.interface_friction import (
+    across_energy,
+    forget_inverse,
+    lie_without_friction,
+    repair_offsets,
+    rubbing_arrays,
+)
 from klack.transient.interface_kernel import FAILED, march, safe_flight
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import Gaps, contact_points, modes_of_step
@@ -78,17 +83,10 @@ from klack.transient.placed_bodies import (
     shaft_pressed,
     surely_unguided,
 )
-from klack.transient.placed_gaps import FRESH, PlacedGaps
+from klack.transient.placed_gaps import FRESH, GapCourse, PlacedGaps
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
 from klack.transient.spatial_rest import settle_at_rest
-from klack.transient.spatial_rubbing import (
-    across_energy,
-    forget_inverse,
-    lie_without_friction,
-    repair_offsets,
-    rubbing_arrays,
-)
 from klack.transient.stop_record import StopRecord
 from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
 from klack.transient.tilting_films import LOST, bend_faces, film_state, film_strain
@@ -120,7 +118,7 @@ _NONE = Outside(1.0, 0.0)  # the force of the network comes as the modal force o
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SpatialValve:
-    """Bodies of a valve that meet point by point: :class:`klack.simulation.spatial_motion`.
+    """Bodies of a valve that meet point by point: :class:`klack.simulation.network_run`.
 
     Parameters
     ----------

@@ -10,8 +10,8 @@ from scipy.spatial import cKDTree
 
 from klack.assembling.spatial_rings import in_all_orders
 from klack.contact.friction import Friction
+from klack.contact.gap_update import RingGaps
 from klack.contact.mortar import ContactSpace, contact_space
-from klack.contact.ring_gaps import RingGaps
 from klack.contact.rings import RingFriction, RingSpace
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.elasticity.eigen import eigenmodes
@@ -31,19 +31,18 @@ from klack.reduction.reduced_body import ReducedBody
 from klack.reduction.selection import ByCount
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
-from klack.transient.guide import guide_at_sections
+from klack.transient.guide import guide_at_sections, shaft_sections, turned_sections
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
-from klack.transient.revolved_guide import shaft_sections, turned_sections
 from klack.transient.revolved_model import (
     RevolvedBody,
+    RevolvedPoints,
     RingContact,
     model_of_reduced,
     reduced_bodies,
     revolved_model,
 )
-from klack.transient.revolved_points import RevolvedPoints
 from klack.transient.spatial_run import SpatialValve
 from klack.verification.transient import STEEL, needle_over_seat
 

@@ -23,7 +23,7 @@ from klack.elasticity.eigen import Modes
 from klack.elasticity.loads import face_dashpots
 from klack.progress import Progress
 from klack.transient.body_damping import BodyDamping, body_damping
-from klack.transient.free_flight import KnownBody
+from klack.transient.full_body import KnownBody
 from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult, Snapshots
 

@@ -44,8 +44,7 @@ from klack.network.travel import Travel
 from klack.progress import Progress, silent
 from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
-from klack.simulation.network_run import State, simulate_network
-from klack.simulation.spatial_motion import SpatialMotion
+from klack.simulation.network_run import SpatialMotion, State, simulate_network
 from klack.simulation.step_sizes import StepSizes, scaled
 from klack.stages import StageClock, collected_warnings, show, trial
 from klack.units import format_si

@@ -31,7 +31,7 @@ from klack.errors import ConvergenceError, InputError, KlackError, refuse_if
 from klack.mesh.rigid import rigid_placement
 from klack.progress import silent
 from klack.simulation.network_result import ImpactEvent, NetworkResult
-from klack.simulation.spatial_path import SpatialPath
+from klack.simulation.spatial_impact import SpatialPath
 from klack.stages import collected_warnings
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.spatial_run import SpatialValve
