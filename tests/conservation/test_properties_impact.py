@@ -23,7 +23,7 @@ from property_profiles import examples
 
 from klack.contact.laws import ContactLaw, HertzLaw, HuntCrossley, LinearLaw, TableLaw
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
-from klack.simulation.compile import propose_step
+from klack.simulation.impact import propose_step
 
 MOST_STEPS = 3000
 

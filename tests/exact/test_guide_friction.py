@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from klack_names import lateral_guide, rigid_body, simulate_interface
 
-from klack.transient.guide_friction import stopping_force
+from klack.transient.guide_step import stopping_force
 
 pytestmark = pytest.mark.slow
 

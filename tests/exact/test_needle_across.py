@@ -21,7 +21,7 @@ from klack.magnetics.off_axis_gap import eccentric_ring, guide_ring, tilted_ring
 from klack.magnetics.solenoid_parts import ArmatureBore
 from klack.transient.placed_gaps import gap_course
 from klack.transient.spatial_run import SpatialValve
-from klack.transient.tilting_film import BearingFilm
+from klack.transient.tilting_films import BearingFilm
 from klack.verification.off_axis import (
     FACE,
     INERTIA,

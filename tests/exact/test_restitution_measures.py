@@ -46,7 +46,7 @@ from klack.analyses.impact.record import LevelResult
 from klack.analyses.impact.trust import best_level, trust_notes
 from klack.analyses.stroke.times import all_lift_times, lift_times
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
-from klack.network.travel import StopBound, Travel
+from klack.network.ranges import StopBound, Travel
 from klack.simulation.impact_events import ImpactFinder
 
 MASS = 2e-3  # [kg]

@@ -35,7 +35,7 @@ from scipy.linalg import expm
 
 from klack.case import find_case, read_case
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
-from klack.simulation.compile import propose_step
+from klack.simulation.impact import propose_step
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
 

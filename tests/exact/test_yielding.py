@@ -49,7 +49,7 @@ from klack.exchange.modal_model import _without_memory
 from klack.plasticity.ladder import YieldingContact
 from klack.plasticity.yielding_body import LoadedBody, YieldingBody
 from klack.plasticity.zone import plastic_zone
-from klack.simulation.compile import propose_step
+from klack.simulation.impact import propose_step
 
 MASS, SPEED, LOADING, ELASTIC = 3e-3, 0.3, 1e8, 2.5e8
 RATIO = LOADING / ELASTIC

@@ -35,8 +35,7 @@ from klack_names import (
 from klack.hydraulics.line import Line
 from klack.hydraulics.liquid import Murnaghan, TabulatedLiquid, Tait
 from klack.mechanics.spring import Spring
-from klack.network.ranges import limits_of, value_text
-from klack.network.travel import Travel
+from klack.network.ranges import Travel, limits_of, value_text
 
 HEPTANE = library_fluid("n-heptane").at(293.15)
 LAW = LinearStopLaw(kind="linear", stiffness=1e8)

@@ -39,7 +39,7 @@ from klack.transient.interface_model import (
 )
 from klack.transient.placed_gaps import gap_course
 from klack.transient.spatial_run import SpatialValve
-from klack.transient.tilting_film import BearingFilm, TiltingFilm
+from klack.transient.tilting_films import BearingFilm, TiltingFilm
 from klack.units import format_si
 
 __all__ = [

@@ -24,9 +24,14 @@ from klack.elasticity.body import ElasticBody
 from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loops import YieldingLoops, loops_of_entry, loops_to_entry, yielding_loops
+from klack.plasticity.loops import (
+    YieldingLoops,
+    loops_of_entry,
+    loops_to_entry,
+    yielding_law,
+    yielding_loops,
+)
 from klack.plasticity.yielding_body import LoadedBody, YieldingBody
-from klack.plasticity.yielding_fit import yielding_law
 from klack.progress import Progress
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding
@@ -249,7 +254,7 @@ def law_loops(
 
 
 def law_with_yield(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw | None:
-    """Law of these loops, see :func:`klack.plasticity.yielding_fit.yielding_law`; None for none.
+    """Law of these loops, see :func:`klack.plasticity.loops.yielding_law`; None for none.
 
     Warns
     -----

@@ -7,7 +7,7 @@ from klack.case.valve_sections import ValveSections
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.network.network import Network
 from klack.network.port import Role
-from klack.network.travel import StopBound, Travel
+from klack.network.ranges import StopBound, Travel
 
 __all__ = ["END_STOP", "FLEXIBLE_BODY", "Meeting", "ValveRoles", "find_meetings", "find_roles"]
 

@@ -25,7 +25,7 @@ from klack.input.problem import nearest, one_of
 from klack.network.protocols import InterfaceLaw
 from klack.network.rows import FilmRow
 from klack.reduction.reduced_body import ReducedBody
-from klack.simulation.compile import flatten
+from klack.simulation.impact import flatten
 from klack.simulation.system import ContactPair, ReducedSystem
 
 __all__ = [

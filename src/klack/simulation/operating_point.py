@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Matrix, Vector
+from klack.network.ranges import Travel
 from klack.network.rows import Rows
-from klack.network.travel import Travel
 from klack.simulation.impact_events import ImpactFinder
 from klack.simulation.limits import Limits
 from klack.simulation.network_compile import CompiledNetwork, compile_network

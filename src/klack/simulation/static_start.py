@@ -35,9 +35,8 @@ from klack.arrays import Index, Matrix, Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
-from klack.network.ranges import range_text, value_text
+from klack.network.ranges import Travel, range_text, value_text
 from klack.network.rows import LimitRow
-from klack.network.travel import Travel
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import start_lines
 from klack.simulation.modal_step import ROW, ROW_Q

@@ -9,7 +9,7 @@ with the lateral displacement *x* of the shaft section (mean over a ring of node
 same weights as the force) and the compliance :math:`k^{-1}` that the modes do not have: of the
 bore, and, for the consistent law, of the shaft itself (static flexibility less that of the kept
 modes).  Coulomb friction of at most :math:`\mu N` acts on the rim of the shaft, along the axis and
-around it, against its slip (:mod:`klack.transient.guide_friction`); it turns and tilts the shaft as
+around it, against its slip (:mod:`klack.transient.guide_step`); it turns and tilts the shaft as
 well.  Viscous drag brakes it along the axis.
 
 Limits: the bore does not move; drag acts along the axis only; no fluid film in the guide.

@@ -25,7 +25,7 @@ from klack.hydraulics.tilted_film import SectorFilm
 from klack.simulation.spatial_impact import FilmLand, FilmMoments, ModalMoments, SpatialImpact
 from klack.transient.interface_arrays import Films, Record
 from klack.transient.interface_model import InterfaceModel
-from klack.transient.tilting_film import TiltingFilm
+from klack.transient.tilting_films import TiltingFilm
 
 __all__ = [
     "FILM_ROWS",

@@ -51,8 +51,7 @@ from klack.arrays import Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
-from klack.transient.guide_films import count_bearing, squeeze_guide
-from klack.transient.guide_friction import begin_rub, no_rub, rub_guide
+from klack.transient.guide_step import begin_rub, count_bearing, no_rub, rub_guide, squeeze_guide
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
     DAMPING,

@@ -88,8 +88,15 @@ from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
 from klack.transient.spatial_rest import settle_at_rest
 from klack.transient.stop_record import StopRecord
-from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
-from klack.transient.tilting_films import LOST, bend_faces, film_state, film_strain
+from klack.transient.tilting_films import (
+    LOST,
+    BearingFilm,
+    TiltingFilm,
+    bend_faces,
+    film_arrays,
+    film_state,
+    film_strain,
+)
 from klack.units import format_si
 
 __all__ = ["SpatialValve"]

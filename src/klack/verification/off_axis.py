@@ -38,8 +38,14 @@ from klack.transient.interface_run import (
     simulate_interface,
 )
 from klack.transient.spatial_run import SpatialValve
-from klack.transient.tilting_film import BearingFilm, TiltingFilm, film_arrays
-from klack.transient.tilting_films import LOST, bend_faces, film_strain
+from klack.transient.tilting_films import (
+    LOST,
+    BearingFilm,
+    TiltingFilm,
+    bend_faces,
+    film_arrays,
+    film_strain,
+)
 from klack.verification.benches import component
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.interface_bodies import lateral_guide, rigid_body

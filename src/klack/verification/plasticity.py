@@ -26,10 +26,9 @@ from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.network.network import Network
 from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loops import YieldingLoops
+from klack.plasticity.loops import YieldingLoops, yielding_law
 from klack.plasticity.radial_return import PlasticState, radial_return
 from klack.plasticity.yielding_body import LoadedBody, YieldingBody
-from klack.plasticity.yielding_fit import yielding_law
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.network_run import simulate_network

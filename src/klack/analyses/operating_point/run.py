@@ -35,8 +35,8 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackErr
 from klack.magnetics.constant_drive import driven, hysteretic_coils, start_currents
 from klack.network.checks import LooseBodyWarning
 from klack.network.network import Network
+from klack.network.ranges import Travel
 from klack.network.rows import Rows
-from klack.network.travel import Travel
 from klack.progress import Progress, silent
 from klack.simulation.operating_point import (
     OperatingPoint,

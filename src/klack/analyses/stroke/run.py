@@ -39,8 +39,8 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.magnetics.driver import Driver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
+from klack.network.ranges import Travel
 from klack.network.rows import Rows
-from klack.network.travel import Travel
 from klack.progress import Progress, silent
 from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult

@@ -7,8 +7,8 @@ from math import isfinite
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.network.ranges import Travel
 from klack.network.rows import Rows
-from klack.network.travel import Travel
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 
 __all__ = ["LiftTimes", "Passage", "all_lift_times", "lift_times"]
