@@ -430,14 +430,9 @@ def _emit(s: Any, out: Any, count: int) -> int:
                 slope = (s.leave_rate1 - s.leave_rate0) / (s.leave_time1 - s.leave_time0)
                 after += slope * (s.stop - s.leave_time0)
             after = max(after, s.fastest)
-    out[count, 0] = s.first
-    out[count, 1] = s.impact_before
-    out[count, 2] = after
-    out[count, 3] = peak
-    out[count, 4] = peak_time
-    out[count, 5] = s.impact_steps
-    out[count, 6] = s.stop
-    out[count, 7] = impulse
+    event = (s.first, s.impact_before, after, peak, peak_time, s.impact_steps, s.stop, impulse)
+    for j, value in enumerate(event):
+        out[count, j] = value
     return 1
 
 

@@ -147,7 +147,6 @@ def linear_row(at: RowPoint, h: float) -> LinearRow:
         for d, step in zip(sides, (h, 0.5 * h), strict=True)
     )
     usual = _usual(at, quick[3])
-    usual = _usual(at, quick[3])
     doubt = max(_apart(a, b, usual) for a, b in zip(slow[:2], quick[:2], strict=True))
     if slow[3] != quick[3]:
         slow, doubt = quick, 1.0

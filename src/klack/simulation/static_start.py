@@ -25,7 +25,7 @@ the same, and hold an armature where none can be.
 """
 
 import warnings
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,7 +36,7 @@ from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import Travel, range_text, value_text
-from klack.network.rows import LimitRow
+from klack.network.rows import BranchRow, LimitRow, LineRow, WaveRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import start_lines
 from klack.simulation.modal_step import ROW, ROW_Q
@@ -448,37 +448,28 @@ class _Balance:
 
     def _columns(self) -> None:
         """Lines and inertances with a free volume at one end carry an unknown flow."""
-        network = self.network
-        density, order = network.nodes.density, network.node_order
-        place = {handle: i for i, handle in enumerate(order)}
+        rows, density, p = self.network.rows, self.network.nodes.density, self.network.node_state.p
+        place = {handle: i for i, handle in enumerate(self.network.node_order)}
         free = set(self.free.tolist())
-        self.column_rows = np.zeros(len(network.rows.branches), np.int64)
-        ends: list[tuple[int, int]] = []
-        friction: list[float] = []
-        self.column_branch: list[int] = []
-        self.column_line: list[int] = []
-        self.column_wave: list[int] = []
-        for k, branch in enumerate(network.rows.branches):
-            if branch.column is not None:
-                self.column_rows[k] = 1
-                a, b = place[branch.a], place[branch.b]
-                if a in free or b in free:
-                    ends.append((a, b))
-                    friction.append(branch.column)
-                    self.column_branch.append(k)
-        for k, line in enumerate(network.rows.lines):
-            a, b = place[line.a], place[line.b]
-            if a in free or b in free:
-                ends.append((a, b))
-                friction.append(line.resistance / density**2)
-                self.column_line.append(k)
-        for k, wave in enumerate(network.rows.waves):
-            a, b = place[wave.a], place[wave.b]
-            if a in free or b in free:
-                ends.append((a, b))
-                friction.append(wave.drop(float(network.node_state.p[a]), 0.0)[1])
-                self.column_wave.append(k)
+
+        def moving(columns: Sequence[BranchRow | LineRow | WaveRow]) -> list[int]:
+            ends = [(place.get(row.a), place.get(row.b)) for row in columns]
+            return [k for k, (a, b) in enumerate(ends) if a in free or b in free]
+
+        is_column = [row.column is not None for row in rows.branches]
+        self.column_rows = np.array(is_column, dtype=np.int64)
+        self.column_branch = [k for k in moving(rows.branches) if is_column[k]]
+        self.column_line, self.column_wave = moving(rows.lines), moving(rows.waves)
+        branches = [rows.branches[k] for k in self.column_branch]
+        lines = [rows.lines[k] for k in self.column_line]
+        waves = [rows.waves[k] for k in self.column_wave]
+        ends = [(place[row.a], place[row.b]) for row in (*branches, *lines, *waves)]
         self.ends = np.array(ends, np.int64).reshape(-1, 2)
+        friction = [
+            *(row.column for row in branches),
+            *(row.resistance / density**2 for row in lines),
+            *(row.drop(float(p[place[row.a]]), 0.0)[1] for row in waves),
+        ]
         self.friction = np.array(friction, dtype=float)
 
     def _couplings(self, units: Vector) -> Couplings:
