@@ -42,8 +42,7 @@ from klack.contact.rubbing_fit import Loop, rubbing_fit
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
 from klack.mechanics.spring import Spring
-from klack.simulation.rubbing_step import slide
-from klack.simulation.yielding_step import press, settle
+from klack.simulation.lasting_laws import press, settle, slide
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

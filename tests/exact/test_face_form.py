@@ -22,8 +22,8 @@ from klack.analyses.impact.interface_level import exact_gaps
 from klack.assembling.problem import build_problem, place_bodies
 from klack.case import find_case, load_case
 from klack.contact.face_form import FaceForm, Waves
-from klack.contact.face_front import area_at_once, front_pressure
 from klack.contact.hertz import point_radius
+from klack.contact.touch_shape import area_at_once, front_pressure
 from klack.exchange.calculix_case import calculix_impact
 
 CASE = """

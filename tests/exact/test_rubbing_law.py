@@ -22,7 +22,7 @@ from klack_names import (
     simulate_impact,
 )
 
-from klack.simulation.rubbing_step import rubbing_mean, rubbing_store, slide, slider_places
+from klack.simulation.lasting_laws import rubbing_mean, rubbing_store, slide, slider_places
 
 TABLE = Path(__file__).parents[1] / "data" / "friction_cone_seat.csv"
 KN = 1e9  # [N/m] along the normal of the ring

@@ -31,9 +31,8 @@ from klack.contact.step_constants import (
     STEP_LEFT,
     TOUCH,
 )
+from klack.simulation.lasting_laws import rubbing_mean, rubbing_store, yielding_mean, yielding_store
 from klack.simulation.phase import compiled
-from klack.simulation.rubbing_step import rubbing_mean, rubbing_store
-from klack.simulation.yielding_step import yielding_mean, yielding_store
 
 __all__ = ["law_potential", "mean_force", "solve_linear", "solve_step"]
 

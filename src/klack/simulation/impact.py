@@ -38,10 +38,10 @@ from klack.simulation.kernel import (
     Watched,
     run_steps,
 )
+from klack.simulation.lasting_laws import pressed_state
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.simulation.single_contact import run_one_contact
 from klack.simulation.system import ReducedSystem
-from klack.simulation.yielding_step import pressed_state
 
 __all__ = ["SystemRecord", "flatten", "propose_step", "simulate", "simulate_impact"]
 

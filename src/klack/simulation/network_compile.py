@@ -16,6 +16,7 @@ from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
 from klack.network.step_function import address_of
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
+from klack.simulation.lasting_laws import settle
 from klack.simulation.modal_step import (
     FIXED_ROWS,
     ROW,
@@ -52,7 +53,6 @@ from klack.simulation.propagator import modal_propagator
 from klack.simulation.rest import rest_time
 from klack.simulation.step_sizes import StepSizes, kinks
 from klack.simulation.wave_rows import WAVE_THROUGHPUT, Waves, compile_waves, start_wave
-from klack.simulation.yielding_step import settle
 
 __all__ = [
     "CompiledNetwork",

@@ -15,6 +15,16 @@ import numpy as np
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING, SEPARATED, SLOWEST
 from klack.network.step_function import shift
 from klack.simulation.interface_step import open_film, solve_interface
+from klack.simulation.lasting_laws import (
+    keep_faces,
+    keep_sliders,
+    press,
+    settle,
+    settled_since,
+    slide,
+    take_back_faces,
+    take_back_sliders,
+)
 from klack.simulation.network_arrays import (
     AHEAD,
     ANSWER,
@@ -35,8 +45,6 @@ from klack.simulation.network_arrays import (
 from klack.simulation.network_ports import move_body, port_speed
 from klack.simulation.network_sliders import push_by_last_friction, slip, slip_seen_late
 from klack.simulation.phase import phase
-from klack.simulation.rubbing_step import keep_sliders, slide, take_back_sliders
-from klack.simulation.yielding_step import keep_faces, press, settle, settled_since, take_back_faces
 
 __all__ = [
     "FORCE_ROUND_OFF",

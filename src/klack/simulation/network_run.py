@@ -22,6 +22,7 @@ from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.impact_doubts import impact_doubts, line_doubts
 from klack.simulation.impact_events import ImpactFinder
+from klack.simulation.lasting_laws import pressed_state, slider_places
 from klack.simulation.limits import Limits
 from klack.simulation.moving_bodies import MovingBodies
 from klack.simulation.network_arrays import (
@@ -54,10 +55,8 @@ from klack.simulation.network_result import (
 )
 from klack.simulation.phase import STATUS_BRANCH, STATUS_DONE, STATUS_ELEMENT, STATUS_PRESSURES
 from klack.simulation.row_calls import SHARE_OF_STEP, call_rows
-from klack.simulation.rubbing_step import slider_places
 from klack.simulation.static_start import RestState, begin_at_rest
 from klack.simulation.step_sizes import StepSizes, largest_divisor, step_sizes
-from klack.simulation.yielding_step import pressed_state
 from klack.units import format_si
 
 __all__ = [

@@ -33,9 +33,8 @@ from klack.simulation.kernel import (
     add_release,
     push_on,
 )
+from klack.simulation.lasting_laws import press, slide
 from klack.simulation.phase import compiled, phase
-from klack.simulation.rubbing_step import slide
-from klack.simulation.yielding_step import press
 
 __all__ = ["run_one_contact"]
 

@@ -16,9 +16,9 @@ from klack.contact.step_constants import LAW_RUBBING, NO_LAW
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.step_function import first, pointers
 from klack.simulation.contact_step import mean_force
+from klack.simulation.lasting_laws import closing_force
 from klack.simulation.network_arrays import Nodes, StepRows
 from klack.simulation.row_calls import call_rows, push_ports, push_walls
-from klack.simulation.rubbing_step import closing_force
 
 __all__ = [
     "Balance",

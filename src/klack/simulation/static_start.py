@@ -39,6 +39,7 @@ from klack.network.ranges import Travel, range_text, value_text
 from klack.network.rows import BranchRow, LimitRow, LineRow, WaveRow
 from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import start_lines
+from klack.simulation.lasting_laws import begin_faces, begin_sliders
 from klack.simulation.modal_step import ROW, ROW_Q
 from klack.simulation.network_arrays import (
     BEFORE,
@@ -54,7 +55,6 @@ from klack.simulation.network_gas import settle_gas
 from klack.simulation.network_result import StaticStart
 from klack.simulation.rest import resting_dissipation
 from klack.simulation.row_calls import SHARE_OF_STEP
-from klack.simulation.rubbing_step import begin_sliders
 from klack.simulation.static_rows import (
     Balance,
     Couplings,
@@ -67,7 +67,6 @@ from klack.simulation.static_rows import (
     slopes_at_rest,
 )
 from klack.simulation.wave_rows import start_wave
-from klack.simulation.yielding_step import begin_faces
 from klack.units import format_si
 
 __all__ = ["RestState", "SteadySlopes", "begin_at_rest", "begin_steady"]

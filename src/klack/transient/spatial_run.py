@@ -52,7 +52,7 @@ from klack.simulation.rest import longest_period
 from klack.simulation.spatial_impact import SpatialImpact, SpatialPath
 from klack.simulation.spatial_step import answer_step, begin_step, end_step
 from klack.simulation.step_sizes import StepSizes
-from klack.transient.impact_recorder import ImpactRecorder, film_lands
+from klack.transient.impact_recorder import ImpactRecorder, StopRecord, film_lands
 from klack.transient.interface_arrays import (
     DAMPING,
     DEBT,
@@ -87,7 +87,6 @@ from klack.transient.placed_gaps import FRESH, GapCourse, PlacedGaps
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 from klack.transient.side_forces import SideForces
 from klack.transient.spatial_rest import settle_at_rest
-from klack.transient.stop_record import StopRecord
 from klack.transient.tilting_films import (
     LOST,
     BearingFilm,

@@ -22,9 +22,9 @@ import numpy as np
 from klack.analyses.impact.record import LevelResult
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
-from klack.contact.face_front import area_at_once, front_pressure
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, find_contacts
+from klack.contact.touch_shape import area_at_once, front_pressure
 from klack.elasticity.body import ElasticBody
 from klack.elasticity.eigen import Modes
 from klack.materials import Material
