@@ -163,20 +163,31 @@ def _lifted(args: Any) -> TangentNumber | None:
     return found[0]
 
 
-def _arithmetic(*functions: Any) -> None:
-    for function in functions:
+def _typed(function: Any, resolve: Callable[[Any], Any]) -> None:
+    """Let a function have the signature that ``resolve`` finds for its arguments, or None."""
 
-        @infer_global(function)
-        class _Binary(AbstractTemplate):
-            key = function
+    @infer_global(function)
+    class _Template(AbstractTemplate):
+        key = function
 
-            def generic(self, args: Any, kws: Any) -> Any:
-                kind = _lifted(args)
-                if kind is None or len(args) != 2:
-                    return None
-                second = args[1] if isinstance(args[1], TangentNumber) else types.float64
-                first = args[0] if isinstance(args[0], TangentNumber) else types.float64
-                return signature(kind, first, second)
+        def generic(self, args: Any, kws: Any) -> Any:
+            return resolve(args)
+
+
+def _of_two(args: Any) -> Any:
+    kind = _lifted(args)
+    if kind is None or len(args) != 2:
+        return None
+    return signature(kind, *(types.float64 if _is_plain(a) else a for a in args))
+
+
+def _of_one(result: Any) -> Callable[[Any], Any]:
+    """Signature of a function of one number; ``result`` None: a number of the same type."""
+    return lambda args: (
+        signature(result or args[0], args[0])
+        if len(args) == 1 and isinstance(args[0], TangentNumber)
+        else None
+    )
 
 
 def _lowered(rule: Callable[..., Any], *functions: Any) -> None:
@@ -256,21 +267,17 @@ for _rule, _functions in (
     (_div, (operator.truediv, operator.itruediv)),
     (_pow, (operator.pow, operator.ipow)),
 ):
-    _arithmetic(*_functions)
+    for _function in _functions:
+        _typed(_function, _of_two)
     _lowered(_rule, *_functions)
 
 
 def _compared(function: Any, sign: str) -> None:
-    @infer_global(function)
-    class _Comparison(AbstractTemplate):
-        key = function
+    def resolve(args: Any) -> Any:
+        kinds = (types.float64 if _is_plain(a) else a for a in args)
+        return None if _lifted(args) is None else signature(types.boolean, *kinds)
 
-        def generic(self, args: Any, kws: Any) -> Any:
-            kind = _lifted(args)
-            if kind is None:
-                return None
-            plain = [a if isinstance(a, TangentNumber) else types.float64 for a in args]
-            return signature(types.boolean, *plain)
+    _typed(function, resolve)
 
     def impl(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         plain = [
@@ -302,133 +309,69 @@ for _operator, _sign in (
 # --------------------------------------------------------------------------- functions
 
 
-def _negative(of: _Lanes, x: Any) -> Any:
-    return of.builder.fneg(x)
-
-
 def _absolute(of: _Lanes, x: Any) -> Any:
     below = of.builder.fcmp_ordered("<", of.value(x), _real(0.0))
     found = of.chosen(below, of.builder.fneg(x), x)
     return of.with_value(found, of.call(abs, of.value(x)))
 
 
-def _root(of: _Lanes, x: Any) -> Any:
+def _smooth(
+    function: Any, slope: Callable[[_Lanes, Any, Any], Any]
+) -> Callable[[_Lanes, Any], Any]:
+    """Rule of a function whose slope follows from its argument and its value."""
+
+    def rule(of: _Lanes, x: Any) -> Any:
+        a = of.value(x)
+        value = of.call(function, a)
+        return of.follow(value, x, slope(of, a, value))
+
+    return rule
+
+
+def _slope_of_root(of: _Lanes, a: Any, root: Any) -> Any:
     """Zero has no slope: it is taken as zero, as where a product with it has one."""
-    b = of.builder
-    root = of.call(math.sqrt, of.value(x))
-    slope = b.fdiv(_real(0.5), root)
-    slope = of.chosen(b.fcmp_ordered(">", root, _real(0.0)), slope, _real(0.0))
-    return of.follow(root, x, slope)
+    slope = of.builder.fdiv(_real(0.5), root)
+    return of.chosen(of.builder.fcmp_ordered(">", root, _real(0.0)), slope, _real(0.0))
 
 
-def _exponential(of: _Lanes, x: Any) -> Any:
-    value = of.call(math.exp, of.value(x))
-    return of.follow(value, x, value)
-
-
-def _logarithm(of: _Lanes, x: Any) -> Any:
-    value = of.value(x)
-    return of.follow(of.call(math.log, value), x, of.builder.fdiv(_real(1.0), value))
-
-
-def _logarithm_of_one_more(of: _Lanes, x: Any) -> Any:
-    b, value = of.builder, of.value(x)
-    return of.follow(of.call(math.log1p, value), x, b.fdiv(_real(1.0), b.fadd(_real(1.0), value)))
-
-
-def _exponential_less_one(of: _Lanes, x: Any) -> Any:
-    value = of.call(math.expm1, of.value(x))
-    return of.follow(value, x, of.builder.fadd(value, _real(1.0)))
-
-
-def _sine(of: _Lanes, x: Any) -> Any:
-    value = of.value(x)
-    return of.follow(of.call(math.sin, value), x, of.call(math.cos, value))
-
-
-def _cosine(of: _Lanes, x: Any) -> Any:
-    value = of.value(x)
-    slope = of.builder.fneg(of.call(math.sin, value))
-    return of.follow(of.call(math.cos, value), x, slope)
-
-
-def _hyperbolic_tangent(of: _Lanes, x: Any) -> Any:
-    b, value = of.builder, of.call(math.tanh, of.value(x))
-    return of.follow(value, x, b.fsub(_real(1.0), b.fmul(value, value)))
-
-
-def _arc_tangent(of: _Lanes, x: Any) -> Any:
-    b, value = of.builder, of.value(x)
-    slope = b.fdiv(_real(1.0), b.fadd(_real(1.0), b.fmul(value, value)))
-    return of.follow(of.call(math.atan, value), x, slope)
-
-
-def _itself(of: _Lanes, x: Any) -> Any:
-    return x
-
-
-def _function(function: Any, rule: Callable[[_Lanes, Any], Any]) -> None:
-    @infer_global(function)
-    class _Unary(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == 1 and isinstance(args[0], TangentNumber):
-                return signature(args[0], args[0])
-            return None
-
-    @lower_builtin(function, TangentNumber)
-    def _impl(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-        return rule(_Lanes(context, builder, sig.return_type), args[0])
-
-
-_FUNCTIONS: tuple[tuple[Any, Callable[[_Lanes, Any], Any]], ...] = (
-    (operator.neg, _negative),
-    (operator.pos, _itself),
-    (abs, _absolute),
-    (float, _itself),
-    (math.fabs, _absolute),
-    (math.sqrt, _root),
-    (math.exp, _exponential),
-    (math.log, _logarithm),
-    (math.log1p, _logarithm_of_one_more),
-    (math.expm1, _exponential_less_one),
-    (math.sin, _sine),
-    (math.cos, _cosine),
-    (math.tanh, _hyperbolic_tangent),
-    (math.atan, _arc_tangent),
-)
-for _plain, _slope in _FUNCTIONS:
-    _function(_plain, _slope)
-
-
-def _plain_function(function: Any, result: Any, rule: Callable[[_Lanes, Any], Any]) -> None:
-    """A function of the value alone."""
-
-    @infer_global(function)
-    class _OfValue(AbstractTemplate):
-        key = function
-
-        def generic(self, args: Any, kws: Any) -> Any:
-            if len(args) == 1 and isinstance(args[0], TangentNumber):
-                return signature(result, args[0])
-            return None
+def _lowered_alone(function: Any, result: Any, rule: Callable[[_Lanes, Any], Any]) -> None:
+    _typed(function, _of_one(result))
 
     @lower_builtin(function, TangentNumber)
     def _impl(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return rule(_Lanes(context, builder, sig.args[0]), args[0])
 
 
-def _truth(of: _Lanes, x: Any) -> Any:
-    return of.builder.fcmp_unordered("!=", of.value(x), _real(0.0))
-
-
-def _whole(of: _Lanes, x: Any) -> Any:
-    return of.context.cast(of.builder, of.value(x), types.float64, types.intp)
-
-
-_plain_function(bool, types.boolean, _truth)
-_plain_function(int, types.intp, _whole)
+_ONE = _real(1.0)
+_SLOPES: tuple[tuple[Any, Callable[[_Lanes, Any, Any], Any]], ...] = (
+    (math.sqrt, _slope_of_root),
+    (math.exp, lambda of, a, value: value),
+    (math.log, lambda of, a, value: of.builder.fdiv(_ONE, a)),
+    (math.log1p, lambda of, a, value: of.builder.fdiv(_ONE, of.builder.fadd(_ONE, a))),
+    (math.expm1, lambda of, a, value: of.builder.fadd(value, _ONE)),
+    (math.sin, lambda of, a, value: of.call(math.cos, a)),
+    (math.cos, lambda of, a, value: of.builder.fneg(of.call(math.sin, a))),
+    (math.tanh, lambda of, a, value: of.builder.fsub(_ONE, of.builder.fmul(value, value))),
+    (
+        math.atan,
+        lambda of, a, value: of.builder.fdiv(_ONE, of.builder.fadd(_ONE, of.builder.fmul(a, a))),
+    ),
+)
+for _plain, _result, _alone in (
+    (operator.neg, None, lambda of, x: of.builder.fneg(x)),
+    (operator.pos, None, lambda of, x: x),
+    (float, None, lambda of, x: x),
+    (abs, None, _absolute),
+    (math.fabs, None, _absolute),
+    (bool, types.boolean, lambda of, x: of.builder.fcmp_unordered("!=", of.value(x), _real(0.0))),
+    (
+        int,
+        types.intp,
+        lambda of, x: of.context.cast(of.builder, of.value(x), types.float64, types.intp),
+    ),
+    *((function, None, _smooth(function, slope)) for function, slope in _SLOPES),
+):
+    _lowered_alone(_plain, _result, _alone)
 
 
 @lower_cast(types.Integer, TangentNumber)
@@ -439,13 +382,11 @@ def _from_plain(context: Any, builder: Any, fromty: Any, toty: Any, value: Any) 
 
 
 def _extreme(function: Any, sign: str) -> None:
-    @infer_global(function)
-    class _Extreme(AbstractTemplate):
-        key = function
+    def resolve(args: Any) -> Any:
+        kind = _lifted(args)
+        return None if kind is None or len(args) < 2 else signature(kind, *([kind] * len(args)))
 
-        def generic(self, args: Any, kws: Any) -> Any:
-            kind = _lifted(args)
-            return None if kind is None or len(args) < 2 else signature(kind, *([kind] * len(args)))
+    _typed(function, resolve)
 
     @lower_builtin(function, types.VarArg(TangentNumber))
     def _impl(context: Any, builder: Any, sig: Any, args: Any) -> Any:
