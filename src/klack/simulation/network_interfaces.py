@@ -265,6 +265,26 @@ def coarse_step_holds(contacts: Any) -> bool:
 
 
 @phase
+def _remembered(contacts: Any, accounts: Any, peaks: Any) -> tuple[Any, ...]:
+    """What a repeated macro step begins with, its gap second and its force fourth."""
+    state = contacts.state
+    return (
+        state.e,
+        state.gap,
+        state.rate,
+        state.force,
+        state.chi,
+        state.deepest,
+        state.since,
+        state.film_before,
+        state.pulled,
+        accounts.contact,
+        accounts.film,
+        peaks,
+    )
+
+
+@phase
 def begin_macro_interfaces(
     contacts: Any, accounts: Any, recording: Recording, sums: Any, peaks: Any
 ) -> None:
@@ -272,22 +292,12 @@ def begin_macro_interfaces(
     state, trial = contacts.state, contacts.trial
     for c in range(contacts.rows.interfaces):
         k = KEPT * c
-        trial.kept[k] = state.e[c]
-        trial.kept[k + 1] = state.gap[c]
-        trial.kept[k + 2] = state.rate[c]
-        trial.kept[k + 3] = state.force[c]
-        trial.kept[k + 4] = state.chi[c]
-        trial.kept[k + 5] = state.deepest[c]
-        trial.kept[k + 6] = state.since[c]
-        trial.kept[k + 7] = state.film_before[c]
-        trial.kept[k + 8] = float(state.hint[c])
-        trial.kept[k + 9] = accounts.contact[c]
-        trial.kept[k + 10] = accounts.film[c]
-        trial.kept[k + 11] = sums[2 * c]
-        trial.kept[k + 12] = sums[2 * c + 1]
-        trial.kept[k + 13] = peaks[c]
-        trial.kept[k + 14] = float(recording.filled[c])
-        trial.kept[k + 15] = state.pulled[c]
+        for values in _remembered(contacts, accounts, peaks):
+            trial.kept[k] = values[c]
+            k += 1
+        trial.kept[k] = float(state.hint[c])
+        trial.kept[k + 1], trial.kept[k + 2] = sums[2 * c], sums[2 * c + 1]
+        trial.kept[k + 3] = float(recording.filled[c])
         if contacts.rows.kind[c] == LAW_RUBBING:
             keep_sliders(contacts.laws, contacts.rows.law0[c])
         if contacts.rows.kind[c] == LAW_YIELDING:
@@ -316,22 +326,12 @@ def take_back_interfaces(
     state, kept = contacts.state, contacts.trial.kept
     for c in range(contacts.rows.interfaces):
         k = KEPT * c
-        state.e[c] = kept[k]
-        state.gap[c] = kept[k + 1]
-        state.rate[c] = kept[k + 2]
-        state.force[c] = kept[k + 3]
-        state.chi[c] = kept[k + 4]
-        state.deepest[c] = kept[k + 5]
-        state.since[c] = kept[k + 6]
-        state.film_before[c] = kept[k + 7]
-        state.hint[c] = int(kept[k + 8])
-        accounts.contact[c] = kept[k + 9]
-        accounts.film[c] = kept[k + 10]
-        sums[2 * c] = kept[k + 11]
-        sums[2 * c + 1] = kept[k + 12]
-        peaks[c] = kept[k + 13]
-        recording.filled[c] = int(kept[k + 14])
-        state.pulled[c] = kept[k + 15]
+        for values in _remembered(contacts, accounts, peaks):
+            values[c] = kept[k]
+            k += 1
+        state.hint[c] = int(kept[k])
+        sums[2 * c], sums[2 * c + 1] = kept[k + 1], kept[k + 2]
+        recording.filled[c] = int(kept[k + 3])
         if contacts.rows.kind[c] == LAW_RUBBING:
             take_back_sliders(contacts.laws, contacts.rows.law0[c])
         if contacts.rows.kind[c] == LAW_YIELDING:
