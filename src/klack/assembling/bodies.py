@@ -30,7 +30,8 @@ from klack.case.surface_names import place_of
 from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import contact_space, touching_shift
-from klack.contact.pairing import CurvedFaces, axial_distance, curved_faces
+from klack.contact.pairing import axial_distance, curved_faces
+from klack.contact.ray_cutting import CurvedFaces
 from klack.contact.surface_edges import SurfaceEdges, surface_edges, turned_away
 from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError

@@ -36,8 +36,8 @@ from scipy.sparse import csr_array
 from klack.arrays import Floats
 from klack.contact.face_form import FaceForm
 from klack.contact.mortar import COVERED, ContactSpace, HatQuadrature, hat_quadrature
-from klack.contact.pairing import INSIDE, OPPOSED, CurvedFaces, curved_faces
-from klack.contact.ray_cutting import cut_listed, cut_nearest, list_near
+from klack.contact.pairing import curved_faces, in_space
+from klack.contact.ray_cutting import CurvedFaces, cut_listed, cut_nearest, list_near
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rotation_matrix
@@ -73,16 +73,15 @@ class ListedFaces:
     ) -> Self:
         """Those near lines from contact points of this reach [m]."""
         faces, within = curved_faces(*master), _LISTED_WITHIN * reach
-        met, _, _ = cut_nearest(position, normal, *faces.arrays, INSIDE, OPPOSED, faces.deepest)
-        near = list_near(position, normal, met, faces.centre, faces.axes, faces.half, within)
+        met, _, _ = cut_nearest(position, normal, faces)
+        near = list_near(position, normal, met, faces, within)
         return cls(faces, *near, within)
 
     def gaps(self, position: Floats, normal: Floats, *, near: bool) -> Floats:
         """Gap along each line [m], nan where nothing is met; ``near``: the lists hold."""
-        master, limits = self.faces.arrays, (INSIDE, OPPOSED, self.faces.deepest)
         if near:
-            return cut_listed(self.first, self.listed, position, normal, *master, *limits)
-        return cut_nearest(position, normal, *master, *limits)[2]
+            return cut_listed(self.first, self.listed, position, normal, self.faces)
+        return cut_nearest(position, normal, self.faces)[2]
 
 
 def slave_and_master(
@@ -175,7 +174,7 @@ class RingGaps:
         """
         slave, master, away = slave_and_master(section, (mesh_a, surface_a), (mesh_b, surface_b))
         hats = hat_quadrature(section, *slave)
-        lines = (_in_half_plane(hats.position), _in_half_plane(hats.normal))
+        lines = (in_space(hats.position), in_space(hats.normal))
         near = ListedFaces.of(master, *lines, section.reach)
         listed = [np.tile(near.listed[a:b], len(angle)) for a, b in pairwise(near.first)]
         flat = np.zeros(len(hats.position))
@@ -224,19 +223,14 @@ class RingGaps:
             way = np.column_stack([(x * normal[:, 0] + y * normal[:, 1]) / rho, normal[:, 2]])
             length = np.linalg.norm(way, axis=1)
             lines = (
-                _in_half_plane(np.column_stack([rho, z])),
-                _in_half_plane(way / length[:, None]),
+                in_space(np.column_stack([rho, z])),
+                in_space(way / length[:, None]),
             )
             more = self.near.gaps(*lines, near=near) / length
             s += more
             if not np.any(np.abs(more) > _SETTLED):  # none of those that met nothing
                 break
         return s
-
-
-def _in_half_plane(x: Floats) -> Floats:
-    """Columns (r, z) become (r, 0, z)."""
-    return np.ascontiguousarray(np.insert(x, 1, 0.0, axis=1))
 
 
 def _around(vectors: Floats, angle: Floats) -> Floats:

@@ -12,22 +12,23 @@ opposed normals the nearest counts.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.face_form import FaceForm
-from klack.contact.ray_cutting import cut_nearest, face_boxes, face_polynomials
+from klack.contact.ray_cutting import (
+    CurvedFaces,
+    cut_nearest,
+    face_boxes,
+    face_polynomials,
+)
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = [
-    "INSIDE",
-    "OPPOSED",
-    "CurvedFaces",
     "FaceGeometry",
     "Projection",
     "axial_distance",
@@ -37,14 +38,9 @@ __all__ = [
     "face_lattice",
     "face_thickness",
     "gaps_to",
+    "in_space",
     "project_to_surface",
 ]
-
-INSIDE = 1e-8
-"""Reference coordinate by which a cut may lie outside a face (faces share their edges)."""
-
-OPPOSED = -0.1
-"""Largest cosine between the normals of two points that face each other."""
 
 _DEPTH = 0.1
 """Deepest penetration that counts, relative to the extent of the master surface."""
@@ -193,34 +189,6 @@ def project_to_surface(
     return Projection(block, np.where(face >= 0, face - start[block], -1), local, gap)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class CurvedFaces:
-    """Faces of a master surface, ready to be cut by lines.
-
-    Parameters
-    ----------
-    coefficients : array, shape (f, 8, 3)
-        See :mod:`klack.contact.ray_cutting`; all blocks of the surface in turn.
-    centre, axes, half : array, shape (f, 3), (f, 3, 3), (f, 3) [m], [-], [m]
-        Box around each face: its middle, its directions in rows, its half widths.
-    triangle : bool array, shape (f,)
-    deepest : float [m]
-        Deepest penetration that counts as one.
-    """
-
-    coefficients: NDArray[np.float64]
-    centre: NDArray[np.float64]
-    axes: NDArray[np.float64]
-    half: NDArray[np.float64]
-    triangle: NDArray[np.bool_]
-    deepest: float
-
-    @property
-    def arrays(self) -> tuple[NDArray[Any], ...]:
-        """All but ``deepest``, in the order in which the compiled cuts take them."""
-        return self.coefficients, self.centre, self.axes, self.half, self.triangle
-
-
 def curved_faces(mesh: Mesh, surface: Surface) -> CurvedFaces:
     """Prepare the faces of a surface for :func:`project_to_surface` and the like."""
     parts, kinds = [], []
@@ -254,16 +222,14 @@ def _nearest(
     deepest: float | None = None,
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
     """Number of the face that each line cuts first, place on it, and gap."""
-    found: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]] = cut_nearest(
-        *(_in_space(points), _in_space(normals), *faces.arrays),
-        *(INSIDE, OPPOSED, faces.deepest if deepest is None else deepest),
-    )
-    return found
+    if deepest is not None:
+        faces = faces._replace(deepest=deepest)
+    return cut_nearest(in_space(points), in_space(normals), faces)
 
 
-def _in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
+def in_space(x: NDArray[np.float64]) -> NDArray[np.float64]:
     """Columns (r, z) become (r, 0, z)."""
-    return x if x.shape[-1] == 3 else np.insert(x, 1, 0.0, axis=-1)
+    return x if x.shape[-1] == 3 else np.ascontiguousarray(np.insert(x, 1, 0.0, axis=-1))
 
 
 def face_gaps(

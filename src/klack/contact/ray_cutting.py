@@ -4,15 +4,19 @@ A face is a polynomial :math:`x(\xi, \eta) = \sum_m c_m\, p_m(\xi, \eta)` in the
 that every face family spans; a line of an axisymmetric body becomes a strip around it.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.arrays import Cube, Index, Matrix, Vector
 from klack.compiling.jit import inner, njit
 from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.mesh.families import FAMILIES
 
 __all__ = [
     "MONOMIALS",
+    "CurvedFaces",
     "cut_face",
     "cut_listed",
     "cut_nearest",
@@ -24,9 +28,22 @@ __all__ = [
 MONOMIALS = 8
 """1, x, y, x^2, x y, y^2, x^2 y, x y^2."""
 
+_INSIDE = 1e-8  # reference coordinate by which a cut may lie outside a face: they share their edges
+_OPPOSED = -0.1  # largest cosine between the normals of two points that face each other
 _CLOSE = 0.1  # half widths of a face within which no other sheet of the surface can be
 
 _BOX_SAMPLES = 5  # along an edge, at which a face is sampled for its box
+
+
+class CurvedFaces(NamedTuple):
+    """Faces of a master surface, all blocks of it in turn, ready to be cut by lines."""
+
+    coefficients: Cube  # (f, 8, 3)
+    centre: Matrix  # (f, 3) [m] middle of the box around each face
+    axes: Cube  # (f, 3, 3) its directions in rows
+    half: Matrix  # (f, 3) [m] its half widths
+    triangle: NDArray[np.bool_]  # (f,) reference domain: triangle, or square [-1, 1]^2
+    deepest: float  # [m] deepest penetration that counts as one
 
 
 def face_polynomials(
@@ -101,21 +118,10 @@ def _monomial_factors(family: str) -> NDArray[np.float64]:
 
 
 @njit
-def cut_nearest(  # type: ignore[no-untyped-def]
-    points, normals, coefficients, centre, axes, half, triangle, inside, opposed, deepest
-):
-    """Nearest valid cut of every line with any of the faces.
-
-    Parameters
-    ----------
-    points, normals : array, shape (p, 3)
-    coefficients : array, shape (f, 8, 3)
-    centre, axes, half : array, shape (f, 3), (f, 3, 3), (f, 3)
-        Box around each face: its middle, its directions in rows, its half widths.
-    triangle : bool array, shape (f,)
-        Reference domain: triangle, or square [-1, 1]^2.
-    inside, opposed, deepest : float
-        Slack of the domain, largest cosine of the normals, deepest penetration [m].
+def cut_nearest(
+    points: Matrix, normals: Matrix, faces: CurvedFaces
+) -> tuple[Index, Matrix, Vector]:
+    """Nearest valid cut of every line, points and normals of shape (p, 3), with any of the faces.
 
     Returns
     -------
@@ -128,30 +134,17 @@ def cut_nearest(  # type: ignore[no-untyped-def]
     face = np.full(count, -1, dtype=np.int64)
     xi = np.zeros((count, 2))
     gap = np.full(count, np.nan)
-    every = np.arange(len(coefficients))
+    every = np.arange(len(faces.coefficients))
     for p in range(count):
-        face[p], xi[p, 0], xi[p, 1], gap[p] = _nearest_of(
-            *(every, points[p], normals[p], coefficients, centre, axes, half, triangle),
-            *(inside, opposed, deepest, 0.0),
-        )
+        found = _nearest_of(every, points[p], normals[p], faces, 0.0)
+        face[p], xi[p, 0], xi[p, 1], gap[p] = found
     return face, xi, gap
 
 
 @njit
-def cut_listed(  # type: ignore[no-untyped-def]
-    first,
-    listed,
-    points,
-    normals,
-    coefficients,
-    centre,
-    axes,
-    half,
-    triangle,
-    inside,
-    opposed,
-    deepest,
-):
+def cut_listed(
+    first: Index, listed: Index, points: Matrix, normals: Matrix, faces: CurvedFaces
+) -> Vector:
     """Nearest valid cut of every line, looked for among a few faces first.
 
     Line p tries the faces ``listed[first[p]:first[p + 1]]``, and all others if none of these is
@@ -164,20 +157,19 @@ def cut_listed(  # type: ignore[no-untyped-def]
         nan where nothing is cut.
     """
     gap = np.full(len(points), np.nan)
-    every = np.arange(len(coefficients))
+    every = np.arange(len(faces.coefficients))
     for p in range(len(points)):
-        for faces in (listed[first[p] : first[p + 1]], every):
-            face, _, _, gap[p] = _nearest_of(
-                *(faces, points[p], normals[p], coefficients, centre, axes, half, triangle),
-                *(inside, opposed, deepest, _CLOSE),
-            )
+        for tried in (listed[first[p] : first[p + 1]], every):
+            face, _, _, gap[p] = _nearest_of(tried, points[p], normals[p], faces, _CLOSE)
             if face >= 0:
                 break
     return gap
 
 
 @njit
-def list_near(points, normals, start, centre, axes, half, within):  # type: ignore[no-untyped-def]
+def list_near(
+    points: Matrix, normals: Matrix, start: Index, faces: CurvedFaces, within: float
+) -> tuple[Index, Index]:
     """Faces whose boxes, larger by ``within`` [m] on all sides, each line meets.
 
     Face ``start[p]`` (-1: none) comes first.
@@ -193,11 +185,12 @@ def list_near(points, normals, start, centre, axes, half, within):  # type: igno
         listed = np.empty(first[-1], dtype=np.int64)
         count = 0
         for p in range(len(points)):
-            for i in range(-1, len(centre)):
+            for i in range(-1, len(faces.centre)):
                 f = i if i >= 0 else start[p]
                 if f < 0 or (i == start[p] and i >= 0):
                     continue
-                if _meets_box(centre[f] - points[p], normals[p], axes[f], half[f], within):
+                middle = faces.centre[f] - points[p]
+                if _meets_box(middle, normals[p], faces.axes[f], faces.half[f], within):
                     if fill:
                         listed[count] = f
                     count += 1
@@ -224,17 +217,16 @@ def _meets_box(d, n, axes, half, within):  # type: ignore[no-untyped-def]
 
 
 @inner
-def _nearest_of(  # type: ignore[no-untyped-def]
-    faces, x, n, coefficients, centre, axes, half, triangle, inside, opposed, deepest, close
-):
+def _nearest_of(tried, x, n, faces, close):  # type: ignore[no-untyped-def]
     """Nearest valid cut of one line with some faces; returns face, u, v, gap.
 
     A cut nearer than ``close`` half widths of its face ends the search.
     """
     x0, x1, x2 = x
     n0, n1, n2 = n
+    centre, axes, half, triangle = faces.centre, faces.axes, faces.half, faces.triangle
     best, found, at_u, at_v, gap = np.inf, -1, 0.0, 0.0, np.nan
-    for f in faces:
+    for f in tried:
         d = (centre[f, 0] - x0, centre[f, 1] - x1, centre[f, 2] - x2)
         h0, h1, h2 = half[f]
         along = d[0] * n0 + d[1] * n1 + d[2] * n2
@@ -244,18 +236,18 @@ def _nearest_of(  # type: ignore[no-untyped-def]
         if not _meets_box(d, n, axes[f], half[f], 0.0):
             continue
         r = np.sqrt(square)
-        if along < -deepest - r or abs(along) - r > best:
+        if along < -faces.deepest - r or abs(along) - r > best:
             continue
         start = 1.0 / 3.0 if triangle[f] else 0.0
         u, v, g, cosine, settled = cut_face(
-            coefficients[f], x0, x1, x2, n0, n1, n2, start, start, along
+            faces.coefficients[f], x0, x1, x2, n0, n1, n2, start, start, along
         )
-        if not settled or cosine > opposed or g < -deepest or abs(g) >= best:
+        if not settled or cosine > _OPPOSED or g < -faces.deepest or abs(g) >= best:
             continue
         if triangle[f]:
-            within = u >= -inside and v >= -inside and u + v <= 1.0 + inside
+            within = u >= -_INSIDE and v >= -_INSIDE and u + v <= 1.0 + _INSIDE
         else:
-            within = abs(u) <= 1.0 + inside and abs(v) <= 1.0 + inside
+            within = abs(u) <= 1.0 + _INSIDE and abs(v) <= 1.0 + _INSIDE
         if within:
             best, found, at_u, at_v, gap = abs(g), f, u, v, g
             if best < close * h0:

@@ -25,7 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.contact.mortar import ContactSpace
-from klack.contact.pairing import CurvedFaces, face_geometry, face_lattice, gaps_to
+from klack.contact.pairing import face_geometry, face_lattice, gaps_to
+from klack.contact.ray_cutting import CurvedFaces
 from klack.materials import Material
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
