@@ -74,8 +74,8 @@ class ListedFaces:
         """Those near lines from contact points of this reach [m]."""
         faces, within = curved_faces(*master), _LISTED_WITHIN * reach
         met, _, _ = cut_nearest(position, normal, faces)
-        near = list_near(position, normal, met, faces, within)
-        return cls(faces, *near, within)
+        first, listed = list_near(position, normal, met, faces, within)
+        return cls(faces, first, listed, within)
 
     def gaps(self, position: Floats, normal: Floats, *, near: bool) -> Floats:
         """Gap along each line [m], nan where nothing is met; ``near``: the lists hold."""
@@ -205,8 +205,10 @@ class RingGaps:
         array, shape (nc, n) [m]
             Of every hat at every angle.
         """
-        lines = (_around(x, self.angle) for x in (self.hats.position, self.hats.normal))
-        position, normal = carried(*lines, placement, self.centre, slave_moves=self.slave_moves)
+        position, normal = (_around(x, self.angle) for x in (self.hats.position, self.hats.normal))
+        position, normal = carried(
+            position, normal, placement, self.centre, slave_moves=self.slave_moves
+        )
         gap = self._along(position.reshape(-1, 3), normal.reshape(-1, 3))
         gap = gap.reshape(len(self.hats.position), -1)
         return mean_gaps(self.hats.weight, gap, self.form[:, None], self.away)

@@ -428,8 +428,8 @@ def _facing(mesh: Mesh, surface: Surface, master: tuple[Mesh, Surface]) -> Itera
     for block in surface.blocks:
         for piece in _pieces(block.family):
             at, hats, share = _shares(mesh, block, piece)
-            lines = (x.reshape(-1, mesh.dimension) for x in (at.position, at.normal))
-            met = project_to_surface(*lines, *master)
+            position, normal = (x.reshape(-1, mesh.dimension) for x in (at.position, at.normal))
+            met = project_to_surface(position, normal, *master)
             yield _Facing(block, piece, at, hats, share, met)
 
 

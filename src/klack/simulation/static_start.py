@@ -462,7 +462,8 @@ class _Balance:
         branches = [rows.branches[k] for k in self.column_branch]
         lines = [rows.lines[k] for k in self.column_line]
         waves = [rows.waves[k] for k in self.column_wave]
-        ends = [(place[row.a], place[row.b]) for row in (*branches, *lines, *waves)]
+        columns: list[BranchRow | LineRow | WaveRow] = [*branches, *lines, *waves]
+        ends = [(place[row.a], place[row.b]) for row in columns]
         self.ends = np.array(ends, np.int64).reshape(-1, 2)
         friction = [
             *(row.column for row in branches),
