@@ -191,7 +191,7 @@ def test_the_farthest_turn_is_beyond_the_lists_of_near_faces(pair):
     _, _, gaps = pair
     arm = np.hypot(*gaps.position[:, :2].T)
 
-    assert 3e-3 * arm.max() < gaps.within < 0.4 * arm.min()
+    assert 3e-3 * arm.max() < gaps.near.within < 0.4 * arm.min()
 
 
 def distance_to_cone(centre, n, radius):
