@@ -12,10 +12,10 @@ from klack.assembling.bodies import assemble_body, build_bodies
 from klack.assembling.candidates import Candidates
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder
 from klack.assembling.modes import mode_pool
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.selection import ByCount
 from klack.case.schema import Case
-from klack.elasticity.statics import Flexibility
-from klack.progress import silent
-from klack.reduction.selection import ByCount
+from klack.machine.progress import silent
 from klack.transient.full_order import simulate_full_order
 
 __all__ = ["numbers"]

@@ -26,7 +26,7 @@ from klack.case import load_case, shipped_cases
 from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
-from klack.progress import silent
+from klack.machine.progress import silent
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
 

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from solid_valve import solid_valve
 
 from klack.assembling.bodies import build_bodies
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.factorization import factorize
+from klack.bodies.elasticity.statics import Flexibility
 from klack.case import load_case, shipped_cases
-from klack.elasticity.assembly import assemble
-from klack.elasticity.factorization import factorize
-from klack.elasticity.statics import Flexibility
-from klack.progress import silent
+from klack.machine.progress import silent
 from klack.simulation.kernel import FAST
 
 __all__ = ["bandwidth", "numbers"]

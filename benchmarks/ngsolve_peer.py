@@ -22,14 +22,14 @@ from solid_valve import solid_valve
 from threadpoolctl import threadpool_limits
 
 from klack.assembling.bodies import build_bodies
-from klack.elasticity.assembly import assemble
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.factorization import factorize
-from klack.elasticity.statics import Flexibility
-from klack.materials import Material
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.factorization import factorize
+from klack.bodies.elasticity.statics import Flexibility
+from klack.machine.progress import silent
+from klack.materials.material import Material
 from klack.mesh.mesh import ElementBlock, Mesh
-from klack.progress import silent
 
 __all__ = ["numbers", "straightened"]
 

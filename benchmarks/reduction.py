@@ -10,10 +10,10 @@ from solid_valve import solid_valve
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
 from klack.case import load_case, shipped_cases
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.progress import silent
+from klack.machine.progress import silent
 
 __all__ = ["largest_residual", "numbers"]
 

@@ -42,7 +42,7 @@ from klack.analyses.study.dask_workers import DaskWorkers, _TaskSize
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.where import Where
 from klack.case.valve import ValveCase
-from klack.progress import silent
+from klack.machine.progress import silent
 
 __all__ = ["main", "numbers"]
 

@@ -26,49 +26,31 @@ DOOR = "klack"
 imports at first use, so arrows that begin there are not counted."""
 
 FLOORS: tuple[tuple[str, ...], ...] = (
-    # ground: errors, units, files that are whole or not there
-    ("errors", "arrays", "closing", "cores", "swapped_names", "progress"),
-    ("input", "own_file", "uninterrupted", "memory", "finite", "energy_balance", "hardening"),
-    (
-        "units",
-        "unit_systems",
-        "materials",
-        "sourced",
-        "signals",
-        "low_pass",
-        "held_folder",
-        "cache",
-    ),
-    ("folder_lock", "material_library", "stages", "expressions"),
-    ("compiling",),
-    ("stage",),
-    ("whole_file",),
-    # bodies
-    ("mesh",),
-    ("elasticity", "model_files"),
-    ("contact", "reduction", "gauges"),
-    ("plasticity",),
-    # the valve as a network of components
-    ("network",),
-    ("control",),
-    ("hydraulics", "magnetics", "thermal"),
-    ("mechanics", "pneumatics"),
+    # ground: errors, what users write, files that are whole or not there, the machine
+    ("arrays", "errors"),
+    ("files", "input", "signals", "studies"),
+    ("machine", "materials", "units"),
+    # bodies, and the valve as a network of components
+    ("mesh", "report"),
+    ("bodies",),
+    ("contact", "measurement", "network"),
+    ("case", "control", "schematic", "terminal", "thermal"),
+    ("hydraulics", "magnetics"),
     # in time, and what is made of it
-    ("simulation",),
-    ("transient", "acoustics", "measurement", "studies"),
+    ("mechanics", "simulation"),
+    ("acoustics", "transient"),
     # from a case to results
-    ("case", "report"),
-    ("assembling", "terminal", "schematic"),
+    ("assembling",),
     ("analyses",),
-    ("exchange", "viewer"),
-    ("verification", "api", "warming", "app"),
+    ("exchange", "viewer", "warming"),
+    ("api", "app", "verification"),
     ("cli",),
     ("__main__",),
 )
 """Rooms from the ground up."""
 
-GROUND = 6
-"""Floors of single small modules that everything stands on: one row of the picture."""
+GROUND = 3
+"""Floors that everything stands on: one row of the picture."""
 
 Graph = Mapping[str, Iterable[str]]
 
@@ -192,11 +174,11 @@ def mermaid(graph: Graph) -> str:
 
 _LANE, _ROW, _WIDE, _TALL = 112, 52, 100, 28  # [px]
 _LANES: Mapping[str, float] = {
-    "cli": 2, "verification": 3, "api": 1, "report": 2, "exchange": 3, "analyses": 2,
-    "assembling": 3,
-    "case": 4, "transient": 0, "acoustics": 1, "measurement": 5, "simulation": 1, "mechanics": 2,
-    "hydraulics": 1, "magnetics": 3, "network": 4, "contact": 2, "reduction": 4, "elasticity": 3,
-    "model_files": 5, "mesh": 4,
+    "cli": 2, "api": 1, "app": 2, "verification": 3, "warming": 4, "viewer": 2, "exchange": 3,
+    "analyses": 2, "assembling": 3, "transient": 0, "acoustics": 1, "simulation": 1,
+    "mechanics": 2, "hydraulics": 1, "magnetics": 3, "terminal": 0, "control": 2, "thermal": 3,
+    "case": 4, "schematic": 5, "contact": 2, "network": 4, "measurement": 5, "bodies": 3,
+    "report": 5, "mesh": 4,
 }  # fmt: skip
 """Lane of each room in the picture, from the left; looks only."""
 _MIDDLE = 2.5
@@ -228,7 +210,7 @@ def picture(graph: Graph) -> str:
     )
 
 
-_GROUND = "ground: errors, units, input, cache, materials, signals, memory, files"
+_GROUND = "ground: errors, input, units, files, machine, materials, signals, studies"
 
 
 def _line(upper: tuple[float, float], lower: tuple[float, float]) -> str:

@@ -1,10 +1,10 @@
 """Every run of every test keeps its energy balance, or the test fails (conservation).
 
-All four solvers hand the residual of their books to ``klack.energy_balance`` when they finish.  The
-product warns there; in the suite the same call raises, with tighter limits, and names the run.
-That holds from the import of this module on: in all test folders, in fixtures of any scope, in runs
-behind the command line, and in worker processes.  Only runs in interpreters that a test starts by
-itself (``subprocess``) still warn as for a user.
+All four solvers hand the residual of their books to ``klack.simulation.energy_balance`` when they
+finish.  The product warns there; in the suite the same call raises, with tighter limits, and names
+the run. That holds from the import of this module on: in all test folders, in fixtures of any
+scope, in runs behind the command line, and in worker processes.  Only runs in interpreters that a
+test starts by itself (``subprocess``) still warn as for a user.
 
 A test that spoils a balance on purpose, or whose residual has a reason, says so::
 
@@ -18,8 +18,8 @@ from contextlib import contextmanager
 
 import pytest
 
-from klack import energy_balance
 from klack.analyses import workers
+from klack.simulation import energy_balance
 
 LIMITS = {
     "simulate": 1e-9,  # a discrete-gradient step is exact; round-off of up to 1e6 steps is left

@@ -11,13 +11,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.friction import Friction
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import Rows
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.transient.interface_arrays import Guide

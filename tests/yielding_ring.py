@@ -11,15 +11,15 @@ from math import pi, sqrt
 import numpy as np
 
 from klack.assembling.yielding import loops_with_yield
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.mortar import contact_space
+from klack.contact.plasticity.yielding_body import LoadedBody
 from klack.contact.statics import contact_compliance, static_contact
-from klack.elasticity.assembly import assemble
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.statics import Flexibility
-from klack.hardening import Hardening
+from klack.materials.hardening import Hardening
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
-from klack.plasticity.yielding_body import LoadedBody
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding
 from klack.verification.transient import STEEL

@@ -27,8 +27,8 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
+from klack.machine.progress import Progress, silent
 from klack.network.component import Component
-from klack.progress import Progress, silent
 
 if TYPE_CHECKING:
     from distributed import Client

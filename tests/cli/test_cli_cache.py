@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from klack_names import KlackError, load_valve_case, main
 
-from klack.cache.entry import Entry
-from klack.cache.result_cache import result_cache
+from klack.machine.cache.entry import Entry
+from klack.machine.cache.result_cache import result_cache
 from klack.network.step_function import is_step_function
 from klack.warming.groups import GROUPS, all_steps
 

@@ -24,8 +24,8 @@ from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.surface_bands import face_band_velocity, radiated_bands, surface_spectra
 from klack.acoustics.third_octave import band_edges, band_numbers
 from klack.analyses.noise.body import net_share, share_at
-from klack.reduction.structure import Structure
-from klack.signals import TimeSeries
+from klack.bodies.reduction.structure import Structure
+from klack.signals.sampled import TimeSeries
 from klack.verification.lattice import STEEL
 from klack.verification.one_dimension import half_sines
 from klack.verification.vibration import rod_structure

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 from klack_names import load_case, run_impact
 
-from klack import energy_balance
 from klack.analyses.impact import interface_level
+from klack.simulation import energy_balance
 from klack.transient import interface_run
 
 pytestmark = pytest.mark.slow

@@ -45,9 +45,8 @@ from klack_names import (
     simulate_network,
 )
 
-from klack import energy_balance
 from klack.mechanics.spring import Spring
-from klack.simulation import impact, network_recorder, network_run
+from klack.simulation import energy_balance, impact, network_recorder, network_run
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
 from klack.verification.network import LIFT, peak_and_hold, whole_valve
 
@@ -467,8 +466,8 @@ def test_impacts_do_not_depend_on_the_spacing_of_records():
 
 
 def test_memory_of_the_records_is_asked_for_before_the_run(monkeypatch: pytest.MonkeyPatch):
-    from klack import memory
     from klack.errors import InputError
+    from klack.machine import memory
 
     small = memory.AvailableMemory(size=100e6, bound="as in this test")
     monkeypatch.setattr(memory, "available_memory", lambda: small)

@@ -9,6 +9,10 @@ import pytest
 from draws import each
 from klack_names import Ambient, evaluate
 
+from klack.hydraulics.gas.flow_law import GAP, VALVE
+from klack.hydraulics.gas.gas_element import GasNetwork
+from klack.hydraulics.gas.gas_library import GASES
+from klack.hydraulics.gas.gas_step import OF_CHAMBER, gas_step
 from klack.network.gas_rows import (
     GasBranchRow,
     GasChamberRow,
@@ -16,10 +20,6 @@ from klack.network.gas_rows import (
     GasSourceRow,
     GasWallRow,
 )
-from klack.pneumatics.flow_law import GAP, VALVE
-from klack.pneumatics.gas_element import GasNetwork
-from klack.pneumatics.gas_library import GASES
-from klack.pneumatics.gas_step import OF_CHAMBER, gas_step
 
 pytestmark = pytest.mark.slow
 

@@ -17,8 +17,8 @@ from klack_names import (
     simulate_impact,
 )
 
-from klack.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
-from klack.reduction.from_state_space import body_of_state_space
+from klack.bodies.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
+from klack.bodies.reduction.from_state_space import body_of_state_space
 from klack.simulation.bodies import fixed_body, rod_body
 
 STEEL = {"length": 0.03, "area": 1e-5, "young": 2e11, "density": 8e3}

@@ -15,9 +15,9 @@ from klack_names import (
 )
 from numpy.testing import assert_allclose
 
-from klack.reduction.ports import Observer, node_observer, surface_port
-from klack.reduction.receptance import reduced_receptance
-from klack.reduction.selection import ByCount, ByParticipation
+from klack.bodies.reduction.ports import Observer, node_observer, surface_port
+from klack.bodies.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.selection import ByCount, ByParticipation
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 AXIS = np.geomspace(2e3, 1e6, 300)

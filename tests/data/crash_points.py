@@ -81,7 +81,7 @@ def forked(
 
 def put(folder: Path, word: str) -> None:
     """Write a folder and a file whose contents say ``word``; a note of the time before goes."""
-    from klack.whole_file import outdated, whole_files
+    from klack.files.whole import outdated, whole_files
 
     with whole_files(folder) as stage:
         (stage / "store").mkdir()
@@ -93,7 +93,7 @@ def put(folder: Path, word: str) -> None:
 
 def seen(folder: Path) -> list[str]:
     """Words that a reader finds."""
-    from klack.whole_file import completed
+    from klack.files.whole import completed
 
     return in_place(completed(folder), "store/a", "store/b", "page")
 

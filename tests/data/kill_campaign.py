@@ -104,7 +104,7 @@ def kind(out: Path, command: str, whole: dict[str, dict[str, bytes]]) -> str:
     from klack.analyses.ending import is_result
     from klack.analyses.noise.analysis import NOISE
     from klack.errors import InputError
-    from klack.whole_file import completed
+    from klack.files.whole import completed
 
     there = contents(completed(out))
     logs = {name: there.pop(name) for name in list(there) if "unfinished" in name}

@@ -23,8 +23,8 @@ import scipy.io
 from scipy.sparse import csr_array, random_array
 from vtkmodules.vtkIOLegacy import vtkUnstructuredGridReader
 
+from klack.bodies.model_files.matrices import read_matrix
 from klack.mesh.files.mesh_file import read_mesh_file
-from klack.model_files.matrices import read_matrix
 
 Reader = Callable[[Path], Any]
 SECONDS = 10  # of processor time for one file

@@ -156,8 +156,8 @@ def stores(result: Path, folder: Path, count: int, draw: random.Random) -> dict:
 
 def entries(folder: Path, count: int, draw: random.Random) -> dict:
     """Entries of the cache: the stored numbers or none."""
-    from klack.cache.entry import Entry
-    from klack.cache.result_cache import ResultCache
+    from klack.machine.cache.entry import Entry
+    from klack.machine.cache.result_cache import ResultCache
 
     cache, key = ResultCache(folder / "cache", 10**9), "0" * 64
     array = np.random.default_rng(1).normal(size=(40, 30))

@@ -29,8 +29,8 @@ from klack.acoustics.mobility import drive_point_mobility, support_force_transfe
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Air, Plate, baffled_plate_efficiency
 from klack.acoustics.radiation import piston_efficiency, power_transfer
+from klack.bodies.reduction.structure import Structure, StructurePort, build_structure
 from klack.mesh.mesh import Mesh, outer_surface
-from klack.reduction.structure import Structure, StructurePort, build_structure
 from klack.verification.reduction import LENGTH, RADIUS, STEEL_WITHOUT_POISSON
 from klack.verification.vibration import STEEL, oscillator, rod_structure
 

@@ -26,7 +26,7 @@ from klack.app.explorer import Explorer, drawn, sliders_of, stroke_numbers
 from klack.app.reader import Reader
 from klack.app.texts import checked_text, exchanged_text
 from klack.case.reader import find_case, read_case
-from klack.stages import collected_warnings
+from klack.machine.stages import collected_warnings
 
 PATH = find_case("demo-valve-axisymmetric")
 TEXT = PATH.read_text("utf-8")

@@ -20,10 +20,10 @@ from hypothesis import strategies as st
 
 from klack.contact import complementarity
 from klack.contact.complementarity import ComplementaritySolver, solve_lcp
+from klack.contact.plasticity.ladder import lowest_share
+from klack.contact.plasticity.radial_return import PlasticState, radial_return
 from klack.errors import ConvergenceError, InputError
-from klack.hardening import Hardening
-from klack.plasticity.ladder import lowest_share
-from klack.plasticity.radial_return import PlasticState, radial_return
+from klack.materials.hardening import Hardening
 from klack.transient.active_set import solve_active
 from klack.transient.interface_arrays import ActiveSet
 

@@ -42,6 +42,8 @@ from klack.analyses.impact.full_level import run_full
 from klack.assembling.candidates import Candidates, grade_of, reach_of
 from klack.assembling.modes import kept_modes, mode_pools
 from klack.assembling.problem import build_problem, place_bodies
+from klack.bodies.elasticity.condensation import condensed_inverse
+from klack.bodies.elasticity.loads import NearLoads
 from klack.case import find_case, load_case
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.gap_update import RigidGaps
@@ -59,8 +61,6 @@ from klack.contact.statics import (
     extended_compliance,
     static_contact,
 )
-from klack.elasticity.condensation import condensed_inverse
-from klack.elasticity.loads import NearLoads
 from klack.verification.contact import (
     STEEL,
     half_spaces,
@@ -263,7 +263,7 @@ def test_gaps_travel_to_other_processes(pair):
 def test_axisymmetric_bodies_are_refused():
     from klack.assembling.bodies import build_bodies
     from klack.case import find_case, load_case
-    from klack.progress import silent
+    from klack.machine.progress import silent
 
     pair = build_bodies(load_case(find_case("demo-valve-axisymmetric")), silent)
     bodies = (pair.upper.mesh, pair.upper_surface, pair.lower.mesh, pair.lower_surface)

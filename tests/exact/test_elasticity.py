@@ -48,9 +48,9 @@ from klack_names import (
 from property_profiles import examples
 from scipy.sparse import random_array
 
-from klack.elasticity.condensation import condensed_inverse
-from klack.elasticity.eigen import eigenmodes, rigid_frequencies
-from klack.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.bodies.elasticity.condensation import condensed_inverse
+from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
+from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 A, B, C = 2e-3, 3e-3, 8e-3

@@ -17,7 +17,7 @@ from klack_names import (
 )
 from scipy.sparse import csr_array, diags_array
 
-from klack.elasticity.statics import Flexibility, RefinedFactorization
+from klack.bodies.elasticity.statics import Flexibility, RefinedFactorization
 
 pytestmark = pytest.mark.skipif(
     "pardiso" not in available_backends(), reason="only PARDISO has single precision"

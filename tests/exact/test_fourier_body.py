@@ -8,11 +8,16 @@ import pytest
 from klack_names import Flexibility, InputError, Material, Mesh, elastic_body, lattice_mesh
 from scipy.sparse import csr_array, eye_array, kron
 
-from klack.elasticity.assembly import assemble, assemble_order
-from klack.elasticity.eigen import eigenmodes, rigid_frequencies
-from klack.elasticity.fourier_body import FourierBody, displacement_rows, fourier_body, rows_around
-from klack.elasticity.loads import order_load
-from klack.gauges.fourier_field import field_rows
+from klack.bodies.elasticity.assembly import assemble, assemble_order
+from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
+from klack.bodies.elasticity.fourier_body import (
+    FourierBody,
+    displacement_rows,
+    fourier_body,
+    rows_around,
+)
+from klack.bodies.elasticity.loads import order_load
+from klack.bodies.gauges.fourier_field import field_rows
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 RADIUS, LENGTH, BOTTOM = 2e-3, 30e-3, 10e-3

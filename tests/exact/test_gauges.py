@@ -24,9 +24,9 @@ from klack_names import (
     traction_load,
 )
 
-from klack.gauges.located_point import locate
-from klack.gauges.rows import Line, displacement_row, strain_row, stress_row
-from klack.low_pass import LowPass
+from klack.bodies.gauges.located_point import locate
+from klack.bodies.gauges.rows import Line, displacement_row, strain_row, stress_row
+from klack.signals.low_pass import LowPass
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 

@@ -35,9 +35,9 @@ from klack_names import (
 )
 
 from klack.analyses.linearisation.loops import loop_margins, return_ratio
+from klack.hydraulics.gas.gas_library import AIR
 from klack.hydraulics.line import Line
 from klack.mechanics.spring import Spring
-from klack.pneumatics.gas_library import AIR
 from klack.simulation.linear_network import LinearNetwork, linear_network
 from klack.simulation.linear_system import LinearSystem, Signal, modes, rational, transfer
 from klack.simulation.operating_point import compiled_at, operating_point

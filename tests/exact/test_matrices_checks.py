@@ -18,11 +18,11 @@ from klack_names import (
 )
 from scipy.sparse import block_diag, csr_array, diags_array
 
-from klack.elasticity.eigen import eigenmodes, rigid_frequencies
-from klack.elasticity.given_matrices import checked_body
-from klack.elasticity.plausible_material import estimate_material
-from klack.elasticity.rigid_motions import rigid_motions, without_rigid_strain
-from klack.reduction.ports import node_set_port
+from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
+from klack.bodies.elasticity.given_matrices import checked_body
+from klack.bodies.elasticity.plausible_material import estimate_material
+from klack.bodies.elasticity.rigid_motions import rigid_motions, without_rigid_strain
+from klack.bodies.reduction.ports import node_set_port
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 MODULUS = STEEL.young * 0.7 / (1.3 * 0.4)

@@ -33,6 +33,9 @@ from klack_names import (
     simulate_network,
 )
 
+from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
+from klack.hydraulics.gas.flow_law import LAMINAR, restriction_flow
+from klack.hydraulics.gas.gas_library import AIR, HYDROGEN, library_gas
 from klack.hydraulics.gas_release import (
     free_gas,
     mixture_at,
@@ -42,9 +45,6 @@ from klack.hydraulics.gas_release import (
 )
 from klack.hydraulics.line import Line
 from klack.mechanics.spring import Spring
-from klack.pneumatics.conductance import factor_of_area, factor_of_conductance
-from klack.pneumatics.flow_law import LAMINAR, restriction_flow
-from klack.pneumatics.gas_library import AIR, HYDROGEN, library_gas
 from klack.simulation.limits import limits_of
 from klack.simulation.operating_point import compiled_at, operating_point
 

@@ -34,13 +34,13 @@ from klack_names import (
 )
 from numpy.testing import assert_allclose
 
-from klack.reduction.attachment import default_shift, shift_at, shifted_attachment
-from klack.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
-from klack.reduction.from_state_space import body_of_state_space, state_space_in_si
-from klack.reduction.ports import node_observer, pressure_port, surface_port
-from klack.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.attachment import default_shift, shift_at, shifted_attachment
+from klack.bodies.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
+from klack.bodies.reduction.from_state_space import body_of_state_space, state_space_in_si
+from klack.bodies.reduction.ports import node_observer, pressure_port, surface_port
+from klack.bodies.reduction.receptance import reduced_receptance
+from klack.input.unit_systems import UNIT_SYSTEMS, unit_system
 from klack.simulation.bodies import rod_body
-from klack.unit_systems import UNIT_SYSTEMS, unit_system
 from klack.verification.reduction import (
     LENGTH,
     RADIUS,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from klack_names import ElementBlock, InputError, Material, Mesh, lattice_mesh
 
-from klack.elasticity.stress import StressField, von_mises
+from klack.bodies.elasticity.stress import StressField, von_mises
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=100e9, poisson=0.3, density=8500.0)

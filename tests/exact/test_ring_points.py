@@ -42,8 +42,13 @@ from klack_names import (
 from scipy.sparse import csr_array
 
 from klack.assembling.touch_ring import goes_round
+from klack.bodies.elasticity.ring_points import (
+    RingPoints,
+    RingRows,
+    resolved_orders,
+    share_of_order,
+)
 from klack.case import find_case, read_case
-from klack.elasticity.ring_points import RingPoints, RingRows, resolved_orders, share_of_order
 from klack.mesh.profile import Line, Profile
 from klack.mesh.rigid import Pose, rotation_matrix
 from klack.transient.guide import _section, turned_sections

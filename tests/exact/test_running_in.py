@@ -38,10 +38,10 @@ from klack.analyses.impact.running_in import running_in, worn_text
 from klack.analyses.impact.yielding_level import doubt_large_strain
 from klack.assembling.ladder import impact_energy
 from klack.assembling.pressure_limit import meridian_case
+from klack.contact.plasticity.ladder import YieldingContact
+from klack.contact.plasticity.loops import loops_of_entry, loops_to_entry
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.worn_faces import WornFaces, opened_by
-from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loops import loops_of_entry, loops_to_entry
 from klack.terminal.options import WantedResult
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding

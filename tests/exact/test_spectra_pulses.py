@@ -47,7 +47,7 @@ from klack.acoustics.third_octave import (
     nominal_label,
 )
 from klack.measurement.impacts import measure_stroke
-from klack.signals import Spectrum, TimeSeries
+from klack.signals.sampled import Spectrum, TimeSeries
 from klack.verification.one_dimension import BouncingDrop
 
 DATA = Path(__file__).parents[1] / "data"

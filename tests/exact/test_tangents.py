@@ -35,10 +35,10 @@ from klack_names import (
 from numba import types
 from numba.core.registry import cpu_target
 
-from klack.compiling.jit import inner, njit
-from klack.compiling.tangent_number import tangent_number, with_tangents
 from klack.contact.yielding_law import YieldingLaw
 from klack.hydraulics.wall_compliance import Wall
+from klack.machine.compiling.jit import inner, njit
+from klack.machine.compiling.tangent_number import tangent_number, with_tangents
 from klack.mechanics.spring import Spring
 from klack.simulation import tangent_run
 from klack.simulation.tangent_loop import LANES, lanes_of

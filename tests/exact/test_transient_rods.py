@@ -46,8 +46,8 @@ from klack_names import (
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
+from klack.bodies.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
 from klack.contact.mortar import ContactSpace
-from klack.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
 from klack.transient.body_damping import body_damping
 from klack.transient.full_order import Scheme, simulate_full_order
 from klack.verification.transient import (

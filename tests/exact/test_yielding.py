@@ -44,11 +44,11 @@ from scipy.sparse import csr_array
 from klack.analyses.stroke.analysis import STROKE, yield_told
 from klack.assembling import yielding
 from klack.assembling.reduced_pair import impact_system
+from klack.contact.plasticity.ladder import YieldingContact
+from klack.contact.plasticity.yielding_body import LoadedBody, YieldingBody
+from klack.contact.plasticity.zone import plastic_zone
 from klack.contact.yielding_law import YieldingLaw
 from klack.exchange.modal_model import _without_memory
-from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.yielding_body import LoadedBody, YieldingBody
-from klack.plasticity.zone import plastic_zone
 from klack.simulation.impact import propose_step
 
 MASS, SPEED, LOADING, ELASTIC = 3e-3, 0.3, 1e8, 2.5e8

@@ -24,10 +24,10 @@ from klack.analyses.impact.record import (
 )
 from klack.analyses.impact.section import section_picture
 from klack.assembling.body_summary import BodySummary
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.restitution import measure_impact
 from klack.mesh.mesh import ElementBlock, Mesh
-from klack.reduction.transfer import TransferComparison
 
 MASS, SPEED = 2.96e-3, 0.5
 

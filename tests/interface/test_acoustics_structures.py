@@ -26,10 +26,10 @@ from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.surface_bands import face_band_velocity
 from klack.analyses.store import RESULT_NAME
 from klack.assembling.structures import radiating_surfaces
+from klack.bodies.reduction.structure import Structure, build_structure
 from klack.case.bodies import SurfaceName
 from klack.case.noise import CaseNoise
 from klack.case.reader import find_case
-from klack.reduction.structure import Structure, build_structure
 from klack.verification.one_dimension import half_sines
 from klack.verification.reduction import rod
 from klack.verification.vibration import oscillator, rod_structure

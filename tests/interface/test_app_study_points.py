@@ -27,7 +27,7 @@ from klack.app.study_files import (
 )
 from klack.app.study_points import StudyPoints, points_json
 from klack.app.texts import checked_text, exchanged_text, study_offer, study_problem, study_text
-from klack.progress import PointCount, silent
+from klack.machine.progress import PointCount, silent
 from klack.terminal.progress import PROGRESS_FILE, show_progress
 
 DOCS = Path("docs/how-to")

@@ -10,7 +10,7 @@ from klack.analyses.impact.body_picture import body_pictures
 from klack.analyses.impact.levels import run_reduced
 from klack.analyses.impact.record import BodyPicture
 from klack.analyses.impact.recovered_motion import recovered_motion
-from klack.elasticity.stress import StressField, von_mises
+from klack.bodies.elasticity.stress import StressField, von_mises
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 

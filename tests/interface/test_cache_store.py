@@ -30,11 +30,11 @@ from hypothesis.extra import numpy as arrays_of
 from scipy.sparse import csr_array
 
 from klack.assembling.generated_mesh import entry_of_mesh, mesh_of_entry
-from klack.cache.content import content_key
-from klack.cache.entry import DamagedEntry, Entry, read_entry, write_entry
-from klack.cache.remember import origin, remembered
-from klack.cache.result_cache import ResultCache, result_cache
 from klack.errors import CacheWarning, InputError
+from klack.machine.cache.content import content_key
+from klack.machine.cache.entry import DamagedEntry, Entry, read_entry, write_entry
+from klack.machine.cache.remember import origin, remembered
+from klack.machine.cache.result_cache import ResultCache, result_cache
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement
@@ -252,9 +252,9 @@ SQUARES = """
 import sys, time
 from pathlib import Path
 import numpy as np
-from klack.cache.entry import Entry
-from klack.cache.remember import remembered
-from klack.cache.result_cache import ResultCache
+from klack.machine.cache.entry import Entry
+from klack.machine.cache.remember import remembered
+from klack.machine.cache.result_cache import ResultCache
 cache = ResultCache(Path(sys.argv[1]), 10**9)
 print("ready", flush=True)
 sys.stdin.readline()
@@ -444,7 +444,7 @@ def test_what_others_delete_again_and_again_is_not_kept_and_costs_no_note(tmp_pa
 KILLED = SQUARES.replace(
     'print("ready", flush=True)',
     """
-import klack.cache.result_cache as module
+import klack.machine.cache.result_cache as module
 def slow(file, key, entry):
     file.write(b"klack cache 1")
     file.flush()
@@ -488,7 +488,7 @@ def test_a_folder_that_cannot_be_written_costs_one_note(tmp_path, monkeypatch, n
     def refuse(*_: object) -> None:
         raise OSError(number, os.strerror(number))
 
-    monkeypatch.setattr("klack.cache.result_cache.write_entry", refuse)
+    monkeypatch.setattr("klack.machine.cache.result_cache.write_entry", refuse)
 
     notes = notes_of(ResultCache(tmp_path, LARGE))
 

@@ -30,15 +30,15 @@ from klack_names import (
     write_step_revolved,
 )
 
-import klack.cache.result_cache as setting
+import klack.machine.cache.result_cache as setting
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity import statics
 from klack.case import find_case
 from klack.case.geometry import StepFile
 from klack.case.schema import Case
-from klack.elasticity import statics
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.stages import stages_with_cached
 from klack.mesh.profile import Line, Profile
-from klack.stages import stages_with_cached
 
 pytestmark = pytest.mark.slow
 

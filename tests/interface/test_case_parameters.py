@@ -28,7 +28,7 @@ from klack.case.measurement import CaseCalibration
 from klack.case.points import points_of
 from klack.case.rewriting import rewritten, written_quantity
 from klack.input.problem import CaseProblem
-from klack.stages import StageClock
+from klack.machine.stages import StageClock
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 TEXT = SMALL.read_text(encoding="utf-8")

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 CALLED = """
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 SCALE = {scale}
 
 @inner
@@ -22,7 +22,7 @@ def part(x):
     return SCALE * x
 """
 CALLS = """
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 import called
 
 @njit
@@ -141,7 +141,7 @@ def test_fields_that_change_places_are_other_code(program, kinds):
     first, second = kinds.split(", ")
     for fields in (f"a: {first}; b: {second}", f"b: {first}; a: {second}"):
         (program / "calls.py").write_text(
-            "from typing import NamedTuple\nfrom klack.compiling.jit import njit\n"
+            "from typing import NamedTuple\nfrom klack.machine.compiling.jit import njit\n"
             f"class Pair(NamedTuple): {fields}\n"
             "@njit\ndef given(pair):\n    return 1.0 * pair.a\n"
             f"def whole(x):\n    return given(Pair(x, {second}(5)))\n"
@@ -262,11 +262,12 @@ def test_without_a_folder_everything_works(program):
 
 def test_a_killed_process_leaves_no_lock_behind(program, tmp_path):
     """Its lock file stays, but the system has given the lock back."""
-    from klack.compiling.turn import take_turn
+    from klack.machine.compiling.turn import take_turn
 
     lock, done = tmp_path / "f.lock", tmp_path / "f.code"
     text = (
-        "import sys, time; from pathlib import Path; from klack.compiling.turn import take_turn\n"
+        "import sys, time; from pathlib import Path\n"
+        "from klack.machine.compiling.turn import take_turn\n"
         f"turn = take_turn(Path({str(lock)!r}), Path({str(done)!r})); print('has it', flush=True)\n"
         "time.sleep(600)"
     )
@@ -305,7 +306,7 @@ for _ in range(2):
 
 
 def test_who_waits_too_long_compiles_itself(tmp_path):
-    from klack.compiling.turn import take_turn
+    from klack.machine.compiling.turn import take_turn
 
     lock, done = tmp_path / "f.lock", tmp_path / "f.code"
     first = take_turn(lock, done)
@@ -321,7 +322,7 @@ def test_who_waits_too_long_compiles_itself(tmp_path):
 
 def test_an_old_lock_is_not_waited_for(tmp_path, monkeypatch):
     """That of a process that was stopped, in the functions within one that was waited for."""
-    from klack.compiling import turn
+    from klack.machine.compiling import turn
 
     lock, done = tmp_path / "f.lock", tmp_path / "f.code"
     lock.touch()

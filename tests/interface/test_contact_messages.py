@@ -55,7 +55,6 @@ from klack_names import (
     tree_of,
 )
 
-from klack import memory
 from klack.analyses.linearisation.run import run_linearisation
 from klack.analyses.operating_point.run import run_operating_points
 from klack.assembling.bodies import mesh_body, place_meshes
@@ -65,6 +64,7 @@ from klack.assembling.valve import mesh_valve_bodies
 from klack.case import find_case, load_case, read_case
 from klack.contact.statics import COARSE, size_over_half_width, static_contact
 from klack.contact.submodel import local_stiffness
+from klack.machine import memory
 from klack.mesh.profile import Line, Profile
 from klack.mesh.quality import PoorElementError
 from klack.mesh.sizing import MeshSizing, Refinement

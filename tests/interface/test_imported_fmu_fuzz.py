@@ -19,9 +19,9 @@ import scipy.io
 from klack_names import ConvergenceError, ImportedFmu, InputError, open_recording
 from scipy.sparse import csc_array
 
+from klack.bodies.model_files.matrices import read_matrix
 from klack.mechanics.fmu_file import inspect_fmu
 from klack.mechanics.fmu_slave import FmuSlave
-from klack.model_files.matrices import read_matrix
 
 pytestmark = pytest.mark.filterwarnings("ignore:Duplicate name")
 

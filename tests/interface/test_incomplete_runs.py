@@ -27,10 +27,10 @@ from klack_names import (
 
 from klack.analyses.noise.source import _notes
 from klack.analyses.stroke import run as stroke
-from klack.finite import require_finite
 from klack.mechanics.spring import Spring
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Channel, Rows
+from klack.simulation.finite import require_finite
 
 LATE = 30.03e-6  # [s]
 

@@ -20,10 +20,10 @@ from klack.analyses.calibration.motion import TRIAL_LOG, Motion, TrialKey, trial
 from klack.analyses.catalogue import load_result
 from klack.analyses.ending import is_result
 from klack.errors import CacheWarning, InputError
-from klack.folder_lock import locked
-from klack.held_folder import HeldFolder
-from klack.stage import Stage
-from klack.whole_file import completed, mark_of, outdated, whole_file, whole_files
+from klack.files.held import HeldFolder
+from klack.files.locks import locked
+from klack.files.stage import Stage
+from klack.files.whole import completed, mark_of, outdated, whole_file, whole_files
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="signals and forks")
 

@@ -297,10 +297,10 @@ class TestFailures:
     def test_strokes_that_do_not_fit_into_memory_are_refused(
         self, small: klack.CaseOnHand, monkeypatch: pytest.MonkeyPatch
     ):
-        from klack.memory import AvailableMemory
+        from klack.machine.memory import AvailableMemory
 
         monkeypatch.setattr(
-            "klack.memory.available_memory", lambda: AvailableMemory(size=2e8, bound="test")
+            "klack.machine.memory.available_memory", lambda: AvailableMemory(size=2e8, bound="test")
         )
         assert len(klack.run_many(small, drawn(4), ["impacts"], threads=2)) == 4
         with pytest.raises(InputError, match="fewer threads"):

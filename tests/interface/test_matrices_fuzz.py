@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_array
 
+from klack.bodies.model_files.matrices import MATRIX_FORMATS, read_matrix
+from klack.bodies.model_files.node_table import read_node_numbers, read_node_table
+from klack.bodies.model_files.system import on_nodes, read_system
+from klack.bodies.model_files.system_matrix import read_row_places
 from klack.errors import InputError
-from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
-from klack.model_files.node_table import read_node_numbers, read_node_table
-from klack.model_files.system import on_nodes, read_system
-from klack.model_files.system_matrix import read_row_places
 from klack.verification.exchange_files import MATRIX_WRITERS, write_matrices
 
 NODES = 7

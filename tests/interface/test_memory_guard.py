@@ -39,22 +39,22 @@ from klack_names import (
 )
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 
-from klack import memory
+from klack.bodies.elasticity import budget as budgets
+from klack.bodies.elasticity import factor_memory
+from klack.bodies.elasticity.budget import Budget
+from klack.bodies.elasticity.condensation import condensation_memory
+from klack.bodies.elasticity.eigen import block_lanczos, eigenmodes
+from klack.bodies.elasticity.factor_memory import FactorMemoryError
+from klack.bodies.reduction.ports import Port
 from klack.case import find_case
 from klack.contact import statics
 from klack.contact.statics import contact_compliance
-from klack.elasticity import budget as budgets
-from klack.elasticity import factor_memory
-from klack.elasticity.budget import Budget
-from klack.elasticity.condensation import condensation_memory
-from klack.elasticity.eigen import block_lanczos, eigenmodes
-from klack.elasticity.factor_memory import FactorMemoryError
-from klack.memory import available_memory, in_words, require_memory
+from klack.machine import memory
+from klack.machine.memory import available_memory, in_words, require_memory
+from klack.machine.progress import remark, silent
+from klack.machine.stages import StageClock
 from klack.mesh.profile import Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement, element_count
-from klack.progress import remark, silent
-from klack.reduction.ports import Port
-from klack.stages import StageClock
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 
@@ -352,7 +352,7 @@ def test_a_real_limit_is_seen_before_the_factor_is_computed(tmp_path):
     before = (
         f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
         "from test_memory_guard import lattice\n"
-        "from klack.elasticity.factorization import factorize\n"
+        "from klack.bodies.elasticity.factorization import factorize\n"
         "from klack.errors import InputError\n"
         "A = lattice(36)\n"
         "factorize(lattice(6), threads=1).close()"

@@ -21,7 +21,7 @@ from klack_names import (
     read_mesh_file,
 )
 
-from klack.model_files.matrices import read_matrix
+from klack.bodies.model_files.matrices import read_matrix
 
 MM = 1e-3
 NODES = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 2, 0), (3, 2, 1))

@@ -21,7 +21,7 @@ from rigid_valve import write_bench
 from klack.analyses.calibration.motion import TRIAL_LOG, Motion, trial_log
 from klack.analyses.catalogue import load_result
 from klack.analyses.shots.one_shot import SHOT_LOG, shot_log
-from klack.cache.entry import Entry
+from klack.machine.cache.entry import Entry
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users, links and pipes")
 
@@ -65,7 +65,7 @@ def test_a_log_is_a_regular_file_of_the_caller(planted: str, open_log, tmp_path:
 
 def test_a_log_of_another_user_is_refused(tmp_path: Path, monkeypatch):
     trial_log(tmp_path, "mark").close()
-    monkeypatch.setattr("klack.own_file.caller", lambda: 12345)
+    monkeypatch.setattr("klack.files.own.caller", lambda: 12345)
     with pytest.raises(InputError, match="of another user"):
         trial_log(tmp_path, "mark")
 
@@ -165,7 +165,7 @@ def test_an_entry_of_another_user_is_not_read(cache: ResultCache, monkeypatch):
     if os.geteuid() == 0:
         os.chown(path, 65534, 65534)
     else:
-        monkeypatch.setattr("klack.cache.entry.caller", lambda: 12345)
+        monkeypatch.setattr("klack.machine.cache.entry.caller", lambda: 12345)
     assert cache.load("0" * 64, "test") is None
     cache.store("0" * 64, Entry(arrays={"x": np.arange(3.0)}))
     monkeypatch.undo()

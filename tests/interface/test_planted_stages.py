@@ -17,13 +17,13 @@ from pathlib import Path
 
 import pytest
 
-from klack import own_file
 from klack.cli.main import main
 from klack.errors import InputError, LeftAloneWarning
-from klack.folder_lock import LOCK_NAME, own_lock_name
-from klack.held_folder import HeldFolder
-from klack.stage import Stage
-from klack.whole_file import completed, whole_file, whole_files
+from klack.files import own as own_file
+from klack.files.held import HeldFolder
+from klack.files.locks import LOCK_NAME, own_lock_name
+from klack.files.stage import Stage
+from klack.files.whole import completed, whole_file, whole_files
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users, links and pipes")
 
@@ -196,7 +196,7 @@ def test_of_another_user_by_number(tmp_path: Path, monkeypatch):
     stage = dead_stage_in(tmp_path)
     before = tree(stage)
     usual = own_file.caller()
-    for module in ("klack.stage", "klack.own_file", "klack.folder_lock"):
+    for module in ("klack.files.stage", "klack.files.own", "klack.files.locks"):
         monkeypatch.setattr(f"{module}.caller", lambda: 12345)
     with pytest.warns(LeftAloneWarning, match=f"of another user \\(number {usual}\\)"):
         completed(tmp_path)

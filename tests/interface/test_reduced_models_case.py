@@ -49,11 +49,11 @@ from klack.analyses.reduction.analysis import REDUCTION
 from klack.assembling.assembled_bodies import assembled_body, assembled_from_matrices
 from klack.assembling.bodies import build_bodies, mesh_body
 from klack.assembling.given_pair import build_given_pair
+from klack.bodies.reduction.ports import Port
 from klack.case import load_case, shipped_cases
 from klack.case.schema import Case
 from klack.mesh.mesh import FaceTable, Mesh
 from klack.mesh.profile import Line, Profile
-from klack.reduction.ports import Port
 from klack.simulation.bodies import rod_body
 from klack.verification.exchange_files import write_matrices
 

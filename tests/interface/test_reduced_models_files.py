@@ -17,8 +17,12 @@ import scipy.io
 from klack_names import InputError, StateSpace
 from scipy.sparse import coo_array, csc_array
 
-from klack.model_files.modal_data import read_modal_data
-from klack.model_files.reduced_models import FileStateSpace, read_reduced_matrices, read_state_space
+from klack.bodies.model_files.modal_data import read_modal_data
+from klack.bodies.model_files.reduced_models import (
+    FileStateSpace,
+    read_reduced_matrices,
+    read_state_space,
+)
 from klack.simulation.bodies import rod_body
 
 ROD = rod_body(

@@ -16,13 +16,13 @@ from klack_names import (
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_array
 
-from klack.reduction import attachment, dynamic_stiffness
-from klack.reduction.attachment import shift_at
-from klack.reduction.damping import LossFactor, ModalDamping, RayleighDamping
-from klack.reduction.ports import Port, node_observer, pressure_port, surface_port
-from klack.reduction.receptance import reduced_receptance
-from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, select
-from klack.reduction.transfer import compare_receptances, mean_level_deviation
+from klack.bodies.reduction import attachment, dynamic_stiffness
+from klack.bodies.reduction.attachment import shift_at
+from klack.bodies.reduction.damping import LossFactor, ModalDamping, RayleighDamping
+from klack.bodies.reduction.ports import Port, node_observer, pressure_port, surface_port
+from klack.bodies.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.selection import ByCount, ByFrequency, ByParticipation, select
+from klack.bodies.reduction.transfer import compare_receptances, mean_level_deviation
 from klack.verification.reduction import rod
 
 

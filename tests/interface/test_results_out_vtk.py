@@ -25,9 +25,9 @@ from klack_names import (
 
 from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes, write_wav
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
+from klack.files.whole import whole_files
 from klack.transient.result import FullOrderResult, MotionOfBody, Snapshots
 from klack.verification.transient import STEEL, rod_body, rod_contact
-from klack.whole_file import whole_files
 
 SOLIDS = ("tet4", "tet10", "hex8", "hex20", "wedge6", "wedge15")
 PLANES = ("tri3", "tri6", "quad4", "quad8")

@@ -16,7 +16,7 @@ import pytest
 from klack_names import IMPACT, ImpactStudy, InputError
 
 from klack.analyses.store import RESULT_NAME
-from klack.reduction.reduced_body import read_arrays
+from klack.bodies.reduction.reduced_body import read_arrays
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
 SEED = int(os.environ.get("KLACK_SEED", "1"))

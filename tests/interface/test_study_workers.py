@@ -399,10 +399,10 @@ class TestRefused:
             klack.run_many(SMALL, [{}], ["impacts"], **given)
 
     def test_too_many_processes_for_the_memory(self, monkeypatch: pytest.MonkeyPatch):
-        from klack.memory import AvailableMemory
+        from klack.machine.memory import AvailableMemory
 
         small = AvailableMemory(size=1e9, bound="a test")
-        monkeypatch.setattr("klack.memory.available_memory", lambda: small)
+        monkeypatch.setattr("klack.machine.memory.available_memory", lambda: small)
         with pytest.raises(InputError, match=r"4 processes that takes about 2 GB .* \(a test\)"):
             klack.run_many(SMALL, [{}], ["impacts"], workers=4)
 

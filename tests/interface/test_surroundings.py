@@ -187,7 +187,7 @@ def test_no_home_and_no_folder_for_temporary_files(result: Path, tmp_path: Path)
 def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypatch, capsys):
     """In a private folder: numba runs what it finds there."""
     import klack.cli.surroundings as surroundings
-    from klack.compiling import compiled_folder
+    from klack.machine.compiling import compiled_folder
 
     monkeypatch.setattr(os, "environ", dict(os.environ))
     os.environ.pop("NUMBA_CACHE_DIR", None)
@@ -204,7 +204,7 @@ def test_without_any_place_compiled_functions_are_kept_for_one_command(monkeypat
 @pytest.mark.slow
 def test_bytecode_is_kept_apart_from_sources_where_a_variable_forbids_it(tmp_path: Path):
     """Of a command alone, in a private folder that ``klack warm --clear`` empties."""
-    from klack.compiling.compiled_folder import clear_folder
+    from klack.machine.compiling.compiled_folder import clear_folder
 
     source = tmp_path / "source"
     shutil.copytree(
@@ -236,7 +236,7 @@ def test_bytecode_is_kept_apart_from_sources_where_a_variable_forbids_it(tmp_pat
 @pytest.mark.parametrize("spoil", ["others may read", "another user", "a parent", "a file"])
 def test_bytecode_is_kept_in_no_folder_that_others_reach(spoil: str, tmp_path: Path, monkeypatch):
     """Truth: Python runs what lies there, whoever wrote it."""
-    from klack.compiling import compiled_folder
+    from klack.machine.compiling import compiled_folder
 
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "own"))
     found = compiled_folder.bytecode_folder()

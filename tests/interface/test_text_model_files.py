@@ -27,14 +27,14 @@ from klack_names import (
 from scipy.io import loadmat
 
 from klack.assembling.given_bodies import reduced_from_file
+from klack.bodies.model_files.modal_data import read_modal_data
+from klack.bodies.model_files.reduced_models import read_state_space
+from klack.bodies.reduction.from_state_space import body_of_state_space
 from klack.case import find_case, load_case
 from klack.exchange.matlab_model import write_matlab
 from klack.exchange.modelica import modelica_text, write_modelica
 from klack.exchange.state_space import state_space
 from klack.exchange.text_model import write_text
-from klack.model_files.modal_data import read_modal_data
-from klack.model_files.reduced_models import read_state_space
-from klack.reduction.from_state_space import body_of_state_space
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
 
 ORIGIN = Provenance(

@@ -6,7 +6,7 @@ import pytest
 from klack_names import build_valve, load_case, load_valve_case, run_impact
 
 from klack.contact import local_law
-from klack.stages import collected_warnings
+from klack.machine.stages import collected_warnings
 
 pytestmark = pytest.mark.slow
 

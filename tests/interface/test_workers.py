@@ -24,10 +24,10 @@ import pytest
 from numba.core import event
 
 from klack.analyses.workers import WorkerPool
-from klack.compiling import ahead
-from klack.compiling.ahead import compiling_ahead
-from klack.cores import available_cores
 from klack.errors import InputError
+from klack.machine.compiling import ahead
+from klack.machine.compiling.ahead import compiling_ahead
+from klack.machine.cores import available_cores
 
 DYING = """
 import os, signal, sys, threading, time

@@ -26,7 +26,7 @@ from klack.analyses.impact.analysis import IMPACT, answer_line, estimate_lines
 from klack.case import find_case
 from klack.case.impact_sections import LinearLocalLaw, Spring, TransferSweep
 from klack.case.schema import Case
-from klack.stages import for_comparison
+from klack.machine.stages import for_comparison
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 

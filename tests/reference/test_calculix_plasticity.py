@@ -12,8 +12,8 @@ import pytest
 from klack_names import build_problem, find_calculix, load_case
 from scipy.sparse import csr_array
 
-from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.yielding_body import YieldingBody
+from klack.contact.plasticity.ladder import YieldingContact
+from klack.contact.plasticity.yielding_body import YieldingBody
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from klack_names import Material, eigenmodes, elastic_body, lattice_mesh
 
-from klack.elasticity.fourier_body import FourierBody, fourier_body
+from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 RADIUS, LENGTH = 2e-3, 30e-3

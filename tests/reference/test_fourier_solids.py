@@ -18,9 +18,9 @@ from klack_names import (
 )
 from scipy.sparse import csr_array
 
-from klack.elasticity.fourier_body import FourierBody, fourier_body, rows_around
-from klack.elasticity.loads import order_load, traction_load
-from klack.gauges.fourier_field import field_rows
+from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body, rows_around
+from klack.bodies.elasticity.loads import order_load, traction_load
+from klack.bodies.gauges.fourier_field import field_rows
 from klack.verification.elasticity import free_bar_frequencies
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)

@@ -13,7 +13,7 @@ from klack_names import InputError, build_problem
 
 from klack.analyses.impact.contact_check import check_yield
 from klack.case.reader import case_schema, read_case
-from klack.material_library import MATERIALS, library_material
+from klack.materials.library import MATERIALS, library_material
 
 ROOT = Path(__file__).parents[2]
 SPHERES = ROOT / "tests" / "data" / "case" / "yielding_spheres.yaml"

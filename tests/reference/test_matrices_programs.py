@@ -33,10 +33,10 @@ from scipy.io import savemat
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import norm
 
-from klack.elasticity.given_matrices import checked_body
+from klack.bodies.elasticity.given_matrices import checked_body
+from klack.bodies.model_files.system import on_nodes, read_system
 from klack.exchange.calculix_run import find_calculix, run_calculix
 from klack.mesh.files.ansys.reader import read_ansys_archive
-from klack.model_files.system import on_nodes, read_system
 from klack.verification.exchange_files import MatrixFiles, write_matrices
 
 needs_calculix = pytest.mark.skipif(find_calculix() is None, reason="CalculiX is not installed")

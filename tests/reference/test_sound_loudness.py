@@ -18,7 +18,7 @@ from klack.acoustics.signal_statistics import a_weighted, a_weighting, pressure_
 from klack.acoustics.sound import click_pressure
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
 from klack.errors import InputError
-from klack.signals import Spectrum, TimeSeries
+from klack.signals.sampled import Spectrum, TimeSeries
 
 RATE = 48_000
 G = 10.0**0.3

@@ -9,8 +9,8 @@ from draws import each
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from klack.case.expressions.expression import Expression, ordered
 from klack.errors import InputError
-from klack.expressions.expression import Expression, ordered
 
 VALUES = {"a": 2.0, "b": 5.0, "c": 0.25}
 

@@ -8,9 +8,9 @@ from fractions import Fraction
 import pytest
 from draws import each
 
+from klack.case.expressions.dimension import dimension_of
+from klack.case.expressions.expression import Expression
 from klack.errors import InputError
-from klack.expressions.dimension import dimension_of
-from klack.expressions.expression import Expression
 from klack.units import KINDS, parse_quantity
 
 # unit: exact size in SI, powers of (m, kg, s)

@@ -8,7 +8,7 @@ from klack.acoustics.spectrum import energy_spectral_density, impulse_spectrum
 from klack.acoustics.third_octave import ThirdOctaves, band_energies
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, find_contacts, measure_impact
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["compare_histories", "first_impact", "impact_third_octaves"]
 

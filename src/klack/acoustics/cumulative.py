@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.signals import Spectrum
+from klack.signals.sampled import Spectrum
 
 __all__ = ["CumulativeEnergy", "cumulative_energy"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from klack.errors import require_positive
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["drive_pattern"]
 

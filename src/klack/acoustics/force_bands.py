@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import force_spectrum
 from klack.acoustics.third_octave import ThirdOctaves, band_edges, band_energies, band_numbers
-from klack.signals import Spectrum, TimeSeries
+from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
     "BandDensity",

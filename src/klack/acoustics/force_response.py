@@ -25,10 +25,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
-from klack.reduction.structure import Structure
-from klack.signals import TimeSeries
+from klack.machine.compiling.jit import njit
+from klack.signals.sampled import TimeSeries
 from klack.simulation.propagator import damping_loss, modal_propagator
 
 __all__ = ["ModalResponse", "aligned_forces", "modal_response", "port_forces", "surface_velocity"]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from klack.acoustics.mount import Mount, moved_mass, support_mobility
 from klack.acoustics.plate import Plate
+from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
-from klack.reduction.structure import Structure
 
 __all__ = ["HarmonicResponse", "harmonic_response", "response_axis"]
 

@@ -19,10 +19,10 @@ import numpy as np
 import scipy
 
 from klack.acoustics.force_response import aligned_forces
-from klack.compiling.jit import njit
+from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError
-from klack.reduction.structure import Structure
-from klack.signals import Spectrum, TimeSeries
+from klack.machine.compiling.jit import njit
+from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = ["injected_density", "injected_energy"]
 

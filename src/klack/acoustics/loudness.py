@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from klack.acoustics.nonlinear_decay import nonlinear_decay
 from klack.errors import InputError
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["Loudness", "loudness_level", "time_varying_loudness"]
 

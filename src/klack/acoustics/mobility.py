@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from klack.acoustics.harmonic import harmonic_response
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Plate
-from klack.reduction.structure import Structure
+from klack.bodies.reduction.structure import Structure
 
 __all__ = ["drive_point_mobility", "support_force_transfer", "transfer_mobility"]
 

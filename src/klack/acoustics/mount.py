@@ -19,8 +19,8 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.acoustics.plate import Plate
+from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError, require_nonnegative, require_positive
-from klack.reduction.structure import Structure
 
 __all__ = ["Mount", "mounted", "moved_mass", "support_mobility"]
 

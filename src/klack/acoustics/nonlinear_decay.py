@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 
 __all__ = ["nonlinear_decay"]
 

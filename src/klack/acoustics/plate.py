@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import require_positive
-from klack.materials import Material
+from klack.materials.material import Material
 
 __all__ = ["Air", "Plate", "baffled_plate_efficiency"]
 

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from klack.acoustics.harmonic import HarmonicResponse, harmonic_response
 from klack.acoustics.mount import Mount
 from klack.acoustics.plate import Air, Plate
-from klack.reduction.structure import Structure
+from klack.bodies.reduction.structure import Structure
 
 __all__ = [
     "PLATE",

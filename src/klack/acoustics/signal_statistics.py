@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from klack.acoustics.third_octave import ThirdOctaves, band_energies
-from klack.signals import Spectrum, TimeSeries
+from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
     "EXPOSURE_REFERENCE",

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from klack.acoustics.spectrum import change_spectrum
 from klack.errors import InputError, require_positive
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["audio_band", "click_pressure", "minimum_phase_filter", "pressure_transfer"]
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError, require_positive
-from klack.signals import Spectrum, TimeSeries
+from klack.signals.sampled import Spectrum, TimeSeries
 
 __all__ = [
     "DENSITY_REFERENCE",

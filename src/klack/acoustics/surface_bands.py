@@ -21,9 +21,9 @@ from klack.acoustics.mount import Mount, support_mobility
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import PLATE, Efficiency, surface_efficiency
 from klack.acoustics.spectrum import force_spectrum
+from klack.bodies.reduction.structure import Structure
 from klack.errors import InputError, require_positive
-from klack.reduction.structure import Structure
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "RadiatedBands",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError
-from klack.signals import Spectrum
+from klack.signals.sampled import Spectrum
 
 __all__ = [
     "ThirdOctaves",

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from klack.errors import InputError, require_positive
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["full_scale_of", "level_statement", "wav_bytes", "write_wav"]
 

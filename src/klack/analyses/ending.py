@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from klack.errors import InputError
-from klack.held_folder import Mark
-from klack.progress import Progress
+from klack.files.held import Mark
+from klack.files.uninterrupted import uninterrupted
+from klack.files.whole import completed, mark_of, outdated
+from klack.machine.progress import Progress
 from klack.terminal.options import Shown, WantedResult
 from klack.terminal.output import require_folder, staged_folder
 from klack.terminal.progress import show_progress
-from klack.uninterrupted import uninterrupted
-from klack.whole_file import completed, mark_of, outdated
 
 if TYPE_CHECKING:
     from klack.analyses.analysis import StoredAnalysis
@@ -180,7 +180,7 @@ class Ending(Shown):
         incomplete : Exception, optional
             Raised at the end: why the record is not all that was asked for.
         """
-        from klack.stages import stages_with_cached
+        from klack.machine.stages import stages_with_cached
 
         names: list[str] = []
 

@@ -7,7 +7,7 @@ from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.missing import missing_notes
 from klack.analyses.stroke.record import StrokeStudy
 from klack.errors import ConvergenceError
-from klack.stages import FAILURES
+from klack.machine.stages import FAILURES
 
 __all__ = ["Attempts", "IncompleteImpactError", "failure_notes", "missing_in"]
 

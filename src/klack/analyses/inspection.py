@@ -8,6 +8,9 @@ import numpy as np
 
 from klack.assembling.assembled_bodies import assembled_body
 from klack.assembling.given_bodies import reduced_from_file
+from klack.bodies.model_files.matrices import MATRIX_FORMATS, read_matrix
+from klack.bodies.model_files.system_matrix import SystemMatrix, WhichMatrixError
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.bodies import CaseFile
 from klack.case.geometry import ProfileGeometry
 from klack.case.key_path import kind_at, node_at, written_at
@@ -25,9 +28,6 @@ from klack.mesh.files.mesh_model import MeshModel
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import corner_volume, mesh_summary
 from klack.mesh.step_content import StepContent, StepPart, step_content
-from klack.model_files.matrices import MATRIX_FORMATS, read_matrix
-from klack.model_files.system_matrix import SystemMatrix, WhichMatrixError
-from klack.reduction.reduced_body import ReducedBody
 from klack.units import format_si, parse_quantity
 
 __all__ = ["INSPECTED", "Row", "inspect_case", "inspect_file"]

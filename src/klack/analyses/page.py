@@ -8,9 +8,9 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from klack.analyses.record import Record
+from klack.files.whole import whole_file
 from klack.report.page import Content, NextStep, Picture, Section, Table
 from klack.report.wording import own_code, quantity
-from klack.whole_file import whole_file
 
 __all__ = ["page_of", "schematic_section", "stage_table", "write_table"]
 

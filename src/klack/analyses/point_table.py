@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from klack import __version__
 from klack.analyses.measures import Measure
 from klack.errors import InputError, MissingExtraError
+from klack.files.whole import whole_file
 from klack.input.problem import nearest, one_of
-from klack.whole_file import whole_file
 
 __all__ = ["NOT_COMPUTED", "PointColumn", "PointTable", "RunsInterrupted", "column_of"]
 

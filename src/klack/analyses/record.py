@@ -13,7 +13,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 from klack import __version__
-from klack.stages import StageClock
+from klack.machine.stages import StageClock
 
 if TYPE_CHECKING:
     from klack.case.any_case import AnyCase

@@ -21,8 +21,8 @@ from zlib import crc32
 import numpy as np
 
 from klack.errors import InputError
-from klack.own_file import kind_of
-from klack.whole_file import completed, in_exchange, whole_file
+from klack.files.own import kind_of
+from klack.files.whole import completed, in_exchange, whole_file
 
 __all__ = ["RESULT_NAME", "RecordFormat", "load_record", "save_record", "stored_format"]
 

@@ -20,10 +20,10 @@ import numpy as np
 
 import klack
 from klack.case.bodies import CaseBody
-from klack.closing import Closing
 from klack.errors import CacheWarning, InputError
-from klack.folder_lock import try_lock
-from klack.own_file import open_own_file
+from klack.files.closing import Closing
+from klack.files.locks import try_lock
+from klack.files.own import open_own_file
 
 if TYPE_CHECKING:
     from klack.case.any_case import AnyCase

@@ -18,8 +18,8 @@ from typing import Any, Generic, TypeVar
 from threadpoolctl import threadpool_limits
 
 from klack.analyses.unfinished import UnfinishedLog
-from klack.closing import Closing
 from klack.errors import ConvergenceError, InputError, KlackError
+from klack.files.closing import Closing
 
 __all__ = [
     "Failure",

@@ -46,6 +46,7 @@ from klack.analyses.study.kinds import kind_of
 from klack.app.answers import Answer, Curve, Floats, Hearing, Judgement, Number, Opened, Slider
 from klack.assembling.problem import contact_problem
 from klack.assembling.valve import Valve, build_valve, filled_network
+from klack.bodies.elasticity.loads import NearLoads
 from klack.case.any_case import AnyCase, CaseTree, tree_of
 from klack.case.key_path import quantity_at, written_at
 from klack.case.points import case_at
@@ -54,12 +55,11 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.contact.history import ImpactHistory
-from klack.elasticity.loads import NearLoads
 from klack.errors import InputError, KlackError
 from klack.input.problem import CaseProblem, Key
-from klack.progress import silent
-from klack.signals import TimeSeries
-from klack.stages import collected_warnings
+from klack.machine.progress import silent
+from klack.machine.stages import collected_warnings
+from klack.signals.sampled import TimeSeries
 from klack.units import Kind, format_si
 
 __all__ = [

@@ -18,8 +18,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from klack.errors import InputError
-from klack.held_folder import HeldFolder, synchronise
-from klack.own_file import SAFELY, kind_of
+from klack.files.held import HeldFolder, synchronise
+from klack.files.own import SAFELY, kind_of
 from klack.terminal.tables import printable
 
 __all__ = ["OWN", "RESULT_NAME", "Found", "OpenFolder", "replace_file", "result_names"]

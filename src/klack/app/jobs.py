@@ -32,8 +32,8 @@ import psutil
 
 from klack.app.folder import OWN, OpenFolder, replace_file, result_names
 from klack.errors import InputError
-from klack.held_folder import HeldFolder
-from klack.progress import PointCount
+from klack.files.held import HeldFolder
+from klack.machine.progress import PointCount
 from klack.terminal.progress import PROGRESS_FILE
 
 __all__ = ["COMMANDS", "LIVE", "OF_STUDIES", "Job", "Jobs", "State"]

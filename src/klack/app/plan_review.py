@@ -22,8 +22,8 @@ from klack.case import plausible
 from klack.case.any_case import tree_of
 from klack.contact.hertz import line_half_width, point_radius
 from klack.errors import KlackError
-from klack.material_library import library_material
-from klack.materials import Material
+from klack.materials.library import library_material
+from klack.materials.material import Material
 from klack.mesh.occ import MM
 from klack.mesh.profile import Arc, Curve, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement, mesh_nodes, run_time

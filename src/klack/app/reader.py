@@ -35,7 +35,7 @@ from klack.app.explorer import (
 from klack.app.study_points import StudyPoints, points_json
 from klack.app.texts import checked_text, exchanged_text, study_offer, study_problem, study_text
 from klack.errors import InputError, KlackError
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["Reader"]
 

@@ -19,7 +19,7 @@ from klack.app.jobs import Jobs
 from klack.app.valve_plan import Plans
 from klack.app.worker import Worker
 from klack.errors import InputError
-from klack.held_folder import HeldFolder
+from klack.files.held import HeldFolder
 
 __all__ = ["LONGEST_NOTE", "Notes", "Sounds", "State", "Uploads"]
 

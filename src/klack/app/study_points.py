@@ -30,9 +30,9 @@ from klack.case.reader import parse, validated
 from klack.case.study import StudyFile
 from klack.case.study_source import StudySource
 from klack.errors import InputError, KlackError
-from klack.progress import silent
+from klack.machine.progress import silent
 from klack.report.wording import printed_unit
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 from klack.studies.fronts import compromise, find_front
 from klack.units import is_level
 

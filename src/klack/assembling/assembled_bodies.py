@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array
 
 from klack.assembling.held_nodes import held_nodes
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.given_matrices import MatrixReport, checked_body
+from klack.bodies.model_files.node_table import read_node_numbers, read_node_table
+from klack.bodies.model_files.system import NodeSystem, on_nodes, read_system
 from klack.case.bodies import CaseBody, CaseFile
 from klack.case.foreign import Matrices
 from klack.case.geometry import NodeTable
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.given_matrices import MatrixReport, checked_body
 from klack.errors import AccuracyWarning, InputError
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh
-from klack.model_files.node_table import read_node_numbers, read_node_table
-from klack.model_files.system import NodeSystem, on_nodes, read_system
 
 __all__ = ["AssembledBody", "assembled_body", "assembled_from_matrices", "node_mesh"]
 

@@ -3,8 +3,8 @@
 import warnings
 
 from klack.assembling.held_nodes import held_nodes
+from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
 from klack.case.bodies import CaseFile
-from klack.elasticity.fourier_body import FourierBody, fourier_body
 from klack.errors import AccuracyWarning
 from klack.mesh.mesh import Mesh
 

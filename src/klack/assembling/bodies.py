@@ -23,6 +23,8 @@ from klack.assembling.generated_mesh import (
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
 from klack.assembling.held_nodes import held_nodes
 from klack.assembling.placement import Touch, first_touch_of_meshes, first_touch_of_profiles
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.gauges.gauge import Gauge
 from klack.case.bodies import CaseBody, CaseFile, SurfaceName
 from klack.case.geometry import MeshSettings
 from klack.case.schema import Case
@@ -33,16 +35,14 @@ from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.pairing import axial_distance, curved_faces
 from klack.contact.ray_cutting import CurvedFaces
 from klack.contact.surface_edges import SurfaceEdges, surface_edges, turned_away
-from klack.elasticity.body import ElasticBody, elastic_body
 from klack.errors import AccuracyWarning, InputError
-from klack.gauges.gauge import Gauge
 from klack.input.problem import Key
+from klack.machine.progress import Progress
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh, Surface, solid_at
 from klack.mesh.quality import PoorElementError
 from klack.mesh.rigid import Pose
 from klack.mesh.sizing import MeshSizing, Refinement
-from klack.progress import Progress
 from klack.units import format_si
 
 __all__ = [
@@ -318,7 +318,7 @@ def assemble_body(case: CaseFile, name: str, mesh: Mesh) -> ElasticBody:
     Warns
     -----
     AccuracyWarning
-        About materials that no solid has (:attr:`klack.materials.Material.question`).
+        About materials that no solid has (:attr:`klack.materials.material.Material.question`).
     """
     body = case.bodies[name]
     if body.matrices is not None:

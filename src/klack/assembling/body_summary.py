@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.modes import elastic_count
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.plausible_material import estimate_material
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.bodies import CaseFile
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.plausible_material import estimate_material
-from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["BodySummary", "summarise_body"]
 

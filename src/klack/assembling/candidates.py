@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.bodies import BodyPair
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.statics import compliances_of
 from klack.contact.worn_faces import WornFaces, opened_by
-from klack.elasticity.statics import Flexibility
 
 __all__ = ["Candidates", "CondensedSpace", "grade_of", "reach_of"]
 

@@ -5,10 +5,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.gauges.gauge import Gauge
+from klack.bodies.gauges.rows import AROUND, Line, displacement_row, strain_row, stress_row
 from klack.case.outputs import CaseOutput
 from klack.case.schema import Case
-from klack.gauges.gauge import Gauge
-from klack.gauges.rows import AROUND, Line, displacement_row, strain_row, stress_row
 from klack.mesh.mesh import Mesh
 from klack.mesh.rigid import Pose, rotation_matrix
 

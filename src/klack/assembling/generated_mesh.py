@@ -7,11 +7,11 @@ from typing import Any, Literal
 
 from numpy.typing import NDArray
 
-from klack.cache.entry import Entry
-from klack.cache.remember import remembered
-from klack.cache.result_cache import result_cache
 from klack.case.geometry import StepFile
 from klack.errors import InputError
+from klack.machine.cache.entry import Entry
+from klack.machine.cache.remember import remembered
+from klack.machine.cache.result_cache import result_cache
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.profile import Profile

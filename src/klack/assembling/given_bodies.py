@@ -8,18 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.modes import damping_of
+from klack.bodies.model_files.modal_data import read_modal_data
+from klack.bodies.model_files.reduced_models import read_reduced_matrices, read_state_space
+from klack.bodies.model_files.uff import FileModalData
+from klack.bodies.reduction.damping import Damping
+from klack.bodies.reduction.from_modal_data import (
+    body_of_craig_bampton,
+    body_of_modal_data,
+    fit_residual,
+)
+from klack.bodies.reduction.from_state_space import body_of_state_space, state_space_in_si
+from klack.bodies.reduction.given_modes import RIGID_FREQUENCY
+from klack.bodies.reduction.reduced_body import ReducedBody, StateSpace
 from klack.case.bodies import CaseFile
 from klack.case.foreign import ModelPort, ReducedModel
 from klack.errors import AccuracyWarning, InputError
 from klack.input.problem import nearest, one_of
-from klack.model_files.modal_data import read_modal_data
-from klack.model_files.reduced_models import read_reduced_matrices, read_state_space
-from klack.model_files.uff import FileModalData
-from klack.reduction.damping import Damping
-from klack.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data, fit_residual
-from klack.reduction.from_state_space import body_of_state_space, state_space_in_si
-from klack.reduction.given_modes import RIGID_FREQUENCY
-from klack.reduction.reduced_body import ReducedBody, StateSpace
 
 __all__ = ["reduced_from_file"]
 

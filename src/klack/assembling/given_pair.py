@@ -12,18 +12,18 @@ from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.given_bodies import reduced_from_file
 from klack.assembling.modes import damping_of, elastic_count, mode_pool, selection_of
 from klack.assembling.reduced_pair import hertz_coefficient, impact_system
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.ports import Port, node_set_port, surface_port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.bodies import CaseBody, SurfaceName
 from klack.case.impact_sections import HertzLocalLaw, LinearLocalLaw
 from klack.case.schema import Case
 from klack.contact.laws import HertzLaw, LinearLaw
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, InputError
-from klack.progress import Progress
-from klack.reduction.ports import Port, node_set_port, surface_port
-from klack.reduction.reduce import reduce_body
-from klack.reduction.reduced_body import ReducedBody
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress
 from klack.simulation.system import ReducedSystem
 
 __all__ = ["GivenPair", "build_given_pair"]

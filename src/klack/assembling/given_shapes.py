@@ -14,21 +14,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from klack.cache.entry import Entry
-from klack.cache.remember import remembered
-from klack.cache.result_cache import result_cache
 from klack.case.bodies import CaseBody, CaseFile
 from klack.case.plausible import MOVING_MASS, SIZE
 from klack.case.schema import Case
 from klack.case.surface_names import place_of, require_surface_names
 from klack.errors import AccuracyWarning, InputError
-from klack.memory import in_words
+from klack.machine.cache.entry import Entry
+from klack.machine.cache.remember import remembered
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.memory import in_words
+from klack.machine.progress import Progress, remark, silent
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Profile
 from klack.mesh.quality import corner_volume
 from klack.mesh.sizing import MeshSizing, element_memory, mesh_nodes, run_time
 from klack.mesh.step_content import step_content
-from klack.progress import Progress, remark, silent
 from klack.units import format_si
 
 __all__ = ["GivenShape", "require_given_shapes", "require_usual_sizes", "tell_effort"]

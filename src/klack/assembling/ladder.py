@@ -12,7 +12,7 @@ from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.statics import ContactLadder, ReachError, StaticContact
 from klack.contact.worn_faces import WornFaces
-from klack.progress import Progress
+from klack.machine.progress import Progress
 
 __all__ = ["closing_force", "effective_mass", "impact_energy", "static_ladder", "wider_space"]
 

@@ -7,18 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.problem import ContactProblem, PlacedBodies
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import kept_modes as chosen_modes
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
 from klack.case.bodies import BodyDamping, ModeChoice
 from klack.case.schema import Case
-from klack.cores import side_by_side
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.progress import Progress
-from klack.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
-from klack.reduction.ports import Port
-from klack.reduction.reduce import kept_modes as chosen_modes
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount, ByFrequency, ByParticipation, ModeSelection
+from klack.machine.cores import side_by_side
+from klack.machine.progress import Progress
 
 __all__ = [
     "PARTICIPATION_POOL",
@@ -55,7 +55,7 @@ def mode_pools(
     """Elastic modes of all bodies: as many as the case needs, and no fewer than ``at_least``.
 
     With ``rough`` they have so many for an estimate, as of
-    :func:`klack.elasticity.eigen.eigenmodes`.
+    :func:`klack.bodies.elasticity.eigen.eigenmodes`.
     """
     bodies = [placed.pair.upper, placed.pair.lower]
     flexibilities = [placed.flexibility_upper, placed.flexibility_lower]

@@ -15,6 +15,11 @@ from klack.assembling.bodies import BodyPair, warn_far_touch
 from klack.assembling.held_nodes import held_nodes
 from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.problem import ContactProblem
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
+from klack.bodies.elasticity.ring_points import RingSections
+from klack.bodies.reduction.selection import ByFrequency
 from klack.case.bodies import CaseFile
 from klack.case.guide import Placement
 from klack.case.schema import Case
@@ -22,14 +27,9 @@ from klack.case.valve import ValveCase
 from klack.contact.gap_update import PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.rings import RingFriction, RingSpace
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.ring_points import RingSections
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.rigid import rigid_placement, rotation_matrix
-from klack.reduction.selection import ByFrequency
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.revolved_model import RevolvedBody, RingContact, revolved_model
 

@@ -12,11 +12,11 @@ from klack.case.bodies import CaseBody
 from klack.case.geometry import ContactRefinement
 from klack.case.guide import Placement
 from klack.case.schema import Case
+from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import highest_load
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
-from klack.plasticity.loops import YieldingLoops
-from klack.progress import Progress
+from klack.machine.progress import Progress
 
 __all__ = ["meridian_case", "pressure_limit"]
 

@@ -18,23 +18,23 @@ from klack.assembling.candidates import Candidates, CondensedSpace
 from klack.assembling.ladder import closing_force, impact_energy, static_ladder, wider_space
 from klack.assembling.rubbing import static_loops
 from klack.assembling.yielding import law_loops, loaded_body
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.budget import Budget
+from klack.bodies.elasticity.eigen import mode_memory
+from klack.bodies.elasticity.statics import Flexibility
 from klack.case.schema import Case
-from klack.closing import Closing
 from klack.contact.mortar import ContactSpace, touching_shift
 from klack.contact.pairing import axial_distance
+from klack.contact.plasticity.loops import YieldingLoops
+from klack.contact.plasticity.yielding_body import LoadedBody
 from klack.contact.statics import ReachError, StaticContact
 from klack.contact.worn_faces import opened_by
-from klack.cores import side_by_side, threads_for
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.budget import Budget
-from klack.elasticity.eigen import mode_memory
-from klack.elasticity.statics import Flexibility
+from klack.files.closing import Closing
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.cores import side_by_side, threads_for
+from klack.machine.progress import Progress, remark
 from klack.mesh.mesh import Surface
 from klack.mesh.rigid import Pose
-from klack.plasticity.loops import YieldingLoops
-from klack.plasticity.yielding_body import LoadedBody
-from klack.progress import Progress, remark
 from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = ["ContactProblem", "PlacedBodies", "build_problem", "contact_problem", "place_bodies"]

@@ -11,6 +11,11 @@ from klack.assembling.modes import damping_of, elastic_count, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.rubbing import fitted_loops
 from klack.assembling.yielding import law_with_yield
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.reduction.ports import Observer, Port
+from klack.bodies.reduction.reduce import Correction, reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.selection import ByCount, ModeSelection
 from klack.case.impact_sections import (
     ConsistentLocalLaw,
     HertzLocalLaw,
@@ -25,21 +30,16 @@ from klack.contact.laws import (
     LinearLaw,
 )
 from klack.contact.local_law import LocalLaw, OverfullModesError, consistent_law
+from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.rubbing_fit import RubbingFit
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.statics import StaticContact
 from klack.contact.submodel import LocalStiffness, local_stiffness
 from klack.contact.yielding_law import YieldingLaw
-from klack.elasticity.eigen import Modes
 from klack.errors import AccuracyWarning, InputError
-from klack.plasticity.loops import YieldingLoops
-from klack.reduction.ports import Observer, Port
-from klack.reduction.reduce import Correction, reduce_body
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount, ModeSelection
+from klack.machine.stages import show, trial
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
-from klack.stages import show, trial
 from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = [

@@ -8,12 +8,12 @@ smooth: other levels have no need of it.
 import warnings
 
 from klack.assembling.bodies import BodyPair
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.local_law import LocalLaw
 from klack.contact.rubbing_fit import RubbingFit, rubbing_fit
 from klack.contact.statics import ReachError, StaticContact, contact_compliance
-from klack.elasticity.statics import Flexibility
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.transient.rubbing_ladder import LockedError, RubbingContact, rubbing_contact
 

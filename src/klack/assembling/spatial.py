@@ -11,6 +11,11 @@ from klack.assembling.modes import damping_of, selection_of, shape_marks
 from klack.assembling.off_axis import off_axis_space, touch_height
 from klack.assembling.placement import axis_through, in_disc
 from klack.assembling.stops import StopContact
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import kept_modes
 from klack.case.guide import LinearGuideLaw, ValveGuide
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
@@ -20,15 +25,10 @@ from klack.contact.gap_update import PlacedGaps, RigidGaps, RingGaps
 from klack.contact.mortar import ContactSpace
 from klack.contact.rings import RingSpace
 from klack.contact.statics import contact_compliance, extended_compliance
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.hydraulics.film import ConeFilm, DiscFilm, FilmShape, RingFilm
 from klack.hydraulics.tilted_film import SectorFilm, sector_film
 from klack.mesh.rigid import rigid_placement
-from klack.reduction.ports import Port
-from klack.reduction.reduce import kept_modes
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import (

@@ -23,20 +23,20 @@ from klack.assembling.spatial import (
     valve_of_meetings,
 )
 from klack.assembling.stops import StopContact
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.ring_points import RingSections
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import kept_modes
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.guide import LinearGuideLaw
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.gap_update import RingGaps
 from klack.contact.rings import RingSpace
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.ring_points import RingSections
 from klack.errors import AccuracyWarning
+from klack.machine.cache.result_cache import result_cache
 from klack.mesh.rigid import rigid_placement
-from klack.reduction.ports import Port
-from klack.reduction.reduce import kept_modes
-from klack.reduction.reduced_body import ReducedBody
 from klack.transient.guide import guide_at_sections, shaft_sections, turned_sections
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel

@@ -17,28 +17,28 @@ from klack.assembling.ladder import effective_mass, static_ladder, wider_space
 from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.rubbing import fitted_loops, static_loops
 from klack.assembling.yielding import law_loops, law_with_yield, loaded_body
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_sections import CaseStop
 from klack.contact.laws import ContactLaw, LinearLaw, TableLaw
 from klack.contact.local_law import LocalLaw, consistent_law
 from klack.contact.mortar import ContactSpace, touching_shift
+from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.statics import ReachError, StaticContact
 from klack.contact.yielding_law import YieldingLaw
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
+from klack.machine.progress import Progress
+from klack.machine.stages import trial, warnings_of
 from klack.mesh.rigid import Pose
-from klack.plasticity.loops import YieldingLoops
-from klack.progress import Progress
-from klack.reduction.ports import Port
-from klack.reduction.reduce import reduce_body
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact import simulate
 from klack.simulation.system import ContactPair, ReducedSystem
-from klack.stages import trial, warnings_of
 from klack.transient.rubbing_ladder import RubbingContact
 
 __all__ = [

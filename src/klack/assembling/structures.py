@@ -9,20 +9,20 @@ from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
 from klack.assembling.stops import StopContact
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.loads import NearLoads
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import kept_modes
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.structure import Structure, StructurePort, build_structure
 from klack.case.bodies import CaseBody, SurfaceName
 from klack.case.noise import CaseNoise
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.loads import NearLoads
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.input.problem import one_of
-from klack.reduction.ports import Port
-from klack.reduction.reduce import kept_modes
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.structure import Structure, StructurePort, build_structure
 
 __all__ = [
     "IMPACT_STOP",

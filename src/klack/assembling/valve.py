@@ -23,27 +23,27 @@ from klack.assembling.spatial import build_spatial, check_heights
 from klack.assembling.spatial_rings import build_spatial_rings
 from klack.assembling.stops import StopContact, StopFaces, build_stop, stop_law
 from klack.assembling.structures import valve_structures
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.ports import Port, pressure_port, surface_port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.structure import Structure
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_consistency import is_consistent
 from klack.case.valve_roles import FLEXIBLE_BODY, find_roles
-from klack.cores import threads_for
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.cores import threads_for
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import warnings_of
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mesh.mesh import Mesh
 from klack.network.component import Component
 from klack.network.network import Network
-from klack.progress import Progress, silent
-from klack.reduction.ports import Port, pressure_port, surface_port
-from klack.reduction.reduce import reduce_body
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.structure import Structure
-from klack.stages import warnings_of
 from klack.transient.spatial_run import SpatialValve
 
 __all__ = [

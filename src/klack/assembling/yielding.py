@@ -14,25 +14,25 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from threadpoolctl import threadpool_limits
 
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.statics import Flexibility
 from klack.case.bodies import CaseFile
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.mortar import ContactSpace
-from klack.contact.pressure_limit import PressureLimit
-from klack.contact.statics import ReachError, StaticContact, extended_compliance
-from klack.contact.yielding_law import YieldingLaw
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.statics import Flexibility
-from klack.errors import AccuracyWarning, ConvergenceError, InputError
-from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loops import (
+from klack.contact.plasticity.ladder import YieldingContact
+from klack.contact.plasticity.loops import (
     YieldingLoops,
     loops_of_entry,
     loops_to_entry,
     yielding_law,
     yielding_loops,
 )
-from klack.plasticity.yielding_body import LoadedBody, YieldingBody
-from klack.progress import Progress
+from klack.contact.plasticity.yielding_body import LoadedBody, YieldingBody
+from klack.contact.pressure_limit import PressureLimit
+from klack.contact.statics import ReachError, StaticContact, extended_compliance
+from klack.contact.yielding_law import YieldingLaw
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.machine.progress import Progress
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
 from klack.transient.yielding_points import let_yield, solve_yielding
 
@@ -254,7 +254,7 @@ def law_loops(
 
 
 def law_with_yield(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw | None:
-    """Law of these loops, see :func:`klack.plasticity.loops.yielding_law`; None for none.
+    """Law of these loops, see :func:`klack.contact.plasticity.loops.yielding_law`; None for none.
 
     Warns
     -----

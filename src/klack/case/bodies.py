@@ -20,17 +20,17 @@ from klack.case.origin import ExpandedCase
 from klack.case.parameters import PARAMETERS, Written
 from klack.case.plausible import GO_ON, Number
 from klack.errors import InputError, refuse
-from klack.hardening import (
+from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of
+from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
+from klack.materials.hardening import (
     HARDNESS_SPREAD,
     LARGEST_YIELD,
     Hardening,
     vickers_of_rockwell,
     yield_of_hardness,
 )
-from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of
-from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
-from klack.material_library import MATERIALS, find_material
-from klack.materials import Material
+from klack.materials.library import MATERIALS, find_material
+from klack.materials.material import Material
 from klack.units import Density, Frequency, Modulus, Rate, Ratio, Time, format_si
 
 __all__ = [
@@ -91,7 +91,10 @@ class Hardness(Section):
 
     @property
     def yield_stress(self) -> float:
-        """Estimate of the yield stress [Pa]; see :func:`klack.hardening.yield_of_hardness`."""
+        """Estimate of the yield stress [Pa].
+
+        See :func:`klack.materials.hardening.yield_of_hardness`.
+        """
         vickers = self.HV
         if vickers is None:
             assert self.HRC is not None
@@ -173,8 +176,8 @@ class CaseMaterial(NamedSection):
     def doubtful_yield(self) -> tuple[float, str] | None:
         """Lowest yield stress [Pa] behind an estimate, and what it rests on; None for a given one.
 
-        A hardness gives an estimate (:data:`klack.hardening.HARDNESS_SPREAD`); a number of the
-        library is that of another bar.
+        A hardness gives an estimate (:data:`klack.materials.hardening.HARDNESS_SPREAD`); a number
+        of the library is that of another bar.
         """
         if self.hardness is not None:
             low, high = (share * self.hardness.yield_stress for share in HARDNESS_SPREAD)
@@ -438,7 +441,9 @@ class Reduction(Section):
         """Shifts [(rad/s)^2] of the attachment modes of a body; None for residual ones or none."""
         if correction != "attachment" or body not in self.shifts:
             return None
-        from klack.reduction.attachment import shift_at  # loads the solvers: not to read a case
+        from klack.bodies.reduction.attachment import (
+            shift_at,  # loads the solvers: not to read a case
+        )
 
         return tuple(shift_at(frequency) for frequency in self.shifts[body])
 

@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, InputPath, Name, Section, Text
-from klack.unit_systems import UnitSystemName
+from klack.input.unit_systems import UnitSystemName
 from klack.units import Mass
 
 __all__ = ["Matrices", "ModelPort", "ReducedModel"]

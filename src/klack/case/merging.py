@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from klack.case.case_text import parse
+from klack.case.expressions.dimension import NUMBER
 from klack.case.origin import Filled, Origin
 from klack.case.parameters import (
     ParameterValue,
@@ -18,7 +19,6 @@ from klack.case.parameters import (
 )
 from klack.case.parts import DEEPEST, CaseInclude, PartFile, part_name
 from klack.errors import InputError
-from klack.expressions.dimension import NUMBER
 from klack.input.problem import Key, nearest, one_of
 from klack.input.section import Section
 

@@ -5,11 +5,11 @@ from typing import Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from klack.bodies.gauges.gauge import GaugeKind
 from klack.errors import refuse
-from klack.gauges.gauge import GaugeKind
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Number, Section
-from klack.low_pass import LowPass
+from klack.signals.low_pass import LowPass
 from klack.units import Frequency, Length
 
 __all__ = ["CaseLowPass", "CaseOutput", "check_outputs"]

@@ -9,9 +9,9 @@ from pydantic import WithJsonSchema
 from pydantic.fields import FieldInfo
 
 from klack.case.case_text import LARGEST_NUMBER
+from klack.case.expressions.dimension import ANYTHING, NUMBER, Dimension, dimension_of
+from klack.case.expressions.expression import RESERVED, Expression, ordered
 from klack.errors import InputError
-from klack.expressions.dimension import ANYTHING, NUMBER, Dimension, dimension_of
-from klack.expressions.expression import RESERVED, Expression, ordered
 from klack.input.problem import Key
 from klack.input.section import Computed
 from klack.units import KINDS, RATE, RATIO, Kind, format_si, typed

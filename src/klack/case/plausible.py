@@ -2,7 +2,7 @@
 
 The usual sign of a wrong unit is a number a thousand times off.  Sizes and masses of bodies are
 judged where their shapes are known, before they are meshed (:mod:`klack.assembling.given_shapes`),
-materials by :attr:`klack.materials.Material.question`.
+materials by :attr:`klack.materials.material.Material.question`.
 """
 
 from dataclasses import dataclass

@@ -139,8 +139,8 @@ def cache(
     Meshes, modes and static solutions are kept, under a key of all that matters.
     Deleting them costs nothing but time.
     """
-    from klack.cache.result_cache import result_cache
-    from klack.memory import in_words
+    from klack.machine.cache.result_cache import result_cache
+    from klack.machine.memory import in_words
 
     wanted = Shown(json=json)
     results = result_cache()
@@ -370,14 +370,14 @@ def warm(
     What is there already is not compiled again.
     NUMBA_CACHE_DIR names another folder for compiled functions.
     """
-    from klack.compiling.compiled_folder import (
+    from klack.machine.compiling.compiled_folder import (
         FOLDER_VARIABLE,
         clear_folder,
         compiled_folder,
         is_usable,
         stored,
     )
-    from klack.memory import in_words
+    from klack.machine.memory import in_words
     from klack.warming.groups import GROUPS
     from klack.warming.run import warm as warm_groups
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from klack.analyses.impact.record import ImpactStudy
     from klack.case.any_case import OwnComponents
     from klack.case.measurement import CaseMeasurement
-    from klack.low_pass import LowPass
+    from klack.signals.low_pass import LowPass
 
 __all__ = ["compare"]
 

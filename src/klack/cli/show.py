@@ -203,7 +203,7 @@ def _end(
     view: "View | None" = None,
 ) -> int:
     """Write a picture and say so."""
-    from klack.whole_file import whole_file
+    from klack.files.whole import whole_file
 
     require_file_target("--out", file)
 

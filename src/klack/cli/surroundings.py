@@ -137,7 +137,7 @@ def keep_bytecode() -> None:
     places = [find_spec(name) for name in ("klack.cli", "numba", "pydantic")]
     if all(place and place.cached and os.path.exists(place.cached) for place in places):
         return
-    from klack.compiling.compiled_folder import bytecode_folder
+    from klack.machine.compiling.compiled_folder import bytecode_folder
 
     folder = bytecode_folder()
     if folder is not None:
@@ -151,7 +151,7 @@ def prepare_compiling() -> None:
 
     Its processes share them; without a home of the user every command compiles anew.
     """
-    from klack.compiling.compiled_folder import FOLDER_VARIABLE, compiled_folder, is_usable
+    from klack.machine.compiling.compiled_folder import FOLDER_VARIABLE, compiled_folder, is_usable
 
     folder = compiled_folder()
     if is_usable(folder) or (folder is not None and folder.is_dir()):  # may be read at least

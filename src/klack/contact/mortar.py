@@ -33,6 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, diags_array
 
+from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.contact.face_form import FaceForm
 from klack.contact.pairing import (
     FaceGeometry,
@@ -43,7 +44,6 @@ from klack.contact.pairing import (
     face_thickness,
     project_to_surface,
 )
-from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import ConvergenceError, InputError
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.contact.face_form import FaceForm
 from klack.contact.ray_cutting import (
     CurvedFaces,
@@ -23,7 +24,6 @@ from klack.contact.ray_cutting import (
     face_boxes,
     face_polynomials,
 )
-from klack.elasticity.shape_functions import reference_nodes, shape_functions
 from klack.errors import InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, Mesh, Surface

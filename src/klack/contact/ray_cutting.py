@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Cube, Index, Matrix, Vector
-from klack.compiling.jit import inner, njit
-from klack.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.machine.compiling.jit import inner, njit
 from klack.mesh.families import FAMILIES
 
 __all__ = [

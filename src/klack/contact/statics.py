@@ -22,16 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
-from klack.cache.entry import Entry
+from klack.bodies.elasticity.condensation import condensation_memory
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.asperity_layer import AsperityLayer, press
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction, with_still_directions
 from klack.contact.mortar import ContactSpace
-from klack.cores import side_by_side
-from klack.elasticity.condensation import condensation_memory
-from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError, require_positive
-from klack.memory import require_memory
+from klack.machine.cache.entry import Entry
+from klack.machine.cores import side_by_side
+from klack.machine.memory import require_memory
 
 __all__ = [
     "COARSE",
@@ -113,7 +113,7 @@ def compliances_of(
     space : ContactSpace
     flexibility_a, flexibility_b : Flexibility
     groups : sequence of int arrays
-        Of points, see :func:`klack.elasticity.condensation.condensed_inverse`.
+        Of points, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
 
     Returns
     -------

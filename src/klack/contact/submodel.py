@@ -13,11 +13,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from klack.cache.result_cache import ResultCache
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.statics import StaticContact, contact_compliance, static_contact
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError, require_positive
+from klack.machine.cache.result_cache import ResultCache
 
 __all__ = ["LocalStiffness", "local_stiffness"]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.elasticity.shape_functions import reference_nodes
 from klack.contact.pairing import face_geometry, project_to_surface
-from klack.elasticity.shape_functions import reference_nodes
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceBlock, FaceTable, Mesh, Surface
 

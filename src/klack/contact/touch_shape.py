@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from klack.contact.mortar import ContactSpace
 from klack.contact.pairing import face_geometry, face_lattice, gaps_to
 from klack.contact.ray_cutting import CurvedFaces
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.mesh.mesh import FaceBlock, Mesh, Surface
 
 __all__ = ["area_at_once", "front_pressure", "relative_curvatures"]

@@ -8,7 +8,7 @@ from klack.case.schema import Case
 from klack.contact.friction import Friction
 from klack.errors import AccuracyWarning, InputError
 from klack.exchange.calculix_deck import CalculixImpact, CalculixSettings, default_penalty
-from klack.progress import Progress
+from klack.machine.progress import Progress
 from klack.units import format_si
 
 __all__ = ["calculix_impact", "calculix_settings"]

@@ -31,10 +31,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.placement import first_touch_of_meshes
+from klack.bodies.elasticity.body import ElasticBody
 from klack.contact.pairing import axial_distance, face_thickness
-from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, refuse, require_positive
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceTable, Mesh, Surface
 

@@ -12,6 +12,7 @@ from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
 from klack.assembling.valve import build_valve
 from klack.assembling.yielding import tell_elastic
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.case.spatial_consistency import require_axial
@@ -19,11 +20,10 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_meetings, find_roles
 from klack.errors import AccuracyWarning, InputError
 from klack.exchange.modal_model import ModalModel, Provenance, body_model, choose_body, pair_model
+from klack.machine.progress import Progress, silent
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mesh.mesh import Mesh
 from klack.network.rows import FilmRow
-from klack.progress import Progress, silent
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.system import ContactPair, ReducedSystem
 
 __all__ = ["CaseModels", "case_models"]

@@ -19,12 +19,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.network.protocols import InterfaceLaw
 from klack.network.rows import FilmRow
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.impact import flatten
 from klack.simulation.system import ContactPair, ReducedSystem
 

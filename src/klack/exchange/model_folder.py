@@ -9,7 +9,7 @@ from pathlib import Path
 from klack.errors import InputError, refuse
 from klack.exchange.modal_model import ModalModel
 from klack.exchange.results.table import identifiers
-from klack.whole_file import whole_files
+from klack.files.whole import whole_files
 
 __all__ = ["LONGEST", "model_folder", "named_apart"]
 

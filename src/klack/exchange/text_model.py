@@ -27,10 +27,11 @@ def write_text(models: Sequence[ModalModel], folder: Path) -> tuple[Path, ...]:
 
     ``NAME_A.csv``, ``_B``, ``_C``, ``_D`` hold bare numbers, one row per line, and ``NAME_A.txt``
     and so on the same with blanks.  ``NAME_state_space.csv`` has all four with their names in one
-    file, as :func:`klack.model_files.reduced_models.read_state_space` reads it.  ``NAME_modes.csv``
-    has frequency, damping and shapes [1/sqrt(kg)]; ``NAME_law.csv`` (``NAME_CONTACT_law.csv`` where
-    there are several contacts) indentation and force; ``NAME_info.txt`` says what is what.  A body
-    has a D with its residual compliance as well, ``NAME_D_with_residual_compliance``.
+    file, as :func:`klack.bodies.model_files.reduced_models.read_state_space` reads it.
+    ``NAME_modes.csv`` has frequency, damping and shapes [1/sqrt(kg)]; ``NAME_law.csv``
+    (``NAME_CONTACT_law.csv`` where there are several contacts) indentation and force;
+    ``NAME_info.txt`` says what is what.  A body has a D with its residual compliance as well,
+    ``NAME_D_with_residual_compliance``.
 
     Parameters and errors are those of :func:`klack.exchange.model_folder.model_folder`;
     a model of more than 2 GB and a contact law with dissipation are errors as well.

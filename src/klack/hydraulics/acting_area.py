@@ -21,8 +21,8 @@ Source: Merritt 1967, ch. 3 (orifices in series); elementary geometry.
 from math import inf, pi, sqrt
 from typing import Any
 
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.narrowest_mantle import FIRST, PER_POINT, arc_to, to_line
+from klack.machine.compiling.jit import inner, njit
 
 __all__ = ["acting_area"]
 

@@ -7,7 +7,6 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
 from klack.errors import InputError
 from klack.hydraulics.acting_area import acting_area
 from klack.hydraulics.flow_force import FlowForce
@@ -19,6 +18,7 @@ from klack.hydraulics.orifice import NOT_CHOKED
 from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.seat import gap_pass
 from klack.input.problem import CaseProblem
+from klack.machine.compiling.jit import inner
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function

@@ -22,7 +22,7 @@ from klack.errors import InputError, MissingExtraError
 from klack.hydraulics.fluid_definition import FluidDefinition, FluidState
 from klack.hydraulics.liquid import ATMOSPHERE
 from klack.hydraulics.property_table import CompressedLiquid
-from klack.sourced import Constant
+from klack.materials.sourced import Constant
 
 __all__ = ["coolprop_fluid", "is_coolprop_name"]
 

@@ -19,7 +19,7 @@ from klack.hydraulics.liquid import (
     walther_viscosity,
 )
 from klack.hydraulics.mixture import EntrainedGas, Vapour
-from klack.sourced import Constant
+from klack.materials.sourced import Constant
 
 __all__ = [
     "FixedProperties",

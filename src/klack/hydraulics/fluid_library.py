@@ -14,7 +14,7 @@ from klack.hydraulics.fluid_definition import (
     TaitOil,
 )
 from klack.hydraulics.liquid import PressureRange
-from klack.sourced import Constant, entry_named, require_entry
+from klack.materials.sourced import Constant, entry_named, require_entry
 
 __all__ = ["FLUIDS", "find_fluid", "library_fluid"]
 

@@ -13,9 +13,9 @@ never negative.
 from math import exp, inf, log
 from typing import Any
 
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.orifice import orifice_flow
+from klack.machine.compiling.jit import inner, njit
 from klack.network.step_function import carray, step_function
 
 __all__ = ["GAS", "WALL", "fluid_store_step", "gas_store", "wall_store"]

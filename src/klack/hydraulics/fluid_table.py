@@ -21,11 +21,11 @@ from math import log1p
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner, njit
 from klack.errors import ConvergenceError, require_positive
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.liquid import HIGHEST_PRESSURE, Murnaghan, Tait
 from klack.hydraulics.mixture import LOWEST_PRESSURE
+from klack.machine.compiling.jit import inner, njit
 from klack.network.protocols import NetworkFluid
 
 __all__ = ["fluid_at", "fluid_table", "pressure_at"]

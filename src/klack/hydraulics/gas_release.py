@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
 from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
 from klack.hydraulics.mixture import LOWEST_PRESSURE
+from klack.machine.compiling.jit import njit
 
 __all__ = [
     "NO_RELEASE",

@@ -16,7 +16,7 @@ from math import atan2, cos, hypot, pi, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 
 __all__ = ["guide_film_damping", "guide_film_drag", "guide_film_force", "guide_film_step"]
 

@@ -6,10 +6,10 @@ from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.network_fluid import ambient_viscosity, energy_table, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
+from klack.machine.compiling.jit import inner
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
 from klack.network.rows import Book, Channel, Rows

@@ -31,10 +31,10 @@ its energy.
 from math import exp, sqrt
 from typing import Any
 
-from klack.compiling.jit import njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.line_friction import KAGAWA
 from klack.hydraulics.pipe_friction import root_of
+from klack.machine.compiling.jit import njit
 from klack.network.rows import WAVE_BEGIN, WAVE_STORE
 from klack.network.step_function import shift, step_function
 

@@ -7,7 +7,6 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.line_cells import (
@@ -24,6 +23,7 @@ from klack.hydraulics.line_cells import (
 from klack.hydraulics.liquid import HIGHEST_PRESSURE
 from klack.hydraulics.network_fluid import network_fluid
 from klack.hydraulics.pipe_friction import PipeFriction, laminar_doubts
+from klack.machine.compiling.jit import njit
 from klack.network.protocols import NetworkFluid
 from klack.network.rows import Rows, WaveRow
 from klack.network.step_function import first

@@ -22,7 +22,7 @@ Source: elementary geometry.
 from math import cos, inf, pi, sin, sqrt
 from typing import Any
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 
 __all__ = ["FIRST", "PER_POINT", "arc_to", "narrowest_mantle", "to_line"]
 

@@ -33,9 +33,9 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner, njit
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Section
+from klack.machine.compiling.jit import inner, njit
 from klack.units import Length
 
 __all__ = ["NUMBERS", "Notch", "notch_opening"]

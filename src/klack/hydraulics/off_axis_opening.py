@@ -9,7 +9,7 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 
 __all__ = ["ANGLES", "FLAT", "off_axis_opening"]
 

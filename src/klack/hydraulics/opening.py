@@ -4,8 +4,8 @@ from math import pi, sqrt
 
 from pydantic import Field
 
-from klack.compiling.jit import njit
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow, orifice_flow
+from klack.machine.compiling.jit import njit
 from klack.network.component import Component
 from klack.units import Ratio
 

@@ -6,12 +6,12 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.constant import with_slope_of
-from klack.compiling.jit import njit
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
+from klack.machine.compiling.constant import with_slope_of
+from klack.machine.compiling.jit import njit
 from klack.network.component import Component
 from klack.network.port import FLOW, Port
 from klack.network.rows import Rows

@@ -26,9 +26,9 @@ from math import exp, log, log1p
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.compiling.jit import njit
 from klack.errors import InputError
 from klack.hydraulics.liquid import ATMOSPHERE, HIGHEST_PRESSURE
+from klack.machine.compiling.jit import njit
 
 __all__ = ["PressureViscosity", "mean_viscosity_ratio"]
 

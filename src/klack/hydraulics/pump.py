@@ -6,11 +6,11 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.network_fluid import energy_table, gas_is_slow
 from klack.input.problem import CaseProblem
 from klack.input.section import Count
+from klack.machine.compiling.jit import inner, njit
 from klack.network.component import Component
 from klack.network.port import FLOW, Port, Role
 from klack.network.rows import Book, Channel, Rows

@@ -6,10 +6,10 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import njit
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
 from klack.input.problem import CaseProblem
+from klack.machine.compiling.jit import njit
 from klack.network.port import FLOW, Port
 from klack.network.ranges import value_text
 from klack.network.rows import Channel, Rows

@@ -18,7 +18,7 @@ positive definite.
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 
 __all__ = ["eliminate_ring", "solve_ring"]
 

@@ -6,7 +6,6 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.network_fluid import ambient_viscosity, viscosity_law
 from klack.hydraulics.off_axis_opening import off_axis_opening
@@ -20,6 +19,7 @@ from klack.hydraulics.orifice import (
 from klack.hydraulics.pressure_viscosity import mean_viscosity_ratio
 from klack.hydraulics.seat_across import SeatAcross, SeatPlace
 from klack.input.problem import CaseProblem
+from klack.machine.compiling.jit import inner, njit
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
 from klack.network.port import ELEMENT, FLOW, Port, Role

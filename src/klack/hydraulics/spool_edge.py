@@ -7,7 +7,6 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
 from klack.hydraulics.annulus import eccentricity_factor
 from klack.hydraulics.flow_force import FlowForce
 from klack.hydraulics.network_fluid import fixed_viscosity
@@ -16,6 +15,7 @@ from klack.hydraulics.opening import OpeningComponent
 from klack.hydraulics.orifice import NOT_CHOKED, choked_flow
 from klack.hydraulics.seat import gap_flow, gap_pass
 from klack.input.problem import CaseProblem
+from klack.machine.compiling.jit import inner
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function

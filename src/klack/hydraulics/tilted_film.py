@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner, njit
 from klack.errors import InputError, require_nonnegative, require_positive
 from klack.hydraulics.ring_system import eliminate_ring, solve_ring
+from klack.machine.compiling.jit import inner, njit
 
 __all__ = [
     "Land",

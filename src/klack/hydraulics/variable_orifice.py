@@ -5,10 +5,10 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
 from klack.hydraulics.network_fluid import fixed_viscosity
 from klack.hydraulics.opening import OpeningComponent, opening_flow
 from klack.input.problem import CaseProblem
+from klack.machine.compiling.jit import inner
 from klack.network.port import ELEMENT, FLOW, Port, Role
 from klack.network.rows import Channel, Rows
 from klack.network.step_function import step_function

@@ -19,7 +19,7 @@ Arrays are pointers: ``phi`` and ``change`` have 6 numbers for each magnet, ``hi
 
 from typing import Any
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 from klack.magnetics.coupled_table import (
     CAPACITOR_ROW,
     MAGNET_ROW,

@@ -12,7 +12,7 @@ balance exactly,
 with the work of each source counted by itself.
 """
 
-from klack.compiling.constant import constant
+from klack.machine.compiling.constant import constant
 from klack.magnetics.coupled_piece import (
     coupled_current,
     coupled_discharged,

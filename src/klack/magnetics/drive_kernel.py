@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 
 __all__ = [
     "NEVER",

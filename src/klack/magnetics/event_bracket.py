@@ -3,7 +3,7 @@
 Source: Dowell and Jarratt, BIT 11 (1971) 168, the Illinois rule.
 """
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 
 __all__ = ["LOCATED", "between", "narrowed"]
 

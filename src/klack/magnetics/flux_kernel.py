@@ -20,7 +20,7 @@ All arrays are pointers to ``float64``; ``at`` is the start of the circuit in ``
 from math import sqrt
 from typing import Any
 
-from klack.compiling.jit import inner, intrinsic
+from klack.machine.compiling.jit import inner, intrinsic
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER
 from klack.magnetics.flux_table import MOST_TUBES, SETTLES, STOPS

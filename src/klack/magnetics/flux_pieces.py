@@ -7,7 +7,7 @@ coil (:mod:`klack.magnetics.flux_step`) and that of several windings
 
 from typing import Any
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 from klack.magnetics.drive_kernel import crossed_switch, state_voltage, switch_current
 from klack.magnetics.event_bracket import LOCATED, between, narrowed
 from klack.magnetics.flux_kernel import (

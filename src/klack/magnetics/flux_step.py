@@ -30,8 +30,8 @@ current are.
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from klack.compiling.constant import constant
 from klack.errors import InputError, require_positive
+from klack.machine.compiling.constant import constant
 from klack.magnetics.circuit import MagneticCircuit
 from klack.magnetics.drive_kernel import due_switch, next_time, state_block
 from klack.magnetics.driver import DriveProgram

@@ -6,7 +6,7 @@ from functools import cache
 from types import MappingProxyType
 
 from klack.magnetics.iron import IronCurve, rational_curve
-from klack.sourced import require_entry
+from klack.materials.sourced import require_entry
 
 __all__ = ["IRON_LIBRARY", "IronEntry", "iron_curve"]
 

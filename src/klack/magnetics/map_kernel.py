@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_table import BRANCH_SIZE, HEADER, MAP
 

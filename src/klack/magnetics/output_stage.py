@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 
 __all__ = [
     "STAGE_HEADER",

@@ -8,8 +8,8 @@ general step.
 
 from typing import Any
 
-from klack.compiling.constant import constant
-from klack.compiling.jit import inner
+from klack.machine.compiling.constant import constant
+from klack.machine.compiling.jit import inner
 from klack.magnetics.drive_kernel import due_switch, next_time, state_block
 from klack.magnetics.flux_table import BRANCH_SIZE as _SIZE
 from klack.magnetics.flux_table import HEADER as _HEADER

@@ -12,7 +12,7 @@ part ``[stops n, width table]`` and ``n`` pairs of stiffness and share.
 
 from typing import Any
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 
 __all__ = ["stops_end", "stops_energy", "stops_mean", "stops_move"]
 

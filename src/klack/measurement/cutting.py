@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from klack.errors import InputError
 from klack.measurement.channels import Role, Trigger
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "Piece",

@@ -17,9 +17,9 @@ import scipy
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError
-from klack.low_pass import low_passed
 from klack.measurement.channels import LiftSensor, Trigger
 from klack.measurement.time_base import uniform_step
+from klack.signals.low_pass import low_passed
 
 __all__ = [
     "recorded_stroke",
@@ -37,7 +37,7 @@ def sense(
     """Lift as the sensor shows it [m].
 
     The low pass is solved exactly for a motion that runs straight between the samples, at any
-    step (:mod:`klack.low_pass`); before the first sample the valve is taken to rest there.
+    step (:mod:`klack.signals.low_pass`); before the first sample the valve is taken to rest there.
 
     Parameters
     ----------

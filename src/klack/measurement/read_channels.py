@@ -16,7 +16,7 @@ from klack.measurement.channels import ROLES, Role
 from klack.measurement.find_channels import FoundChannel
 from klack.measurement.recording import Recording
 from klack.measurement.time_base import TimeBase
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["CommonTime", "common_time", "read_channels", "windows"]
 

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.closing import Closing
 from klack.errors import InputError
+from klack.files.closing import Closing
 from klack.input.section import refuse_lfs_pointer
 from klack.measurement.time_base import TimeBase, survey_time
 

@@ -6,6 +6,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import InputError
 from klack.input.problem import CaseProblem, nearest, one_of
 from klack.input.section import Name
@@ -13,7 +14,6 @@ from klack.mechanics.rigid_mass import RigidMass
 from klack.network.component import Component
 from klack.network.port import MOTION, Port
 from klack.network.rows import Rows
-from klack.reduction.reduced_body import ReducedBody
 from klack.units import Speed
 
 __all__ = ["FlexibleBody"]

@@ -17,7 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from klack.closing import Closing
+from klack.files.closing import Closing
 from klack.mechanics import fmu_child
 from klack.mechanics.fmu_child import ANSWER, request
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 from klack.mechanics.friction import require_breakaway
 from klack.mechanics.relaxation import relaxed
 from klack.network.component import Component

@@ -9,9 +9,9 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
 from klack.input.problem import CaseProblem
 from klack.input.section import Number
+from klack.machine.compiling.jit import inner
 from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, LimitRow, Rows

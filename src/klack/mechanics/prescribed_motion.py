@@ -9,13 +9,13 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import InputError
 from klack.input.problem import CaseProblem
 from klack.input.section import InputPath, Name, Text
 from klack.network.component import Component
 from klack.network.port import MOTION, Port
 from klack.network.rows import MotionCourse, Rows
-from klack.reduction.reduced_body import ReducedBody
 from klack.units import LENGTH, TIME, Length, Time, parse_quantity
 
 __all__ = ["PrescribedMotion"]

@@ -11,7 +11,7 @@ Stable at any step: for :math:`x \to \infty` the force follows its drive.
 
 from math import exp, expm1
 
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 
 __all__ = ["relaxed"]
 

@@ -7,12 +7,12 @@ from typing import ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.input.problem import CaseProblem
 from klack.input.section import Name
 from klack.network.component import Component
 from klack.network.port import MOTION, Port
 from klack.network.rows import Rows
-from klack.reduction.reduced_body import ReducedBody
 from klack.units import Mass, Speed
 
 __all__ = ["RigidMass"]

@@ -7,9 +7,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, model_validator
 
-from klack.compiling.jit import inner
 from klack.input.problem import CaseProblem
 from klack.input.section import Number, Section
+from klack.machine.compiling.jit import inner
 from klack.mechanics.nonlinear_spring import (
     HIGHEST_POWER,
     curve_mean,

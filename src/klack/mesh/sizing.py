@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError, require_nonnegative, require_positive
-from klack.memory import available_memory, require_memory
+from klack.machine.memory import available_memory, require_memory
 from klack.units import format_si
 
 __all__ = [

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import InputError, refuse
-from klack.memory import require_memory
+from klack.machine.memory import require_memory
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.quality import require_positive_jacobians

@@ -79,12 +79,12 @@ COMPONENTS = (
     ("pressure-loss", "klack.hydraulics.pressure_loss.PressureLoss"),
     ("pipe-friction", "klack.hydraulics.pipe_friction.PipeFriction"),
     # pneumatics
-    ("gas-chamber", "klack.pneumatics.gas_chamber.GasChamber"),
-    ("gas-source", "klack.pneumatics.gas_source.GasSource"),
-    ("gas-orifice", "klack.pneumatics.gas_orifice.GasOrifice"),
-    ("gas-valve", "klack.pneumatics.gas_valve.GasValve"),
-    ("gas-gap", "klack.pneumatics.gas_gap.GasGap"),
-    ("gas-face", "klack.pneumatics.gas_face.GasFace"),
+    ("gas-chamber", "klack.hydraulics.gas.gas_chamber.GasChamber"),
+    ("gas-source", "klack.hydraulics.gas.gas_source.GasSource"),
+    ("gas-orifice", "klack.hydraulics.gas.gas_orifice.GasOrifice"),
+    ("gas-valve", "klack.hydraulics.gas.gas_valve.GasValve"),
+    ("gas-gap", "klack.hydraulics.gas.gas_gap.GasGap"),
+    ("gas-face", "klack.hydraulics.gas.gas_face.GasFace"),
     # magnetics and drivers
     ("solenoid", "klack.magnetics.solenoid.Solenoid"),
     ("magnetic-network", "klack.magnetics.magnetic_network.MagneticNetwork"),
@@ -109,7 +109,7 @@ COMPONENTS = (
 """Type and dotted path of the class, for each component type."""
 
 _FLUID = "klack.hydraulics.fluid_choice.FluidChoice"
-_GAS = "klack.pneumatics.gas_choice.GasChoice"
+_GAS = "klack.hydraulics.gas.gas_choice.GasChoice"
 
 
 def type_words() -> tuple[str, ...]:

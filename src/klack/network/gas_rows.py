@@ -54,7 +54,7 @@ class GasBranchRow:
     a, b : int
         Handles of nodes.
     law : tuple of 6 floats
-        See :func:`klack.pneumatics.flow_law.flow_through`.
+        See :func:`klack.hydraulics.gas.flow_law.flow_through`.
     lift : (int, int) or None
         Handles of the ports whose distance opens it.
     table : array, shape (2, n)

@@ -19,7 +19,7 @@ from klack.network.protocols import InterfaceLaw, NetworkFluid, NetworkGas, Runn
 from klack.network.step_function import StepFunction
 
 if TYPE_CHECKING:
-    from klack.reduction.reduced_body import ReducedBody
+    from klack.bodies.reduction.reduced_body import ReducedBody
 
 __all__ = [
     "AMBIENT",

@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Vector
-from klack.compiling.jit import Marked, intrinsic, njit
+from klack.machine.compiling.jit import Marked, intrinsic, njit
 
 __all__ = [
     "StepFunction",

@@ -14,13 +14,13 @@ from zlib import ZLIB_RUNTIME_VERSION
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from plotly.offline import get_plotlyjs, get_plotlyjs_version
 
-from klack.cache.entry import bytes_of_entry, entry_of_bytes
-from klack.cache.remember import remembered
-from klack.cache.result_cache import result_cache
+from klack.files.whole import whole_file
+from klack.machine.cache.entry import bytes_of_entry, entry_of_bytes
+from klack.machine.cache.remember import remembered
+from klack.machine.cache.result_cache import result_cache
 from klack.report.interactive import figure_of
 from klack.report.page import Content
 from klack.report.spoken import spoken
-from klack.whole_file import whole_file
 
 __all__ = ["render_html", "write_report"]
 

@@ -16,12 +16,12 @@ from xml.etree import ElementTree
 
 import typst
 
-from klack.cache.entry import bytes_of_entry, entry_of_bytes
-from klack.cache.remember import remembered
-from klack.cache.result_cache import result_cache
+from klack.files.whole import whole_file
+from klack.machine.cache.entry import bytes_of_entry, entry_of_bytes
+from klack.machine.cache.remember import remembered
+from klack.machine.cache.result_cache import result_cache
 from klack.report.chart import AnyChart
 from klack.report.page import Content, Section
-from klack.whole_file import whole_file
 
 __all__ = ["render_pdf", "write_pdf"]
 

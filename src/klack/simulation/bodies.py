@@ -1,7 +1,7 @@
 """Bodies that need no finite elements: rigid mass, immovable wall, elastic rod.
 
-They are :class:`klack.reduction.reduced_body.ReducedBody` objects like any other, so the lumped
-level and the exact one-dimensional tests run through the same code as a reduced valve.
+They are :class:`klack.bodies.reduction.reduced_body.ReducedBody` objects like any other, so the
+lumped level and the exact one-dimensional tests run through the same code as a reduced valve.
 """
 
 from math import pi, sqrt
@@ -9,8 +9,8 @@ from typing import Literal
 
 import numpy as np
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.errors import InputError, require_nonnegative, require_positive
-from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["fixed_body", "rigid_mass_body", "rod_body"]
 

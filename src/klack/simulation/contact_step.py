@@ -16,7 +16,6 @@ from math import sqrt
 import numpy as np
 
 from klack.arrays import Vector
-from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     FORCE_LEFT,
     HERTZ_EQUAL,
@@ -31,6 +30,7 @@ from klack.contact.step_constants import (
     STEP_LEFT,
     TOUCH,
 )
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.lasting_laws import rubbing_mean, rubbing_store, yielding_mean, yielding_store
 from klack.simulation.phase import compiled
 

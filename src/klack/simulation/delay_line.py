@@ -32,8 +32,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from klack.arrays import Ints, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.errors import InputError
+from klack.machine.compiling.jit import inner, njit
 from klack.network.rows import LineRow
 from klack.network.step_function import first, shift
 from klack.units import format_si

@@ -20,15 +20,15 @@ from math import pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from klack import energy_balance
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.step_constants import LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import ConvergenceError, InputError, require_positive
-from klack.finite import require_finite
 from klack.network.protocols import InterfaceLaw
-from klack.reduction.reduced_body import ReducedBody
+from klack.simulation import energy_balance
 from klack.simulation.contact_step import law_potential
+from klack.simulation.finite import require_finite
 from klack.simulation.kernel import (
     STATUS_FINE,
     Contacts,
@@ -380,7 +380,7 @@ def simulate(
     Warns
     -----
     AccuracyWarning
-        When the energy balance does not close to 1e-9 (:mod:`klack.energy_balance`).
+        When the energy balance does not close to 1e-9 (:mod:`klack.simulation.energy_balance`).
     """
     require_positive("simulate: step", step, "s")
     require_positive("simulate: duration", duration, "s")

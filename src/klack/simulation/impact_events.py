@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from klack.arrays import Vector
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 from klack.network.rows import GROUND, BodyRow, Rows
 from klack.simulation.network_interfaces import FORCE_ROUND_OFF
 from klack.simulation.network_result import ChannelData, ImpactEvent

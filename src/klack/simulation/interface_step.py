@@ -34,7 +34,6 @@ from math import log
 import numpy as np
 
 from klack.arrays import Vector
-from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     FILM_NEWTON_LIMIT,
     FORCE_LEFT,
@@ -47,6 +46,7 @@ from klack.contact.step_constants import (
     RUBBED_LEFT,
     STEP_LEFT,
 )
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.contact_step import law_potential, mean_force, solve_linear, solve_step
 
 __all__ = ["film_force", "interface_store", "open_film", "solve_interface"]

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Index, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import LEAST_WAY, SEPARATED, SETTLED, SWEEPS
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.contact_step import law_potential, solve_step
 from klack.simulation.phase import compiled, phase
 

@@ -33,7 +33,7 @@ Behind the two sizes of its tables, the numbers of the law are the largest inden
 from math import sqrt
 
 from klack.arrays import Vector
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 
 __all__ = [
     "begin_faces",

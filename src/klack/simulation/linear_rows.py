@@ -1,7 +1,7 @@
 r"""Elements and branches as linear laws about a state: the limit of their own step functions.
 
 A step function maps states, displacements and pressures of a step of length :math:`h` to forces,
-flows and next states.  Its exact derivatives (:mod:`klack.compiling.tangent_number`),
+flows and next states.  Its exact derivatives (:mod:`klack.machine.compiling.tangent_number`),
 
 .. math:: s_1 = P s_0 + Q_0 y_0 + Q_1 y_1 + Q_p p, \qquad
           f = R s_0 + T_0 y_0 + T_1 y_1 + T_p p,
@@ -25,8 +25,8 @@ import scipy
 from numba.core.errors import NumbaError
 
 from klack.arrays import Matrix, Vector
-from klack.compiling.jit import njit
 from klack.errors import ConvergenceError, InputError
+from klack.machine.compiling.jit import njit
 from klack.network.rows import BranchRow, ElementRow
 from klack.network.step_function import address_of, call, first, is_step_function
 from klack.simulation.tangent_loop import LANES, lanes_of, tangent_address

@@ -15,7 +15,7 @@ for each number of ports, because a loop over ports inside the loop over modes w
 
 from typing import Any
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.kernel import FAST
 
 __all__ = [

@@ -7,6 +7,7 @@ from math import ceil
 import numpy as np
 
 from klack.arrays import Index, Vector
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.step_constants import LAW_YIELDING, NO_LAW
 from klack.errors import InputError
 from klack.hydraulics.fluid import Fluid
@@ -14,7 +15,6 @@ from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.gas_release import NO_RELEASE, release_numbers
 from klack.network.rows import GROUND, BodyRow, BranchRow, ElementRow, Rows
 from klack.network.step_function import address_of
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import Lines, LineState, compile_lines, start_lines
 from klack.simulation.lasting_laws import settle
 from klack.simulation.modal_step import (

@@ -13,7 +13,6 @@ at equilibrium.  The next step begins with these shares.
 from math import expm1
 from typing import Any
 
-from klack.compiling.jit import inner
 from klack.errors import InputError
 from klack.hydraulics.fluid_store import fluid_store_step
 from klack.hydraulics.fluid_table import fluid_at
@@ -24,6 +23,7 @@ from klack.hydraulics.gas_release import (
     settled_share,
     share_moved,
 )
+from klack.machine.compiling.jit import inner
 from klack.network.rows import Rows
 from klack.simulation.network_arrays import Nodes, NodeState
 from klack.simulation.phase import compiled

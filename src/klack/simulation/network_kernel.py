@@ -22,7 +22,7 @@ with elements and fluid in each of them, repeated until nothing moves any more.
 from typing import Any, NamedTuple
 
 from klack.arrays import Index, Matrix, Vector
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import Lines, LineState, lines_commit, lines_incoming
 from klack.simulation.network_arrays import (

@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.fluid_table import fluid_at, pressure_at
+from klack.machine.compiling.jit import inner, njit
 from klack.network.step_function import shift
 from klack.simulation.network_arrays import ANSWER, AT_ONCE, FINE, SEEN, STORE, Y1, Step
 from klack.simulation.network_gas import (

@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.network.step_function import pointers
 from klack.simulation.network_arrays import FINE, NetworkArrays, Recording
 from klack.simulation.network_ports import drive_force, port_speed

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from klack.arrays import Matrix, Vector
 from klack.contact.step_constants import NO_LAW
 from klack.hydraulics.fluid import Fluid
-from klack.memory import require_memory
+from klack.machine.memory import require_memory
 from klack.network.rows import BranchRow, Channel, ElementRow, Rows
 from klack.simulation.contact_step import mean_force
 from klack.simulation.flow_channels import flow_label

@@ -10,7 +10,6 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from klack import energy_balance
 from klack.arrays import Vector
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
@@ -18,6 +17,7 @@ from klack.errors import AccuracyWarning, ConvergenceError, InputError, require_
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.accuracy import Accuracy
 from klack.network.rows import BranchRow, ElementRow, Rows
+from klack.simulation import energy_balance
 from klack.simulation.control_loop import ControlLoop
 from klack.simulation.delay_line import LINE_MEMORY
 from klack.simulation.impact_doubts import impact_doubts, line_doubts
@@ -160,8 +160,8 @@ def simulate_network(
     -----
     AccuracyWarning
         When the energy balance does not close to 1e-6 of :attr:`EnergyBooks.scale`
-        (:mod:`klack.energy_balance`), and when the steps do not resolve the peak force of the
-        first impact on a stop to 0.05 %, or its time to 0.05 us
+        (:mod:`klack.simulation.energy_balance`), and when the steps do not resolve the peak force
+        of the first impact on a stop to 0.05 %, or its time to 0.05 us
         (:mod:`klack.simulation.impact_doubts`).
     """
     for name, value in (("duration", duration), ("step", step), ("record", record)):

@@ -28,7 +28,7 @@ impulse below :math:`F_s h`.
 from math import exp
 from typing import Any
 
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.simulation.network_arrays import AHEAD, BEGIN, FORCE, KEPT_SLIDER, PORTS, Y1, Step
 from klack.simulation.network_ports import move_body, port_speed
 from klack.simulation.phase import phase

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from klack.arrays import Floats
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.laws import LinearLaw
 from klack.errors import InputError, require_positive
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.contact_step import solve_step
 from klack.simulation.propagator import modal_propagator
 

@@ -1,6 +1,6 @@
 """The decorator of the parts that a compiled time loop is made of."""
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 
 __all__ = [
     "STATUS_BRANCH",

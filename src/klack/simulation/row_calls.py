@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from klack.arrays import Vector
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.network.step_function import call, first, pointers, shift
 from klack.simulation.network_arrays import ANSWER, FINE, SEEN, STORE, Y1, Step, StepRows
 from klack.simulation.phase import STATUS_DONE, STATUS_ELEMENT, STATUS_REFUSED, phase

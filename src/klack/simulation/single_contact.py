@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Cube, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import (
     LAW_LINEAR,
     LAW_RUBBING,
@@ -20,6 +19,7 @@ from klack.contact.step_constants import (
     LEAST_WAY,
     SEPARATED,
 )
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.contact_step import solve_linear, solve_step
 from klack.simulation.kernel import (
     FAST,

@@ -8,7 +8,7 @@ takes over.
 """
 
 from klack.arrays import Vector
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.network.step_function import first, pointers, shift
 from klack.simulation.delay_line import lines_commit, lines_incoming
 from klack.simulation.network_arrays import (

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Index, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.contact.step_constants import LAW_RUBBING, NO_LAW
 from klack.hydraulics.fluid_table import fluid_at
+from klack.machine.compiling.jit import inner, njit
 from klack.network.step_function import first, pointers
 from klack.simulation.contact_step import mean_force
 from klack.simulation.lasting_laws import closing_force

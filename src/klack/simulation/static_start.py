@@ -32,12 +32,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Index, Matrix, Vector
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid_table import fluid_at
 from klack.network.ranges import Travel, range_text, value_text
 from klack.network.rows import BranchRow, LimitRow, LineRow, WaveRow
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.delay_line import start_lines
 from klack.simulation.lasting_laws import begin_faces, begin_sliders
 from klack.simulation.modal_step import ROW, ROW_Q

@@ -5,11 +5,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import InputError, require_nonnegative
 from klack.network.protocols import InterfaceLaw
-from klack.reduction.reduced_body import ReducedBody
 
 __all__ = ["AxialForce", "ContactPair", "ReducedSystem", "ReturnSpring"]
 

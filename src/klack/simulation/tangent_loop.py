@@ -6,8 +6,8 @@ import numpy as np
 from numba import types
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
-from klack.compiling.tangent_number import tangent_number, with_tangents
+from klack.machine.compiling.jit import njit
+from klack.machine.compiling.tangent_number import tangent_number, with_tangents
 from klack.network.step_function import StepFunction
 from klack.simulation.network_kernel import run_network
 from klack.simulation.network_record import record_moment

@@ -1,8 +1,8 @@
 r"""Run a network together with its derivatives in some directions: what would change, and how much.
 
 The compiled time loop runs on numbers that carry derivatives
-(:mod:`klack.compiling.tangent_number`).  All of it is differentiated but for its decisions, which
-are those of the run itself.
+(:mod:`klack.machine.compiling.tangent_number`).  All of it is differentiated but for its decisions,
+which are those of the run itself.
 
 **Steps follow the touches.**  A step cannot see when within it a body touches: impacts begin with
 an error that depends on this phase, a saw-tooth of nothing as high as :math:`10^{-5}` and as narrow
@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.errors import ConvergenceError, InputError
-from klack.memory import require_memory
+from klack.machine.memory import require_memory
 from klack.network.accuracy import Accuracy
 from klack.network.rows import Rows
 from klack.simulation.impact_events import ImpactFinder

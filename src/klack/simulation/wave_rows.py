@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from klack.arrays import Index, Vector
-from klack.compiling.jit import inner
 from klack.errors import InputError
+from klack.machine.compiling.jit import inner
 from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE, WaveRow
 from klack.network.step_function import address_of, call, evaluate, first, shift
 from klack.units import format_si

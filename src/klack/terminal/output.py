@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, Self
 
 from klack.errors import InputError
-from klack.held_folder import Mark
-from klack.own_file import planted
-from klack.whole_file import whole_file, whole_files
+from klack.files.held import Mark
+from klack.files.own import planted
+from klack.files.whole import whole_file, whole_files
 
 __all__ = [
     "Written",

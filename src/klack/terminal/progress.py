@@ -14,7 +14,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from klack.progress import PointCount, Progress, silent
+from klack.machine.progress import PointCount, Progress, silent
 
 __all__ = ["PROGRESS_FILE", "show_progress"]
 

@@ -7,7 +7,7 @@ point that opens takes a row out, each at the cost of one product with it.
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import ActiveSet
 

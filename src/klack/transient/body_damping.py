@@ -5,7 +5,7 @@ r"""Viscous damping of a body with every degree of freedom, as the reduced level
 
 with mass-normalised modes :math:`\varphi_i` and rigid modes *R*: a damping ratio for each of a few
 modes is a matrix of low rank, Rayleigh damping a sparse one.  Rigid motion is never damped, as in
-:mod:`klack.reduction.damping`.
+:mod:`klack.bodies.reduction.damping`.
 
 A step of the full order solves :math:`(S + Z D Z^T) x = b + G^T \lambda` with a sparse *S* and the
 thin :math:`Z`.  With :math:`Y = S^{-1} Z` and :math:`P = (D^{-1} + Z^T Y)^{-1}` (Woodbury)
@@ -16,7 +16,7 @@ thin :math:`Z`.  With :math:`Y = S^{-1} Z` and :math:`P = (D^{-1} + Z^T Y)^{-1}`
 which costs two thin products beside the solve with *S*.
 
 A non-reflecting end adds the sparse matrix of its dashpots
-(:func:`klack.elasticity.loads.face_dashpots`), which brakes rigid motion as well: the body
+(:func:`klack.bodies.elasticity.loads.face_dashpots`), which brakes rigid motion as well: the body
 continues beyond that face.
 """
 
@@ -27,11 +27,11 @@ import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.factorization import Factorization
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.factorization import Factorization
+from klack.bodies.reduction.damping import Damping, RayleighDamping
 from klack.errors import require_nonnegative
-from klack.reduction.damping import Damping, RayleighDamping
 from klack.transient.interface_solve import InterfaceSolve
 
 __all__ = ["BodyDamping", "DampingMatrix", "LowRankSolve", "body_damping"]

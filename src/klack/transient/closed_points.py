@@ -18,7 +18,7 @@ has to shrink what the equations are missed by.
 import numpy as np
 
 from klack.arrays import Matrix, Vector
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 from klack.simulation.kernel import FAST
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Closed

@@ -29,10 +29,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, diags_array, eye_array, kron, vstack
 
 from klack.arrays import Floats
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.condensation import condensed_inverse
-from klack.elasticity.eigen import Modes
-from klack.elasticity.factorization import Backend, Factorization, Precision, factorize
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.condensation import condensed_inverse
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.factorization import Backend, Factorization, Precision, factorize
 from klack.errors import InputError
 from klack.transient.body_damping import BodyDamping, DampingMatrix, LowRankSolve
 from klack.transient.interface_solve import InterfaceSolve, interface_solve

@@ -52,18 +52,18 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from klack import energy_balance
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.factorization import Backend, Precision
 from klack.contact.asperity_layer import AsperityLayer, press
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
-from klack.cores import share_of
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.factorization import Backend, Precision
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
-from klack.finite import require_finite
+from klack.machine.cores import share_of
+from klack.simulation import energy_balance
+from klack.simulation.finite import require_finite
 from klack.transient.body_damping import BodyDamping
 from klack.transient.full_body import FullBody, KnownBody, Scheme, open_gaps
 from klack.transient.result import (
@@ -207,7 +207,7 @@ def simulate_full_order(
     -----
     AccuracyWarning
         When the energy balance, numerical losses included, does not close to 1e-9
-        (:mod:`klack.energy_balance`).
+        (:mod:`klack.simulation.energy_balance`).
     """
     require_positive("simulate_full_order: speed", speed, "m/s")
     require_positive("simulate_full_order: duration", duration, "s")

@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.ring_points import RingSections
-from klack.elasticity.statics import Flexibility
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.ring_points import RingSections
+from klack.bodies.elasticity.statics import Flexibility
 from klack.errors import InputError, require_nonnegative, require_positive
 from klack.mesh.mesh import Mesh
 from klack.transient.interface_arrays import Guide

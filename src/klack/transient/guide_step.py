@@ -41,8 +41,8 @@ from typing import NamedTuple
 import numpy as np
 
 from klack.arrays import Cube, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.guide_film import guide_film_step
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Films, Guide, Modes, State, Step
 

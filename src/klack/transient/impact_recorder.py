@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from klack.arrays import Cube, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.tilted_film import SectorFilm
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.network_arrays import Recording, Scratch
 from klack.simulation.network_compile import CompiledNetwork
 from klack.simulation.spatial_impact import FilmLand, FilmMoments, ModalMoments, SpatialImpact

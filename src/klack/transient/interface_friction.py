@@ -41,7 +41,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Vector
-from klack.compiling.jit import inner
+from klack.machine.compiling.jit import inner
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import (
     FRICTION,

@@ -48,7 +48,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Matrix, Vector
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import solve_active
 from klack.transient.guide_step import begin_rub, count_bearing, no_rub, rub_guide, squeeze_guide

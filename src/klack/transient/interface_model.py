@@ -31,15 +31,15 @@ import scipy
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, vstack
 
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_friction import FaceFriction, lifted_offset
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import contact_compliance
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.errors import ConvergenceError, InputError
 
 __all__ = [

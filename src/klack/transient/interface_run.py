@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from klack import energy_balance
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
 from klack.contact.statics import ReachError
 from klack.errors import ConvergenceError, InputError, require_nonnegative, require_positive
-from klack.finite import require_finite
+from klack.simulation import energy_balance
+from klack.simulation.finite import require_finite
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.transient.interface_arrays import (
     CONTACT_STEPS,
@@ -157,7 +157,7 @@ def simulate_interface(
     Warns
     -----
     AccuracyWarning
-        When the energy balance does not close to 1e-3 (:mod:`klack.energy_balance`).
+        When the energy balance does not close to 1e-3 (:mod:`klack.simulation.energy_balance`).
     """
     require_nonnegative("simulate_interface: speed", speed, "m/s")
     require_positive("simulate_interface: duration", duration, "s")

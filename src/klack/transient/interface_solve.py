@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from klack.elasticity.condensation import Halves, reached_rows
-from klack.elasticity.factorization import Factorization
+from klack.bodies.elasticity.condensation import Halves, reached_rows
+from klack.bodies.elasticity.factorization import Factorization
 
 __all__ = ["InterfaceSolve", "SplitSolve", "WholeSolve", "interface_solve"]
 

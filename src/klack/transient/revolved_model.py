@@ -3,9 +3,9 @@
 Bodies of revolution at the points of rings: modes and statics of all Fourier orders.
 
 A body that is hit on one side of its seat moves in every order.  Its orders do not couple
-(:mod:`klack.elasticity.fourier_body`), so it is taken apart: rigid motions and modes of the lowest
-frequencies, whatever their order, and of every order that the points resolve the static compliance.
-Orders without a mode are there with their statics alone.
+(:mod:`klack.bodies.elasticity.fourier_body`), so it is taken apart: rigid motions and modes of the
+lowest frequencies, whatever their order, and of every order that the points resolve the static
+compliance. Orders without a mode are there with their statics alone.
 
 What comes out, :class:`RevolvedPoints`, is what the interface level takes of a solid body, without
 a mesh of it: :func:`klack.transient.interface_model.model_at_points` puts two or three together.
@@ -22,21 +22,21 @@ from scipy.sparse import csr_array, vstack
 from threadpoolctl import threadpool_limits
 
 from klack.arrays import Floats
-from klack.cache.result_cache import ResultCache
-from klack.contact.face_friction import lifted_offset
-from klack.contact.rings import RingFriction, RingSpace
-from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.fourier_body import FourierBody
-from klack.elasticity.ring_points import (
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.fourier_body import FourierBody
+from klack.bodies.elasticity.ring_points import (
     RingPoints,
     RingRows,
     RingSections,
     resolved_orders,
     share_of_order,
 )
-from klack.elasticity.statics import Flexibility
+from klack.bodies.elasticity.statics import Flexibility
+from klack.contact.face_friction import lifted_offset
+from klack.contact.rings import RingFriction, RingSpace
 from klack.errors import InputError
-from klack.memory import require_memory
+from klack.machine.cache.result_cache import ResultCache
+from klack.machine.memory import require_memory
 from klack.transient.interface_model import (
     InterfaceModel,
     PointBody,
@@ -141,7 +141,7 @@ def reduce_revolved(
     sections : RingSections, optional
         That are read as well.
     cache : ResultCache, optional
-        As of :class:`klack.elasticity.statics.Flexibility`.
+        As of :class:`klack.bodies.elasticity.statics.Flexibility`.
     """
     sums = _Orders(rows, points, loads, sections)
     pairs = _Pairs(others, below, (points.count - 1) // 2)
@@ -379,7 +379,7 @@ def reduced_bodies(
     contacts : sequence of RingContact
         All with the same number of angles.
     cache : ResultCache, optional
-        As of :class:`klack.elasticity.statics.Flexibility`.
+        As of :class:`klack.bodies.elasticity.statics.Flexibility`.
     """
     ways = {contact.ways for contact in contacts}
     if len(ways) > 1:

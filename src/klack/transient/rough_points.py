@@ -16,7 +16,7 @@ it still leads downhill, so the inverse is kept from step to step while the ener
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.phase import phase
 from klack.transient.interface_arrays import Layer, Pressed
 

@@ -43,10 +43,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Ints, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.contact.face_friction import with_still_directions
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, InputError
+from klack.machine.compiling.jit import inner, njit
 from klack.simulation.kernel import FAST
 from klack.simulation.phase import phase
 from klack.transient.closed_points import (

@@ -22,8 +22,8 @@ from math import pi
 import numpy as np
 
 from klack.arrays import Floats, Matrix, Vector
-from klack.compiling.jit import inner, njit
 from klack.hydraulics.tilted_film import Land, SectorFilm, film_pressure, film_slopes
+from klack.machine.compiling.jit import inner, njit
 from klack.network.rows import FilmRow
 from klack.transient.interface_arrays import Films, Guide, Modes, State
 from klack.transient.interface_model import InterfaceModel

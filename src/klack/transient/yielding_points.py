@@ -16,7 +16,7 @@ have not settled it.
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.simulation.phase import phase
 from klack.transient.active_set import rebuild, solve_active
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from klack.case.any_case import read_valve_case
+from klack.case.expressions.expression import Expression
 from klack.case.valve import ValveCase
-from klack.expressions.expression import Expression
 from klack.simulation.network_run import simulate_network
 from klack.verification.check import Check, check
 

@@ -6,13 +6,13 @@ from itertools import product
 
 import numpy as np
 
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.complementarity import solve_lcp
 from klack.contact.local_law import consistent_law
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.pairing import face_geometry, project_to_surface
 from klack.contact.statics import StaticContact, contact_compliance, static_contact
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.statics import Flexibility
 from klack.mesh.mesh import Mesh
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.lattice import STEEL, lattice_mesh

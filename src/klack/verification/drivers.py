@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import expm
 from scipy.special import jn_zeros
 
-from klack.compiling.jit import njit
 from klack.errors import ConvergenceError
+from klack.machine.compiling.jit import njit
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import DriveProgram
 from klack.magnetics.eddy import cylinder_ladder

@@ -6,14 +6,14 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.sparse import csr_array, eye_array, kron
 
-from klack.elasticity.assembly import assemble, assemble_order
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.eigen import eigenmodes, rigid_frequencies
-from klack.elasticity.factorization import available_backends
-from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.loads import order_load, traction_load
-from klack.elasticity.statics import Flexibility
-from klack.materials import Material
+from klack.bodies.elasticity.assembly import assemble, assemble_order
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
+from klack.bodies.elasticity.factorization import available_backends
+from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
+from klack.bodies.elasticity.loads import order_load, traction_load
+from klack.bodies.elasticity.statics import Flexibility
+from klack.materials.material import Material
 from klack.mesh.mesh import Mesh
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.lattice import STEEL, lattice_mesh

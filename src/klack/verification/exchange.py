@@ -16,22 +16,22 @@ from typing import Literal
 import numpy as np
 
 from klack import __version__
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.given_matrices import body_of_matrices
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.given_matrices import body_of_matrices
+from klack.bodies.model_files.reduced_models import read_state_space
+from klack.bodies.model_files.system import on_nodes, read_system
+from klack.bodies.reduction.from_state_space import body_of_state_space
+from klack.bodies.reduction.reduced_body import ReducedBody, StateSpace
 from klack.errors import ConvergenceError
 from klack.exchange.modal_model import ModalModel, Provenance, body_model, pair_model
-from klack.materials import Material
+from klack.input.unit_systems import unit_system
+from klack.materials.material import Material
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.mesh import Mesh
-from klack.model_files.reduced_models import read_state_space
-from klack.model_files.system import on_nodes, read_system
-from klack.reduction.from_state_space import body_of_state_space
-from klack.reduction.reduced_body import ReducedBody, StateSpace
 from klack.simulation.bodies import rod_body
 from klack.simulation.impact import simulate
 from klack.simulation.system import ReducedSystem
-from klack.unit_systems import unit_system
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.exchange_files import (
     MATRIX_WRITERS,

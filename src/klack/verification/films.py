@@ -5,12 +5,12 @@ from math import cos, pi, sin
 import numpy as np
 from scipy.integrate import quad
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.laws import HuntCrossley, LinearLaw, gonthier_coefficient
 from klack.hydraulics.film import ConeFilm, DiscFilm, RingFilm, flow_factor, mean_flow_factor
 from klack.hydraulics.guide_film import guide_film_force
 from klack.hydraulics.tilted_film import SectorFilm, sector_film, sector_forces, sector_step
 from klack.network.rows import FilmRow
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.verification.check import Check, ComparedCurve, check

@@ -7,7 +7,7 @@ from math import cos, pi, radians, sin, sqrt, tan
 import numpy as np
 
 from klack.contact.friction import Friction
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.transient.interface_arrays import Closed
 from klack.transient.interface_model import InterfaceContact
 from klack.transient.interface_run import simulate_interface

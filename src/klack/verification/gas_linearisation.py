@@ -8,12 +8,12 @@ import numpy as np
 from scipy.linalg import expm
 
 from klack.analyses.linearisation.loops import gas_drives
+from klack.hydraulics.gas.gas_library import library_gas
+from klack.hydraulics.gas.gas_source import GasSource
 from klack.hydraulics.pressure_history import PressureStep
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import Rows
-from klack.pneumatics.gas_library import library_gas
-from klack.pneumatics.gas_source import GasSource
 from klack.simulation.linear_network import linear_network
 from klack.simulation.linear_system import LinearSystem, transfer
 from klack.simulation.network_run import simulate_network

@@ -20,7 +20,7 @@ from math import cos, gamma, inf, pi, radians, sin, sqrt
 import numpy as np
 
 from klack.contact.friction import Friction
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_run import simulate_interface
 from klack.verification.check import Check, ComparedCurve, check

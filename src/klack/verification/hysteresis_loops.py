@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from klack.compiling.jit import njit
+from klack.machine.compiling.jit import njit
 from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.hysteresis import (
     STOPS_PER_PART,

@@ -6,12 +6,12 @@ from math import exp, inf, pi, sqrt
 
 import numpy as np
 
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.complementarity import solve_lcp
 from klack.contact.restitution import find_contacts, measure_impact
-from klack.elasticity.body import elastic_body
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.mesh.rigid import rotation_matrix
 from klack.transient.active_set import solve_active
 from klack.transient.full_order import simulate_full_order

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from klack.bodies.elasticity import eigen
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.asperity_layer import AsperityLayer
 from klack.contact.face_friction import FaceFriction
 from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
 from klack.contact.restitution import measure_impact
-from klack.elasticity import eigen
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.statics import Flexibility
 from klack.simulation.propagator import modal_propagator
 from klack.transient.interface_arrays import Guide, Modes, Outside, Record, State
 from klack.transient.interface_kernel import march

@@ -7,11 +7,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.linalg import solve_banded
 
-from klack.compiling.jit import njit
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.laws import ContactLaw, FlatLaw, HuntCrossley
 from klack.contact.step_constants import NO_LAW, SEPARATED
+from klack.machine.compiling.jit import njit
 from klack.network.rows import FilmRow
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.interface_step import interface_store, solve_interface
 from klack.simulation.propagator import modal_propagator
 

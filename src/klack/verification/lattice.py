@@ -9,7 +9,7 @@ from itertools import permutations, product
 
 import numpy as np
 
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 

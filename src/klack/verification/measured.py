@@ -15,7 +15,7 @@ from klack.analyses.comparison.impacts_record import ComparedPulse, MeasuredImpa
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.run import run_impact
 from klack.case.reader import find_case, read_case, text_of
-from klack.stages import collected_warnings
+from klack.machine.stages import collected_warnings
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.half_space import oblique_spheres
 from klack.verification.sphere_in_liquid import (

@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError
 from klack.hydraulics.film import RingFilm
@@ -25,7 +26,6 @@ from klack.mechanics.stop_law import LinearStopLaw
 from klack.network.component import Component
 from klack.network.network import Network
 from klack.network.rows import FilmRow
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import State as NetworkState
 from klack.simulation.network_run import simulate_network

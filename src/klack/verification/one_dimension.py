@@ -7,10 +7,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaincinv
 
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import ContactLaw, HertzLaw, LinearLaw
-from klack.reduction.reduced_body import ReducedBody
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from klack.files.whole import whole_file
 from klack.report.chart import AxisSpec, Chart, Curve, Mark, Panel
 from klack.report.looks import thinned
 from klack.report.printed import svg_chart
@@ -28,7 +29,6 @@ from klack.verification.check import (
     summary,
     tolerance_text,
 )
-from klack.whole_file import whole_file
 
 __all__ = ["render_page", "write_page"]
 

@@ -11,24 +11,24 @@ from scipy.interpolate import PchipInterpolator
 from scipy.sparse import csr_array
 
 from klack.assembling.yielding import loops_with_yield
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.history import ImpactHistory
 from klack.contact.mortar import ContactSpace, contact_space, touching_shift
+from klack.contact.plasticity.ladder import YieldingContact
+from klack.contact.plasticity.loops import YieldingLoops, yielding_law
+from klack.contact.plasticity.radial_return import PlasticState, radial_return
+from klack.contact.plasticity.yielding_body import LoadedBody, YieldingBody
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.statics import ReachError, StaticContact, contact_compliance, static_contact
 from klack.contact.yielding_law import YieldingLaw
-from klack.elasticity.body import elastic_body
-from klack.elasticity.statics import Flexibility
-from klack.hardening import Hardening
+from klack.materials.hardening import Hardening
 from klack.mechanics.stop_law import LinearStopLaw
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import Mesh
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.network.network import Network
-from klack.plasticity.ladder import YieldingContact
-from klack.plasticity.loops import YieldingLoops, yielding_law
-from klack.plasticity.radial_return import PlasticState, radial_return
-from klack.plasticity.yielding_body import LoadedBody, YieldingBody
 from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.impact import simulate_impact
 from klack.simulation.network_run import simulate_network

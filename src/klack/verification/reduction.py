@@ -4,18 +4,18 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.materials import Material
-from klack.reduction.attachment import shift_at
-from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import direct_receptance, full_order_receptance
-from klack.reduction.ports import Observer, Port, surface_port
-from klack.reduction.receptance import reduced_receptance
-from klack.reduction.reduce import reduce_body
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.attachment import shift_at
+from klack.bodies.reduction.damping import LossFactor
+from klack.bodies.reduction.full_order import direct_receptance, full_order_receptance
+from klack.bodies.reduction.ports import Observer, Port, surface_port
+from klack.bodies.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.selection import ByCount
+from klack.materials.material import Material
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.lattice import lattice_mesh
 

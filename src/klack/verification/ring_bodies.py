@@ -9,26 +9,26 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from klack.assembling.spatial_rings import in_all_orders
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
+from klack.bodies.elasticity.ring_points import RingRows, RingSections
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import ModalDamping
+from klack.bodies.reduction.ports import surface_port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.selection import ByCount
 from klack.contact.friction import Friction
 from klack.contact.gap_update import RingGaps
 from klack.contact.mortar import ContactSpace, contact_space
 from klack.contact.rings import RingFriction, RingSpace
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.fourier_body import FourierBody, fourier_body
-from klack.elasticity.ring_points import RingRows, RingSections
-from klack.elasticity.statics import Flexibility
 from klack.mechanics.end_stop import EndStop
 from klack.mechanics.flexible_body import FlexibleBody
 from klack.mechanics.stop_law import LinearStopLaw
 from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.swept import sweep
 from klack.network.network import Network
-from klack.reduction.damping import ModalDamping
-from klack.reduction.ports import surface_port
-from klack.reduction.reduce import reduce_body
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount
 from klack.simulation.network_result import NetworkResult
 from klack.simulation.network_run import simulate_network
 from klack.transient.guide import guide_at_sections, shaft_sections, turned_sections

@@ -6,8 +6,8 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 
 from klack import __version__
-from klack.cores import available_cores
-from klack.elasticity.factorization import available_backends
+from klack.bodies.elasticity.factorization import available_backends
+from klack.machine.cores import available_cores
 
 __all__ = ["run_conditions"]
 

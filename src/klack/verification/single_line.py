@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from klack.compiling.jit import njit
 from klack.hydraulics.fluid_table import fluid_at
 from klack.hydraulics.line_cells import (
     SCALARS,
@@ -15,6 +14,7 @@ from klack.hydraulics.line_cells import (
     rates_of_cells,
 )
 from klack.hydraulics.line_friction import ExponentialWeights
+from klack.machine.compiling.jit import njit
 from klack.network.rows import WAVE_BEGIN, WAVE_END, WAVE_STORE, LineRow
 from klack.network.step_function import address_of, call, first
 from klack.simulation.delay_line import (

@@ -17,7 +17,7 @@ from klack.acoustics.signal_statistics import (
 )
 from klack.acoustics.sound import audio_band, click_pressure, minimum_phase_filter
 from klack.acoustics.spectrum import energy_spectral_density, force_spectrum
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.one_dimension import half_sines
 

@@ -8,7 +8,7 @@ import numpy as np
 from klack.acoustics.spectrum import energy_spectral_density, impulse_spectrum
 from klack.acoustics.third_octave import band_edges, band_energies, middle_frequencies
 from klack.contact.laws import HertzLaw
-from klack.signals import Spectrum, TimeSeries
+from klack.signals.sampled import Spectrum, TimeSeries
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.one_dimension import half_sines, hertz_force, mass_on_law
 

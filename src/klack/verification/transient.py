@@ -6,12 +6,12 @@ from math import gamma, pi, sqrt
 import numpy as np
 from scipy.sparse import csr_array
 
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
 from klack.contact.history import ImpactHistory
 from klack.contact.mortar import ContactSpace, contact_space, touching_shift
-from klack.elasticity.body import ElasticBody, elastic_body
-from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.profile import Arc, Line, Profile

@@ -18,11 +18,11 @@ from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Air, Plate
 from klack.acoustics.radiation import piston_efficiency, power_transfer
 from klack.acoustics.surface_bands import face_band_velocity
-from klack.elasticity.eigen import eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.reduction.damping import ModalDamping
-from klack.reduction.ports import Port, surface_port
-from klack.reduction.structure import Structure, StructurePort, build_structure
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import ModalDamping
+from klack.bodies.reduction.ports import Port, surface_port
+from klack.bodies.reduction.structure import Structure, StructurePort, build_structure
 from klack.verification.check import Check, ComparedCurve, check
 from klack.verification.lattice import STEEL
 from klack.verification.one_dimension import half_sines

@@ -27,12 +27,12 @@ from klack.case.reader import find_case, read_case
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
+from klack.machine.progress import Progress, silent
 from klack.mesh.files.catalogue import MESH_FORMATS, STEP_ENDINGS
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import edge_lengths
 from klack.mesh.skin import skin_of_mesh
 from klack.network.component import Component
-from klack.progress import Progress, silent
 from klack.report.looks import thinned
 from klack.schematic.picture import schematic_svg
 from klack.units import format_si

@@ -10,8 +10,8 @@ from typing import Any
 
 from numba.core import event
 
-from klack.cache.result_cache import FOLDER_VARIABLE
 from klack.errors import CacheWarning
+from klack.machine.cache.result_cache import FOLDER_VARIABLE
 from klack.warming.groups import GROUPS
 
 __all__ = ["Compiled", "Warmed", "warm"]

@@ -17,7 +17,7 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import Key
-from klack.progress import Progress, silent
+from klack.machine.progress import Progress, silent
 from klack.units import FREQUENCY, LENGTH, TIME, format_si, parse_quantity
 
 __all__ = ["advice_yaml", "advise_case", "advised_text", "changed_values"]

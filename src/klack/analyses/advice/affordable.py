@@ -11,7 +11,7 @@ from dataclasses import replace
 from klack.analyses.advice.advice import Counsel, Fixed, Measured, settle
 from klack.analyses.advice.ladder import Measure
 from klack.input.problem import Key
-from klack.memory import available_memory
+from klack.machine.memory import available_memory
 
 __all__ = ["added", "affordable", "fits", "larger", "memory_of", "time_of"]
 

@@ -157,7 +157,7 @@ def _require_new_file(path: Path | None) -> None:
 
 
 def _write_whole(path: Path, text: str) -> None:
-    from klack.whole_file import whole_file
+    from klack.files.whole import whole_file
 
     with whole_file(path) as new:
         new.write_text(text, encoding="utf-8")

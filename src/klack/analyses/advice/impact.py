@@ -40,17 +40,17 @@ from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
 from klack.assembling.yielding import tell_elastic
+from klack.bodies.elasticity.eigen import Modes
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import measure_impact
 from klack.contact.statics import size_over_half_width
-from klack.elasticity.eigen import Modes
 from klack.errors import InputError, KlackError
 from klack.input.problem import Key
-from klack.progress import Progress, silent
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import collected_warnings
 from klack.simulation.impact import simulate_impact
-from klack.stages import collected_warnings
 from klack.units import format_si
 
 __all__ = ["AdviceLevel", "advise_impact"]

@@ -16,14 +16,14 @@ from klack.analyses.advice.settings import Setting, SettingValue
 from klack.analyses.impact.interface_level import build_interface, simulate_case
 from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.reduction.ports import Port
 from klack.case.bodies import ModeChoice
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.contact.history import ImpactHistory
-from klack.elasticity.eigen import Modes
 from klack.errors import InputError
-from klack.progress import Progress
-from klack.reduction.ports import Port
+from klack.machine.progress import Progress
 from klack.units import format_si
 
 __all__ = [

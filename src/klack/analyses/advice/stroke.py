@@ -21,15 +21,15 @@ from klack.analyses.advice.settings import Setting, SettingValue, applied
 from klack.analyses.stroke.run import run_variant, variant_network
 from klack.assembling.valve import Valve, build_valve, build_valve_bodies
 from klack.assembling.yielding import tell_elastic
+from klack.bodies.elasticity.body import ElasticBody
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
-from klack.elasticity.body import ElasticBody
 from klack.errors import InputError, KlackError
-from klack.progress import Progress, silent
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import collected_warnings
 from klack.simulation.step_sizes import step_sizes
-from klack.stages import collected_warnings
 
 __all__ = ["advise_stroke", "first_impacts", "step_ladder", "stroke_measures"]
 

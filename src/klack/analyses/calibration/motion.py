@@ -18,6 +18,7 @@ from klack.analyses.workers import LoggedWork
 from klack.assembling.modes import damping_of
 from klack.assembling.stops import StopFaces
 from klack.assembling.valve import filled_network
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.any_case import CaseTree
 from klack.case.free_parameters import FreeParameter
 from klack.case.valve import ValveCase
@@ -28,7 +29,6 @@ from klack.measurement.channels import LiftSensor, Trigger
 from klack.measurement.lift_sensor import recorded_stroke
 from klack.measurement.stroke_measures import StrokeSet
 from klack.network.network import Network
-from klack.reduction.reduced_body import ReducedBody
 from klack.simulation.network_run import simulate_network
 
 __all__ = [

@@ -36,9 +36,11 @@ from klack.case.rewriting import moved_files, rewritten, written_quantity
 from klack.case.spatial_consistency import require_axial
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
-from klack.cores import available_cores
 from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
+from klack.machine.cores import available_cores
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.channels import ROLES, LiftSensor
 from klack.measurement.fit_window import (
     FitWindow,
@@ -58,8 +60,6 @@ from klack.measurement.shot_covariance import (
     shot_covariance,
 )
 from klack.measurement.stroke_measures import StrokeSet
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
 __all__ = ["CALIBRATED_NAME", "calibrated_text", "calibration_of", "run_calibration"]

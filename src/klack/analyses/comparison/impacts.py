@@ -13,14 +13,14 @@ from klack.analyses.comparison.calculix import level_of
 from klack.analyses.comparison.impacts_record import ComparedPulse, MeasuredImpactStudy
 from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.record import case_fields, run_fields
+from klack.bodies.gauges.gauge import GaugeKind, GaugeRecord
 from klack.errors import AccuracyWarning, InputError
-from klack.gauges.gauge import GaugeKind, GaugeRecord
-from klack.low_pass import LowPass
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.pulse import Pulse, fit_pulse, measure_pulse
 from klack.measurement.recording import ChannelInfo, Recording, open_recording, some_names
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
+from klack.signals.low_pass import LowPass
 from klack.units import LENGTH, PRESSURE, SPEED
 
 __all__ = ["compare_impact", "gauge_of"]

@@ -28,12 +28,12 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.shots.record import FIRST_IMPACT, Shot, ShotColumns, ShotsStudy, ShotTraces
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.channels import LIFT_ALONE
 from klack.measurement.impacts import measure_stroke
 from klack.measurement.loading import load_stroke_set
 from klack.measurement.stroke_measures import MeasuredImpact, Rejection, StrokeSet
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
 
 __all__ = ["LIKELY", "compare_shots", "mean_of_highest"]
 

@@ -26,6 +26,8 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.measurement.channels import LIFT_ALONE, LiftSensor, Trigger
 from klack.measurement.differentiation import velocity_of
 from klack.measurement.impacts import measure_stroke
@@ -33,8 +35,6 @@ from klack.measurement.lift_sensor import recorded_stroke, trigger_instant
 from klack.measurement.loading import load_stroke_set
 from klack.measurement.set_measures import first_impact_column, highest_rebound
 from klack.measurement.stroke_measures import MeasuredImpact, Stop, StrokeMeasures, StrokeSet
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
 from klack.units import format_si
 
 __all__ = ["EXCELLENT", "FAIR", "compare_numbers", "compare_strokes", "sensor_words"]

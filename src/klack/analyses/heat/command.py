@@ -77,7 +77,7 @@ def heat(
         )
         from klack.analyses.heat.run import HEAT_LOG, run_heat
         from klack.analyses.heat.summary import HEAT
-        from klack.compiling.ahead import compiling_ahead
+        from klack.machine.compiling.ahead import compiling_ahead
 
     ahead = compiling_ahead(("loop", "rest"), wanted.threads)
     with ending.resumable(HEAT_LOG) as progress, ahead:

@@ -18,13 +18,13 @@ from klack.hydraulics.fluid import Fluid
 from klack.hydraulics.fluid_definition import FixedProperties
 from klack.input.problem import nearest, one_of
 from klack.input.section import Section
+from klack.machine.progress import silent
+from klack.machine.stages import trial
 from klack.magnetics.driver import Driver
 from klack.magnetics.insulation import CLASS_TEMPERATURES, USUAL_CLASS
 from klack.magnetics.winding import warm_resistance
 from klack.network.component import Component
-from klack.progress import silent
 from klack.simulation.network_result import NetworkResult
-from klack.stages import trial
 from klack.units import format_si
 
 __all__ = [

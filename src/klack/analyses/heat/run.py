@@ -24,15 +24,15 @@ from klack.analyses.heat.record import CauseRow, HeatStudy, WarmColumn
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.result_cache import result_cache
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.thermal import CaseThermal
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.errors import InputError
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.thermal.heat_network import HeatNetwork, heat_network
 from klack.thermal.slow_warm_up import SlowSettings, SlowWarmUp, WarmPoint, warm_up
 

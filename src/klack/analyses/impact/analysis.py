@@ -21,8 +21,8 @@ from klack.analyses.impact.running_in import running_in_columns, running_in_rows
 from klack.analyses.json_parts import JsonForm, Key, Real, measured_keys, schema_key
 from klack.analyses.measures import text_table
 from klack.analyses.store import RecordFormat
-from klack.gauges.gauge import GaugeRecord
-from klack.reduction.structure import STRUCTURE_UNITS
+from klack.bodies.gauges.gauge import GaugeRecord
+from klack.bodies.reduction.structure import STRUCTURE_UNITS
 from klack.terminal.tables import TextTable
 from klack.units import format_si
 

@@ -19,10 +19,10 @@ from klack.assembling.modes import kept_modes
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair, impact_system
 from klack.assembling.touch_ring import TouchingSide, touch_ring
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.case.schema import Case
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh
 from klack.mesh.quality import edge_lengths

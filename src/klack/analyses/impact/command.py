@@ -47,7 +47,7 @@ def run_case(case: Path, level: list[str], wanted: WantedResult, *, certify: boo
         from klack.analyses.impact.run import run_impact
         from klack.analyses.impact.running_in import WORN, worn_text
         from klack.analyses.incomplete import IncompleteImpactError
-        from klack.compiling.ahead import compiling_ahead
+        from klack.machine.compiling.ahead import compiling_ahead
 
     incomplete: Exception | None = None
     with show_progress(wanted.quiet) as progress, compiling_ahead(("levels",), wanted.threads):

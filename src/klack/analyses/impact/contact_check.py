@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.impact.record import LevelResult, PressureRecord
 from klack.assembling.bodies import BodyPair
+from klack.bodies.elasticity.body import ElasticBody
 from klack.case.bodies import CaseFile
 from klack.contact.hertz import line_half_width, point_radius
 from klack.contact.mortar import ContactSpace
@@ -37,10 +38,9 @@ from klack.contact.statics import (
 )
 from klack.contact.surface_edges import SurfaceEdges
 from klack.contact.touch_shape import relative_curvatures
-from klack.elasticity.body import ElasticBody
 from klack.errors import AccuracyWarning
+from klack.machine.stages import warnings_of
 from klack.mesh.mesh import Surface
-from klack.stages import warnings_of
 from klack.units import format_si
 
 __all__ = [

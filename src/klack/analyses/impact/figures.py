@@ -13,9 +13,9 @@ from klack.acoustics.comparison import first_impact, impact_third_octaves
 from klack.acoustics.spectrum import impulse_level, impulse_spectrum
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.impact.record import ImpactStudy, LevelResult
+from klack.bodies.gauges.gauge import GaugeKind
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.contact.history import ImpactHistory
-from klack.gauges.gauge import GaugeKind
-from klack.reduction.transfer import TransferComparison
 from klack.report.chart import (
     AnyChart,
     AxisSpec,

@@ -11,6 +11,9 @@ from klack.analyses.impact.record import FrictionRecord, LevelResult
 from klack.assembling.modes import damping_of, is_damped
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import starting_gap
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.loads import face_dashpots
 from klack.case.schema import (
     Case,
 )
@@ -18,10 +21,7 @@ from klack.contact.face_friction import FaceFriction
 from klack.contact.history import BodyEnergy
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import ReachError
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.loads import face_dashpots
-from klack.progress import Progress
+from klack.machine.progress import Progress
 from klack.transient.body_damping import BodyDamping, body_damping
 from klack.transient.full_body import KnownBody
 from klack.transient.full_order import simulate_full_order

@@ -25,11 +25,11 @@ from klack.analyses.impact.record import LevelResult
 from klack.assembling.bodies import BodyPair
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
+from klack.bodies.gauges.gauge import Gauge, GaugeRecord
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.errors import AccuracyWarning
-from klack.gauges.gauge import Gauge, GaugeRecord
-from klack.reduction.reduced_body import ReducedBody
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult
 from klack.transient.result import MotionOfBody, Snapshots

@@ -23,16 +23,16 @@ from klack.analyses.incomplete import Attempts, IncompleteImpactError, failure_n
 from klack.analyses.record import case_fields, run_fields
 from klack.assembling.given_pair import GivenPair, build_given_pair
 from klack.assembling.modes import elastic_count
-from klack.cache.result_cache import result_cache
 from klack.case.consistency import GIVEN_LEVELS
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
 from klack.contact.laws import HertzLaw, LinearLaw
 from klack.errors import InputError
 from klack.input.problem import one_of
-from klack.progress import Progress
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress
+from klack.machine.stages import StageClock, collected_warnings
 from klack.simulation.impact import simulate_impact
-from klack.stages import StageClock, collected_warnings
 
 __all__ = ["require_given_levels", "run_given_impact"]
 

@@ -15,6 +15,12 @@ from klack.assembling.bodies import BodyPair
 from klack.assembling.modes import damping_of, selection_of
 from klack.assembling.off_axis import ANGLES, off_axis_model, ring_contacts
 from klack.assembling.problem import ContactProblem
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import RayleighDamping
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.schema import Case
 from klack.contact.face_friction import FaceFriction
@@ -24,14 +30,8 @@ from klack.contact.mortar import ContactSpace, tangent_rows
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import ImpactMeasures, measure_impact
 from klack.contact.statics import ReachError, extended_compliance
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
 from klack.errors import InputError
 from klack.mesh.mesh import Mesh, Surface
-from klack.reduction.damping import RayleighDamping
-from klack.reduction.ports import Port
-from klack.reduction.selection import ByCount, ByParticipation, ModeSelection, select
 from klack.transient.guide import guide_of_shaft
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import (

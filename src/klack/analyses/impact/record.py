@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from klack.analyses.record import CaseRecord
 from klack.assembling.body_summary import BodySummary
+from klack.bodies.gauges.gauge import GaugeRecord
+from klack.bodies.reduction.structure import Structure
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures
-from klack.gauges.gauge import GaugeRecord
 from klack.mesh.skin import Skin
-from klack.reduction.structure import Structure
-from klack.reduction.transfer import TransferComparison
 
 __all__ = [
     "SETTLED",

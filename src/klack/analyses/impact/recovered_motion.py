@@ -17,12 +17,12 @@ from klack.assembling.modes import damping_of, mode_pools, selection_of
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair, first_stiffness, impact_system, own_pair
 from klack.assembling.yielding import tell_elastic
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
-from klack.progress import Progress
-from klack.reduction.ports import Port
-from klack.reduction.reduce import reduce_body
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.machine.progress import Progress
 from klack.simulation.impact import simulate
 from klack.transient.result import MotionOfBody
 

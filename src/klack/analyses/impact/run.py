@@ -86,27 +86,27 @@ from klack.assembling.reduced_pair import (
     static_curve,
 )
 from klack.assembling.structures import impact_structures
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.loads import NearLoads
+from klack.bodies.reduction.reduce import Correction
+from klack.bodies.reduction.structure import Structure
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.case.impact_sections import SubmodelLocalLaw
 from klack.case.levels import Level
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
-from klack.closing import Closing
 from klack.contact.history import ImpactHistory
+from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import Deviation, measure_impact
 from klack.contact.statics import ReachError, StaticContact, static_contact
 from klack.contact.submodel import LocalStiffness
-from klack.cores import available_cores
-from klack.elasticity.eigen import Modes
-from klack.elasticity.loads import NearLoads
 from klack.errors import AccuracyWarning, InputError
-from klack.plasticity.loops import YieldingLoops
-from klack.progress import Progress, silent
-from klack.reduction.reduce import Correction
-from klack.reduction.structure import Structure
-from klack.reduction.transfer import TransferComparison
-from klack.stages import (
+from klack.files.closing import Closing
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.cores import available_cores
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import (
     StageClock,
     collected_warnings,
     for_comparison,

@@ -24,11 +24,11 @@ from klack.case.reader import read_case
 from klack.case.rewriting import moved_files, with_values
 from klack.case.schema import Case
 from klack.contact.history import ImpactHistory
+from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.restitution import measure_impact
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, InputError
 from klack.input.problem import Key
-from klack.plasticity.loops import YieldingLoops
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.units import format_si

@@ -7,24 +7,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.assembling.problem import ContactProblem
-from klack.case.impact_sections import TransferSweep
-from klack.case.schema import Case
-from klack.cores import side_by_side
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
-from klack.progress import Progress
-from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import (
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import LossFactor
+from klack.bodies.reduction.full_order import (
     entry_of_receptance,
     full_order_receptance,
     receptance_of_entry,
 )
-from klack.reduction.ports import Port
-from klack.reduction.receptance import Receptance, reduced_receptance
-from klack.reduction.reduce import reduce_body
-from klack.reduction.selection import ByCount
-from klack.reduction.transfer import TransferComparison, compare_receptances
+from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.receptance import Receptance, reduced_receptance
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.selection import ByCount
+from klack.bodies.reduction.transfer import TransferComparison, compare_receptances
+from klack.case.impact_sections import TransferSweep
+from klack.case.schema import Case
+from klack.machine.cores import side_by_side
+from klack.machine.progress import Progress
 
 __all__ = ["LOSS_FACTOR", "TRANSFER_COUNTS", "TRANSFER_MODES", "compare_transfer", "sweep_of"]
 

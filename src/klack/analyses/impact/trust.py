@@ -22,12 +22,12 @@ import numpy as np
 from klack.analyses.impact.record import LevelResult
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
 from klack.contact.history import ImpactHistory
 from klack.contact.restitution import Deviation, ImpactMeasures, find_contacts
 from klack.contact.touch_shape import area_at_once, front_pressure
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.materials import Material
+from klack.materials.material import Material
 from klack.units import format_si
 
 __all__ = [

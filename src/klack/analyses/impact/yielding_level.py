@@ -17,11 +17,11 @@ from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import ReducedPair, simulate_bodies
 from klack.case.impact_sections import ConsistentLocalLaw
 from klack.contact.history import ImpactHistory
+from klack.contact.plasticity.loops import YieldingLoops
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.restitution import measure_impact
 from klack.errors import AccuracyWarning
-from klack.plasticity.loops import YieldingLoops
-from klack.progress import Progress
+from klack.machine.progress import Progress
 from klack.units import format_si
 
 __all__ = [

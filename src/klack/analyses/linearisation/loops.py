@@ -26,11 +26,11 @@ from klack.analyses.linearisation.record import LoopMargins
 from klack.control.controlled import Controlled
 from klack.control.pid import PidController
 from klack.errors import InputError
+from klack.hydraulics.gas.gas_source import GasSource
 from klack.input.problem import one_of
 from klack.network.network import Network
 from klack.network.port import Role
 from klack.network.rows import Rows
-from klack.pneumatics.gas_source import GasSource
 from klack.simulation.linear_system import LinearSystem, Signal, transfer
 from klack.units import KINDS, parse_quantity
 

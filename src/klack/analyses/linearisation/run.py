@@ -29,7 +29,6 @@ from klack.analyses.operating_point.run import PointFound, find_point, valve_at
 from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.run import variant_network
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.result_cache import result_cache
 from klack.case.any_case import CaseTree
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
@@ -37,11 +36,13 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.errors import InputError, KlackError
 from klack.input.problem import nearest, one_of
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings, trial
 from klack.magnetics.constant_drive import coils_of, driven
 from klack.magnetics.driver import Driver
 from klack.network.network import Network
 from klack.network.rows import Rows
-from klack.progress import Progress, silent
 from klack.simulation.linear_network import LinearNetwork, linear_network
 from klack.simulation.linear_system import (
     ORDER,
@@ -54,7 +55,6 @@ from klack.simulation.linear_system import (
     transfer,
 )
 from klack.simulation.operating_point import compiled_at
-from klack.stages import StageClock, collected_warnings, trial
 
 __all__ = ["LinearPoint", "linear_point", "run_linearisation", "usual_band"]
 

@@ -33,8 +33,8 @@ from klack.acoustics.radiation import Efficiency, power_transfer
 from klack.acoustics.surface_bands import surface_spectra
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.noise.record import BodyNoise, Surface
-from klack.reduction.structure import Structure
-from klack.signals import TimeSeries
+from klack.bodies.reduction.structure import Structure
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "ASSUMED_DAMPING",

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from klack.acoustics.spectrum import force_series
 from klack.contact.history import ImpactHistory
 from klack.errors import InputError
-from klack.memory import in_words, require_memory
-from klack.signals import TimeSeries
+from klack.machine.memory import in_words, require_memory
+from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import ChannelData, ImpactEvent, InterfaceRecord, NetworkResult
 from klack.units import format_si
 

@@ -14,7 +14,7 @@ from klack.acoustics.loudness import Loudness
 from klack.acoustics.signal_statistics import SoundStatistics
 from klack.acoustics.third_octave import ThirdOctaves
 from klack.analyses.record import Record
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "BodyNoise",

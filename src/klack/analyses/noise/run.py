@@ -38,10 +38,10 @@ from klack.analyses.noise.source import NoiseSource, SourceStop
 from klack.analyses.record import run_fields
 from klack.errors import InputError
 from klack.input.problem import one_of
-from klack.materials import Material
-from klack.progress import Progress, silent
-from klack.signals import TimeSeries
-from klack.stages import StageClock, collected_warnings
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
+from klack.materials.material import Material
+from klack.signals.sampled import TimeSeries
 from klack.units import format_si
 
 __all__ = ["click_sound", "noise_design", "run_noise"]

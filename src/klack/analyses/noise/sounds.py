@@ -6,7 +6,7 @@ from pathlib import Path
 from klack.acoustics.drive_pattern import drive_pattern
 from klack.acoustics.wav import full_scale_of, write_wav
 from klack.analyses.noise.record import NoiseDesign, NoiseStudy
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["StudySound", "common_full_scale", "study_sounds", "write_sounds"]
 

@@ -25,6 +25,7 @@ from klack.analyses.stroke.record import StopSummary, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.run import run_stroke
 from klack.assembling.body_summary import BodySummary
 from klack.assembling.structures import IMPACT_STOP
+from klack.bodies.reduction.structure import Structure
 from klack.case.bodies import CaseMaterial
 from klack.case.levels import LEVELS, VARIANTS
 from klack.case.noise import CaseNoise
@@ -32,9 +33,8 @@ from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
 from klack.input.problem import nearest, one_of
-from klack.progress import Progress, silent
-from klack.reduction.structure import Structure
-from klack.signals import TimeSeries
+from klack.machine.progress import Progress, silent
+from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 
 __all__ = [

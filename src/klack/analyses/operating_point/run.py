@@ -24,7 +24,6 @@ from klack.analyses.record import case_fields, run_fields
 from klack.analyses.stroke.run import variant_network
 from klack.analyses.study.strokes import STROKES
 from klack.assembling.valve import Valve, build_valve, filled_network
-from klack.cache.result_cache import result_cache
 from klack.case.any_case import CaseTree
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
@@ -32,19 +31,20 @@ from klack.case.points import case_at
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.errors import AccuracyWarning, ConvergenceError, InputError, KlackError
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings, trial
 from klack.magnetics.constant_drive import driven, hysteretic_coils, start_currents
 from klack.network.checks import LooseBodyWarning
 from klack.network.network import Network
 from klack.network.ranges import Travel
 from klack.network.rows import Rows
-from klack.progress import Progress, silent
 from klack.simulation.operating_point import (
     OperatingPoint,
     far_ends,
     operating_point,
     without_guesses,
 )
-from klack.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
 __all__ = [

@@ -16,8 +16,8 @@ from klack.analyses.measures import Column, Measure, described_in, text_table
 from klack.analyses.reduction.one_node import corrected_label, place_words
 from klack.analyses.reduction.run import ReductionStudy
 from klack.assembling.modes import elastic_count
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.transfer import TransferComparison
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.terminal.tables import TextTable
 
 __all__ = ["BODY_MEASURES", "REDUCTION", "reduction_told"]

@@ -16,25 +16,25 @@ from klack.analyses.impact.transfer import LOSS_FACTOR, TRANSFER_COUNTS, sweep_o
 from klack.assembling.gauges import placed_point
 from klack.assembling.problem import ContactProblem
 from klack.assembling.reduced_pair import recipe_stiffness
-from klack.case.schema import Case
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.eigen import Modes
-from klack.elasticity.statics import Flexibility
-from klack.gauges.located_point import locate
-from klack.mesh.rigid import Pose
-from klack.progress import Progress
-from klack.reduction.damping import LossFactor
-from klack.reduction.full_order import (
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.gauges.located_point import locate
+from klack.bodies.reduction.damping import LossFactor
+from klack.bodies.reduction.full_order import (
     entry_of_receptance,
     full_order_receptance,
     receptance_of_entry,
 )
-from klack.reduction.ports import Observer, Port, node_observer
-from klack.reduction.receptance import observed_receptance
-from klack.reduction.reduce import Correction, reduce_body
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.selection import ByCount
-from klack.reduction.transfer import TransferComparison, compare_curves
+from klack.bodies.reduction.ports import Observer, Port, node_observer
+from klack.bodies.reduction.receptance import observed_receptance
+from klack.bodies.reduction.reduce import Correction, reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.selection import ByCount
+from klack.bodies.reduction.transfer import TransferComparison, compare_curves
+from klack.case.schema import Case
+from klack.machine.progress import Progress
+from klack.mesh.rigid import Pose
 from klack.report.chart import Chart
 from klack.report.wording import sentence
 from klack.simulation.observed_contact import ObservedImpact, observed_impact

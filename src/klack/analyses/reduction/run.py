@@ -21,14 +21,14 @@ from klack.assembling.modes import elastic_count, mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.assembling.yielding import tell_elastic
-from klack.cache.result_cache import result_cache
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
-from klack.elasticity.eigen import Modes, eigenmodes
-from klack.elasticity.statics import Flexibility
-from klack.progress import Progress, silent
-from klack.reduction.reduced_body import ReducedBody
-from klack.reduction.transfer import TransferComparison
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
 
 __all__ = ["ReductionStudy", "run_reduce"]
 

@@ -74,7 +74,7 @@ def sensitivities(
         from klack.analyses.sensitivities.analysis import SENSITIVITIES
         from klack.analyses.sensitivities.differences import sensitivities_of
         from klack.case.valve import ValveCase
-        from klack.compiling.ahead import compiling_ahead
+        from klack.machine.compiling.ahead import compiling_ahead
 
     # derivatives are compiled here, what the check of a stroke needs beside them
     ahead = ("loop",) if isinstance(checked, ValveCase) else ("levels",)

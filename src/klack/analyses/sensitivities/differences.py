@@ -32,8 +32,8 @@ from klack.case.schema import Case
 from klack.case.study_source import StudySource
 from klack.errors import ConvergenceError
 from klack.input.problem import one_of
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 
 __all__ = ["sensitivities_of"]
 

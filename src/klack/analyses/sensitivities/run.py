@@ -25,9 +25,9 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import find_roles
 from klack.errors import ConvergenceError, InputError
 from klack.input.problem import one_of
-from klack.progress import Progress, silent
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.simulation.tangent_run import DIRECTIONS, TangentRun
-from klack.stages import StageClock, collected_warnings
 from klack.units import format_si, is_level
 
 __all__ = ["run_sensitivities"]

@@ -49,9 +49,9 @@ from klack.case.points import case_at, checked_parts, points_of
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.errors import InputError
+from klack.machine.progress import Progress
 from klack.network.rows import Rows
-from klack.progress import Progress
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 from klack.simulation.network_run import has_python_steps
 from klack.simulation.tangent_numbers import Direction
 from klack.simulation.tangent_run import DIRECTIONS, TangentRun, compile_tangents, run_tangents

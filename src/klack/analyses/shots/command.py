@@ -110,7 +110,7 @@ def _strokes(
         from klack.analyses.stroke_shots.analysis import STROKE_SHOTS
         from klack.analyses.stroke_shots.one_stroke import STROKE_LOG, shots_of_valve
         from klack.analyses.stroke_shots.run import run_stroke_shots
-        from klack.compiling.ahead import compiling_ahead
+        from klack.machine.compiling.ahead import compiling_ahead
 
     shots_of_valve(case)
     # both "--variant a,b" and "--variant a --variant b"

@@ -25,8 +25,8 @@ from klack.case.any_case import AnyCase
 from klack.case.distribution import Distribution
 from klack.case.schema import Case
 from klack.case.shots import Shots, StrokeShots
-from klack.cores import available_cores
 from klack.errors import InputError, require_positive
+from klack.machine.cores import available_cores
 
 __all__ = [
     "ShotDraw",

@@ -22,9 +22,9 @@ from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
 from klack.contact.mortar import ContactSpace
 from klack.contact.statics import extended_compliance
+from klack.machine.progress import Progress
+from klack.machine.stages import collected_warnings
 from klack.mesh.rigid import rigid_placement
-from klack.progress import Progress
-from klack.stages import collected_warnings
 from klack.transient.interface_model import InterfaceModel
 
 __all__ = ["ShotModel", "build_shots", "centred_case", "shot_bodies", "shot_model"]

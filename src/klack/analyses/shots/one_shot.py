@@ -14,8 +14,8 @@ from klack.analyses.unfinished import LogForm, UnfinishedLog, fingerprint
 from klack.case.schema import Case
 from klack.contact.gap_update import RigidGaps
 from klack.contact.restitution import ImpactMeasures, measure_impact
+from klack.machine.stages import collected_warnings
 from klack.mesh.rigid import rigid_placement
-from klack.stages import collected_warnings
 from klack.transient.interface_arrays import Guide
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.interface_result import InterfaceResult

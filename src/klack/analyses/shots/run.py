@@ -34,14 +34,14 @@ from klack.analyses.shots.one_shot import (
 )
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy
 from klack.analyses.workers import LoggedWork, answer, grouped_doubts, unwrapped
-from klack.cache.result_cache import result_cache
 from klack.case.guide import CaseGuide, LinearGuideLaw
 from klack.case.placed_errors import tells_place
 from klack.case.schema import Case
 from klack.case.shots import Shots, StrokeShots
 from klack.errors import ConvergenceError
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings, trial
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings, trial
 from klack.units import format_si
 
 __all__ = [

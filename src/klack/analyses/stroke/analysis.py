@@ -39,7 +39,7 @@ from klack.analyses.stroke.missing import cut_records
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.analyses.stroke.step_check import CHANGE_MEASURES, NOTICED, ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
-from klack.reduction.structure import STRUCTURE_UNITS
+from klack.bodies.reduction.structure import STRUCTURE_UNITS
 from klack.report.wording import quantity, share
 from klack.simulation.flow_channels import present_name, with_present_names
 from klack.simulation.network_result import ImpactEvent

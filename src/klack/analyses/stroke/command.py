@@ -123,7 +123,7 @@ def stroke(
         after = STROKE.load(continued) if continued is not None else None
     from klack.analyses.stroke.record import IncompleteStrokeError
     from klack.analyses.stroke.run import run_stroke
-    from klack.compiling.ahead import compiling_ahead
+    from klack.machine.compiling.ahead import compiling_ahead
 
     incomplete: Exception | None = None
     with show_progress(asked.quiet) as progress, compiling_ahead(("loop", "rest"), asked.threads):

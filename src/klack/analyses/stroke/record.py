@@ -15,8 +15,8 @@ from klack.analyses.record import CaseRecord
 from klack.analyses.stroke.step_check import ImpactChange
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
+from klack.bodies.reduction.structure import Structure
 from klack.errors import ConvergenceError
-from klack.reduction.structure import Structure
 from klack.simulation.network_result import ChannelData, ImpactEvent, NetworkResult
 
 __all__ = [

@@ -28,7 +28,6 @@ from klack.analyses.stroke.step_check import CheckedSteps, checked_steps, not_ch
 from klack.analyses.stroke.times import all_lift_times
 from klack.assembling.body_summary import BodySummary, summarise_body
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.result_cache import result_cache
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
@@ -36,17 +35,18 @@ from klack.case.valve_roles import ValveRoles, find_roles
 from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
 from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings, show, trial
 from klack.magnetics.driver import Driver
 from klack.mechanics.end_stop import EndStop
 from klack.network.network import Network
 from klack.network.ranges import Travel
 from klack.network.rows import Rows
-from klack.progress import Progress, silent
 from klack.schematic.picture import schematic_svg
 from klack.simulation.network_result import IncompleteRunError, NetworkResult
 from klack.simulation.network_run import SpatialMotion, State, simulate_network
 from klack.simulation.step_sizes import StepSizes, scaled
-from klack.stages import StageClock, collected_warnings, show, trial
 from klack.units import format_si
 
 __all__ = [

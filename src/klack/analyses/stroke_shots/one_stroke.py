@@ -28,11 +28,11 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles
 from klack.contact.friction import Friction
 from klack.errors import ConvergenceError, InputError, KlackError, refuse_if
+from klack.machine.progress import silent
+from klack.machine.stages import collected_warnings
 from klack.mesh.rigid import rigid_placement
-from klack.progress import silent
 from klack.simulation.network_result import ImpactEvent, NetworkResult
 from klack.simulation.spatial_impact import SpatialPath
-from klack.stages import collected_warnings
 from klack.transient.interface_model import InterfaceModel
 from klack.transient.spatial_run import SpatialValve
 

@@ -33,15 +33,15 @@ from klack.analyses.stroke_shots.record import (
 )
 from klack.analyses.workers import LoggedWork, grouped_doubts
 from klack.assembling.valve import Valve, build_valve
-from klack.cache.result_cache import result_cache
 from klack.case.levels import Variant
 from klack.case.placed_errors import tells_place
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import ValveRoles, find_roles
 from klack.errors import ConvergenceError, InputError
-from klack.progress import Progress, silent
+from klack.machine.cache.result_cache import result_cache
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.schematic.picture import schematic_svg
-from klack.stages import StageClock, collected_warnings
 from klack.transient.spatial_run import SpatialValve
 from klack.units import format_si
 

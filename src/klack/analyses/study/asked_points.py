@@ -16,8 +16,8 @@ from klack.case.points import PointKey, Points, PointValue
 from klack.case.study import CaseStudy
 from klack.errors import AccuracyWarning, KlackError, refuse_if
 from klack.input.problem import Key
-from klack.progress import Progress
-from klack.signals import TimeSeries
+from klack.machine.progress import Progress
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "UNCHECKED",

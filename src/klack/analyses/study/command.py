@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from klack.analyses.study.record import StudyRecord
     from klack.case.any_case import CaseTree
-    from klack.progress import Progress
+    from klack.machine.progress import Progress
 
 __all__ = ["optimise", "study"]
 

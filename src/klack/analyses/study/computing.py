@@ -20,12 +20,12 @@ from threadpoolctl import ThreadpoolController
 
 from klack.analyses.study.asked_points import AskedPoints, PointGroup, PointRow, groups_of
 from klack.case.points import case_at, with_changes
-from klack.closing import Closing
-from klack.cores import available_cores
 from klack.errors import InputError, KlackError
-from klack.progress import Progress, silent
-from klack.signals import TimeSeries
-from klack.stages import FAILURES, show
+from klack.files.closing import Closing
+from klack.machine.cores import available_cores
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import FAILURES, show
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "Agenda",

@@ -18,7 +18,7 @@ from klack.analyses.study.where import Answer, PointOrder, SentCase, answered, d
 from klack.analyses.workers import Failure, unwrapped
 from klack.case.any_case import AnyCase, CaseTree
 from klack.errors import ConvergenceError, InputError, MissingExtraError
-from klack.progress import Progress, remark
+from klack.machine.progress import Progress, remark
 
 if TYPE_CHECKING:
     from distributed import Client, Future

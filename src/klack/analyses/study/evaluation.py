@@ -28,7 +28,7 @@ from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import GivenPoints, PointValue
 from klack.case.study_source import StudySource
 from klack.errors import InputError
-from klack.progress import Progress
+from klack.machine.progress import Progress
 
 __all__ = [
     "Evaluation",

@@ -18,7 +18,7 @@ from klack.analyses.study.record import (
 from klack.case.study_source import StudySource
 from klack.errors import InputError, refuse_if
 from klack.input.problem import one_of
-from klack.progress import Progress
+from klack.machine.progress import Progress
 from klack.studies.designs import Listed, unevenness
 from klack.studies.samples import exceedance_of
 from klack.studies.sensitivity import elementary_effects, sobol_indices

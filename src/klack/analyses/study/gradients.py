@@ -15,7 +15,7 @@ from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
 from klack.errors import InputError, KlackError
 from klack.input.problem import one_of
-from klack.progress import Progress
+from klack.machine.progress import Progress
 from klack.studies.designs import Listed
 from klack.studies.polish import NoValue
 

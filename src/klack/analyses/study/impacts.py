@@ -46,8 +46,8 @@ from klack.case.schema import Case
 from klack.case.study import CaseStudy
 from klack.errors import refuse_if
 from klack.input.problem import Key
-from klack.progress import Progress
-from klack.signals import TimeSeries
+from klack.machine.progress import Progress
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["IMPACTS"]
 

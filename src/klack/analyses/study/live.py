@@ -8,7 +8,7 @@ from time import perf_counter
 
 from klack.analyses.study.analysis import STUDY
 from klack.analyses.study.record import StudyRecord
-from klack.progress import PointCount, Progress, counted, remark
+from klack.machine.progress import PointCount, Progress, counted, remark
 
 __all__ = ["LIVE", "LiveRecord", "Pace", "ProgressPage", "Seen", "duration_text"]
 

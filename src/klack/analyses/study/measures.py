@@ -34,7 +34,7 @@ from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP
 from klack.errors import InputError, KlackError, refuse_if
 from klack.input.problem import nearest, one_of
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import ImpactEvent
 
 __all__ = [

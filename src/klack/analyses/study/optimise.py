@@ -34,8 +34,8 @@ from klack.case.points import PointValue
 from klack.case.study_source import StudySource
 from klack.case.valve import ValveCase
 from klack.errors import refuse_if
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 from klack.studies.batches import Batches
 from klack.studies.designs import Range
 from klack.studies.fronts import compromise, find_front, spread_over

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from klack.analyses.study.wording import shown_unit
 from klack.case.any_case import AnyCase
+from klack.case.expressions.expression import RESERVED, Expression, ordered
 from klack.case.key_path import Quantity, kind_at, node_at, quantity_at, split_path
 from klack.case.points import PointValue
 from klack.case.reader import text_of
 from klack.case.study import StudyParameter, Written
 from klack.case.study_source import StudySource
 from klack.errors import InputError, refuse_if
-from klack.expressions.expression import RESERVED, Expression, ordered
 from klack.input.problem import CaseProblem, Key, one_of
 from klack.studies.designs import (
     Listed,

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.point_table import PointColumn, PointTable, column_of
 from klack.analyses.record import CaseRecord
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = [
     "NOT_YET",

@@ -30,8 +30,8 @@ from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.where import HERE, Where
 from klack.case.any_case import AnyCase, CaseTree
 from klack.case.study_source import StudySource
-from klack.progress import Progress, silent
-from klack.stages import StageClock, collected_warnings
+from klack.machine.progress import Progress, silent
+from klack.machine.stages import StageClock, collected_warnings
 
 __all__ = ["asked_points", "run_study"]
 

@@ -13,7 +13,7 @@ from klack.case.points import GivenPoints
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
 from klack.errors import InputError
-from klack.progress import Progress, silent
+from klack.machine.progress import Progress, silent
 
 __all__ = ["require_way", "run_points"]
 

@@ -44,15 +44,15 @@ from klack.case.points import PointValue, case_at, checked_parts
 from klack.case.study import CaseStudy
 from klack.case.valve import ValveCase
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, ValveRoles, find_roles
-from klack.cores import available_cores
 from klack.errors import KlackError, refuse_if
 from klack.input.problem import Key
-from klack.memory import require_memory
-from klack.progress import Progress
-from klack.signals import TimeSeries
+from klack.machine.cores import available_cores
+from klack.machine.memory import require_memory
+from klack.machine.progress import Progress
+from klack.machine.stages import collected_warnings
+from klack.signals.sampled import TimeSeries
 from klack.simulation.network_recorder import recorded_columns
 from klack.simulation.network_run import has_python_steps
-from klack.stages import collected_warnings
 
 __all__ = ["STROKES"]
 

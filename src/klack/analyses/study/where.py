@@ -27,13 +27,13 @@ from klack.analyses.study.evaluation import point_log_form
 from klack.analyses.study.kinds import kind_of
 from klack.analyses.unfinished import code_of_klack
 from klack.analyses.workers import Failure, WorkerDied, WorkerPool, answer, shared, unwrapped
+from klack.bodies.elasticity.factorization import chosen_backend
 from klack.case.any_case import AnyCase, CaseTree
 from klack.case.points import PointKey, Points, PointValue
-from klack.cores import available_cores
-from klack.elasticity.factorization import chosen_backend
 from klack.errors import ConvergenceError, InputError, refuse_if
-from klack.memory import available_memory, require_memory
-from klack.progress import Progress
+from klack.machine.cores import available_cores
+from klack.machine.memory import available_memory, require_memory
+from klack.machine.progress import Progress
 
 if TYPE_CHECKING:
     from distributed import Client

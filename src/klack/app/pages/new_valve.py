@@ -30,7 +30,7 @@ from klack.app.pages.parts import FacesStep, PartsStep
 from klack.app.state import State
 from klack.app.valve_plan import BODIES, STEPS, ValvePlan
 from klack.errors import InputError, KlackError
-from klack.material_library import MATERIALS, MaterialEntry
+from klack.materials.library import MATERIALS, MaterialEntry
 from klack.units import format_si
 
 __all__ = ["new_valve_page"]

@@ -33,7 +33,7 @@ from klack.app.pages.frame import (
 from klack.app.pages.studies import show_study_run
 from klack.app.state import LONGEST_NOTE, State
 from klack.errors import InputError, KlackError
-from klack.whole_file import mark_of
+from klack.files.whole import mark_of
 
 __all__ = ["overview_page"]
 

@@ -23,7 +23,7 @@ from klack.exchange.fmu.model_description import (
 )
 from klack.exchange.fmu.variables import fmu_variables
 from klack.exchange.modal_model import ModalModel
-from klack.whole_file import whole_file
+from klack.files.whole import whole_file
 
 __all__ = ["build_fmu", "data_header", "source_texts"]
 

@@ -7,7 +7,7 @@ from math import isnan
 from pathlib import Path
 
 from klack.exchange.results.table import ResultAxis, ResultChannel, ResultTable, file_stems
-from klack.whole_file import whole_files
+from klack.files.whole import whole_files
 
 __all__ = ["write_csv"]
 

@@ -22,7 +22,7 @@ from klack.analyses.study.record import StudyColumn, StudyRecord
 from klack.errors import InputError, optional_package
 from klack.exchange.results.study_table import about_study, result_table
 from klack.exchange.results.table import ResultChannel, ResultRun, ResultScalar, identifiers
-from klack.signals import TimeSeries
+from klack.signals.sampled import TimeSeries
 
 __all__ = ["dataset_of"]
 

@@ -8,7 +8,7 @@ import scipy
 
 from klack.errors import InputError
 from klack.exchange.results.table import ResultRun, ResultTable, identifiers, octave_text
-from klack.whole_file import whole_file
+from klack.files.whole import whole_file
 
 __all__ = ["write_mat"]
 

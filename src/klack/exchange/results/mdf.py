@@ -9,7 +9,7 @@ from pathlib import Path
 
 from klack.errors import optional_package
 from klack.exchange.results.table import ResultRun, ResultTable
-from klack.whole_file import whole_file
+from klack.files.whole import whole_file
 
 __all__ = ["write_mdf"]
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from klack.errors import optional_package
 from klack.exchange.results.table import ResultRun, ResultTable, identifiers
-from klack.whole_file import whole_file
+from klack.files.whole import whole_file
 
 __all__ = ["write_netcdf"]
 

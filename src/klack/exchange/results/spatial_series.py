@@ -18,16 +18,16 @@ from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.assembling.modes import shape_marks
 from klack.assembling.spatial import modes_in_network
 from klack.assembling.valve import build_valve_bodies, valve_parts
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.case.valve import ValveCase
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError, refuse
 from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtk_series import stress_grid
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, grid_piece, write_grid, write_pvd
-from klack.progress import Progress, silent
+from klack.files.whole import whole_files
+from klack.machine.progress import Progress, silent
 from klack.simulation.spatial_impact import ModalMoments, SpatialImpact
-from klack.whole_file import whole_files
 
 __all__ = ["valve_shapes", "write_spatial_series"]
 

@@ -14,6 +14,7 @@ from klack.analyses.record import CaseRecord
 from klack.analyses.stroke.measures import EVENT_MEASURES, VARIANT_MEASURES
 from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
 from klack.assembling.body_summary import BodySummary
+from klack.bodies.reduction.transfer import TransferComparison
 from klack.contact.history import ImpactHistory
 from klack.exchange.results.table import (
     ResultAxis,
@@ -22,7 +23,6 @@ from klack.exchange.results.table import (
     ResultScalar,
     ResultTable,
 )
-from klack.reduction.transfer import TransferComparison
 from klack.simulation.network_result import ImpactEvent, InterfaceRecord
 
 __all__ = ["about_study", "result_table", "stroke_table"]

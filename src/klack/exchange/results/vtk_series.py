@@ -16,17 +16,17 @@ from klack.analyses.impact.full_level import simulate_in_full
 from klack.analyses.impact.recovered_motion import recovered_motion
 from klack.assembling.modes import is_damped, kept_modes, mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.case.schema import Case
 from klack.case.valve import ValveCase
-from klack.elasticity.body import ElasticBody
-from klack.elasticity.stress import StressField, von_mises
 from klack.errors import InputError
 from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
+from klack.files.whole import whole_files
+from klack.machine.progress import Progress, silent
 from klack.mesh.mesh import Mesh
-from klack.progress import Progress, silent
 from klack.transient.result import MotionOfBody, Snapshots
-from klack.whole_file import whole_files
 
 __all__ = ["write_impact_series"]
 

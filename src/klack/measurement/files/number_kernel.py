@@ -8,7 +8,7 @@ fast path), which is exact up to 15 digits and right to two units in the last pl
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.compiling.jit import inner, njit
+from klack.machine.compiling.jit import inner, njit
 from klack.measurement.recording import OVER_RANGE
 
 __all__ = ["BAD_CELL", "MISSING", "TOO_MANY", "WHITESPACE", "parse_rows"]

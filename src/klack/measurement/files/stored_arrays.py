@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from klack.bodies.model_files.mat5 import MatValue, read_mat5
 from klack.errors import InputError
 from klack.measurement.files.clock import (
     PACKED,
@@ -35,7 +36,6 @@ from klack.measurement.files.clock import (
 from klack.measurement.files.csv_dialect import split_label
 from klack.measurement.recording import ChannelInfo, Recording, left_out
 from klack.measurement.unit_text import no_unit, plain_unit
-from klack.model_files.mat5 import MatValue, read_mat5
 
 __all__ = ["ArrayRecording", "MatlabFile", "StoredArray", "StoredGroup", "stored_array"]
 

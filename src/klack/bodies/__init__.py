@@ -1,0 +1,1 @@
+"""Elastic bodies: matrices, modes and reduced models, model files, gauges."""

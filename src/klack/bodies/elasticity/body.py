@@ -1,0 +1,278 @@
+"""An elastic body: its mesh, its matrices, its supports and its rigid-body modes.
+
+Rigid modes are built exactly from the coordinates (translations, rotations about the centre of
+mass) and then made orthonormal in the mass, :math:`R^T M R = 1`.  A body of revolution can only
+move along its axis.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+import scipy
+from numpy import float64, int64
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
+
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.rigid_motions import (
+    at_distant_nodes,
+    held_best,
+    held_dofs,
+    motions_left_free,
+    orthonormal_in_mass,
+    rigid_motions,
+)
+from klack.errors import InputError
+from klack.materials.material import Material
+from klack.mesh.mesh import Mesh
+
+__all__ = ["ElasticBody", "VibratingBody", "checked_nodes", "elastic_body", "require_support"]
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticBody:
+    """A body ready for statics and vibration; made by :func:`elastic_body`.
+
+    Parameters
+    ----------
+    name : str
+    mesh : Mesh
+    K : csr_array, shape (n_dof, n_dof) [N/m]
+        Stiffness of all degrees of freedom, supports not applied.
+    M : csr_array, shape (n_dof, n_dof) [kg]
+    fixed : int array
+        Sorted degrees of freedom that are held at zero.
+    """
+
+    name: str
+    mesh: Mesh
+    K: csr_array
+    M: csr_array
+    fixed: NDArray[np.int64]
+
+    @property
+    def dimension(self) -> int:
+        """3 for a solid, 2 for a body of revolution; as many displacements has each node."""
+        return self.mesh.dimension
+
+    @property
+    def dof_count(self) -> int:
+        """Number of degrees of freedom, fixed ones included."""
+        return self.mesh.dof_count
+
+    @cached_property
+    def free(self) -> NDArray[np.int64]:
+        """Sorted degrees of freedom that are not fixed."""
+        moving = np.ones(self.dof_count, dtype=bool)
+        moving[self.fixed] = False
+        return np.flatnonzero(moving)
+
+    @cached_property
+    def axial_momentum(self) -> NDArray[np.float64]:
+        """Momentum of all degrees of freedom at unit velocity along z, M e_z, shape (n_dof,) [kg].
+
+        z is the last component, in space and in the meridian plane.
+        """
+        along = np.zeros(self.dof_count)
+        along[self.dimension - 1 :: self.dimension] = 1.0
+        return np.asarray(self.M @ along)
+
+    @cached_property
+    def nodal_mass(self) -> NDArray[np.float64]:
+        """Row sums of the scalar mass matrix, shape (n_nodes,) [kg]; they add up to the mass."""
+        return self.axial_momentum[self.dimension - 1 :: self.dimension]
+
+    @cached_property
+    def mass(self) -> float:
+        """Mass of the whole body (full circle) [kg]."""
+        return float(self.nodal_mass.sum())
+
+    @cached_property
+    def centre_of_mass(self) -> NDArray[np.float64]:
+        """Centre of mass, shape (dimension,) [m]; r = 0 for a body of revolution."""
+        centre = self.nodal_mass @ self.mesh.points / self.mass
+        if self.dimension == 2:
+            centre[0] = 0.0
+        return centre
+
+    @property
+    def centre_in_space(self) -> NDArray[np.float64]:
+        """Centre of mass (x, y, z) [m], of a body of revolution on its axis."""
+        return np.array([0.0, 0.0, *self.centre_of_mass])[-3:]
+
+    @cached_property
+    def inertia(self) -> NDArray[np.float64]:
+        """Tensor of inertia about the centre of mass, shape (3, 3) [kg m^2]; the axis is z."""
+        x = self.mesh.points - self.centre_of_mass
+        d = self.dimension
+        moments = x.T @ (self.M[::d, ::d] @ x)
+        if d == 2:  # integral of r^2 dm is shared equally by x and y
+            moments = np.diag([moments[0, 0] / 2, moments[0, 0] / 2, moments[1, 1]])
+        return np.trace(moments) * np.eye(3) - moments
+
+    @cached_property
+    def is_fixed(self) -> bool:
+        """True when the supports hold the body (it has no rigid modes)."""
+        return bool(np.any(rigid_motions(self.mesh, self.centre_of_mass)[self.fixed]))
+
+    @cached_property
+    def rigid_modes(self) -> NDArray[np.float64]:
+        """Rigid modes, shape (n_dof, 6 | 1 | 0) [1/sqrt(kg)], orthonormal in the mass."""
+        if self.is_fixed:
+            return np.zeros((self.dof_count, 0))
+        return orthonormal_in_mass(rigid_motions(self.mesh, self.centre_of_mass), self.M)
+
+    @cached_property
+    def isostatic_support(self) -> NDArray[np.int64]:
+        """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""
+        d = self.dimension
+        x = self.mesh.points
+        if d == 2:
+            return np.array([2 * np.argmin(x[:, 1]) + 1])
+        return held_best(self.rigid_modes, at_distant_nodes(x, self.centre_of_mass))
+
+
+def elastic_body(
+    name: str,
+    mesh: Mesh,
+    materials: Mapping[str, Material],
+    *,
+    fixed_nodes: Iterable[int] = (),
+) -> ElasticBody:
+    """Assemble a body and check its supports.
+
+    Parameters
+    ----------
+    name : str
+    mesh : Mesh
+    materials : mapping of str to Material
+        By name of the solid.
+    fixed_nodes : node numbers
+        Held in all directions.  None: the body is free.  On the axis of a body of revolution
+        the radial displacement is always fixed.
+
+    Raises
+    ------
+    InputError
+        If the mesh is not in one piece, or the supports leave a rigid motion free.
+    """
+    nodes = checked_nodes(name, mesh, fixed_nodes)
+    K, M = assemble(mesh, materials)
+    body = ElasticBody(name=name, mesh=mesh, K=K, M=M, fixed=held_dofs(mesh, nodes))
+    if nodes.size:
+        require_support(name, rigid_motions(mesh, body.centre_of_mass)[body.fixed])
+    return body
+
+
+def checked_nodes(name: str, mesh: Mesh, fixed_nodes: Iterable[int]) -> NDArray[np.int64]:
+    """Sorted numbers of the held nodes of a mesh that is in one piece.
+
+    Raises
+    ------
+    InputError
+        If it is not, or does not have such nodes.
+    """
+    _check_one_piece(name, mesh)
+    nodes = np.unique(np.fromiter(fixed_nodes, dtype=np.int64))
+    if nodes.size and not (nodes[0] >= 0 and nodes[-1] < mesh.node_count):
+        raise InputError(
+            f"body '{name}': fixed_nodes",
+            got=f"node numbers from {nodes[0]} to {nodes[-1]}",
+            expected=f"numbers from 0 to {mesh.node_count - 1}",
+            hint="node numbers count from zero in the order of mesh.points.",
+        )
+    return nodes
+
+
+def require_support(
+    name: str,
+    held: NDArray[np.float64],
+    key: str = "fixed_nodes",
+    what: str = "supports",
+    hint: str = "do not lie on one line, for example those of a whole surface.",
+) -> None:
+    """Refuse a support that leaves rigid motions free, from their values at what it holds."""
+    left = motions_left_free(held)
+    if left:
+        raise InputError(
+            f"body '{name}': {key}",
+            got=f"{what} that leave {left} of {held.shape[1]} rigid motions free",
+            expected="a support that constrains the body, or none (a free body)",
+            hint=f"fix nodes that {hint}",
+        )
+
+
+def _check_one_piece(name: str, mesh: Mesh) -> None:
+    """Every node must be tied to every other one through elements."""
+    pairs = [
+        np.stack([np.repeat(b.connectivity[:, 0], b.connectivity.shape[1]), b.connectivity.ravel()])
+        for b in mesh.blocks
+    ]
+    rows, columns = np.concatenate(pairs, axis=1)
+    graph = coo_array(
+        (np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(mesh.node_count,) * 2
+    )
+    count, label = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    if count == 1:
+        return
+    smallest = np.flatnonzero(label == np.argmin(np.bincount(label)))
+    where = ", ".join(f"{1e3 * c:.4f}" for c in mesh.points[smallest].mean(axis=0))
+    raise InputError(
+        f"body '{name}': mesh",
+        got=f"{count} parts that share no nodes; the smallest has {len(smallest)} nodes "
+        f"around ({where}) mm",
+        expected="one connected body",
+        hint="glue the solids before meshing, merge coincident nodes, or drop nodes that belong "
+        "to no element.",
+    )
+
+
+class VibratingBody(Protocol):
+    """A body with every freedom it has, or of revolution in one Fourier order around its axis.
+
+    :class:`~klack.bodies.elasticity.body.ElasticBody` and
+    :class:`~klack.bodies.elasticity.fourier_body.FourierBody`.
+    """
+
+    @property
+    def name(self) -> str:
+        """Name in messages."""
+
+    @property
+    def mesh(self) -> Mesh:
+        """Nodes and elements."""
+
+    @property
+    def dimension(self) -> int:
+        """Degrees of freedom of each node."""
+
+    @property
+    def K(self) -> csr_array:
+        """Stiffness of all degrees of freedom, supports not applied."""
+
+    @property
+    def M(self) -> csr_array:
+        """Mass of all degrees of freedom."""
+
+    @property
+    def fixed(self) -> NDArray[int64]:
+        """Sorted degrees of freedom that are held at zero."""
+
+    @property
+    def free(self) -> NDArray[int64]:
+        """Sorted degrees of freedom that are not fixed."""
+
+    @property
+    def dof_count(self) -> int:
+        """Number of degrees of freedom, fixed ones included."""
+
+    @property
+    def rigid_modes(self) -> NDArray[float64]:
+        """Rigid modes, orthonormal in the mass; no columns for a fixed body."""
+
+    @property
+    def isostatic_support(self) -> NDArray[int64]:
+        """Degrees of freedom, one per rigid mode, that prevent every rigid motion when fixed."""

@@ -1,0 +1,354 @@
+r"""Static flexibility of a fixed or of a free body.
+
+A fixed body answers a load with :math:`u = K^{-1} f`.  A free body under a constant load
+accelerates; seen from its moving centre it takes the shape (inertia relief, Craig & Kurdila 2006,
+ch. 17)
+
+.. math:: u = P^T K^+ P f, \qquad P = 1 - M R R^T,
+
+where P removes the resultant of the load by the inertia forces of the rigid motion, and P^T the
+rigid motion from the answer.  K^+ may be any generalised inverse: here six degrees of freedom of
+three distant nodes (one of a body of revolution, two in Fourier order 1) are held, which costs no
+reaction force because the load is in balance.
+
+A factorisation cannot be stored, but what was solved with it can.  With a cache, a body that was
+factorised before is factorised again only when something is asked for that the cache does not have.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property
+from itertools import product
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.bodies.elasticity.body import VibratingBody
+from klack.bodies.elasticity.budget import WITHOUT, Budget
+from klack.bodies.elasticity.condensation import condensed_inverse
+from klack.bodies.elasticity.factor_memory import FactorMemoryError
+from klack.bodies.elasticity.factorization import Backend, Factorization, chosen_backend, factorize
+from klack.errors import ConvergenceError, InputError
+from klack.files.closing import Closing
+from klack.machine.cache.content import content_key
+from klack.machine.cache.entry import Entry
+from klack.machine.cache.remember import remembered
+from klack.machine.cache.result_cache import ResultCache
+from klack.machine.memory import require_memory
+
+__all__ = ["Flexibility", "RefinedFactorization"]
+
+
+_ENERGY = 1e-11  # error of a solution in the energy norm, relative
+_ROUNDS = 40
+_COLUMNS = 16  # at once: five blocks of them are held
+
+
+class RefinedFactorization(Closing):
+    """A :class:`~klack.bodies.elasticity.factorization.Factorization` that corrects a rough one.
+
+    Parameters
+    ----------
+    A : sparse array, shape (n, n)
+        Symmetric positive definite.
+    rough : Factorization
+        Of A, in single precision; closed with this one.
+    """
+
+    def __init__(self, A: Any, rough: Factorization) -> None:
+        self._A, self._rough = A, rough
+        self.backend = f"{rough.backend}, single precision, refined"
+        self.size = rough.size
+        self.nonzeros = rough.nonzeros
+        self.memory = rough.memory
+
+    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Solve A X = B for one or several columns.
+
+        Raises
+        ------
+        ConvergenceError
+            If the factor is too rough for this matrix.
+        """
+        B = np.asarray(B, dtype=np.float64)
+        columns = B[:, None] if B.ndim == 1 else B
+        X = np.empty(columns.shape, order="F")
+        for at in range(0, columns.shape[1], _COLUMNS):
+            X[:, at : at + _COLUMNS] = self._solve_block(columns[:, at : at + _COLUMNS])
+        return X[:, 0] if B.ndim == 1 else X
+
+    def _solve_block(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Preconditioned conjugate gradients, one recurrence for each column."""
+        X = self._rough.solve(B)
+        R = B - self._A @ X
+        Z = self._rough.solve(R)
+        whole = np.abs(_products(X, B))
+        former, error = whole, _products(R, Z)
+        P = Z
+        for _ in range(_ROUNDS):
+            # one more correction is there already, and gains what the last one has gained
+            if np.all(error**2 <= _ENERGY**2 * whole * former):
+                return X + Z
+            image = self._A @ P
+            step = _ratio(error, _products(P, image))
+            X += P * step
+            before, R = R, R - image * step
+            Z = self._rough.solve(R)
+            # the form of Polak and Ribiere allows for a preconditioner that rounds
+            turn = _ratio(_products(Z, R - before), error)
+            former, error = error, _products(R, Z)
+            P = Z + P * np.maximum(turn, 0.0)
+        raise ConvergenceError(
+            f"solutions through a factor in single precision: {self.size} degrees of freedom did "
+            f"not converge in {_ROUNDS} rounds.\n"
+            "Try: a machine with twice the memory, or larger elements away from the contact."
+        )
+
+    def close(self) -> None:
+        """Give the memory back to the system."""
+        self._rough.close()
+
+
+def _products(X: NDArray[np.float64], Y: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.einsum("ij,ij->j", X, Y)
+
+
+def _ratio(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Quotients, 0 where a column is solved already."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b != 0.0)
+
+
+_CHUNK = 64
+_COPIES = 2 * 12.0  # bytes for each entry of K: a copy, and what it passes through
+_POSITIVE = Entry(arrays={}, text="positive definite")
+
+Result = TypeVar("Result")
+
+
+class Flexibility(Closing):
+    """Elastic static response of a body to loads; one factorisation, many right-hand sides.
+
+    Parameters
+    ----------
+    body : VibratingBody
+    backend : {"auto", "pardiso", "ngsolve", "superlu"}
+    threads : int, optional
+        See :func:`klack.bodies.elasticity.factorization.factorize`.
+    cache : ResultCache, optional
+        Keeps what :meth:`deflections` and :meth:`remembered` compute, for later runs.
+    budget : Budget
+        What has to fit beside the factor.  Where a factor in double precision does not, one in
+        single precision is taken and its solutions are refined (pardiso only;
+        :mod:`klack.bodies.elasticity.statics`).
+    at_once : bool
+        Other bodies may be solved for at the same time: ``threads`` leaves them their cores.
+    """
+
+    def __init__(
+        self,
+        body: VibratingBody,
+        *,
+        backend: Backend = "auto",
+        threads: int | None = None,
+        cache: ResultCache | None = None,
+        budget: Budget = WITHOUT,
+        at_once: bool = False,
+    ) -> None:
+        self.body, self.cache, self.at_once = body, cache, at_once
+        self._budget = replace(budget, name=budget.name or body.name)
+        self._backend, self._threads = backend, threads
+        self._factor: Factorization | None = None
+        self._closed = False
+        self._R = body.rigid_modes
+        self._MR = body.M @ self._R
+        self._kept = body.free
+        if self._R.shape[1]:
+            self._kept = np.setdiff1d(body.free, body.isostatic_support, assume_unique=True)
+        # known to be positive definite, and most of what it is needed for is in the cache
+        self.remembered("factorisation", (), self._check, lambda _: _POSITIVE, lambda _: None)
+
+    @property
+    def factorization(self) -> Factorization:
+        """The factorisation, made when it is first needed."""
+        if self._closed:
+            raise RuntimeError("this factorisation has been closed")
+        if self._factor is None:
+            require_memory(
+                f"factorisation of body '{self.body.name}'",
+                _COPIES * self.body.K.nnz,
+                what=f"the stiffness of {len(self._kept)} degrees of freedom in the solver",
+                hint="larger elements away from the contact, or a machine with more memory.",
+            )
+            K = self.body.K[self._kept][:, self._kept]
+            self._factor = self.factorised(K)
+        return self._factor
+
+    def factorised(self, K: csr_array) -> Factorization:
+        """Factor of a positive definite matrix by the solver of this body, as precise as fits."""
+        backend, threads, budget = self._backend, self._threads, self._budget
+        try:
+            return factorize(K, backend=backend, threads=threads, budget=budget)
+        except FactorMemoryError as error:
+            if chosen_backend(backend) != "pardiso":
+                raise
+            refused = error
+        budget.tell(
+            f"memory of '{budget.name}': got {refused.got}, expected {refused.expected}: the "
+            "factor is taken in single precision, and solutions are refined"
+        )
+        try:
+            rough = factorize(
+                K, backend=backend, threads=threads, precision="single", budget=budget
+            )
+        except FactorMemoryError:
+            raise
+        except InputError as error:  # rounding has made it indefinite
+            raise refused from error
+        return RefinedFactorization(K, rough)
+
+    @cached_property
+    def key(self) -> str:
+        """Key of everything that an answer depends on."""
+        body = self.body
+        return content_key(
+            (body.K, body.M, body.fixed, body.mesh.points, body.dimension),
+            (chosen_backend(self._backend), self._threads),
+        )
+
+    def solve(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacements under loads.
+
+        Parameters
+        ----------
+        F : array, shape (n_dof,) or (n_dof, m) [N]
+            Entries at fixed degrees of freedom are taken by the support.
+
+        Returns
+        -------
+        array of the same shape [m]
+            Column-major; of a free body without rigid motion, R^T M u = 0.
+        """
+        F = np.asarray(F, dtype=np.float64)
+        if F.ndim not in (1, 2) or len(F) != self.body.dof_count:
+            raise InputError(
+                f"Flexibility of body '{self.body.name}': F",
+                got=f"shape {F.shape}",
+                expected=f"({self.body.dof_count},) or ({self.body.dof_count}, m)",
+                hint="give one force per degree of freedom of the mesh, fixed ones included.",
+            )
+        U = np.zeros(F.shape, order="F")
+        if F.ndim == 1:
+            U[:] = self._solve_block(F[:, None])[:, 0]
+        else:
+            for at in range(0, F.shape[1], _CHUNK):
+                U[:, at : at + _CHUNK] = self._solve_block(F[:, at : at + _CHUNK])
+        return U
+
+    def condensed(
+        self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
+    ) -> NDArray[np.float64]:
+        r"""Static compliance seen by given loads, G F G^T: half the work of solving for them.
+
+        Of a free body, with :math:`A = G R` and :math:`Z = K^+ M R` (six columns),
+
+        .. math:: G P^T K^+ P G^T = G K^+ G^T - A (G Z)^T - (G Z) A^T + A (R^T M Z) A^T .
+
+        Parameters
+        ----------
+        G : csr_array, shape (m, n_dof)
+            One load per row.
+        groups : sequence of int arrays
+            Of rows, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
+
+        Returns
+        -------
+        array, shape (m, m) [m/N]
+            Symmetric.
+        """
+        kept = csr_array(G)[:, self._kept]
+        C = condensed_inverse(self.factorization, kept, groups=groups)
+        if self._R.shape[1]:
+            MR = self._MR[self._kept]
+            Z = self.factorization.solve(MR)
+            A, GZ, W = G @ self._R, kept @ Z, MR.T @ Z
+            whole = np.arange(G.shape[0])
+            for i, j in product(groups or (whole,), repeat=2):
+                C[np.ix_(i, j)] += A[i] @ W @ A[j].T - A[i] @ GZ[j].T - GZ[i] @ A[j].T
+            C = (C + C.T) / 2.0
+        return C
+
+    def compliance_at(
+        self, G: csr_array, groups: Sequence[NDArray[np.int64]] = ()
+    ) -> NDArray[np.float64]:
+        """Compliance as of :meth:`condensed`, kept in the cache: for the points of a contact."""
+        return self.remembered(
+            "compliance of the contact",
+            (G, *groups),
+            lambda: self.condensed(G, groups),
+            lambda C: Entry(arrays={"C": C}),
+            lambda entry: entry.arrays["C"],
+        )
+
+    def coupling(self, G: csr_array, H: csr_array) -> NDArray[np.float64]:
+        """Opening of each row of G [m] per force [N] on each row of H, G F H^T; kept in the cache.
+
+        Solved for the fewer rows: by reciprocity H F G^T is its transpose.
+        """
+        if G.shape[0] < H.shape[0]:
+            return self.coupling(H, G).T
+        return self.remembered(
+            "coupling of two contacts",
+            (G, H),
+            lambda: np.asarray(G @ self.solve(H.T.toarray())),
+            lambda C: Entry(arrays={"C": C}),
+            lambda entry: entry.arrays["C"],
+        )
+
+    def deflections(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Displacements under loads as of :meth:`solve`, kept in the cache: for ports."""
+        return self.remembered(
+            "deflections",
+            (F,),
+            lambda: self.solve(F),
+            lambda U: Entry(arrays={"U": U}),
+            lambda entry: entry.arrays["U"],
+        )
+
+    def remembered(
+        self,
+        kind: str,
+        parts: tuple[object, ...],
+        compute: Callable[[], Result],
+        pack: Callable[[Result], Entry],
+        unpack: Callable[[Entry], Result],
+    ) -> Result:
+        """Take a result of this body from its cache.
+
+        As :func:`klack.machine.cache.remember.remembered`; ``parts`` is what it depends on besides
+        the body and its solver.
+        """
+        if self.cache is None:
+            return compute()
+        return remembered(self.cache, kind, (self.key, *parts), compute, pack=pack, unpack=unpack)
+
+    def close(self) -> None:
+        """Release the memory of the factorisation."""
+        self._closed = True
+        if self._factor is not None:
+            self._factor.close()
+
+    def _check(self) -> None:
+        """Factorise, so that an error of the matrix is raised here."""
+        _ = self.factorization
+
+    def _solve_block(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+        R, MR = self._R, self._MR
+        if R.shape[1]:
+            F = F - MR @ (R.T @ F)
+        U = np.zeros(F.shape, order="F")
+        U[self._kept] = self.factorization.solve(F[self._kept])
+        if R.shape[1]:
+            U -= R @ (MR.T @ U)
+        return U

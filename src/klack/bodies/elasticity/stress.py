@@ -1,0 +1,204 @@
+r"""Stresses at the nodes from a displacement field.
+
+In every element the stress
+
+.. math:: \sigma = \lambda\, \mathrm{tr}(\varepsilon)\, 1 + 2 \mu\, \varepsilon
+
+is taken where it is best, at the points of the reduced Gauss rule (Barlow 1976), carried to the
+nodes with the shape functions of the corners, and averaged over the elements that share a node.  A
+stress that is constant comes out exactly, with quadratic elements also one that is linear.  The
+mean is taken within a solid: where two materials meet, the stress may jump.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.errors import InputError
+from klack.materials.material import Material
+from klack.mesh.mesh import ElementBlock, Mesh
+
+__all__ = ["COMPONENTS", "StressField", "stress_points", "von_mises"]
+
+COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "xz")
+"""Order of the stresses; of a body of revolution x is the radius and y the direction around."""
+
+_LINEAR = {
+    **{"tri6": "tri3", "quad8": "quad4", "tet10": "tet4"},
+    **{"hex20": "hex8", "wedge15": "wedge6"},
+}
+_CORNER = 1.0 / np.sqrt(3.0)
+
+
+class StressField:
+    """Stresses of one mesh, for any number of displacement fields.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Solid, or axisymmetric with columns r and z.
+    materials : mapping of str to Material
+        By name of the solid.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        The mesh with nodes of its own for every solid, without surfaces and sets.
+    nodes : int array, shape (n_points,)
+        Node of the given mesh that each point of that mesh is.
+
+    Examples
+    --------
+    A bar of two elements, stretched by 1 per mille without change of its width:
+
+    >>> corners = np.array([[x, y, z] for z in (0, 1) for y in (0, 1) for x in (0, 1, 2)], float)
+    >>> brick = np.array([[0, 1, 4, 3, 6, 7, 10, 9], [1, 2, 5, 4, 7, 8, 11, 10]])
+    >>> mesh = Mesh(points=corners, blocks=(ElementBlock("hex8", brick, "bar"),))
+    >>> steel = Material(name="steel", young=200e9, poisson=0.25, density=7850.0)
+    >>> stress = StressField(mesh, {"bar": steel})(1e-3 * corners * [1.0, 0.0, 0.0])
+    >>> [round(float(x) / 1e6, 6) for x in stress[0]]
+    [240.0, 80.0, 80.0, 0.0, 0.0, 0.0]
+    """
+
+    def __init__(self, mesh: Mesh, materials: Mapping[str, Material]) -> None:
+        for solid in mesh.solids:
+            if solid not in materials:
+                raise InputError(
+                    f"stress: solid '{solid}'",
+                    got="no material",
+                    expected="one for every solid of the mesh",
+                    hint="add it under that name.",
+                )
+        self.mesh, self.nodes = _apart_at_solids(mesh)
+        self._blocks = [_Block(self.mesh, block, materials[block.solid]) for block in
+                        self.mesh.blocks]  # fmt: skip
+        rows = np.concatenate([block.connectivity.ravel() for block in self.mesh.blocks])
+        shared = np.bincount(rows, minlength=self.mesh.node_count)
+        self._mean = csr_array(
+            (1.0 / shared[rows], (rows, np.arange(rows.size))),
+            shape=(self.mesh.node_count, rows.size),
+        )
+
+    def __call__(self, displacement: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Stresses of a displacement field.
+
+        Parameters
+        ----------
+        displacement : array, shape (n_dof,) or (n_nodes, dimension) [m]
+            Of the given mesh.
+
+        Returns
+        -------
+        array, shape (n_points, 6) [Pa]
+            In the order of :data:`COMPONENTS`, at the points of :attr:`mesh`.
+        """
+        u = np.asarray(displacement, dtype=float).reshape(-1, self.mesh.dimension)[self.nodes]
+        corners = [block.stress(u).reshape(-1, 6) for block in self._blocks]
+        return np.asarray(self._mean @ np.concatenate(corners))
+
+
+def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    r"""Equivalent stress after von Mises.
+
+    .. math:: \sigma_v = \sqrt{\tfrac12 \left[(\sigma_{xx} - \sigma_{yy})^2 + (\sigma_{yy} -
+        \sigma_{zz})^2 + (\sigma_{zz} - \sigma_{xx})^2\right] + 3\,(\tau_{xy}^2 + \tau_{yz}^2 +
+        \tau_{xz}^2)}
+
+    Parameters
+    ----------
+    stress : array, shape (..., 6) [Pa]
+        In the order of :data:`COMPONENTS`.
+
+    Returns
+    -------
+    array, shape (...,) [Pa]
+
+    Examples
+    --------
+    >>> float(von_mises(np.array([-2.0, 0.0, 0.0, 0.0, 0.0, 0.0])))
+    2.0
+    """
+    xx, yy, zz, xy, yz, xz = np.moveaxis(stress, -1, 0)
+    direct = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
+    return np.asarray(np.sqrt(direct + 3.0 * (xy**2 + yz**2 + xz**2)))
+
+
+class _Block:
+    """Gradients of the shape functions of one block at its stress points."""
+
+    def __init__(self, mesh: Mesh, block: ElementBlock, material: Material) -> None:
+        self.connectivity, self.material = block.connectivity, material
+        self.axisymmetric = mesh.dimension == 2
+        xi = stress_points(block.family)
+        N, dN = shape_functions(block.family, xi)
+        x = mesh.points[block.connectivity]
+        J = np.einsum("ena,qnb->eqab", x, dN)
+        self.gradients = np.einsum("qnb,eqba->eqna", dN, np.linalg.inv(J))
+        if self.axisymmetric:
+            self.over_radius = N / np.einsum("qn,en->eq", N, x[..., 0])[..., None]
+        self.to_nodes = _to_nodes(block.family, xi)
+
+    def stress(self, u: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Stress at the nodes of every element, shape (n_elements, n_nodes, 6)."""
+        of_element = u[self.connectivity]
+        H = np.einsum("eni,eqna->eqia", of_element, self.gradients, optimize=True)
+        strain = np.zeros((*H.shape[:2], 6))  # shear strains are halves, as in the tensor
+        if self.axisymmetric:
+            strain[..., 0], strain[..., 2] = H[..., 0, 0], H[..., 1, 1]
+            strain[..., 1] = np.einsum("en,eqn->eq", of_element[..., 0], self.over_radius)
+            strain[..., 5] = 0.5 * (H[..., 0, 1] + H[..., 1, 0])
+        else:
+            for i in range(3):
+                strain[..., i] = H[..., i, i]
+            for i, (a, b) in enumerate(((0, 1), (1, 2), (0, 2))):
+                strain[..., 3 + i] = 0.5 * (H[..., a, b] + H[..., b, a])
+        stress = 2.0 * self.material.shear_modulus * strain
+        stress[..., :3] += self.material.lame_lambda * strain[..., :3].sum(axis=-1, keepdims=True)
+        return np.asarray(self.to_nodes @ stress)
+
+
+def stress_points(family: str) -> NDArray[np.float64]:
+    """Reference coordinates of the points where the stress is taken, shape (q, d)."""
+    if family not in _LINEAR:
+        return reference_nodes(family).mean(axis=0, keepdims=True)
+    match _LINEAR[family]:
+        case "tet4":
+            return quadrature("tet10", "stiffness")[0]
+        case "wedge6":
+            triangle = np.array([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)])
+            return np.vstack([np.c_[triangle, np.full(3, z)] for z in (-_CORNER, _CORNER)])
+        case "tri3":
+            return np.array([(1 / 6, 1 / 6), (2 / 3, 1 / 6), (1 / 6, 2 / 3)])
+        case box:
+            return _CORNER * reference_nodes(box)
+
+
+def _to_nodes(family: str, xi: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Matrix from values at the stress points to values at the nodes, shape (n_nodes, q)."""
+    nodes = reference_nodes(family)
+    if len(xi) == 1:
+        return np.ones((len(nodes), 1))
+    linear = _LINEAR[family]
+    at_points, at_nodes = shape_functions(linear, xi)[0], shape_functions(linear, nodes)[0]
+    return np.asarray(np.linalg.solve(at_points.T, at_nodes.T).T)
+
+
+def _apart_at_solids(mesh: Mesh) -> tuple[Mesh, NDArray[np.int64]]:
+    """Mesh in which solids share no nodes, and the old number of each of its nodes."""
+    nodes, blocks, first = [], [], 0
+    for solid in mesh.solids:
+        own = [block for block in mesh.blocks if block.solid == solid]
+        used = np.unique(np.concatenate([block.connectivity.ravel() for block in own]))
+        for block in own:
+            blocks.append(
+                replace(block, connectivity=first + np.searchsorted(used, block.connectivity))
+            )
+        nodes.append(used)
+        first += len(used)
+    every = np.concatenate(nodes)
+    return Mesh(points=mesh.points[every], blocks=tuple(blocks)), every

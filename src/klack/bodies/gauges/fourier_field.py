@@ -1,0 +1,54 @@
+"""Displacement of a body of revolution in one Fourier order, at points of space."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from klack.bodies.elasticity.fourier_body import FourierBody, displacement_rows
+from klack.bodies.elasticity.shape_functions import shape_functions
+from klack.bodies.gauges.located_point import locate
+
+__all__ = ["field_rows"]
+
+Floats = NDArray[np.float64]
+
+_SAME = 1e-12  # of the size of the body: places of the half section that are one
+
+
+def field_rows(body: FourierBody, points: Floats, *, where: str, towards: float = 0.0) -> csr_array:
+    """Rows that read the displacement of points; with the shape of a mode, its field in space.
+
+    Parameters
+    ----------
+    body : FourierBody
+    points : array, shape (m, 3) [m]
+        Cylindrical coordinates of points of the body: radius, height z, angle [rad].
+    where : str
+        For the error, e.g. ``"probe"``.
+    towards : float [rad]
+        Angle of the direction in which the body bends.
+
+    Returns
+    -------
+    csr_array, shape (3 m, n_dof)
+        x, y, z of the first point, then those of the next.
+
+    Raises
+    ------
+    InputError
+        For a point outside of the body, with its distance and the nearest point of the body.
+    """
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    grain = _SAME * float(np.ptp(body.mesh.points))
+    _, first, of_point = np.unique(
+        np.round(points[:, :2] / grain), axis=0, return_index=True, return_inverse=True
+    )
+    found = [locate(body.mesh, points[index, :2], where)[0] for index in first]
+    values = [shape_functions(item.block.family, item.xi[None])[0][0] for item in found]
+    counts = np.cumsum([0, *(len(item.nodes) for item in found)])
+    places = csr_array(
+        (np.concatenate(values), np.concatenate([item.nodes for item in found]), counts),
+        shape=(len(found), body.mesh.node_count),
+    )
+    weights = csr_array(places[of_point.ravel()])
+    return displacement_rows(weights, body.order, points[:, 2], towards=towards)

@@ -1,0 +1,107 @@
+"""A gauge on a body, and its record over time."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.signals.low_pass import LowPass
+
+__all__ = ["GAUGE_UNITS", "Gauge", "GaugeKind", "GaugeRecord"]
+
+Floats = NDArray[np.float64]
+
+GaugeKind = Literal["displacement", "velocity", "strain", "stress"]
+
+GAUGE_UNITS: dict[GaugeKind, str] = {
+    "displacement": "m",
+    "velocity": "m/s",
+    "strain": "1",
+    "stress": "Pa",
+}
+"""Unit of what each kind reads."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Gauge:
+    """What is read on one body: ``row . u`` of its nodal displacements, or ``row . u'``.
+
+    Parameters
+    ----------
+    name, body : str
+    kind : {"displacement", "velocity", "strain", "stress"}
+    row : array, shape (n_dof,)
+        Of a velocity the row of the displacement.
+    place : str
+        In words, for example ``"along z over 3 mm at (10, -1260) mm"``.
+    low_pass : LowPass or None
+        Of the sensor.
+    """
+
+    name: str
+    body: str
+    kind: GaugeKind
+    row: Floats
+    place: str
+    low_pass: LowPass | None = None
+
+    def record(self, start: float, step: float, values: Floats) -> "GaugeRecord":
+        """Record of this gauge from its exact values; see :class:`GaugeRecord`."""
+        return GaugeRecord(
+            name=self.name,
+            body=self.body,
+            kind=self.kind,
+            place=self.place,
+            start=start,
+            step=step,
+            exact=values,
+            low_pass=self.low_pass,
+        )
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class GaugeRecord:
+    """What one gauge reads during an impact, at uniform instants.
+
+    Parameters
+    ----------
+    name, body, kind, place : str
+        As of its :class:`Gauge`.
+    start, step : float [s]
+        First instant and the time between two; the clock is that of the contact force.
+    exact : array, shape (n,)
+        On the body, before the low pass, in :attr:`unit`; tension and motion along the direction
+        are positive.
+    low_pass : LowPass or None
+    """
+
+    name: str
+    body: str
+    kind: GaugeKind
+    place: str
+    start: float
+    step: float
+    exact: Floats
+    low_pass: LowPass | None = None
+
+    @property
+    def unit(self) -> str:
+        """Unit of the values; 1 for a strain."""
+        return GAUGE_UNITS[self.kind]
+
+    @property
+    def time(self) -> Floats:
+        """Instants, shape (n,) [s]."""
+        return np.asarray(self.start + self.step * np.arange(len(self.exact)))
+
+    @property
+    def values(self) -> Floats:
+        """What the sensor shows, shape (n,): behind its low pass."""
+        return self.exact if self.low_pass is None else self.low_pass(self.exact, self.step)
+
+    @property
+    def label(self) -> str:
+        """Kind, place and low pass in words."""
+        behind = "" if self.low_pass is None else f", {self.low_pass.words}"
+        return f"{self.kind} of {self.body} {self.place}{behind}"

@@ -1,0 +1,119 @@
+"""Nodes without elements: a table of numbers and coordinates, and lists of node numbers.
+
+A table has one node per line: number, x, y, z (or r, z); comments start with ``#``, ``%``, ``!``
+or ``$``, a heading of words may come first.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.bodies.model_files.number_lines import number_rows, numbers_in, whole_numbers
+from klack.errors import InputError
+from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
+
+__all__ = ["read_node_numbers", "read_node_table"]
+
+_COMMENTS = b"#%!$"
+_LONGEST = 10_000
+
+
+def read_node_table(
+    path: Path, unit_length: float, dimension: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Read nodes in the order of the file.
+
+    Parameters
+    ----------
+    path : Path
+        A table, or a mesh file whose nodes are taken.
+    unit_length : float [m]
+        Unit of the coordinates.
+    dimension : {3, 2}
+        Columns x, y, z, or r, z.
+
+    Returns
+    -------
+    numbers : int array, shape (n,)
+    points : array, shape (n, dimension) [m]
+
+    Raises
+    ------
+    InputError
+        With the line that cannot be understood, and for numbers that come twice.
+    """
+    if path.suffix.lower() in MESH_FORMATS and not _is_table(path, dimension):
+        model = read_mesh_file(path, unit_length)
+        if model.mesh.dimension != dimension:
+            raise _wrong(str(path), f"nodes of dimension {model.mesh.dimension}", dimension)
+        return model.node_numbers, model.mesh.points
+    table = _rows(path, dimension + 1)
+    if not len(table):
+        raise _wrong(str(path), "no nodes", dimension)
+    numbers = whole_numbers(str(path), table[:, 0], "a node number")
+    if len(np.unique(numbers)) < len(numbers):
+        raise _wrong(str(path), "a node number twice", dimension)
+    points = table[:, 1:] * unit_length
+    if not np.all(np.isfinite(points)):
+        raise _wrong(str(path), "coordinates that are not finite", dimension)
+    if dimension == 2 and points[:, 0].min() < 0:
+        raise _wrong(str(path), f"r = {points[:, 0].min():g} m", dimension)
+    return numbers, points
+
+
+def read_node_numbers(path: Path) -> NDArray[np.int64]:
+    """Read a list of node numbers: blanks, commas or lines between them.
+
+    Raises
+    ------
+    InputError
+        For anything else.
+    """
+    lines = [line for line in path.read_bytes().splitlines() if line.strip()[:1] not in _signs()]
+    values = numbers_in(b"\n".join(lines))
+    if values is None or not len(values):
+        raise InputError(
+            str(path),
+            got="no list of numbers",
+            expected="node numbers, with blanks, commas or lines between them",
+            hint="one number per line; comments start with #.",
+        )
+    return np.unique(whole_numbers(str(path), values, "a node number"))
+
+
+def _signs() -> tuple[bytes, ...]:
+    return tuple(bytes([sign]) for sign in _COMMENTS)
+
+
+def _is_table(path: Path, dimension: int) -> bool:
+    """True if the first line is a row of numbers: a table under the ending of a mesh file."""
+    with path.open("rb") as stream:
+        values = numbers_in(stream.readline(_LONGEST))
+    return values is not None and len(values) == dimension + 1
+
+
+def _rows(path: Path, columns: int) -> NDArray[np.float64]:
+    with path.open("rb") as stream:
+        if stream.read(3) != b"\xef\xbb\xbf":
+            stream.seek(0)
+        start, line = stream.tell(), 1
+        # a heading of words
+        while first := stream.readline(_LONGEST):
+            if numbers_in(first) is not None or first.strip()[:1] in _signs():
+                break
+            if line > 1 or not first.strip()[:1].isalpha():
+                break
+            start, line = stream.tell(), line + 1
+        stream.seek(start)
+        return number_rows(stream, columns, where=str(path), line=line, comments=_COMMENTS)
+
+
+def _wrong(where: str, got: str, dimension: int) -> InputError:
+    return InputError(
+        where,
+        got=got,
+        expected="number, x, y, z of each node" if dimension == 3 else "number, r, z of each node",
+        hint="one node per line; an axisymmetric body needs 'model: axisymmetric'.",
+    )

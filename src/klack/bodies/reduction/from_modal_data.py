@@ -1,0 +1,221 @@
+"""Reduced bodies from modes with their responses, and from Craig-Bampton matrices."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from klack.bodies.reduction.damping import Damping
+from klack.bodies.reduction.given_modes import RIGID_FREQUENCY, ModesAtPorts, body_of_modes
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.errors import InputError
+
+__all__ = ["body_of_craig_bampton", "body_of_modal_data", "fit_residual"]
+
+
+def body_of_modal_data(
+    name: str,
+    *,
+    frequency: NDArray[np.float64],
+    damping: NDArray[np.float64],
+    shapes: NDArray[np.float64],
+    port_names: Sequence[str],
+    residual: NDArray[np.float64] | None = None,
+    where: str,
+    mass: float | None = None,
+) -> ReducedBody:
+    """Take mass-normalised modes as they are; those below 1 Hz are rigid.
+
+    Parameters
+    ----------
+    name : str
+    frequency, damping : array, shape (m,) [Hz], [-]
+    shapes : array, shape (m, n_ports) [1/sqrt(kg)]
+        The mean displacement of each port along +z, weighted as its force.
+    port_names : sequence of str
+    residual : array, shape (n_ports, n_ports), optional [m/N]
+        Compliance of the modes that are left out.
+    where : str
+        File, for messages.
+    mass : float, optional [kg]
+
+    Raises
+    ------
+    InputError
+        For negative frequencies or damping, and as
+        :func:`klack.bodies.reduction.given_modes.body_of_modes`.
+    """
+    for key, values, unit in (("frequency", frequency, "Hz"), ("damping", damping, "-")):
+        if not np.all(np.isfinite(values)) or np.any(values < 0):
+            worst = int(np.argmax(~np.isfinite(values) | (values < 0)))
+            raise InputError(
+                f"{where}: {key} of mode {worst + 1}",
+                got=f"{values[worst]:g} {unit}",
+                expected=f"0 {unit} or more",
+                hint="a negative damping creates energy; correct or leave out the mode.",
+            )
+    rigid = frequency < RIGID_FREQUENCY
+    count = len(port_names)
+    return body_of_modes(
+        name,
+        where,
+        ModesAtPorts(
+            port_names=tuple(port_names),
+            omega=2.0 * np.pi * frequency[~rigid],
+            damping=damping[~rigid],
+            shapes=shapes[~rigid],
+            rigid_gram=shapes[rigid].T @ shapes[rigid],
+            residual=np.zeros((count, count)) if residual is None else residual,
+            coordinates=len(frequency),
+        ),
+        mass=mass,
+    )
+
+
+_SYMMETRIC = 1e-6
+_SINGULAR = 1e-13
+
+
+def body_of_craig_bampton(
+    name: str,
+    K: NDArray[np.float64],
+    M: NDArray[np.float64],
+    *,
+    port_names: Sequence[str],
+    rows: Sequence[int],
+    damping: Damping,
+    where: str,
+    mass: float | None = None,
+) -> ReducedBody:
+    """Solve the reduced eigenvalue problem and take the ports from the boundary rows.
+
+    Parameters
+    ----------
+    name : str
+    K, M : array, shape (n, n) [N/m], [kg]
+    port_names : sequence of str
+    rows : sequence of int
+        Row of the boundary displacement of each port, from 0.
+    damping : Damping
+    where : str
+        File, for messages.
+    mass : float, optional [kg]
+
+    Raises
+    ------
+    InputError
+        If the matrices are not symmetric, M is not positive definite or K not semidefinite.
+    """
+    for key, matrix in (("K", K), ("M", M)):
+        apart = float(np.max(np.abs(matrix - matrix.T)))
+        if apart > _SYMMETRIC * float(np.max(np.abs(matrix))):
+            i, j = np.unravel_index(int(np.argmax(np.abs(matrix - matrix.T))), matrix.shape)
+            raise InputError(
+                f"{where}: {key}",
+                got=f"{matrix[i, j]:.6g} in row {i + 1}, column {j + 1} and {matrix[j, i]:.6g} "
+                "across",
+                expected="a symmetric matrix",
+                hint="rotating and damping terms are not supported; export K and M alone.",
+            )
+    omega2, shapes = _all_modes(where, 0.5 * (K + K.T), 0.5 * (M + M.T))
+    limit = (2.0 * np.pi * RIGID_FREQUENCY) ** 2 + 1e-12 * float(np.max(np.abs(omega2)))
+    if omega2[0] < -limit:
+        raise InputError(
+            f"{where}: K",
+            got=f"a negative stiffness (lowest omega^2 {omega2[0]:.4g} 1/s^2)",
+            expected="a stiffness of 0 or more in every direction: else the body is unstable",
+            hint="export K without preload and geometric stiffness.",
+        )
+    rigid = omega2 < limit
+    at_ports = shapes[list(rows)].T
+    omega = np.sqrt(omega2[~rigid])
+    return body_of_modes(
+        name,
+        where,
+        ModesAtPorts(
+            port_names=tuple(port_names),
+            omega=omega,
+            damping=damping.ratios(omega),
+            shapes=at_ports[~rigid],
+            rigid_gram=at_ports[rigid].T @ at_ports[rigid],
+            residual=np.zeros((len(rows), len(rows))),
+            coordinates=len(K),
+        ),
+        mass=mass,
+    )
+
+
+def _all_modes(
+    where: str, K: NDArray[np.float64], M: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """All modes, mass-normalised; scaled first, as modal and physical coordinates differ much."""
+    diagonal = np.diag(M)
+    if np.all(diagonal > 0):
+        scale = 1.0 / np.sqrt(diagonal)
+        M = M * np.outer(scale, scale)
+        lowest = float(np.linalg.eigvalsh(M)[0])
+        if lowest > _SINGULAR:
+            omega2, vectors = scipy.linalg.eigh(K * np.outer(scale, scale), M)
+            return omega2, vectors * scale[:, None]
+    raise InputError(
+        f"{where}: M",
+        got="a mass matrix that is singular or negative",
+        expected="mass above 0 in every coordinate",
+        hint="leave out coordinates without mass (statically condensed rotations, multipliers).",
+    )
+
+
+_HIGHEST = 0.5  # of the highest mode: above, the modes left out are no constant
+_FEWEST = 3
+_AGREEMENT = 0.1
+
+
+def fit_residual(
+    where: str,
+    frequency: NDArray[np.float64],
+    response: NDArray[np.complex128],
+    *,
+    omega: NDArray[np.float64],
+    damping: NDArray[np.float64],
+    product: NDArray[np.float64],
+) -> float:
+    """Residual compliance [m/N] between two places.
+
+    Parameters
+    ----------
+    where : str
+        File and places, for messages.
+    frequency, response : array, shape (n,) [Hz], [m/N]
+    omega, damping, product : array, shape (m,) [rad/s], [-], [1/kg]
+        Modes, rigid ones included, and the product of their shapes at both places.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three frequencies below half the highest mode, or if modes and
+        responses disagree by more than a tenth in the median.
+    """
+    low = frequency <= _HIGHEST * float(omega.max(initial=0.0)) / (2.0 * np.pi)
+    if np.sum(low) < _FEWEST:
+        raise InputError(
+            where,
+            got=f"{int(np.sum(low))} frequencies below half of the highest mode",
+            expected=f"at least {_FEWEST}",
+            hint="export the responses over the range of the modes, or leave them out.",
+        )
+    w = 2.0 * np.pi * frequency[low, None]
+    modal = np.sum(product / (omega**2 - w**2 + 2j * damping * omega * w), axis=1)
+    missing = response[low] - modal
+    weight = 1.0 / np.maximum(np.abs(modal), 1e-12 * np.abs(modal).max(initial=1e-300)) ** 2
+    residual = float(np.sum(weight * missing.real) / np.sum(weight))
+    size = np.maximum(np.abs(response[low]), 1e-300)
+    apart = float(np.median(np.abs(missing - residual) / size))
+    if not apart <= _AGREEMENT:
+        raise InputError(
+            where,
+            got=f"responses that differ from the modes by {100 * apart:.3g} % in the median",
+            expected="at most 10 %",
+            hint="modes and responses belong to different bodies, supports or units.",
+        )
+    return residual

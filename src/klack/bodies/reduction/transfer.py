@@ -1,0 +1,200 @@
+r"""Frequency limit of a reduced body: its receptance against that of the full body.
+
+The deviation is taken in decibels, point by point, ``20 log10 |G_reduced / G_full|``, and its
+magnitude is then averaged over a sliding window of one-third octave (equal weight per logarithmic
+frequency):
+
+- A point-wise limit would be decided by antiresonances, where a shift of a fraction of a per cent
+  gives tens of decibels over a negligible share of the band.
+- An energy mean over the band would be decided by the resonances alone, which the modes have right
+  by construction; a missing static share would go unnoticed.
+- The mean *magnitude* of the level difference counts resonances, antiresonances and everything
+  between by the share of the band that they spoil.
+
+``valid_up_to`` is the frequency up to which this mean stays within the tolerance everywhere.  The
+damping is structural with a declared loss factor, equal for full and reduced, so that every peak
+and notch is finite; the axis should have at least two points per half-power bandwidth
+(``ln 2 / eta`` per octave and more).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from klack.bodies.reduction.receptance import Receptance
+from klack.errors import InputError, require_positive
+
+__all__ = [
+    "TransferComparison",
+    "compare_curves",
+    "compare_receptances",
+    "mean_level_deviation",
+    "valid_up_to",
+]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TransferComparison:
+    """Receptances at one port, the reference first.
+
+    Parameters
+    ----------
+    body, port : str
+    frequencies : array, shape (n,) [Hz]
+    labels : tuple of str, length k
+    curves : complex array, shape (k, n) [m/N]
+    level_deviations : array, shape (k, n) [dB]
+        Point by point, against the first curve.
+    mean_deviations : array, shape (k, n) [dB]
+        Magnitude, averaged over a sliding window of one-third octave.
+    tolerance : float [dB]
+    valid_up_to : array, shape (k,) [Hz]
+        Highest frequency below which the mean deviation stays within the tolerance; 0 if it never
+        does, the top of the axis if it always does.
+    loss_factor : float [-]
+    reference_note : str
+        What the reference is and how well it was verified.
+    """
+
+    body: str
+    port: str
+    frequencies: NDArray[np.float64]
+    labels: tuple[str, ...]
+    curves: NDArray[np.complex128]
+    level_deviations: NDArray[np.float64]
+    mean_deviations: NDArray[np.float64]
+    tolerance: float
+    valid_up_to: NDArray[np.float64]
+    loss_factor: float
+    reference_note: str
+
+
+def compare_receptances(
+    reference: Receptance,
+    candidates: Sequence[Receptance],
+    port: str,
+    *,
+    body: str,
+    loss_factor: float,
+    reference_note: str,
+    tolerance: float = 1.0,
+) -> TransferComparison:
+    """Lay receptances of reduced bodies over that of the full one.
+
+    Parameters
+    ----------
+    reference : Receptance
+    candidates : sequence of Receptance
+        On the same frequency axis.
+    port : str
+    body : str
+    loss_factor : float [-]
+        With which all of them were computed.
+    reference_note : str
+    tolerance : float [dB]
+    """
+    for candidate in candidates:
+        if not np.array_equal(candidate.frequencies, reference.frequencies):
+            raise InputError(
+                f"compare_receptances: '{candidate.label}'",
+                got=f"{len(candidate.frequencies)} frequencies",
+                expected=f"the {len(reference.frequencies)} frequencies of the reference",
+                hint="compute all receptances on one axis.",
+            )
+    return compare_curves(
+        reference.frequencies,
+        {item.label: item.drive(port) for item in (reference, *candidates)},
+        body=body,
+        port=port,
+        loss_factor=loss_factor,
+        reference_note=reference_note,
+        tolerance=tolerance,
+    )
+
+
+def compare_curves(
+    frequencies: NDArray[np.float64],
+    curves: Mapping[str, NDArray[np.complex128]],
+    *,
+    body: str,
+    port: str,
+    loss_factor: float,
+    reference_note: str,
+    tolerance: float = 1.0,
+) -> TransferComparison:
+    """Lay transfer functions over the first of them; see :func:`compare_receptances`.
+
+    Parameters
+    ----------
+    frequencies : array, shape (n,) [Hz]
+    curves : mapping of label to complex array, shape (n,) [m/N]
+    body, port, loss_factor, reference_note, tolerance
+        As there.
+    """
+    require_positive("compare_curves: tolerance", tolerance, "dB")
+    values = np.array(list(curves.values()))
+    levels = 20.0 * np.log10(np.abs(values / values[0]))
+    means = np.array([mean_level_deviation(frequencies, level) for level in levels])
+    return TransferComparison(
+        body=body,
+        port=port,
+        frequencies=frequencies,
+        labels=tuple(curves),
+        curves=values,
+        level_deviations=levels,
+        mean_deviations=means,
+        tolerance=tolerance,
+        valid_up_to=np.array([valid_up_to(frequencies, m, tolerance) for m in means]),
+        loss_factor=loss_factor,
+        reference_note=reference_note,
+    )
+
+
+def mean_level_deviation(
+    frequencies: NDArray[np.float64], level: NDArray[np.float64], octaves: float = 1.0 / 3.0
+) -> NDArray[np.float64]:
+    """Magnitude of a level difference, averaged over a sliding window of log frequency.
+
+    Parameters
+    ----------
+    frequencies : array, shape (n,) [Hz]
+        At least two.
+    level : array, shape (n,) [dB]
+    octaves : float
+        Width of the window; at the ends of the axis it is cut, not shifted.
+
+    Returns
+    -------
+    array, shape (n,) [dB]
+
+    Examples
+    --------
+    >>> f = np.geomspace(1.0, 8.0, 31)
+    >>> np.allclose(mean_level_deviation(f, np.full(31, -2.0)), 2.0)
+    True
+    """
+    x = np.log2(frequencies)
+    magnitude = np.abs(level)
+    steps = np.diff(x) * (magnitude[1:] + magnitude[:-1]) / 2.0
+    integral = np.concatenate([[0.0], np.cumsum(steps)])
+    low = np.maximum(x - octaves / 2.0, x[0])
+    high = np.minimum(x + octaves / 2.0, x[-1])
+    return (np.interp(high, x, integral) - np.interp(low, x, integral)) / (high - low)
+
+
+def valid_up_to(
+    frequencies: NDArray[np.float64], deviation: NDArray[np.float64], tolerance: float
+) -> float:
+    """Highest frequency [Hz] below which ``deviation`` never exceeds ``tolerance`` (0 if none).
+
+    Examples
+    --------
+    >>> valid_up_to(np.array([1.0, 2.0, 3.0, 4.0]), np.array([0.1, 0.5, 1.2, 0.3]), 1.0)
+    2.0
+    """
+    exceeded = np.flatnonzero(~(deviation <= tolerance))
+    if not exceeded.size:
+        return float(frequencies[-1])
+    return float(frequencies[exceeded[0] - 1]) if exceeded[0] else 0.0

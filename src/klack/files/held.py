@@ -1,0 +1,162 @@
+"""A folder held open, so that renaming or replacing it does not affect its entries.
+
+Between a look at a path and the use of it, another user who may write to a folder above can put a
+link in its place.  So the folder is opened once, and everything in it is reached from there by a
+single name, which is never followed if it is a link.
+"""
+
+import errno
+import os
+import shutil
+import stat
+from contextlib import suppress
+from pathlib import Path
+
+from klack.files.closing import Closing
+from klack.files.own import SAFELY, open_own_file
+from klack.files.swapped_names import swap_names
+
+__all__ = ["HeldFolder", "Mark", "synchronise"]
+
+Mark = tuple[int, int]
+"""Number of a file or folder, and when it changed [ns]: the number alone is given out again."""
+
+_BY_HANDLE = os.open in os.supports_dir_fd  # not on Windows
+_FOLDER = os.O_RDONLY | getattr(os, "O_DIRECTORY", 0) | getattr(os, "O_CLOEXEC", 0)
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+
+
+class HeldFolder(Closing):
+    """A folder, held until :meth:`close`.
+
+    Parameters
+    ----------
+    path : Path
+        An existing folder, or a link to one.
+
+    Raises
+    ------
+    OSError
+        If it is not there, is no folder or may not be read; of every method, if the system refuses.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.handle = os.open(path, _FOLDER) if _BY_HANDLE else None
+
+    def close(self) -> None:
+        """Release the folder and its locks."""
+        if self.handle is not None:
+            os.close(self.handle)
+            self.handle = None
+
+    def inner(self, name: str) -> "HeldFolder":
+        """A folder in it, held as well; not one behind a link."""
+        found = HeldFolder.__new__(HeldFolder)
+        found.path = self.path / name
+        found.handle = None
+        if _BY_HANDLE:
+            found.handle = os.open(name, _FOLDER | _NO_LINK, dir_fd=self.handle)
+        return found
+
+    @property
+    def steady_path(self) -> Path:
+        """Path by which this process reaches this folder even if it is renamed."""
+        if self.handle is not None:
+            path = Path(f"/proc/self/fd/{self.handle}")
+            with suppress(OSError):
+                if os.path.samestat(path.stat(), os.fstat(self.handle)):
+                    return path
+        return self.path
+
+    def own_state(self) -> os.stat_result:
+        """State of the folder itself."""
+        return self.path.lstat() if self.handle is None else os.fstat(self.handle)
+
+    def state(self, name: str) -> os.stat_result | None:
+        """State of an entry, of the link itself if it is one; None if there is none."""
+        try:
+            return os.stat(self._at(name), dir_fd=self.handle, follow_symlinks=False)
+        except FileNotFoundError:
+            return None
+
+    def mark(self, name: str) -> Mark | None:
+        """Identity of an entry, distinct from earlier ones of the same name."""
+        state = self.state(name)
+        return None if state is None else (state.st_ino, state.st_mtime_ns)
+
+    def names(self) -> list[str]:
+        """Names of all entries, sorted."""
+        return sorted(os.listdir(self.path if self.handle is None else self.handle))
+
+    def has_folder(self, name: str) -> bool:
+        """Whether there is a folder of this name, not a link to one."""
+        state = self.state(name)
+        return state is not None and stat.S_ISDIR(state.st_mode)
+
+    def make(self, name: str, mode: int = 0o777) -> None:
+        """Make a folder in it."""
+        os.mkdir(self._at(name), mode, dir_fd=self.handle)
+
+    def move(self, name: str, to: "HeldFolder") -> None:
+        """Move an entry into another folder; a file of the same name there is replaced."""
+        os.replace(self._at(name), to._at(name), src_dir_fd=self.handle, dst_dir_fd=to.handle)
+
+    def rename(self, name: str, new: str) -> None:
+        """Give an entry another name."""
+        os.rename(self._at(name), self._at(new), src_dir_fd=self.handle, dst_dir_fd=self.handle)
+
+    def link(self, name: str, to: "HeldFolder") -> None:
+        """Hard-link a file into another folder; of a link itself, not of its target."""
+        os.link(
+            self._at(name),
+            to._at(name),
+            src_dir_fd=self.handle,
+            dst_dir_fd=to.handle,
+            follow_symlinks=False,
+        )
+
+    def swap(self, name: str, other: "HeldFolder") -> bool:
+        """Exchange the entries of a name in two folders; False where the system cannot."""
+        if self.handle is None or other.handle is None:
+            return False
+        return swap_names(self.handle, name, other.handle, name)
+
+    def remove(self, name: str) -> None:
+        """Remove a file, or a folder with all that is in it; links are not followed."""
+        state = self.state(name)
+        if state is None:
+            return
+        if stat.S_ISDIR(state.st_mode):
+            shutil.rmtree(self._at(name), dir_fd=self.handle)
+        else:
+            os.unlink(self._at(name), dir_fd=self.handle)
+
+    def remove_empty(self, name: str) -> None:
+        """Remove a folder that is empty."""
+        os.rmdir(self._at(name), dir_fd=self.handle)
+
+    def open(self, name: str, flags: int) -> int:
+        """Handle of a file in it, which is made readable by the caller alone; not behind a link."""
+        return os.open(self._at(name), flags | SAFELY, 0o600, dir_fd=self.handle)
+
+    def open_own_file(self, name: str, flags: int) -> int:
+        """Handle of a regular file of the caller in it; see :func:`open_own_file`."""
+        return open_own_file(self._at(name), flags, folder=self.handle)
+
+    def synchronise(self) -> None:
+        """Have its list of entries on the disk."""
+        if self.handle is not None:
+            synchronise(self.handle)
+
+    def _at(self, name: str) -> str:
+        return name if self.handle is not None else os.fspath(self.path / name)
+
+
+def synchronise(handle: int) -> None:
+    """Have an open file or folder on the disk, where the file system can."""
+    try:
+        os.fsync(handle)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EROFS):
+            raise

@@ -1,0 +1,215 @@
+"""Files and folders that are either complete or unchanged.
+
+New files are written into a hidden folder beside their place (:mod:`klack.files.stage`):
+
+1. they are filled in, and the disk is told to keep them (fsync), since a power cut may otherwise
+   leave the new name with an empty file behind it;
+2. one rename makes them *ready*: from here on they count;
+3. what is replaced moves out of the way, what is new to its place, and the stage goes.
+
+A process that is killed before step 2 changes nothing.  Killed after it, the next klack of the same
+user that reads or writes the folder brings step 3 to its end first (:func:`completed`), unless
+the files have been replaced since.  What stands in the folder is the one truth for all readers:
+nothing is ever read from a stage.
+
+Written by hand: packages for atomic writing replace one file; here several that belong together
+change at once, and what a killed process left half done is finished by the next.
+"""
+
+import errno
+import os
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from klack.errors import InputError, LeftAloneWarning
+from klack.files.held import HeldFolder, Mark, synchronise
+from klack.files.locks import LOCK_NAME, locked
+from klack.files.own import planted
+from klack.files.stage import PREFIX, Stage, dead_stage, is_stage_content, name_outdated
+from klack.files.uninterrupted import uninterrupted
+
+__all__ = ["completed", "in_exchange", "mark_of", "outdated", "whole_file", "whole_files"]
+
+Refusal = Callable[[Path, OSError], InputError]
+
+_MOST_NAMED = 3
+
+
+@contextmanager
+def whole_file(path: Path, refuse: Refusal | None = None) -> Iterator[Path]:
+    """Temporary path of the same name that replaces ``path`` on success.
+
+    Parameters
+    ----------
+    path : Path
+    refuse : callable, optional
+        Turns the error of the system into that of the caller.
+
+    Raises
+    ------
+    InputError
+        If the place cannot be written to.
+    """
+    say = refuse or _refuse
+    with whole_files(path.parent, lambda _, error: say(path, error)) as stage:
+        yield stage / path.name
+
+
+@contextmanager
+def whole_files(
+    folder: Path, refuse: Refusal | None = None, beside: Mapping[str, Mark] | None = None
+) -> Iterator[Path]:
+    """Give a hidden folder whose contents move into ``folder`` when all of it is complete.
+
+    Files and folders of the same names are replaced, everything else in ``folder`` stays, but for
+    names given to :func:`outdated`.  Folders that were made for it go again where nothing came into
+    them.  Of two processes that write the same names, the one that ends last stays, as a whole.
+    Ctrl-C is held back while files move and stages are made and removed.
+
+    Parameters
+    ----------
+    folder : Path
+    refuse : callable, optional
+        Turns the error of the system into that of the caller.
+    beside : mapping of str to mark, optional
+        Files that must still be there (:func:`mark_of`) when the new ones move; nothing moves
+        where another process has replaced one of them.
+
+    Raises
+    ------
+    InputError
+        If the place cannot be written to.
+    """
+    made = [p for p in (folder, *folder.absolute().parents) if not p.exists()]
+    held: HeldFolder | None = None
+    stage: Stage | None = None
+    try:
+        with uninterrupted():
+            if found := planted(folder):
+                raise PermissionError(errno.EPERM, f"it is {found}")
+            folder.mkdir(parents=True, exist_ok=True)
+            held = HeldFolder(folder)
+            _complete(held)
+            stage = Stage(held)
+        yield stage.content
+        if not is_stage_content(folder):  # the outer stage looks after the disk
+            _keep(stage.content)
+        with uninterrupted():
+            _complete(held)
+            with locked(held):
+                stage.put(beside or {})
+    except OSError as error:
+        if is_stage_content(folder):  # the outer stage knows the name that the user gave
+            raise
+        raise (refuse or _refuse)(folder, error) from error
+    finally:
+        with uninterrupted():
+            if stage is not None:
+                stage.remove()
+                stage.close()
+            if held is not None:
+                held.close()
+            for path in made:  # innermost first; stays if the results are inside
+                try:
+                    path.rmdir()
+                except OSError:
+                    break
+
+
+def outdated(stage: Path, names: Iterable[str]) -> None:
+    """Delete files of these names from the folder when the stage is moved."""
+    gone = tuple(names)
+    for name in gone:
+        (stage / name).unlink(missing_ok=True)
+    name_outdated(stage, gone)
+
+
+def completed(folder: Path) -> Path:
+    """The folder, once files that a killed klack of this user had ready are in their place."""
+    try:
+        with HeldFolder(folder) as held, uninterrupted():
+            _complete(held)
+    except OSError:  # it is not there, or may only be read: what stands there counts
+        pass
+    return folder
+
+
+def mark_of(path: Path) -> Mark | None:
+    """Identity of a file or folder, distinct from others of its name; None if there is none."""
+    try:
+        state = path.lstat()
+    except OSError:
+        return None
+    return state.st_ino, state.st_mtime_ns
+
+
+def in_exchange(folder: Path) -> bool:
+    """Whether a process writes to a folder at this moment, or was killed while doing so."""
+    try:
+        return any(True for _ in folder.glob(f"{PREFIX}*"))
+    except OSError:
+        return True
+
+
+def _complete(folder: HeldFolder) -> None:
+    """Bring what killed processes of this user left to its end; name what looks like it."""
+    if not _stage_names(folder):
+        return
+    with locked(folder):
+        found = {name: _brought_to_end(folder, name) for name in _stage_names(folder)}
+    left = [f"{name!r} ({reason})" for name, reason in found.items() if reason]
+    if left:
+        more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
+        warnings.warn(
+            f"{str(folder.path)!r} has an entry that was not made by your klack; it is left "
+            f"unchanged: {', '.join(left[:_MOST_NAMED])}{more}. Remove it if you know its origin.",
+            LeftAloneWarning,
+            stacklevel=4,
+        )
+
+
+def _stage_names(folder: HeldFolder) -> list[str]:
+    return [
+        name
+        for name in folder.names()
+        if name.startswith(PREFIX) and not name.startswith(LOCK_NAME)
+    ]
+
+
+def _brought_to_end(folder: HeldFolder, name: str) -> str | None:
+    """Finish and remove a stage whose process is dead; why it is left alone, if it is none."""
+    try:
+        found = dead_stage(folder, name)
+        if not isinstance(found, Stage):
+            return found
+        with found:
+            found.finish()
+            found.remove()
+    except FileNotFoundError:  # removed by its own process at this moment
+        return None
+    except OSError as error:
+        return error.strerror or str(error)
+    return None
+
+
+def _keep(folder: Path) -> None:
+    """Have everything below a folder on the disk."""
+    for place, _, files in os.walk(folder, topdown=False):
+        for path in (*(Path(place, name) for name in files), Path(place)):
+            with suppress(IsADirectoryError, PermissionError):  # Windows opens no folders
+                handle = os.open(path, os.O_RDONLY)
+                try:
+                    synchronise(handle)
+                finally:
+                    os.close(handle)
+
+
+def _refuse(path: Path, error: OSError) -> InputError:
+    return InputError(
+        str(path),
+        got=f"an error: {error.strerror or error}",
+        expected="a writable path",
+        hint="check the path and the free space.",
+    )

@@ -1,0 +1,1 @@
+"""What long work asks of the machine: cores, memory, stored results, compiled code, progress."""

@@ -1,0 +1,113 @@
+"""Compute once, and take it from the cache ever after."""
+
+import hashlib
+import os
+import platform
+from collections.abc import Callable
+from functools import cache
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import TypeVar
+
+import klack
+from klack.machine.cache.content import content_key
+from klack.machine.cache.entry import Entry
+from klack.machine.cache.result_cache import ResultCache
+from klack.machine.cores import available_cores
+
+__all__ = ["origin", "remembered"]
+
+
+FORMAT = 1
+"""Number of the way results are stored; a new one makes old entries unknown."""
+
+_DISTRIBUTIONS = (
+    *("numpy", "scipy", "numba", "netgen-mesher", "netgen-occt"),
+    *("mkl", "pypardiso", "ngsolve"),
+)
+_SOURCES = ("cache", "mesh", "elasticity", "contact", "reduction")
+_THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_CBWR")
+
+
+@cache  # fixed while the process lives
+def origin() -> str:
+    """Key of klack's own sources, the versions of its libraries, processor and threads.
+
+    The sources count as they are, not by their version: who edits klack is never given a result of
+    the code before.  Processor and number of threads decide the order of sums in the libraries.
+    """
+    return content_key(
+        FORMAT,
+        klack.__version__,
+        _sources(),
+        {name: _version(name) for name in _DISTRIBUTIONS},
+        (platform.system(), platform.machine(), platform.python_version(), _instructions()),
+        {name: os.environ.get(name) for name in _THREADS},
+        available_cores(),
+    )
+
+
+def _sources() -> str:
+    root = Path(klack.__file__).parent
+    paths = [path for name in _SOURCES for path in (root / name).rglob("*.py")]
+    digest = hashlib.sha256()
+    for path in sorted([*paths, root / "materials/material.py"]):
+        digest.update(f"{path.relative_to(root).as_posix()}\n".encode())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()
+
+
+def _version(distribution: str) -> str:
+    try:
+        return version(distribution)
+    except PackageNotFoundError:
+        return ""
+
+
+def _instructions() -> tuple[str, ...]:
+    """Instruction sets of the processor, as numpy has found them."""
+    module = import_module("numpy._core._multiarray_umath")
+    found = getattr(module, "__cpu_features__", {})
+    return tuple(sorted(name for name, there in found.items() if there))
+
+
+Result = TypeVar("Result")
+
+
+def remembered(
+    cache: ResultCache | None,
+    kind: str,
+    parts: tuple[object, ...],
+    compute: Callable[[], Result],
+    *,
+    pack: Callable[[Result], Entry],
+    unpack: Callable[[Entry], Result],
+) -> Result:
+    """Result of a function, from the cache where it is there.
+
+    Parameters
+    ----------
+    cache : ResultCache or None
+        None computes.
+    kind : str
+        What it is, e.g. ``"modes"``.
+    parts : tuple
+        Everything that the result depends on; see :func:`klack.machine.cache.content.content_key`.
+    compute : callable
+        Must depend on nothing else and warn of nothing: a warning would come only once.
+    pack, unpack : callable
+        To arrays and back, bit by bit.
+    """
+    if cache is None:
+        return compute()
+    key = content_key(origin(), kind, parts)
+    entry = cache.load(key, kind)
+    if entry is not None:
+        try:
+            return unpack(entry)
+        except (KeyError, ValueError, TypeError):  # written for another purpose; replaced below
+            pass
+    result = compute()
+    cache.store(key, pack(result))
+    return result

@@ -1,0 +1,80 @@
+"""Let a second process compile while this one does: each half of what a first run needs.
+
+Both fill the same store; who needs what the other one compiles at this moment waits for it
+(:mod:`klack.machine.compiling.turn`).
+"""
+
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from numba.core import event
+
+from klack.machine.compiling.compiled_folder import compiled_folder, is_usable
+from klack.machine.cores import available_cores
+
+__all__ = ["compiling_ahead"]
+
+_MODULE = "klack.warming"
+
+
+@contextmanager
+def compiling_ahead(groups: Sequence[str], threads: int | None = None) -> Iterator[None]:
+    """Start a second process with the first function of klack that is compiled meanwhile.
+
+    None is started where all functions are in the store, where no store can be used, and on one
+    core.  It ends with this block, also with this process.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        Of :data:`klack.warming.groups.GROUPS`, those first that this process needs last.
+    threads : int, optional
+        Cores that may be used.
+    """
+    starting = _Starting(groups)
+    if min(threads or available_cores(), available_cores()) < 2:
+        yield
+        return
+    event.register("numba:compile", starting)
+    try:
+        yield
+    finally:
+        event.unregister("numba:compile", starting)
+        starting.end()
+
+
+class _Starting(event.Listener):
+    """Starts the process once something is compiled."""
+
+    def __init__(self, groups: Sequence[str]) -> None:
+        self._groups, self._tried = groups, False
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def on_start(self, event: Any) -> None:
+        function = event.data["dispatcher"].py_func
+        if self._tried or not function.__module__.startswith("klack."):
+            return
+        self._tried = True
+        folder = compiled_folder()
+        if folder is not None and is_usable(folder):
+            with suppress(OSError):
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", _MODULE, *self._groups],
+                    stdin=subprocess.PIPE,  # its end tells that this process has gone
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    cwd=Path(__file__).parent,
+                )
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+    def end(self) -> None:
+        """End the process; what it has compiled stays."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate()

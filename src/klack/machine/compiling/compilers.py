@@ -1,0 +1,158 @@
+"""How numba compiles klack's functions: its own steps, with three of their costs left out.
+
+- numba compares the options of the function that it compiles with those of every function that it
+  has compiled before, one option after another: a tenth of all compiling.
+- The garbage collector searches the many objects of a compiler, which live until its end, again and
+  again: another tenth.
+- Inner functions are optimised and turned into machine code on their own, and then once more in
+  each function that calls them (:mod:`klack.machine.compiling.compilers`).
+
+Functions that only compiled ones call: without machine code of their own.
+
+What a compiled function calls is linked into it, and turned into machine code there.  An inner
+function is never entered in another way, so this is left out for itself.
+"""
+
+import gc
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import llvmlite.binding as llvm
+from numba.core.codegen import CPUCodeLibrary
+from numba.core.compiler import Compiler, CompileResult, Flags
+
+__all__ = ["EntryCompiler", "InnerCode", "InnerCompiler"]
+
+
+_KIND = "klack inner"
+
+
+class InnerCode(CPUCodeLibrary):
+    """A function and all that it calls, for linking into other functions.
+
+    numba takes it for a library of machine code; what it asks only machine code has no effect.
+    """
+
+    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
+        """Name, kind and content, as numba stores them."""
+        self._ensure_finalized()
+        return self.name, _KIND, self._get_module_for_linking().as_bitcode()
+
+    @staticmethod
+    def is_stored_in(state: tuple[Any, ...]) -> bool:
+        """Whether a stored result of compiling is that of an inner function."""
+        return bool(state[0][1] == _KIND)
+
+    @classmethod
+    def restored(cls, target_context: Any, state: tuple[Any, ...]) -> CompileResult:
+        """Result of compiling, from what was stored of it."""
+        (name, _, content), fndesc, environment, signature, _, lifted, words, reload_init, _ = state
+        for prepare in reload_init:
+            prepare()
+        library = cls(target_context.codegen(), name)
+        library._final_module = llvm.parse_bitcode(content)
+        library._reload_init.update(reload_init)
+        library._finalize_final_module()
+        return CompileResult(
+            target_context=target_context,
+            typing_context=target_context.typing_context,
+            library=library,
+            environment=environment,
+            entry_point=target_context.get_executable(library, fndesc, environment),
+            fndesc=fndesc,
+            type_annotation=words,
+            signature=signature,
+            objectmode=False,
+            lifted=lifted,
+            typing_error=None,
+            call_helper=None,
+            metadata=None,
+            reload_init=reload_init,
+            referenced_envs=(),
+        )
+
+    @property
+    def codegen(self) -> "InnerCode":
+        """Where numba would note objects that machine code uses."""
+        return self
+
+    def set_env(self, name: str, environment: Any) -> None:
+        """Refuse objects of Python, which only functions with machine code can use."""
+        if environment.consts:
+            raise AssertionError(f"inner functions use no objects of Python: {self.name}")
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """No address."""
+        return 0
+
+    def _optimize_final_module(self) -> None:
+        """Optimise once.
+
+        numba's first round, for counted references, is left out here: it comes in the callers.
+        Without vectorising here the time loop is a third slower: loops that are put into a large
+        function first are not vectorised there.
+        """
+        match self._codegen._module_pass_manager():
+            case (passes, builder):
+                passes.run(self._final_module, builder)
+            case passes:  # LLVM 14, of numba 0.60
+                passes.run(self._final_module)
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+class _Options(Flags):
+    """Options of a function, equal if the same ones were given."""
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, _Options):
+            return bool(self._values == other._values)
+        return bool(super().__eq__(other))
+
+    __hash__ = Flags.__hash__
+
+
+class EntryCompiler(Compiler):
+    """Compile a function that Python calls."""
+
+    def __init__(
+        self,
+        typingctx: Any,
+        targetctx: Any,
+        library: Any,
+        args: Any,
+        return_type: Any,
+        flags: Any,
+        locals: Any,
+    ) -> None:
+        options = _Options(flags)
+        super().__init__(typingctx, targetctx, library, args, return_type, options, locals)
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a plain function."""
+        with _uncollected():
+            return super().compile_extra(func)
+
+
+class InnerCompiler(EntryCompiler):
+    """Compile a function that only compiled ones call."""
+
+    def compile_extra(self, func: Callable[..., Any]) -> Any:
+        """Compile a plain function as far as its callers need it."""
+        self.state.library = InnerCode(self.state.targetctx.codegen(), func.__qualname__)
+        return super().compile_extra(func)
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without the garbage collector."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()

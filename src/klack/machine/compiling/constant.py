@@ -1,0 +1,50 @@
+"""The two places at which a derivative is not that of the operations on a number."""
+
+from typing import Any
+
+from klack.machine.compiling.jit import intrinsic
+
+__all__ = ["constant", "with_slope_of"]
+
+
+@intrinsic
+def constant(typingctx: Any, number: Any) -> Any:
+    """The same number, taken as chosen: a first guess, the length of a piece; in compiled code.
+
+    A plain number is left as it is.  Of one with derivatives
+    (:mod:`klack.machine.compiling.tangent_number`) these are dropped.  A solution has the same ones
+    from any guess, and so has a sum over pieces of any length but for the error of the method;
+    where a guess or a length follows from that of the step before, what is left of their own
+    derivatives would grow from step to step without bound.
+    """
+    from llvmlite import ir
+
+    lanes = getattr(number, "lanes", 0)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if not lanes:
+            return args[0]
+        kind, place = ir.VectorType(ir.DoubleType(), lanes), ir.Constant(ir.IntType(32), 0)
+        value = builder.extract_element(args[0], place)
+        return builder.insert_element(ir.Constant(kind, [0.0] * lanes), value, place)
+
+    return number(number), codegen
+
+
+@intrinsic
+def with_slope_of(typingctx: Any, number: Any, twin: Any) -> Any:
+    """The same number with the derivatives of its twin, another way to write it; compiled.
+
+    For a number whose own way loses them, as a root at zero that is multiplied by itself does.
+    """
+    from llvmlite import ir
+
+    lanes = getattr(number, "lanes", 0)
+
+    def codegen(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        if not lanes:
+            return args[0]
+        place = ir.Constant(ir.IntType(32), 0)
+        return builder.insert_element(args[1], builder.extract_element(args[0], place), place)
+
+    return number(number, twin), codegen

@@ -1,0 +1,163 @@
+"""Stages of a long run: times and warnings."""
+
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from time import perf_counter
+from typing import TypeVar
+
+import numpy as np
+
+from klack.errors import AccuracyWarning, InputError, KlackError
+from klack.machine.cache.result_cache import ResultCache
+from klack.machine.progress import PointCount, Progress, counted, remark
+
+Found = TypeVar("Found")
+
+__all__ = [
+    "FAILURES",
+    "WITH_CACHED",
+    "StageClock",
+    "collected_warnings",
+    "for_comparison",
+    "show",
+    "stages_with_cached",
+    "trial",
+    "warnings_of",
+]
+
+FAILURES = (KlackError, np.linalg.LinAlgError, MemoryError)
+"""Errors that a calculation may end with that are not internal errors."""
+
+WITH_CACHED = ", with cached results"
+"""Suffix of the name of a stage that used results of earlier runs."""
+
+
+def stages_with_cached(stage_times: Mapping[str, float]) -> tuple[str, ...]:
+    """Stages of a run that took results of earlier runs from the cache."""
+    return tuple(
+        name.removesuffix(WITH_CACHED) for name in stage_times if name.endswith(WITH_CACHED)
+    )
+
+
+class StageClock:
+    """Passes progress on and measures how long each stage takes, and what it took from the cache.
+
+    Parameters
+    ----------
+    progress : callable
+    cache : ResultCache, optional
+    """
+
+    def __init__(self, progress: Progress, cache: ResultCache | None = None) -> None:
+        self._progress, self._cache = progress, cache
+        self._served, self._helped = self._count(), set[str]()
+        self._stage, self._since = "", perf_counter()
+        self._times: dict[str, float] = {}
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        """Report the progress of a stage."""
+        if stage != self._stage:
+            self._book()
+            self._stage = stage
+        self._progress(stage, fraction)
+
+    def remark(self, line: str) -> None:
+        """Pass a line of text on."""
+        remark(self._progress, line)
+
+    def counted(self, count: PointCount) -> None:
+        """Pass a count of points on."""
+        counted(self._progress, count)
+
+    def _book(self) -> None:
+        now = perf_counter()
+        if self._stage:
+            self._times[self._stage] = self._times.get(self._stage, 0.0) + now - self._since
+        self._since = now
+        served = self._count()
+        if self._stage and served > self._served:
+            self._helped.add(self._stage)
+        self._served = served
+
+    def _count(self) -> int:
+        return 0 if self._cache is None else self._cache.served.total()
+
+    def spent(self, stages: Sequence[str]) -> float:
+        """Seconds in these stages so far."""
+        self._book()
+        return sum(self._times.get(stage, 0.0) for stage in stages)
+
+    def times(self) -> dict[str, float]:
+        """Seconds per stage; the name shows the use of cached results."""
+        self._book()
+        return {
+            f"{stage}{WITH_CACHED if stage in self._helped else ''}": time
+            for stage, time in self._times.items()
+        }
+
+
+@contextmanager
+def collected_warnings() -> Iterator[list[str]]:
+    """Collect accuracy warnings as notes of the study, each once; show all others as usual."""
+    notes: list[str] = []
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield notes
+    for item in caught:
+        if issubclass(item.category, AccuracyWarning):
+            text = str(item.message)
+            if text not in notes:
+                notes.append(text)
+        else:
+            warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+@contextmanager
+def trial() -> Iterator[list[warnings.WarningMessage]]:
+    """Keep the warnings of a trial to itself; :func:`show` shows those of the one that counts."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield caught
+
+
+def show(caught: Iterable[warnings.WarningMessage]) -> None:
+    """Show warnings that a :func:`trial` has kept."""
+    for item in caught:
+        warnings.warn_explicit(item.message, item.category, item.filename, item.lineno)
+
+
+def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
+    """Compute something used only for comparison: a failure warns and returns None.
+
+    Parameters
+    ----------
+    what : str
+        What is left out then, begin of a sentence.
+    compute : callable
+    """
+    try:
+        return compute()
+    except InputError as error:
+        reason = error.got  # not where: a key that the case may not have
+    except FAILURES as error:
+        reason = str(error) or type(error).__name__
+    warnings.warn(
+        f"{what} was left out, which is for comparison only: {reason}",
+        AccuracyWarning,
+        stacklevel=2,
+    )
+    return None
+
+
+@contextmanager
+def warnings_of(run: str) -> Iterator[None]:
+    """Begin every accuracy warning with the run that it belongs to."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        yield
+    for item in caught:
+        text: Warning | str = item.message
+        if issubclass(item.category, AccuracyWarning):
+            text = f"{run}: {item.message}"
+        warnings.warn_explicit(text, item.category, item.filename, item.lineno)

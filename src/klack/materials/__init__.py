@@ -1,0 +1,1 @@
+"""Materials: elastic, yielding, and libraries of numbers with their sources."""

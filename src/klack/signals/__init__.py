@@ -1,0 +1,1 @@
+"""Sampled signals and spectra, and the low pass of a sensor."""
