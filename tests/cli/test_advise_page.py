@@ -5,7 +5,9 @@ import re
 from pathlib import Path
 
 import pytest
-from klack_names import load_case, main
+
+from klack.case import load_case
+from klack.cli.main import main
 
 PAGE = (Path(__file__).parents[2] / "docs/how-to/advise.md").read_text(encoding="utf-8")
 

@@ -5,10 +5,13 @@ from pathlib import Path
 
 import pytest
 from energy_ledger import allowed
-from klack_names import InputError, load_case, main, read_case, read_case_tree
 from ruamel.yaml import YAML
 
+from klack.case import load_case, read_case
+from klack.case.any_case import read_case_tree
 from klack.case.rewriting import with_values
+from klack.cli.main import main
+from klack.errors import InputError
 
 CASE = """\
 # a small sphere on a small block: the comment stays

@@ -8,7 +8,9 @@ import json
 from pathlib import Path
 
 import pytest
-from klack_names import load_case, main
+
+from klack.case import load_case
+from klack.cli.main import main
 
 pytestmark = pytest.mark.slow
 

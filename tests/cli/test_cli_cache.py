@@ -11,8 +11,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from klack_names import KlackError, load_valve_case, main
 
+from klack.case.any_case import load_valve_case
+from klack.cli.main import main
+from klack.errors import KlackError
 from klack.machine.cache.entry import Entry
 from klack.machine.cache.result_cache import result_cache
 from klack.network.step_function import is_step_function

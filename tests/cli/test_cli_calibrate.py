@@ -5,11 +5,12 @@ import sys
 
 import numpy as np
 import pytest
-from klack_names import load_valve_case, main
 from rigid_valve import write_bench
 
 from klack.analyses.calibration.analysis import CALIBRATION
 from klack.analyses.calibration.motion import TRIAL_LOG, MotionModel
+from klack.case.any_case import load_valve_case
+from klack.cli.main import main
 
 pytestmark = pytest.mark.slow
 

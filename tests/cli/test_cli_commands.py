@@ -11,12 +11,14 @@ from shlex import quote
 from types import ModuleType, SimpleNamespace
 
 import pytest
-from klack_names import AccuracyWarning, ConvergenceError, InputError, main, show_progress
 
 import klack.cli.commands as demo_module
 from klack import verification
 from klack.cli.commands import COMMANDS
+from klack.cli.main import main
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.terminal.output import staged_folder, write_json
+from klack.terminal.progress import show_progress
 from klack.terminal.tables import print_table
 from klack.verification import GROUPS, Check, compare, run_checks
 

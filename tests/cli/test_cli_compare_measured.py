@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import STROKE, main
+
+from klack.analyses.stroke.analysis import STROKE
+from klack.cli.main import main
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 STROKES, NOISE, RATE = 3, 0.2e-6, 400e3

@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from klack_names import IMPACT, main, read_case, run_impact
 
-from klack.case import find_case
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.run import run_impact
+from klack.case import find_case, read_case
+from klack.cli.main import main
 
 VALVE = find_case("demo-valve-axisymmetric")
 

@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 import scipy.io
 from c_compiler import needs_compiler
-from klack_names import Provenance, body_model, build_fmu, main, write_step_revolved
 from scipy.sparse import coo_array
 
 from klack.case import find_case
+from klack.cli.main import main
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.modal_model import Provenance, body_model
 from klack.mesh.profile import Line, Profile
+from klack.mesh.solid import write_step_revolved
 from klack.simulation.bodies import rod_body
 
 NEEDLE = find_case("needle-from-inp").parent / "needle.inp"

@@ -11,12 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import main, read_case_tree, simulate_network
 from quoted_output import compare
 from scipy.io import loadmat
 
 from klack.analyses.linearisation.analysis import LINEARISATION
 from klack.analyses.linearisation.loops import plain_name
+from klack.case.any_case import read_case_tree
+from klack.cli.main import main
+from klack.simulation.network_run import simulate_network
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 MAGNET = (HOW_TO / "held_open.yaml").read_text(encoding="utf-8")

@@ -12,10 +12,11 @@ from shutil import copytree
 
 import numpy as np
 import pytest
-from klack_names import IMPACT, main
 
+from klack.analyses.impact.analysis import IMPACT
 from klack.analyses.noise.analysis import NOISE
 from klack.analyses.noise.content import noise_content
+from klack.cli.main import main
 
 ROOT = Path(__file__).parents[2]
 HOW_TO = ROOT / "docs" / "how-to"

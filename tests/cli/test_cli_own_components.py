@@ -11,7 +11,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from klack_names import InputError, load_any_case, load_valve_case, main, read_case_tree
+
+from klack.case.any_case import load_any_case, load_valve_case, read_case_tree
+from klack.cli.main import main
+from klack.errors import InputError
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = """

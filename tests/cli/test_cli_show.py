@@ -7,7 +7,10 @@ from xml.etree import ElementTree
 
 import pytest
 from json_schema_check import require_documented
-from klack_names import load_valve_case, main, type_words
+
+from klack.case.any_case import load_valve_case
+from klack.cli.main import main
+from klack.network.catalogue import type_words
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 VALVE = HOW_TO / "small_valve.yaml"

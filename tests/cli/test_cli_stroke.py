@@ -12,8 +12,11 @@ from shutil import copytree
 
 import numpy as np
 import pytest
-from klack_names import STROKE, gonthier_coefficient, main
 from scipy.integrate import solve_ivp
+
+from klack.analyses.stroke.analysis import STROKE
+from klack.cli.main import main
+from klack.contact.laws import gonthier_coefficient
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 CASE = HOW_TO / "small_valve.yaml"

@@ -2,20 +2,13 @@
 
 import numpy as np
 import pytest
-from klack_names import (
-    FilmRow,
-    HertzLaw,
-    HuntCrossley,
-    LinearLaw,
-    TableLaw,
-    gonthier_coefficient,
-    interface_motion,
-    interface_store,
-    solve_interface,
-    steel_rod,
-)
 
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
 from klack.contact.step_constants import NO_LAW
+from klack.network.rows import FilmRow
+from klack.simulation.interface_step import interface_store, solve_interface
+from klack.verification.interface_motion import interface_motion
+from klack.verification.one_dimension import steel_rod
 
 pytestmark = pytest.mark.slow
 

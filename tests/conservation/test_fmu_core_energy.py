@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 from c_compiler import needs_compiler
-from klack_names import Provenance, TableLaw, build_fmu, one_contact, pair_model
 
+from klack.contact.laws import TableLaw
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.modal_model import Provenance, pair_model
 from klack.simulation.bodies import rod_body
+from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
 pytestmark = [pytest.mark.slow, needs_compiler]

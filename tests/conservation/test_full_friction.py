@@ -12,20 +12,17 @@ from functools import cache
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    FaceFriction,
-    Friction,
-    FullOrderResult,
-    InputError,
-    elastic_body,
-    simulate_full_order,
-    simulate_interface,
-    sweep,
-)
 from scipy.sparse import csr_array
 
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace, contact_space, tangent_rows, touching_shift
+from klack.errors import InputError
+from klack.mesh.swept import sweep
+from klack.transient.full_order import simulate_full_order
+from klack.transient.interface_run import simulate_interface
+from klack.transient.result import FullOrderResult
 from klack.transient.rubbing import OPEN, SLIP, STICK
 from klack.verification.interface_bodies import lateral_guide, reduce_bodies, rubbing_faces
 from klack.verification.transient import (

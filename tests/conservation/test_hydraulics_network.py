@@ -19,46 +19,41 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    Ambient,
-    Annulus,
-    Chamber,
-    CheckValve,
-    ConicalSeat,
-    EndStop,
-    FlowSource,
-    FluidChoice,
-    Inertance,
-    Network,
-    Orifice,
-    PipeFriction,
-    PressureFace,
-    PressureLoss,
-    PressureSource,
-    PulsatingFlow,
-    Pump,
-    ReliefValve,
-    RigidMass,
-    Rows,
-    Seat,
-    SpoolEdge,
-    ValveCase,
-    VariableOrifice,
-    evaluate,
-    fixed_body,
-    fluid_at,
-    fluid_table,
-    interface_motion,
-    library_fluid,
-    rigid_mass_body,
-    simulate_network,
-)
 from rigid_valve import RELIEF_VALVE
 from scipy.optimize import brentq
 
 from klack.case.reader import parse, validated
+from klack.case.valve import ValveCase
+from klack.hydraulics.annulus import Annulus
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.conical_seat import ConicalSeat
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_loss import PressureLoss
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.pulsating_flow import PulsatingFlow
+from klack.hydraulics.pump import Pump
+from klack.hydraulics.relief_valve import ReliefValve
+from klack.hydraulics.seat import Seat
+from klack.hydraulics.spool_edge import SpoolEdge
+from klack.hydraulics.variable_orifice import VariableOrifice
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient, Rows
+from klack.network.step_function import evaluate
+from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.network_pressures import bracketed
+from klack.simulation.network_run import simulate_network
+from klack.verification.interface_motion import interface_motion
 
 FLUIDS = {
     "liquid": library_fluid("n-heptane").at(293.15),

@@ -19,27 +19,21 @@ from math import pi
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    ElasticBody,
-    FullOrderResult,
-    HertzLaw,
-    HuntCrossley,
-    LinearLaw,
-    TableLaw,
-    contact_space,
-    lattice_mesh,
-    measure_impact,
-    simulate,
-    simulate_full_order,
-    simulate_impact,
-    sphere_over_cylinder,
-)
 
+from klack.bodies.elasticity.body import ElasticBody
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
+from klack.contact.mortar import contact_space
+from klack.contact.restitution import measure_impact
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
 from klack.simulation.contact_step import law_potential, mean_force, solve_step
+from klack.simulation.impact import simulate, simulate_impact
 from klack.simulation.interface_step import film_force, interface_store, solve_interface
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
+from klack.transient.full_order import simulate_full_order
+from klack.transient.result import FullOrderResult
 from klack.verification.contact import half_spaces, parabola, sphere_on_cone
+from klack.verification.lattice import lattice_mesh
+from klack.verification.transient import sphere_over_cylinder
 
 STEEL = {"young": 2.1e11, "density": 7850.0}
 DEPTH = 6e-6 * np.linspace(0.0, 1.0, 30)[1:] ** 1.3  # [m]

@@ -7,9 +7,10 @@ is nobody's mistake.
 from pathlib import Path
 
 import pytest
-from klack_names import load_case, run_impact
 
 from klack.analyses.impact import interface_level
+from klack.analyses.impact.run import run_impact
+from klack.case import load_case
 from klack.simulation import energy_balance
 from klack.transient import interface_run
 

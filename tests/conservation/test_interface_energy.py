@@ -14,24 +14,22 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    InputError,
-    elastic_body,
-    measure_impact,
-    modal_propagator,
-    mode_pools,
-    silent,
-    simulate_full_order,
-    simulate_interface,
-)
 from numba import njit
 
 from klack.analyses.impact.interface_level import build_interface
 from klack.assembling.bodies import find_touch
+from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
+from klack.bodies.elasticity.body import elastic_body
 from klack.case import load_case, shipped_cases
 from klack.case.schema import Case
+from klack.contact.restitution import measure_impact
+from klack.errors import InputError
+from klack.machine.progress import silent
+from klack.simulation.propagator import modal_propagator
+from klack.transient.full_order import simulate_full_order
 from klack.transient.interface_model import InterfaceContact, InterfaceModel
+from klack.transient.interface_run import simulate_interface
 from klack.verification.interface_bodies import advance, free_rod, reduce_bodies, rod_between_stops
 from klack.verification.transient import (
     STEEL,

@@ -3,21 +3,19 @@
 from math import exp, pi
 
 import pytest
-from klack_names import (
-    Ambient,
-    Chamber,
-    FlowSource,
-    Network,
-    Orifice,
-    PressureFace,
-    PressureSource,
-    RigidMass,
-    library_fluid,
-    simulate_network,
-)
 
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient
+from klack.simulation.network_run import simulate_network
 
 BAR = 1e5
 HEPTANE = library_fluid("n-heptane").at(293.15)

@@ -11,33 +11,30 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from klack_names import (
-    EndStop,
-    FluxMap,
-    InputError,
-    MagneticBranch,
-    MagneticCircuit,
-    MagneticNetwork,
-    Network,
-    PeakHold,
-    RigidMass,
-    Solenoid,
-    TwoPoint,
-    VoltageStep,
-    VoltageTable,
-    evaluate,
-    simulate_network,
-    static_state,
-)
 
+from klack.errors import InputError
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.flux_step import flux_numbers, flux_state, magnet_step
 from klack.magnetics.flux_table import HEADER
 from klack.magnetics.hysteresis import falling_width
 from klack.magnetics.iron import VACUUM_PERMEABILITY, froehlich
 from klack.magnetics.lifting_magnet import lifting_magnet
+from klack.magnetics.magnetic_network import MagneticNetwork
+from klack.magnetics.peak_hold import PeakHold
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
+from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.solenoid_parts import PermanentMagnet
+from klack.magnetics.static import static_state
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.step_function import evaluate
+from klack.simulation.network_run import simulate_network
 from klack.verification.drivers import injector, opening, run_coil
 
 DRIVER = PeakHold(

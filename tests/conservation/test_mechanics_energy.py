@@ -3,24 +3,21 @@
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    Component,
-    ConstantForce,
-    ForceOverStroke,
-    ForceOverTime,
-    Gravity,
-    LuGreFriction,
-    Network,
-    NonlinearSpring,
-    RigidMass,
-    SurgingSpring,
-    evaluate,
-)
 from numpy.typing import NDArray
 
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.force_over_stroke import ForceOverStroke
+from klack.mechanics.gravity import Gravity
+from klack.mechanics.lugre_friction import LuGreFriction
+from klack.mechanics.nonlinear_spring import NonlinearSpring
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.rubber_stop import MaxwellElement, RubberStop
 from klack.mechanics.spring import Spring
+from klack.mechanics.surging_spring import SurgingSpring
+from klack.network.component import Component
+from klack.network.network import Network
 from klack.network.rows import ElementRow
+from klack.network.step_function import evaluate
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

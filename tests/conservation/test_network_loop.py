@@ -19,35 +19,28 @@ from time import sleep
 import energy_ledger
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    Chamber,
-    ContactPair,
-    ConvergenceError,
-    EndStop,
-    EnergyBooks,
-    FlexibleBody,
-    FluidChoice,
-    ForceOverTime,
-    GuideFriction,
-    ImpactEvent,
-    LinearLaw,
-    Network,
-    NetworkResult,
-    Orifice,
-    PressureFace,
-    ReducedSystem,
-    RigidMass,
-    Rows,
-    VoltageStep,
-    fluid_at,
-    fluid_table,
-    simulate_network,
-)
 
+from klack.contact.laws import LinearLaw
+from klack.errors import AccuracyWarning, ConvergenceError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.magnetics.voltage_step import VoltageStep
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Rows
 from klack.simulation import energy_balance, impact, network_recorder, network_run
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
+from klack.simulation.network_result import EnergyBooks, ImpactEvent, NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.simulation.system import ContactPair, ReducedSystem
 from klack.verification.network import LIFT, peak_and_hold, whole_valve
 
 MODES = (8, 12, 8)

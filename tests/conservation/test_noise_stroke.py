@@ -8,13 +8,17 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from klack_names import StrokeStudy, TimeSeries, ValveCase, load_valve_case, run_stroke
 
 from klack.acoustics.force_bands import force_bands
 from klack.analyses.noise.record import NoiseDesign
 from klack.analyses.noise.run import run_noise
 from klack.analyses.noise.source import NoiseSource, stroke_sources
+from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case
 from klack.case.reader import find_case
+from klack.case.valve import ValveCase
+from klack.signals.sampled import TimeSeries
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,6 @@ pressures, moving faces, and steps from nanoseconds to a second.
 import numpy as np
 import pytest
 from draws import each
-from klack_names import Ambient, evaluate
 
 from klack.hydraulics.gas.flow_law import GAP, VALVE
 from klack.hydraulics.gas.gas_element import GasNetwork
@@ -20,6 +19,8 @@ from klack.network.gas_rows import (
     GasSourceRow,
     GasWallRow,
 )
+from klack.network.rows import Ambient
+from klack.network.step_function import evaluate
 
 pytestmark = pytest.mark.slow
 

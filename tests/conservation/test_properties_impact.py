@@ -10,20 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from klack_names import (
-    AxialForce,
-    ContactPair,
-    ImpactHistory,
-    ReducedSystem,
-    measure_impact,
-    simulate,
-    simulate_impact,
-)
 from property_profiles import examples
 
+from klack.contact.history import ImpactHistory
 from klack.contact.laws import ContactLaw, HertzLaw, HuntCrossley, LinearLaw, TableLaw
+from klack.contact.restitution import measure_impact
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
-from klack.simulation.impact import propose_step
+from klack.simulation.impact import propose_step, simulate, simulate_impact
+from klack.simulation.system import AxialForce, ContactPair, ReducedSystem
 
 MOST_STEPS = 3000
 

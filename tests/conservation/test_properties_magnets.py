@@ -10,23 +10,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, reject
 from hypothesis import strategies as st
-from klack_names import (
-    ConvergenceError,
-    FluxMap,
-    InputError,
-    PeakHold,
-    PulseWidth,
-    Solenoid,
-    TwoPoint,
-    VoltageStep,
-    VoltageTable,
-    run_coil,
-    static_state,
-)
 from property_profiles import examples, log_range
 
+from klack.errors import ConvergenceError, InputError
 from klack.magnetics.air_gap import edge_on_plane, edges_beside_wall, equal_edges, slot_loss
 from klack.magnetics.eddy import cylinder_ladder, sheet_ladder
+from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.iron import (
     VACUUM_PERMEABILITY,
     IronCurve,
@@ -35,6 +24,14 @@ from klack.magnetics.iron import (
     measured,
     tanh_curve,
 )
+from klack.magnetics.peak_hold import PeakHold
+from klack.magnetics.pwm import PulseWidth
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.static import static_state
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
+from klack.verification.drivers import run_coil
 
 
 @st.composite

@@ -14,23 +14,20 @@ import pytest
 from energy_ledger import allowed
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from klack_names import (
-    Component,
-    ConvergenceError,
-    GuideFriction,
-    InputError,
-    Network,
-    NetworkResult,
-    NetworkSection,
-    RigidMass,
-    component_classes,
-    evaluate,
-    simulate_network,
-)
 from property_profiles import examples, log_range
 
+from klack.errors import ConvergenceError, InputError
 from klack.mechanics.force_over_stroke import ForceOverStroke, stroke_force_step
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.catalogue import component_classes
+from klack.network.component import Component
+from klack.network.declaration import NetworkSection
+from klack.network.network import Network
+from klack.network.step_function import evaluate
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 from klack.simulation.network_sliders import largest_friction, slider_force
 from klack.units import RATIO
 

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from klack_names import evaluate, fluid_at, fluid_table, library_fluid
 from property_profiles import examples, log_range
 
 from klack.hydraulics.annulus import Annulus, annulus_step
 from klack.hydraulics.film import ConeFilm, DiscFilm, RingFilm, mean_flow_factor
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
 from klack.hydraulics.land_face import land_areas
 from klack.hydraulics.orifice import Orifice, orifice_flow
 from klack.hydraulics.seat import Seat, seat_step
+from klack.network.step_function import evaluate
 
 AMBIENT = 101_325.0
 FLUID = library_fluid("n-heptane").at(293.15, gas_fraction=1e-3)

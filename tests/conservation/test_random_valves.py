@@ -37,8 +37,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 from draws import program
-from klack_names import AccuracyWarning, IncompleteRunError, InputError, read_valve_case, type_words
 from rigid_valve import RELIEF_VALVE
+
+from klack.case.any_case import read_valve_case
+from klack.errors import AccuracyWarning, InputError
+from klack.network.catalogue import type_words
+from klack.simulation.network_result import IncompleteRunError
 
 DRAWS = program("random_valves")
 

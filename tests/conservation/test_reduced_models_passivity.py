@@ -7,19 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import (
-    ContactPair,
-    InputError,
-    LinearLaw,
-    ModalDamping,
-    ReducedSystem,
-    StateSpace,
-    simulate_impact,
-)
 
+from klack.bodies.reduction.damping import ModalDamping
 from klack.bodies.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
 from klack.bodies.reduction.from_state_space import body_of_state_space
+from klack.bodies.reduction.reduced_body import StateSpace
+from klack.contact.laws import LinearLaw
+from klack.errors import InputError
 from klack.simulation.bodies import fixed_body, rod_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 STEEL = {"length": 0.03, "area": 1e-5, "young": 2e11, "density": 8e3}
 ROD = rod_body("rod", elastic_modes=20, damping=0.001, **STEEL)

@@ -2,22 +2,19 @@
 
 import numpy as np
 import pytest
-from klack_names import (
-    Flexibility,
-    LossFactor,
-    Material,
-    ModalDamping,
-    eigenmodes,
-    elastic_body,
-    full_order_receptance,
-    lattice_mesh,
-    reduce_body,
-)
 from numpy.testing import assert_allclose
 
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import LossFactor, ModalDamping
+from klack.bodies.reduction.full_order import full_order_receptance
 from klack.bodies.reduction.ports import Observer, node_observer, surface_port
 from klack.bodies.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.reduce import reduce_body
 from klack.bodies.reduction.selection import ByCount, ByParticipation
+from klack.materials.material import Material
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 AXIS = np.geomspace(2e3, 1e6, 300)

@@ -15,34 +15,28 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from klack_names import (
-    ConstantForce,
-    ContactPair,
-    EndStop,
-    ForceOverTime,
-    InputError,
-    Network,
-    ReducedSystem,
-    RigidMass,
-    Rows,
-    RubbingLaw,
-    TableLaw,
-    fixed_body,
-    interface_store,
-    library_fluid,
-    rigid_mass_body,
-    simulate,
-    simulate_network,
-    solve_interface,
-)
 
 from klack.assembling.stops import bulk_compliance, without_bulk
+from klack.contact.laws import TableLaw
 from klack.contact.local_law import LocalLaw
 from klack.contact.rubbing_fit import Loop, rubbing_fit
+from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.step_constants import LAW_RUBBING, LAW_YIELDING
 from klack.contact.yielding_law import YieldingLaw
+from klack.errors import InputError
+from klack.hydraulics.fluid_library import library_fluid
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Rows
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate
+from klack.simulation.interface_step import interface_store, solve_interface
 from klack.simulation.lasting_laws import press, settle, slide
+from klack.simulation.network_run import simulate_network
+from klack.simulation.system import ContactPair, ReducedSystem
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

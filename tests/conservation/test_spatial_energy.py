@@ -17,20 +17,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import (
-    FaceFriction,
-    Flexibility,
-    ForceOverTime,
-    Friction,
-    NetworkResult,
-    eigenmodes,
-    measure_impact,
-    simulate_interface,
-)
 from spatial_needle import ABOVE, BELOW, LIFT, Needle, move, ring
 
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
+from klack.contact.restitution import measure_impact
+from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
+from klack.simulation.network_result import NetworkResult
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
+from klack.transient.interface_run import simulate_interface
 from klack.transient.revolved_model import reduced_bodies
 from klack.verification.ring_bodies import (
     NeedleOnRing,

@@ -8,30 +8,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    STROKE,
-    AccuracyWarning,
-    EndStop,
-    FlexibleBody,
-    NetworkResult,
-    RubbingLaw,
-    StrokeStudy,
-    TableLaw,
-    ValveCase,
-    case_models,
-    load_valve_case,
-    read_case,
-    read_valve_case,
-    run_impact,
-    run_stroke,
-    simulate_network,
-    stroke_content,
-)
 
 from klack.analyses.impact.contact_check import check_contact
+from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.figures import stop_law_chart
+from klack.analyses.stroke.record import StrokeStudy
+from klack.analyses.stroke.run import run_stroke
 from klack.assembling import rubbing as rubbing_module
 from klack.assembling.valve import Valve, build_valve
+from klack.case import read_case
+from klack.case.any_case import load_valve_case, read_valve_case
+from klack.case.valve import ValveCase
+from klack.contact.laws import TableLaw
+from klack.contact.rubbing_law import RubbingLaw
+from klack.errors import AccuracyWarning
+from klack.exchange.case_models import case_models
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 from klack.transient.rubbing_ladder import LockedError, RubbingContact
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"

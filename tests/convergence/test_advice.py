@@ -17,16 +17,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ImpactHistory,
-    ValveCase,
-    build_valve,
-    load_valve_case,
-    mode_pools,
-    read_valve_case,
-    silent,
-    simulate_impact,
-)
 
 from klack.analyses.advice.advice import Advice, Counsel, settle
 from klack.analyses.advice.impact import advise_impact
@@ -40,10 +30,17 @@ from klack.analyses.advice.modes import (
 )
 from klack.analyses.advice.settings import applied
 from klack.analyses.advice.stroke import advise_stroke, first_impacts, step_ladder, stroke_measures
+from klack.assembling.modes import mode_pools
 from klack.assembling.problem import ContactProblem, build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
+from klack.assembling.valve import build_valve
 from klack.case import find_case, read_case
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.case.schema import Case
+from klack.case.valve import ValveCase
+from klack.contact.history import ImpactHistory
+from klack.machine.progress import silent
+from klack.simulation.impact import simulate_impact
 
 pytestmark = pytest.mark.slow
 

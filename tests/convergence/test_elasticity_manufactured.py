@@ -13,17 +13,16 @@ B = A b^2.  The finite elements are solved, so the error of the displacements is
 
 import numpy as np
 import pytest
-from klack_names import (
-    Material,
-    StressField,
-    assemble,
-    factorize,
-    lattice_mesh,
-    quadrature,
-    shape_functions,
-    traction_load,
-)
 from scipy.sparse.linalg import spsolve
+
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.factorization import factorize
+from klack.bodies.elasticity.loads import traction_load
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import shape_functions
+from klack.bodies.elasticity.stress import StressField
+from klack.materials.material import Material
+from klack.verification.lattice import lattice_mesh
 
 MATERIAL = Material(name="unit", young=1.0, poisson=0.3, density=1.0)
 LAMBDA, MU = MATERIAL.lame_lambda, MATERIAL.shear_modulus

@@ -11,26 +11,22 @@ from typing import Any
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import (
-    Component,
-    EndStop,
-    FilmRow,
-    ForceOverTime,
-    GuideFriction,
-    InterfaceRecord,
-    Network,
-    NetworkResult,
-    RigidMass,
-    Rows,
-    SurgingSpring,
-    load_valve_case,
-    simulate_network,
-)
 from numpy.typing import NDArray
 
+from klack.case.any_case import load_valve_case
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.surging_spring import SurgingSpring
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.rows import FilmRow, Rows
 from klack.simulation.impact_doubts import impact_doubts, late_by_swinging, missing_peak
 from klack.simulation.network_arrays import PARTS
+from klack.simulation.network_result import InterfaceRecord, NetworkResult
+from klack.simulation.network_run import simulate_network
 
 STEEP = FilmRow(cubic=2e-15, linear=0.0, cut_off=1e-6, suction=1e9)
 """Hardest at touch: a needle of 2 g at 2 m/s crosses it without losing much of its speed."""

@@ -7,9 +7,11 @@ step and held, or from where the lift will be at half the step.
 import numpy as np
 import pytest
 from c_compiler import needs_compiler
-from klack_names import build_fmu, case_models, load_any_case
 
 from klack.case import find_case
+from klack.case.any_case import load_any_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
 
 fmpy = pytest.importorskip("fmpy")
 pytestmark = [needs_compiler, pytest.mark.slow]

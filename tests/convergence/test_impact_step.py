@@ -23,31 +23,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ContactPair,
-    ElasticBody,
-    FaceFriction,
-    Friction,
-    HertzLaw,
-    LinearLaw,
-    ReducedSystem,
-    elastic_body,
-    find_contacts,
-    lattice_mesh,
-    measure_impact,
-    needle_over_seat,
-    read_valve_case,
-    run_stroke,
-    simulate,
-    simulate_full_order,
-    simulate_interface,
-)
 from scipy.optimize import brentq
 
+from klack.analyses.stroke.run import run_stroke
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.case.any_case import read_valve_case
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
+from klack.contact.laws import HertzLaw, LinearLaw
 from klack.contact.mortar import contact_space, tangent_rows, touching_shift
+from klack.contact.restitution import find_contacts, measure_impact
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
+from klack.simulation.impact import simulate
+from klack.simulation.system import ContactPair, ReducedSystem
+from klack.transient.full_order import simulate_full_order
+from klack.transient.interface_run import simulate_interface
 from klack.verification.contact import STEEL, IndentationProblem
 from klack.verification.interface_bodies import advance, free_rod, rigid_body, sphere_on_beam
+from klack.verification.lattice import lattice_mesh
+from klack.verification.transient import needle_over_seat
 
 MODES, STIFFNESS, GAP, DURATION = 5, 20.0, 0.1, 6.0  # unit rod, unit speed
 

@@ -10,18 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import (
-    Component,
-    ConstantForce,
-    ImportedFmu,
-    InputError,
-    Network,
-    NetworkResult,
-    RigidMass,
-    simulate_network,
-)
 
+from klack.errors import InputError
+from klack.mechanics.force import ConstantForce
+from klack.mechanics.imported_fmu import ImportedFmu
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

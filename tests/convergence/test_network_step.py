@@ -15,29 +15,26 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from klack_names import (
-    Component,
-    EndStop,
-    FilmRow,
-    FlexibleBody,
-    ForceOverTime,
-    InputError,
-    LinearLaw,
-    Network,
-    NetworkResult,
-    PeakHold,
-    RigidMass,
-    Rows,
-    interface_motion,
-    simulate_network,
-    steel_rod,
-    step_sizes,
-)
 
+from klack.contact.laws import LinearLaw
+from klack.errors import InputError
 from klack.hydraulics.line_friction import KAGAWA, laminar_resistance, unsteady_terms
+from klack.magnetics.peak_hold import PeakHold
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.rigid_mass import RigidMass
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.rows import FilmRow, Rows
 from klack.simulation.bodies import rod_body
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.simulation.step_sizes import step_sizes
 from klack.verification.drivers import injector, opening, run_coil
+from klack.verification.interface_motion import interface_motion
 from klack.verification.network import peak_and_hold, whole_valve
+from klack.verification.one_dimension import steel_rod
 from klack.verification.single_line import End, exponential_decay, plain_line, ringing, run_line
 
 DRIVER = PeakHold(

@@ -12,21 +12,17 @@ from typing import Any
 import numpy as np
 import pytest
 from draws import program
-from klack_names import (
-    STROKE,
-    ImpactEvent,
-    InputError,
-    StrokeStudy,
-    StrokeVariant,
-    load_valve_case,
-    read_valve_case,
-    run_stroke,
-)
 
 import klack
+from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.measures import steps_told
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.run import run_stroke
 from klack.analyses.stroke.step_check import ImpactChange, checked_steps, impact_changes, told
+from klack.case.any_case import load_valve_case, read_valve_case
+from klack.errors import InputError
 from klack.network.accuracy import PROMISED
+from klack.simulation.network_result import ImpactEvent
 from klack.simulation.step_sizes import StepSizes, scaled
 
 ROOT = Path(__file__).parents[2]

@@ -4,8 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from klack_names import FullOrderResult, simulate_full_order
 
+from klack.transient.full_order import simulate_full_order
+from klack.transient.result import FullOrderResult
 from klack.verification.transient import drop_rod, sphere_over_cylinder
 
 pytestmark = pytest.mark.slow

@@ -10,17 +10,6 @@ from math import factorial
 
 import numpy as np
 import pytest
-from klack_names import (
-    Flexibility,
-    Material,
-    ModalDamping,
-    Modes,
-    TimeSeries,
-    eigenmodes,
-    elastic_body,
-    lattice_mesh,
-    surface_port,
-)
 from scipy.sparse.linalg import spsolve
 
 from klack.acoustics.force_response import modal_response, surface_velocity
@@ -29,8 +18,16 @@ from klack.acoustics.mobility import drive_point_mobility, support_force_transfe
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.plate import Air, Plate, baffled_plate_efficiency
 from klack.acoustics.radiation import piston_efficiency, power_transfer
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.damping import ModalDamping
+from klack.bodies.reduction.ports import surface_port
 from klack.bodies.reduction.structure import Structure, StructurePort, build_structure
+from klack.materials.material import Material
 from klack.mesh.mesh import Mesh, outer_surface
+from klack.signals.sampled import TimeSeries
+from klack.verification.lattice import lattice_mesh
 from klack.verification.reduction import LENGTH, RADIUS, STEEL_WITHOUT_POISSON
 from klack.verification.vibration import STEEL, oscillator, rod_structure
 

@@ -5,27 +5,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    IMPACT,
-    InputError,
-    read_case_tree,
-    report_content,
-    run_impact,
-    run_stroke,
-    stroke_content,
-    tree_of,
-)
 from threadpoolctl import threadpool_limits
 
 from klack.acoustics.signal_statistics import sound_statistics
 from klack.analyses.contact_doubts import contact_doubt
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.body import Transfers
 from klack.analyses.noise.run import click_sound
 from klack.analyses.noise.source import impact_sources, sources_of
+from klack.analyses.stroke.content import stroke_content
+from klack.analyses.stroke.run import run_stroke
 from klack.app.explorer import Explorer, drawn, sliders_of, stroke_numbers
 from klack.app.reader import Reader
 from klack.app.texts import checked_text, exchanged_text
+from klack.case.any_case import read_case_tree, tree_of
 from klack.case.reader import find_case, read_case
+from klack.errors import InputError
 from klack.machine.stages import collected_warnings
 
 PATH = find_case("demo-valve-axisymmetric")

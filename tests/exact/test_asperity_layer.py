@@ -9,10 +9,13 @@ from math import gamma, pi, sqrt
 
 import numpy as np
 import pytest
-from klack_names import InputError, build_problem, run_impact, silent
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.problem import build_problem
 from klack.case import find_case, load_case
 from klack.contact.asperity_layer import AsperityLayer, press, summit_integral
+from klack.errors import InputError
+from klack.machine.progress import silent
 
 SUMMITS = "roughness: {rms: 0.2 um, asperity_radius: 50 um}"
 SOFT = "roughness: {curve: [[0.3 um, 1 MPa], [0.6 um, 4 MPa], [1.2 um, 16 MPa]]}"

@@ -11,20 +11,13 @@ from math import acos, cos, hypot, pi, radians, sin, tan
 
 import numpy as np
 import pytest
-from klack_names import (
-    Ambient,
-    ConicalSeat,
-    InputError,
-    Network,
-    PressureFace,
-    PressureSource,
-    RigidMass,
-    library_fluid,
-)
 from pages import HOW_TO, numbers, printed, require_parts, run_of
 from scipy.integrate import quad
 from scipy.optimize import minimize
 
+from klack.errors import InputError
+from klack.hydraulics.conical_seat import ConicalSeat
+from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.off_axis_seat import (
     SeatFace,
     edge_gap,
@@ -33,8 +26,13 @@ from klack.hydraulics.off_axis_seat import (
     pressure_load,
     ring_opening,
 )
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
 from klack.hydraulics.seat import Seat, ball_opening, cone_opening, flat_opening
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient
 
 PAGE = (HOW_TO / "double-seat.md").read_text(encoding="utf-8")
 OIL = library_fluid("ISO VG 46").at(313.15)

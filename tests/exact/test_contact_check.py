@@ -18,19 +18,6 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import (
-    AccuracyWarning,
-    MeshSizing,
-    build_problem,
-    case_models,
-    load_case,
-    mesh_meridian,
-    mesh_revolved,
-    read_case,
-    run_impact,
-    run_reduce,
-    silent,
-)
 
 from klack.analyses.contact_doubts import elastic_above
 from klack.analyses.impact.contact_check import (
@@ -40,12 +27,22 @@ from klack.analyses.impact.contact_check import (
     ends_reached,
 )
 from klack.analyses.impact.recovered_motion import recovered_motion
+from klack.analyses.impact.run import run_impact
 from klack.analyses.noise.source import impact_sources
+from klack.analyses.reduction.run import run_reduce
+from klack.assembling.problem import build_problem
 from klack.assembling.yielding import tell_elastic
+from klack.case import load_case, read_case
 from klack.case.schema import Case
 from klack.contact.statics import COARSE
 from klack.contact.surface_edges import surface_edges
+from klack.errors import AccuracyWarning
+from klack.exchange.case_models import case_models
+from klack.machine.progress import silent
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Arc, Line, Profile
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_revolved
 
 CASE = """
 klack: 1

@@ -34,7 +34,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import Flexibility, ImpactHistory, InputError, Pose, lattice_mesh, silent
 from scipy.sparse import csr_array
 
 import klack
@@ -44,9 +43,11 @@ from klack.assembling.modes import kept_modes, mode_pools
 from klack.assembling.problem import build_problem, place_bodies
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.loads import NearLoads
+from klack.bodies.elasticity.statics import Flexibility
 from klack.case import find_case, load_case
 from klack.contact.complementarity import ComplementaritySolver
 from klack.contact.gap_update import RigidGaps
+from klack.contact.history import ImpactHistory
 from klack.contact.mortar import (
     ContactSpace,
     contact_space,
@@ -61,6 +62,9 @@ from klack.contact.statics import (
     extended_compliance,
     static_contact,
 )
+from klack.errors import InputError
+from klack.machine.progress import silent
+from klack.mesh.rigid import Pose
 from klack.verification.contact import (
     STEEL,
     half_spaces,
@@ -68,6 +72,7 @@ from klack.verification.contact import (
     sphere_on_cone,
     uniform_compression,
 )
+from klack.verification.lattice import lattice_mesh
 
 
 def pointwise(family, layers, xi, **size):

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import build_problem, load_case
 
 from klack.assembling.ladder import effective_mass
+from klack.assembling.problem import build_problem
+from klack.case import load_case
 from klack.contact.statics import ReachError, size_over_half_width
 from klack.verification.contact import STEEL, half_spaces, parabola
 

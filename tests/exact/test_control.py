@@ -11,30 +11,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from klack_names import (
-    STROKE,
-    Ambient,
-    Chamber,
-    ControlledForce,
-    ControlledPressure,
-    ControlledVoltage,
-    InputError,
-    Network,
-    Orifice,
-    RigidMass,
-    Sensor,
-    component_class,
-    library_fluid,
-    load_valve_case,
-    read_valve_case,
-    run_stroke,
-    simulate_network,
-)
 
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.control.hysteresis import HysteresisController
 from klack.control.pid import PidController, Setpoint
+from klack.control.sensor import Sensor
 from klack.control.state_machine import MachineState, StateMachine, Transition
+from klack.errors import InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.controlled_pressure import ControlledPressure
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.orifice import Orifice
+from klack.magnetics.controlled_voltage import ControlledVoltage
+from klack.mechanics.controlled_force import ControlledForce
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.catalogue import component_class
+from klack.network.network import Network
+from klack.network.rows import Ambient
+from klack.simulation.network_run import simulate_network
 
 DOCS = Path(__file__).parents[2] / "docs"
 CASE = DOCS / "how-to" / "controlled_valve.yaml"

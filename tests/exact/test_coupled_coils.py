@@ -14,35 +14,33 @@ import numpy as np
 import pytest
 import yaml
 from draws import each
-from klack_names import (
-    BoostCapacitor,
-    ControlledVoltage,
-    EndStop,
-    InputError,
-    MagneticNetwork,
-    Network,
-    PeakHold,
-    PrescribedMotion,
-    RigidMass,
-    Sensor,
-    Solenoid,
-    TwoPoint,
-    VoltageStep,
-    VoltageTable,
-    load_valve_case,
-    run_stroke,
-    simulate_network,
-    static_state,
-)
 
 from klack.analyses.stroke.figures import loop_chart
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case
 from klack.control.pid import PidController, Setpoint
+from klack.control.sensor import Sensor
+from klack.errors import InputError
+from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.boost_driver import BoostDriver, Shot
 from klack.magnetics.constant_drive import driven, hysteretic_coils
+from klack.magnetics.controlled_voltage import ControlledVoltage
 from klack.magnetics.coupled_step import coupled_step
 from klack.magnetics.flux_step import magnet_step
+from klack.magnetics.magnetic_network import MagneticNetwork
+from klack.magnetics.peak_hold import PeakHold
 from klack.magnetics.remanent_start import remanent_state
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.static import static_state
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.prescribed_motion import PrescribedMotion
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.simulation.network_run import simulate_network
 from klack.verification.coils_in_networks import two_coils
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"

@@ -13,13 +13,17 @@ from math import cos, pi, radians, sin
 import numpy as np
 import pytest
 from draws import each
-from klack_names import FAMILIES, InputError, MeshSizing, mesh_meridian, sweep
 
 from klack.analyses.impact.record import SectionPicture
 from klack.analyses.impact.section import section_picture
+from klack.errors import InputError
+from klack.mesh.families import FAMILIES
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import ElementBlock, Mesh, Surface, outer_surface
 from klack.mesh.profile import Line, Profile
+from klack.mesh.sizing import MeshSizing
 from klack.mesh.skin import Skin, skin_of_mesh
+from klack.mesh.swept import sweep
 from klack.report.depth_image import Camera, Quarter, Seen, Window, outlines, seen_of
 
 ROUND_OFF = 1e-12

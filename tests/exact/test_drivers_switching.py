@@ -13,30 +13,25 @@ import pytest
 from draws import each
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from klack_names import (
-    Book,
-    ConvergenceError,
-    DriveProfile,
-    InputError,
-    LinearReluctance,
-    MagneticBranch,
-    MagneticCircuit,
-    PeakHold,
-    PulseWidth,
-    TwoPoint,
-    VoltageStep,
-    VoltageTable,
-    evaluate,
-    load_valve_case,
-    read_valve_case,
-    simulate_network,
-)
 from ruamel.yaml import YAML
 
+from klack.case.any_case import load_valve_case, read_valve_case
+from klack.errors import ConvergenceError, InputError
 from klack.magnetics.boost_driver import BoostDriver, Shot
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.drive_profile import DriveProfile
 from klack.magnetics.driver import DriveProgram, DriveState, Switch, When
 from klack.magnetics.flux_step import flux_numbers, flux_state, magnet_step
+from klack.magnetics.peak_hold import PeakHold
+from klack.magnetics.pwm import PulseWidth
+from klack.magnetics.reluctance import LinearReluctance
 from klack.magnetics.remanent_start import remanent_state
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
+from klack.network.rows import Book
+from klack.network.step_function import evaluate
+from klack.simulation.network_run import simulate_network
 from klack.verification.drivers import injector, linear_coil, run_coil
 from klack.verification.output_stage import random_driver, run_stage
 

@@ -30,27 +30,23 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from klack_names import (
-    FAMILIES,
-    ElementBlock,
-    Flexibility,
-    Material,
-    Mesh,
-    ResultCache,
-    assemble,
-    available_backends,
-    elastic_body,
-    factorize,
-    lattice_mesh,
-    quadrature,
-    traction_load,
-)
 from property_profiles import examples
 from scipy.sparse import random_array
 
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.body import elastic_body
 from klack.bodies.elasticity.condensation import condensed_inverse
 from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
+from klack.bodies.elasticity.factorization import available_backends, factorize
+from klack.bodies.elasticity.loads import traction_load
+from klack.bodies.elasticity.quadrature import quadrature
 from klack.bodies.elasticity.shape_functions import reference_nodes, shape_functions
+from klack.bodies.elasticity.statics import Flexibility
+from klack.machine.cache.result_cache import ResultCache
+from klack.materials.material import Material
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import ElementBlock, Mesh
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 A, B, C = 2e-3, 3e-3, 8e-3

@@ -6,18 +6,15 @@ solutions have all that statics and modes need.
 
 import numpy as np
 import pytest
-from klack_names import (
-    ConvergenceError,
-    Material,
-    available_backends,
-    eigenmodes,
-    elastic_body,
-    factorize,
-    lattice_mesh,
-)
 from scipy.sparse import csr_array, diags_array
 
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.factorization import available_backends, factorize
 from klack.bodies.elasticity.statics import Flexibility, RefinedFactorization
+from klack.errors import ConvergenceError
+from klack.materials.material import Material
+from klack.verification.lattice import lattice_mesh
 
 pytestmark = pytest.mark.skipif(
     "pardiso" not in available_backends(), reason="only PARDISO has single precision"

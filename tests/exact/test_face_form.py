@@ -16,15 +16,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, Material, run_impact, silent
 
 from klack.analyses.impact.interface_level import exact_gaps
+from klack.analyses.impact.run import run_impact
 from klack.assembling.problem import build_problem, place_bodies
 from klack.case import find_case, load_case
 from klack.contact.face_form import FaceForm, Waves
 from klack.contact.hertz import point_radius
 from klack.contact.touch_shape import area_at_once, front_pressure
+from klack.errors import InputError
 from klack.exchange.calculix_case import calculix_impact
+from klack.machine.progress import silent
+from klack.materials.material import Material
 
 CASE = """
 klack: 1

@@ -16,24 +16,11 @@ from math import cos, log, pi, sin, sqrt
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    EndStop,
-    FilmRow,
-    HertzLaw,
-    HuntCrossley,
-    InputError,
-    LinearLaw,
-    TableLaw,
-    fixed_body,
-    gonthier_coefficient,
-    one_contact,
-    rigid_mass_body,
-    simulate_impact,
-    steel_rod,
-)
 from scipy.integrate import quad
 
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
 from klack.contact.step_constants import NO_LAW
+from klack.errors import InputError
 from klack.hydraulics.film import (
     ConeFilm,
     DiscFilm,
@@ -48,9 +35,14 @@ from klack.hydraulics.guide_film import (
     guide_film_force,
     guide_film_step,
 )
+from klack.mechanics.end_stop import EndStop
+from klack.network.rows import FilmRow
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
 from klack.simulation.interface_step import film_force, interface_store, solve_interface
 from klack.verification import sphere_in_liquid as spheres
 from klack.verification.interface_motion import interface_motion, squeeze_by_volumes
+from klack.verification.one_dimension import one_contact, steel_rod
 
 
 @pytest.mark.parametrize(

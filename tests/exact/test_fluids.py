@@ -20,25 +20,18 @@ import pytest
 from draws import each
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from klack_names import (
-    Ambient,
-    Annulus,
-    FluidChoice,
-    Inertance,
-    InputError,
-    Orifice,
-    Rows,
-    Seat,
-    evaluate,
-)
 from property_profiles import examples, log_range
 from scipy.integrate import quad
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from klack.errors import InputError
+from klack.hydraulics.annulus import Annulus
 from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_library import FLUIDS, library_fluid
 from klack.hydraulics.fluid_table import fluid_at, fluid_table, pressure_at
+from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.line import Line
 from klack.hydraulics.line_friction import KAGAWA, laminar_weight, vardy_brown_weight, zielke_weight
 from klack.hydraulics.liquid import (
@@ -51,7 +44,11 @@ from klack.hydraulics.liquid import (
     walther_viscosity,
 )
 from klack.hydraulics.mixture import EntrainedGas, Vapour
+from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pressure_viscosity import PressureViscosity, mean_viscosity_ratio
+from klack.hydraulics.seat import Seat
+from klack.network.rows import Ambient, Rows
+from klack.network.step_function import evaluate
 
 AMBIENT = 101_325.0
 

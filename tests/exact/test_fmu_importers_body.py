@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from c_compiler import needs_compiler
-from klack_names import build_fmu, case_models
 
 from klack.case import find_case, load_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
 from klack.exchange.fmu.documentation import receptance
 
 fmpy = pytest.importorskip("fmpy")

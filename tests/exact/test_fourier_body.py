@@ -5,10 +5,10 @@ They are polynomials of degree two in r and z, which quadratic elements have: ro
 
 import numpy as np
 import pytest
-from klack_names import Flexibility, InputError, Material, Mesh, elastic_body, lattice_mesh
 from scipy.sparse import csr_array, eye_array, kron
 
 from klack.bodies.elasticity.assembly import assemble, assemble_order
+from klack.bodies.elasticity.body import elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
 from klack.bodies.elasticity.fourier_body import (
     FourierBody,
@@ -17,7 +17,12 @@ from klack.bodies.elasticity.fourier_body import (
     rows_around,
 )
 from klack.bodies.elasticity.loads import order_load
+from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.gauges.fourier_field import field_rows
+from klack.errors import InputError
+from klack.materials.material import Material
+from klack.mesh.mesh import Mesh
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 RADIUS, LENGTH, BOTTOM = 2e-3, 30e-3, 10e-3

@@ -10,22 +10,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElementBlock,
-    Flexibility,
-    InputError,
-    Material,
-    Mesh,
-    Pose,
-    build_bodies,
-    read_case,
-    run_impact,
-    silent,
-    traction_load,
-)
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.bodies import build_bodies
+from klack.bodies.elasticity.loads import traction_load
+from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.gauges.located_point import locate
 from klack.bodies.gauges.rows import Line, displacement_row, strain_row, stress_row
+from klack.case import read_case
+from klack.errors import InputError
+from klack.machine.progress import silent
+from klack.materials.material import Material
+from klack.mesh.mesh import ElementBlock, Mesh
+from klack.mesh.rigid import Pose
 from klack.signals.low_pass import LowPass
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)

@@ -4,9 +4,10 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from klack_names import lateral_guide, rigid_body, simulate_interface
 
 from klack.transient.guide_step import stopping_force
+from klack.transient.interface_run import simulate_interface
+from klack.verification.interface_bodies import lateral_guide, rigid_body
 
 pytestmark = pytest.mark.slow
 

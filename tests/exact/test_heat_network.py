@@ -8,23 +8,20 @@ from math import inf
 
 import numpy as np
 import pytest
-from klack_names import (
-    Component,
-    Conductance,
-    Convection,
-    ConvergenceError,
-    FixedTemperature,
-    HeatCapacity,
-    InputError,
-    Network,
-    Radiation,
-)
 from scipy.linalg import expm
 
+from klack.errors import ConvergenceError, InputError
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.thermal.conductance import Conductance
+from klack.thermal.convection import Convection
+from klack.thermal.fixed_temperature import FixedTemperature
 from klack.thermal.grounded_inverse import grounded_inverse
+from klack.thermal.heat_capacity import HeatCapacity
 from klack.thermal.heat_network import HeatNetwork, heat_network
 from klack.thermal.heat_source import HeatSource, HeatTable
 from klack.thermal.heat_step import heat_step, steady_temperature
+from klack.thermal.radiation import Radiation
 from klack.thermal.slow_warm_up import SlowSettings, warm_up
 
 

@@ -9,27 +9,24 @@ from math import cos, log10, pi, radians, sqrt
 
 import numpy as np
 import pytest
-from klack_names import (
-    Ambient,
-    Chamber,
-    InputError,
-    Network,
-    PipeFriction,
-    PressureFace,
-    PressureLoss,
-    RigidMass,
-    Rows,
-    SpoolEdge,
-    evaluate,
-    library_fluid,
-    simulate_network,
-)
 from scipy.optimize import brentq
 
+from klack.errors import InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
 from klack.hydraulics.line_friction import laminar_resistance
 from klack.hydraulics.notch import Notch, notch_opening
+from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_loss import PressureLoss
+from klack.hydraulics.spool_edge import SpoolEdge
 from klack.hydraulics.wall_compliance import Wall, tube_compliance
+from klack.mechanics.rigid_mass import RigidMass
+from klack.network.network import Network
+from klack.network.rows import Ambient, Rows
+from klack.network.step_function import evaluate
+from klack.simulation.network_run import simulate_network
 from klack.verification.benches import RHO_OIL as RHO
 from klack.verification.benches import branch_of, branch_step
 

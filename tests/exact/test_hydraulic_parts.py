@@ -10,34 +10,30 @@ from math import exp, pi, sin, sqrt, tan
 
 import numpy as np
 import pytest
-from klack_names import (
-    Accumulator,
-    AccuracyWarning,
-    Ambient,
-    Chamber,
-    CheckValve,
-    FlowSource,
-    FluidChoice,
-    Inertance,
-    LandFace,
-    PipeFriction,
-    PressureFace,
-    PressureSource,
-    PulsatingFlow,
-    ReliefValve,
-    Rows,
-    VariableOrifice,
-    evaluate,
-    fluid_at,
-    fluid_table,
-    library_fluid,
-)
 from scipy.integrate import quad
 
+from klack.errors import AccuracyWarning
+from klack.hydraulics.accumulator import Accumulator
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.fluid_store import gas_store
+from klack.hydraulics.fluid_table import fluid_at, fluid_table
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.land_face import LandFace
 from klack.hydraulics.opening import opening_flow
 from klack.hydraulics.orifice import Orifice, orifice_step
+from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.pulsating_flow import PulsatingFlow
 from klack.hydraulics.pump import Pump, swept_share
+from klack.hydraulics.relief_valve import ReliefValve
+from klack.hydraulics.variable_orifice import VariableOrifice
+from klack.network.rows import Ambient, Rows
+from klack.network.step_function import evaluate
 
 BAR = 1e5
 AMBIENT = Ambient()

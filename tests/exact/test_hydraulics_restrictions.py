@@ -5,10 +5,10 @@ from math import cos, hypot, log, pi, sin, sqrt, tanh
 import numpy as np
 import pytest
 from draws import each
-from klack_names import Ambient, Rows, evaluate, library_fluid
 from scipy.integrate import quad
 
 from klack.hydraulics.annulus import Annulus, annulus_step, eccentricity_factor
+from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.land_face import land_areas
 from klack.hydraulics.orifice import Orifice, _tanh, choked_flow, orifice_step
 from klack.hydraulics.seat import (
@@ -19,6 +19,8 @@ from klack.hydraulics.seat import (
     gap_flow,
     seat_step,
 )
+from klack.network.rows import Ambient, Rows
+from klack.network.step_function import evaluate
 
 BAR = 1e5
 MU, RHO, P_V = 4.05e-4, 685.8, 4.7e3  # n-heptane at 20 C

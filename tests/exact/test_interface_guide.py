@@ -6,24 +6,20 @@ from math import exp, pi, sqrt
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import (
-    Flexibility,
-    InputError,
-    MeshSizing,
-    Pose,
-    Surface,
-    eigenmodes,
-    elastic_body,
-    lateral_guide,
-    lattice_mesh,
-    mesh_revolved,
-    modal_model,
-    rigid_body,
-    simulate_interface,
-)
 
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.errors import InputError
+from klack.mesh.mesh import Surface
 from klack.mesh.profile import Line, Profile
+from klack.mesh.rigid import Pose
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_revolved
 from klack.transient.guide import guide_of_shaft
+from klack.transient.interface_run import simulate_interface
+from klack.verification.interface_bodies import lateral_guide, modal_model, rigid_body
+from klack.verification.lattice import lattice_mesh
 from klack.verification.transient import STEEL, needle_over_seat
 
 pytestmark = pytest.mark.slow

@@ -16,15 +16,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from klack_names import (
-    InterfaceContact,
-    find_contacts,
-    measure_impact,
-    modal_propagator,
-    simulate_interface,
-)
 
+from klack.contact.restitution import find_contacts, measure_impact
+from klack.simulation.propagator import modal_propagator
 from klack.transient.interface_kernel import safe_flight
+from klack.transient.interface_model import InterfaceContact
+from klack.transient.interface_run import simulate_interface
 from klack.verification.interface_bodies import (
     free_rod,
     lateral_guide,

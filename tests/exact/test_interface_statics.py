@@ -5,10 +5,12 @@ Modes and residual compliance together answer *every* load pattern exactly, for 
 
 import numpy as np
 import pytest
-from klack_names import Flexibility, eigenmodes, free_rod, reduce_bodies, rod_between_stops
 
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
 from klack.transient.interface_model import InterfaceContact, rigid_motion
 from klack.verification.contact import STEEL, uniform_compression
+from klack.verification.interface_bodies import free_rod, reduce_bodies, rod_between_stops
 from klack.verification.transient import block_between_plates, free_blocks
 
 pytestmark = pytest.mark.slow

@@ -14,7 +14,6 @@ import pytest
 from draws import each
 from hypothesis import example, given
 from hypothesis import strategies as st
-from klack_names import AccuracyWarning, InputError, TimeSeries
 from property_profiles import examples
 
 from klack.acoustics.spectrum import impulse_spectrum
@@ -27,6 +26,8 @@ from klack.contact.laws import (
     gonthier_coefficient,
 )
 from klack.contact.local_law import consistent_law
+from klack.errors import AccuracyWarning, InputError
+from klack.signals.sampled import TimeSeries
 from klack.simulation.contact_step import law_potential, mean_force, solve_step
 from klack.verification.contact import STEEL, half_spaces, parabola
 

@@ -8,36 +8,34 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from klack_names import (
-    ELEMENT,
-    Chamber,
-    Component,
-    ConstantForce,
-    EndStop,
-    GasChamber,
-    GasOrifice,
-    GasSource,
-    GuideFriction,
-    InputError,
-    Junction,
-    LinearStopLaw,
-    LuGreFriction,
-    Network,
-    Orifice,
-    PressureFace,
-    PressureSource,
-    ReliefValve,
-    RigidMass,
-    Rows,
-    SurgingSpring,
-    library_fluid,
-    python_step,
-)
 
 from klack.analyses.linearisation.loops import loop_margins, return_ratio
+from klack.errors import InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.gas.gas_chamber import GasChamber
 from klack.hydraulics.gas.gas_library import AIR
+from klack.hydraulics.gas.gas_orifice import GasOrifice
+from klack.hydraulics.gas.gas_source import GasSource
+from klack.hydraulics.junction import Junction
 from klack.hydraulics.line import Line
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.relief_valve import ReliefValve
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.lugre_friction import LuGreFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.mechanics.surging_spring import SurgingSpring
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.port import ELEMENT
+from klack.network.rows import Rows
+from klack.network.step_function import python_step
 from klack.simulation.linear_network import LinearNetwork, linear_network
 from klack.simulation.linear_system import LinearSystem, Signal, modes, rational, transfer
 from klack.simulation.operating_point import compiled_at, operating_point

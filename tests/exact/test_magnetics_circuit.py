@@ -14,29 +14,25 @@ from math import pi
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    FluxMap,
-    InputError,
-    MagneticBranch,
-    MagneticCircuit,
-    Solenoid,
-    VoltageStep,
-    run_coil,
-    static_state,
-)
 from numpy.testing import assert_allclose
 from scipy.special import iv
 
+from klack.errors import AccuracyWarning, InputError
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.eddy import cylinder_ladder, sheet_ladder
+from klack.magnetics.flux_map import FluxMap
 from klack.magnetics.iron import VACUUM_PERMEABILITY, brauer, froehlich, measured, tanh_curve
 from klack.magnetics.iron import VACUUM_PERMEABILITY as MU0
 from klack.magnetics.iron_library import IRON_LIBRARY, iron_curve
 from klack.magnetics.lifting_magnet import lifting_magnet
 from klack.magnetics.reluctance import GapReluctance, LinearReluctance
+from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.solenoid_parts import IronPart
 from klack.magnetics.solid_iron import shells
+from klack.magnetics.static import static_state
 from klack.magnetics.tabulation import hermite_grid
+from klack.magnetics.voltage_step import VoltageStep
+from klack.verification.drivers import run_coil
 
 
 def pair_of_poles(area=12e-6, core=None, leakage=5e-9, turns=60.0, remanence=0.0):

@@ -7,22 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    InputError,
-    Material,
-    Mesh,
-    elastic_body,
-    lattice_mesh,
-    unit_system,
-)
 from scipy.sparse import block_diag, csr_array, diags_array
 
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.bodies.elasticity.eigen import eigenmodes, rigid_frequencies
 from klack.bodies.elasticity.given_matrices import checked_body
 from klack.bodies.elasticity.plausible_material import estimate_material
 from klack.bodies.elasticity.rigid_motions import rigid_motions, without_rigid_strain
 from klack.bodies.reduction.ports import node_set_port
+from klack.errors import InputError
+from klack.input.unit_systems import unit_system
+from klack.materials.material import Material
+from klack.mesh.mesh import Mesh
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 MODULUS = STEEL.young * 0.7 / (1.3 * 0.4)

@@ -20,35 +20,31 @@ import numpy as np
 import pytest
 import yaml
 from draws import each
-from klack_names import (
-    AccuracyWarning,
-    Component,
-    ConstantForce,
-    ControlledForce,
-    ForceOverStroke,
-    ForceOverTime,
-    InputError,
-    Lever,
-    LuGreFriction,
-    Network,
-    NonlinearSpring,
-    PrescribedMotion,
-    RigidMass,
-    Sensor,
-    SurgingSpring,
-    component_class,
-    evaluate,
-    load_valve_case,
-    run_stroke,
-    simulate_network,
-)
 from scipy.linalg import expm
 
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case
 from klack.control.pid import PidController
+from klack.control.sensor import Sensor
+from klack.errors import AccuracyWarning, InputError
+from klack.mechanics.controlled_force import ControlledForce
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.force_over_stroke import ForceOverStroke
 from klack.mechanics.gravity import STANDARD_GRAVITY, Gravity
+from klack.mechanics.lever import Lever
+from klack.mechanics.lugre_friction import LuGreFriction
+from klack.mechanics.nonlinear_spring import NonlinearSpring
+from klack.mechanics.prescribed_motion import PrescribedMotion
 from klack.mechanics.relaxation import relaxed
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.rubber_stop import MaxwellElement, RubberStop
 from klack.mechanics.spring import Spring
+from klack.mechanics.surging_spring import SurgingSpring
+from klack.network.catalogue import component_class
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.step_function import evaluate
+from klack.simulation.network_run import simulate_network
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

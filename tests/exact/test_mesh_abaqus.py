@@ -19,10 +19,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import FAMILIES, InputError, Mesh, Surface, corner_volume, read_abaqus
 
+from klack.errors import InputError
+from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.deck import read_deck
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.quality import corner_volume
 
 DATA = Path(__file__).parents[1] / "data"
 MM = 1e-3

@@ -11,18 +11,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    FAMILIES,
-    Material,
-    Mesh,
-    Surface,
-    corner_volume,
-    eigenmodes,
-    elastic_body,
-    read_mesh_file,
-)
 
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.materials.material import Material
+from klack.mesh.families import FAMILIES
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.mesh import Mesh, Surface
+from klack.mesh.quality import corner_volume
 
 MM = 1e-3
 SCALE = np.pi / 3  # numbers that no decimal format holds exactly

@@ -7,7 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import Mesh, corner_volume, read_mesh_file
+
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.mesh import Mesh
+from klack.mesh.quality import corner_volume
 
 MM = 1e-3
 # Section r 0..2, z 0..3 with one quadrilateral and two triangles

@@ -15,17 +15,13 @@ Quality measures against elements whose shape is known. Truth: exact, 1e-12.
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    FAMILIES,
-    ElementBlock,
-    InputError,
-    KlackError,
-    Mesh,
-    mesh_meridian,
-    quadrature,
-    shape_functions,
-)
 
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import shape_functions
+from klack.errors import InputError, KlackError
+from klack.mesh.families import FAMILIES
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import ElementBlock, Mesh
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import (
     corner_volume,

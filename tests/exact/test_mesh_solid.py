@@ -15,15 +15,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import FAMILIES, InputError, mesh_meridian, quadrature, shape_functions, sweep
 
 from klack.assembling.held_nodes import sector_nodes, surface_nodes
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import shape_functions
+from klack.errors import InputError
+from klack.mesh.families import FAMILIES
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.mesh import ElementBlock, FaceTable, Mesh, Surface, outer_surface
 from klack.mesh.profile import Arc, Line, Profile
 from klack.mesh.quality import mesh_summary, require_connected
 from klack.mesh.sizing import MeshSizing, Refinement
 from klack.mesh.solid import mesh_revolved, mesh_step, write_step_revolved
 from klack.mesh.step_content import step_content
+from klack.mesh.swept import sweep
 
 MM = 1e-3
 COARSE = MeshSizing(size=1.5 * MM)

@@ -7,11 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import silent, study_of
 
 import klack
 from klack.analyses.sensitivities.parameters import slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner, moved_forces, transported
+from klack.case.study_source import study_of
+from klack.machine.progress import silent
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 MASS = "network.components.needle.mass"

@@ -14,14 +14,16 @@ from math import acos, hypot, pi
 
 import numpy as np
 import pytest
-from klack_names import IncompleteRunError, VoltageStep, lateral_guide
 
 from klack.hydraulics.off_axis_seat import SeatFace, flow_area, pressure_load
 from klack.magnetics.off_axis_gap import eccentric_ring, guide_ring, tilted_ring_face
 from klack.magnetics.solenoid_parts import ArmatureBore
+from klack.magnetics.voltage_step import VoltageStep
+from klack.simulation.network_result import IncompleteRunError
 from klack.transient.placed_gaps import gap_course
 from klack.transient.spatial_run import SpatialValve
 from klack.transient.tilting_films import BearingFilm
+from klack.verification.interface_bodies import lateral_guide
 from klack.verification.off_axis import (
     FACE,
     INERTIA,

@@ -19,40 +19,37 @@ from math import cos, pi, sin
 
 import numpy as np
 import pytest
-from klack_names import (
-    Ambient,
-    Annulus,
-    Chamber,
-    Component,
-    ConstantForce,
-    EndStop,
-    FlowSource,
-    ForceMapSolenoid,
-    ForceOverTime,
-    Gravity,
-    GuideFriction,
-    ImportedFmu,
-    Inertance,
-    InputError,
-    LinearStopLaw,
-    Network,
-    NetworkResult,
-    Orifice,
-    PrescribedMotion,
-    PressureFace,
-    PressureSource,
-    RigidMass,
-    Seat,
-    Solenoid,
-    VoltageTable,
-    gonthier_coefficient,
-    library_fluid,
-    simulate_network,
-)
 from scipy.interpolate import PchipInterpolator
 
+from klack.contact.laws import gonthier_coefficient
+from klack.errors import InputError
+from klack.hydraulics.annulus import Annulus
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.inertance import Inertance
 from klack.hydraulics.line import Line
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.seat import Seat
+from klack.magnetics.force_map_solenoid import ForceMapSolenoid
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.voltage_table import VoltageTable
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.gravity import Gravity
+from klack.mechanics.imported_fmu import ImportedFmu
+from klack.mechanics.prescribed_motion import PrescribedMotion
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.rows import Ambient
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 
 MASS, STIFFNESS, FORCE = 2e-3, 1e9, 12.0
 PULLED = 20e-6  # [s]

@@ -8,19 +8,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import (
-    ContactPair,
-    InputError,
-    LinearLaw,
-    ReducedBody,
-    ReducedSystem,
-    fixed_body,
-    rigid_mass_body,
-    simulate_impact,
-)
 from scipy.integrate import solve_ivp
 
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.contact.laws import LinearLaw
+from klack.errors import InputError
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
 from klack.simulation.observed_contact import observed_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 MASS, STIFFNESS, SPEED = 2e-3, 1e9, 0.4  # [kg], [N/m], [m/s]
 WALL = fixed_body("wall")

@@ -9,31 +9,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    Chamber,
-    ConstantForce,
-    ConvergenceError,
-    EndStop,
-    ForceOverTime,
-    GuideFriction,
-    InputError,
-    Network,
-    Orifice,
-    RigidMass,
-    build_valve,
-    find_roles,
-    library_fluid,
-    simulate_network,
-)
 
 from klack.analyses.operating_point.conditions import Conditions, asked_sweeps, stated_drive
 from klack.analyses.operating_point.content import sweep_charts, write_csv
 from klack.analyses.operating_point.record import OperatingPoints
 from klack.analyses.operating_point.run import find_point, run_operating_points
+from klack.assembling.valve import build_valve
 from klack.case.any_case import CaseTree, read_case_tree, tree_of
+from klack.case.valve_roles import find_roles
+from klack.errors import ConvergenceError, InputError
+from klack.hydraulics.chamber import Chamber
 from klack.hydraulics.flow_source import FlowSource, FlowStep
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.orifice import Orifice
 from klack.hydraulics.pressure_source import PressureSource, PressureTable
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.simulation.network_run import simulate_network
 from klack.simulation.operating_point import far_ends, operating_point, steady_rows
 from klack.units import CURRENT
 

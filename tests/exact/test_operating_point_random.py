@@ -9,33 +9,29 @@ from math import pi, sqrt, tanh
 
 import numpy as np
 import pytest
-from klack_names import (
-    Chamber,
-    Component,
-    ConvergenceError,
-    EndStop,
-    FlowSource,
-    InputError,
-    Network,
-    Orifice,
-    PressureFace,
-    PressureSource,
-    RigidMass,
-    Seat,
-    Solenoid,
-    VoltageStep,
-    compile_network,
-    library_fluid,
-    linear_network,
-    step_sizes,
-)
 from scipy.linalg import expm
 
 from klack.analyses.operating_point.run import searched
+from klack.errors import ConvergenceError, InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.seat import Seat
 from klack.magnetics.constant_drive import driven
+from klack.magnetics.solenoid import Solenoid
 from klack.magnetics.solenoid_parts import PoleGap
+from klack.magnetics.voltage_step import VoltageStep
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.simulation.linear_network import linear_network
 from klack.simulation.modal_step import ROW, ROW_V
+from klack.simulation.network_compile import compile_network
 from klack.simulation.network_run import saved_state, simulate_network
 from klack.simulation.operating_point import (
     OperatingPoint,
@@ -45,6 +41,7 @@ from klack.simulation.operating_point import (
     steady_rows,
 )
 from klack.simulation.static_start import begin_steady
+from klack.simulation.step_sizes import step_sizes
 
 pytestmark = pytest.mark.slow
 

@@ -10,32 +10,20 @@ from math import sqrt
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    Accumulator,
-    Chamber,
-    EndStop,
-    EntrainedGas,
-    GasChamber,
-    GasFace,
-    GasOrifice,
-    GasSource,
-    GasValve,
-    InputError,
-    Network,
-    NetworkSection,
-    Orifice,
-    PressureFace,
-    Pump,
-    RigidMass,
-    fluid_table,
-    library_fluid,
-    linear_network,
-    simulate_network,
-)
 
+from klack.errors import InputError
+from klack.hydraulics.accumulator import Accumulator
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.fluid_table import fluid_table
 from klack.hydraulics.gas.conductance import factor_of_area, factor_of_conductance
 from klack.hydraulics.gas.flow_law import LAMINAR, restriction_flow
+from klack.hydraulics.gas.gas_chamber import GasChamber
+from klack.hydraulics.gas.gas_face import GasFace
 from klack.hydraulics.gas.gas_library import AIR, HYDROGEN, library_gas
+from klack.hydraulics.gas.gas_orifice import GasOrifice
+from klack.hydraulics.gas.gas_source import GasSource
+from klack.hydraulics.gas.gas_valve import GasValve
 from klack.hydraulics.gas_release import (
     free_gas,
     mixture_at,
@@ -44,8 +32,18 @@ from klack.hydraulics.gas_release import (
     settled_share,
 )
 from klack.hydraulics.line import Line
+from klack.hydraulics.mixture import EntrainedGas
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pump import Pump
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.declaration import NetworkSection
+from klack.network.network import Network
 from klack.simulation.limits import limits_of
+from klack.simulation.linear_network import linear_network
+from klack.simulation.network_run import simulate_network
 from klack.simulation.operating_point import compiled_at, operating_point
 
 BODY = {"needle": RigidMass(mass=3e-3), "spring": Spring(stiffness=1e4, preload=5.0)}

@@ -19,28 +19,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.linalg
-from klack_names import (
-    ByCount,
-    Flexibility,
-    LossFactor,
-    ModalDamping,
-    Modes,
-    ReducedBody,
-    StateSpace,
-    eigenmodes,
-    full_order_receptance,
-    lattice_mesh,
-    reduce_body,
-)
 from numpy.testing import assert_allclose
 
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.reduction.attachment import default_shift, shift_at, shifted_attachment
+from klack.bodies.reduction.damping import LossFactor, ModalDamping
 from klack.bodies.reduction.from_modal_data import body_of_craig_bampton, body_of_modal_data
 from klack.bodies.reduction.from_state_space import body_of_state_space, state_space_in_si
+from klack.bodies.reduction.full_order import full_order_receptance
 from klack.bodies.reduction.ports import node_observer, pressure_port, surface_port
 from klack.bodies.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody, StateSpace
+from klack.bodies.reduction.selection import ByCount
 from klack.input.unit_systems import UNIT_SYSTEMS, unit_system
 from klack.simulation.bodies import rod_body
+from klack.verification.lattice import lattice_mesh
 from klack.verification.reduction import (
     LENGTH,
     RADIUS,

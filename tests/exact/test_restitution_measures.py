@@ -24,30 +24,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    ChannelData,
-    EndStop,
-    ImpactEvent,
-    InputError,
-    Lever,
-    LinearStopLaw,
-    Network,
-    RigidMass,
-    compare_histories,
-    find_contacts,
-    find_roles,
-    measure_impact,
-    read_valve_case,
-    simulate_network,
-)
 
+from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.levels import deviations, level_result
 from klack.analyses.impact.record import LevelResult
 from klack.analyses.impact.trust import best_level, trust_notes
 from klack.analyses.stroke.times import all_lift_times, lift_times
+from klack.case.any_case import read_valve_case
+from klack.case.valve_roles import find_roles
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.contact.restitution import find_contacts, measure_impact
+from klack.errors import InputError
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.lever import Lever
+from klack.mechanics.rigid_mass import RigidMass
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.network.network import Network
 from klack.network.ranges import StopBound, Travel
 from klack.simulation.impact_events import ImpactFinder
+from klack.simulation.network_result import ChannelData, ImpactEvent
+from klack.simulation.network_run import simulate_network
 
 MASS = 2e-3  # [kg]
 

@@ -8,9 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import ElementBlock, InputError, Material, Mesh, lattice_mesh
 
 from klack.bodies.elasticity.stress import StressField, von_mises
+from klack.errors import InputError
+from klack.materials.material import Material
+from klack.mesh.mesh import ElementBlock, Mesh
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=100e9, poisson=0.3, density=8500.0)

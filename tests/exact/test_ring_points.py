@@ -26,31 +26,28 @@ from math import cos, pi, sin
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    Flexibility,
-    InputError,
-    Material,
-    MeshSizing,
-    build_bodies,
-    eigenmodes,
-    elastic_body,
-    mesh_meridian,
-    silent,
-    sweep,
-)
 from scipy.sparse import csr_array
 
+from klack.assembling.bodies import build_bodies
 from klack.assembling.touch_ring import goes_round
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.ring_points import (
     RingPoints,
     RingRows,
     resolved_orders,
     share_of_order,
 )
+from klack.bodies.elasticity.statics import Flexibility
 from klack.case import find_case, read_case
+from klack.errors import AccuracyWarning, InputError
+from klack.machine.progress import silent
+from klack.materials.material import Material
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
 from klack.mesh.rigid import Pose, rotation_matrix
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.swept import sweep
 from klack.transient.guide import _section, turned_sections
 from klack.verification.interface import gaps_of_sphere_over_cone
 from klack.verification.ring_bodies import NeedleOnRing, RingStroke

@@ -10,10 +10,12 @@ from math import inf, sqrt
 
 import numpy as np
 import pytest
-from klack_names import ConvergenceError, Friction, InputError, simulate_interface
 
 from klack.contact.asperity_layer import AsperityLayer, press
+from klack.contact.friction import Friction
+from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_arrays import Layer, Pressed
+from klack.transient.interface_run import simulate_interface
 from klack.transient.rough_points import layer_energy, solve_rough
 from klack.verification.interface_bodies import (
     LAYER,

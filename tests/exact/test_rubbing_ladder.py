@@ -9,22 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    Friction,
-    RubbingLaw,
-    TableLaw,
-    build_problem,
-    case_models,
-    read_case,
-    run_impact,
-    silent,
-)
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import friction_doubt
+from klack.case import read_case
+from klack.contact.friction import Friction
+from klack.contact.laws import TableLaw
 from klack.contact.local_law import consistent_law
 from klack.contact.rubbing_fit import rubbing_fit
+from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.statics import contact_compliance, static_contact
+from klack.errors import AccuracyWarning
+from klack.exchange.case_models import case_models
+from klack.machine.progress import silent
 from klack.transient.rubbing_ladder import rubbing_contact
 
 pytestmark = [

@@ -12,17 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    ContactPair,
-    InputError,
-    ReducedSystem,
-    RubbingLaw,
-    fixed_body,
-    rigid_mass_body,
-    simulate_impact,
-)
 
+from klack.contact.rubbing_law import RubbingLaw
+from klack.errors import InputError
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
 from klack.simulation.lasting_laws import rubbing_mean, rubbing_store, slide, slider_places
+from klack.simulation.system import ContactPair, ReducedSystem
 
 TABLE = Path(__file__).parents[1] / "data" / "friction_cone_seat.csv"
 KN = 1e9  # [N/m] along the normal of the ring

@@ -16,35 +16,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    ConvergenceError,
-    InputError,
-    build_problem,
-    first_stiffness,
-    load_case,
-    modal_model,
-    mode_pools,
-    own_pair,
-    read_case,
-    rigid_body,
-    run_impact,
-    simulate_interface,
-)
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
 from klack.analyses.impact.command import run_case
+from klack.analyses.impact.run import run_impact
 from klack.analyses.impact.running_in import running_in, worn_text
 from klack.analyses.impact.yielding_level import doubt_large_strain
 from klack.assembling.ladder import impact_energy
+from klack.assembling.modes import mode_pools
 from klack.assembling.pressure_limit import meridian_case
+from klack.assembling.problem import build_problem
+from klack.assembling.reduced_pair import first_stiffness, own_pair
+from klack.case import load_case, read_case
 from klack.contact.plasticity.ladder import YieldingContact
 from klack.contact.plasticity.loops import loops_of_entry, loops_to_entry
 from klack.contact.pressure_limit import PressureLimit
 from klack.contact.worn_faces import WornFaces, opened_by
+from klack.errors import ConvergenceError, InputError
 from klack.terminal.options import WantedResult
 from klack.transient.interface_arrays import ActiveSet, Limit, Worn
+from klack.transient.interface_run import simulate_interface
 from klack.transient.yielding_points import let_yield, solve_yielding
+from klack.verification.interface_bodies import modal_model, rigid_body
 from klack.verification.plasticity import ball_in_seat
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"

@@ -32,34 +32,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    AxialForce,
-    Chamber,
-    Component,
-    ContactPair,
-    EndStop,
-    FlexibleBody,
-    ForceOverTime,
-    GuideFriction,
-    ImpactHistory,
-    ImpactStudy,
-    Murnaghan,
-    Network,
-    NetworkResult,
-    Orifice,
-    PressureFace,
-    ReducedSystem,
-    RigidMass,
-    RingFilm,
-    find_contacts,
-    measure_impact,
-    read_case,
-    run_impact,
-    simulate,
-    simulate_network,
-    solve_interface,
-)
 
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.case import read_case
+from klack.contact.history import ImpactHistory
 from klack.contact.laws import (
     ContactLaw,
     HertzLaw,
@@ -68,11 +45,29 @@ from klack.contact.laws import (
     TableLaw,
     gonthier_coefficient,
 )
+from klack.contact.restitution import find_contacts, measure_impact
 from klack.contact.step_constants import NO_LAW
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.film import RingFilm
 from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.liquid import Murnaghan
 from klack.hydraulics.mixture import Vapour
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.component import Component
+from klack.network.network import Network
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
+from klack.simulation.impact import simulate
+from klack.simulation.interface_step import solve_interface
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
+from klack.simulation.system import AxialForce, ContactPair, ReducedSystem
 
 METRES = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
 

@@ -18,24 +18,16 @@ from math import gamma, pi, sqrt
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    HertzLaw,
-    HuntCrossley,
-    InputError,
-    LinearLaw,
-    ReducedBody,
-    TableLaw,
-    gonthier_coefficient,
-    measure_impact,
-    run_impact,
-    simulate,
-    simulate_impact,
-)
 from scipy.linalg import expm
 
+from klack.analyses.impact.run import run_impact
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.case import find_case, read_case
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
+from klack.contact.restitution import measure_impact
+from klack.errors import InputError
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
-from klack.simulation.impact import propose_step
+from klack.simulation.impact import propose_step, simulate, simulate_impact
 from klack.simulation.propagator import damping_loss, modal_propagator
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
 

@@ -9,18 +9,16 @@ from math import exp, pi, sqrt
 
 import numpy as np
 import pytest
-from klack_names import (
-    EndStop,
-    ForceOverTime,
-    GuideFriction,
-    Network,
-    NetworkResult,
-    RigidMass,
-    simulate_network,
-)
 
 from klack.contact.history import BodyEnergy, EnergyLedger
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 from klack.simulation.network_sliders import largest_friction, slider_force
 from klack.transient.interface_result import InterfaceEnergy
 

@@ -15,7 +15,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from klack_names import InputError, StepSizes, TimeSeries, band_edges
 from scipy.integrate import quad
 
 from klack.acoustics.drive_pattern import drive_pattern
@@ -39,8 +38,11 @@ from klack.acoustics.sound import (
     pressure_transfer,
 )
 from klack.acoustics.spectrum import force_spectrum
+from klack.acoustics.third_octave import band_edges
 from klack.analyses.noise import source as noise_source
 from klack.analyses.noise.force import before_impact, first_part, interrupted_impact, stop_force
+from klack.errors import InputError
+from klack.signals.sampled import TimeSeries
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,
@@ -49,6 +51,7 @@ from klack.simulation.network_result import (
     NetworkResult,
     StepCounts,
 )
+from klack.simulation.step_sizes import StepSizes
 
 AIR = {"distance": 1.0, "density": 1.204, "sound_speed": 343.2}
 STRENGTH = 1.204 * 343.2 / (4.0 * pi)  # rho c / (4 pi r^2) at 1 m

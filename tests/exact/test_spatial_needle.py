@@ -9,10 +9,12 @@ from math import inf, pi, sqrt
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import AccuracyWarning, ForceOverTime, InputError, simulate_interface
 from spatial_needle import ABOVE, BELOW, INERTIA, MASS, Needle, move, ring
 
+from klack.errors import AccuracyWarning, InputError
+from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
+from klack.transient.interface_run import simulate_interface
 
 ROUND = Needle(seat=ring(8, 0.6e-3, BELOW), stop=ring(8, 2e-3, ABOVE))
 

@@ -10,10 +10,11 @@ from math import cos, inf, pi, sin, sqrt
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import ForceOverTime, simulate_interface
 from spatial_needle import ABOVE, BELOW, INERTIA, MASS, Needle, move, ring
 
+from klack.mechanics.force import ForceOverTime
 from klack.mechanics.spring import Spring
+from klack.transient.interface_run import simulate_interface
 
 pytestmark = pytest.mark.slow
 

@@ -16,15 +16,6 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from klack_names import (
-    ContactPair,
-    HertzLaw,
-    InputError,
-    ReducedSystem,
-    fixed_body,
-    rigid_mass_body,
-    simulate_impact,
-)
 from property_profiles import examples, log_range
 from scipy.integrate import quad
 
@@ -46,8 +37,13 @@ from klack.acoustics.third_octave import (
     middle_frequencies,
     nominal_label,
 )
+from klack.contact.laws import HertzLaw
+from klack.errors import InputError
 from klack.measurement.impacts import measure_stroke
 from klack.signals.sampled import Spectrum, TimeSeries
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 from klack.verification.one_dimension import BouncingDrop
 
 DATA = Path(__file__).parents[1] / "data"

@@ -8,41 +8,36 @@ from math import pi, sqrt
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    Ambient,
-    Chamber,
-    CheckValve,
-    Component,
-    ConstantForce,
-    ConvergenceError,
-    EndStop,
-    FlexibleBody,
-    FlowSource,
-    ForceMapSolenoid,
-    ForceOverTime,
-    GuideFriction,
-    Inertance,
-    InputError,
-    Junction,
-    Network,
-    Orifice,
-    PressureFace,
-    PressureSource,
-    ReducedBody,
-    RigidMass,
-    Seat,
-    Solenoid,
-    VoltageTable,
-    library_fluid,
-    simulate_network,
-)
 from scipy.optimize import brentq
 
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.junction import Junction
 from klack.hydraulics.line import Line
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.seat import Seat
+from klack.magnetics.force_map_solenoid import ForceMapSolenoid
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.voltage_table import VoltageTable
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ConstantForce, ForceOverTime
+from klack.mechanics.friction import GuideFriction
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.checks import LooseBodyWarning
+from klack.network.component import Component
+from klack.network.network import Network
+from klack.network.rows import Ambient
 from klack.simulation.network_result import NetworkResult, StaticStart
+from klack.simulation.network_run import simulate_network
 
 AMBIENT = Ambient()
 MU0 = 4e-7 * pi

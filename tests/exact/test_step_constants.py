@@ -22,18 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    FilmRow,
-    HertzLaw,
-    LinearLaw,
-    TableLaw,
-    fixed_body,
-    one_contact,
-    rigid_mass_body,
-)
 from numba import njit
 
 from klack.contact import step_constants
+from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
 from klack.contact.step_constants import (
     MATLAB_LEFT,
     MATLAB_TURNS,
@@ -46,8 +38,11 @@ from klack.exchange.fmu.build import source_texts
 from klack.exchange.matlab_model import write_matlab
 from klack.exchange.modal_model import ModalModel, Provenance, pair_model
 from klack.exchange.modelica import modelica_text
+from klack.network.rows import FilmRow
 from klack.network.step_function import first, pointers
+from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.simulation.network_gas import solve_mass_balance
+from klack.verification.one_dimension import one_contact
 
 STEP = 40e-9  # [s]
 PLAIN = (-1, 0, 1, 2)  # kinds of a law: such numbers stand for other things as well

@@ -8,39 +8,37 @@ from math import cos, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from klack_names import (
-    Accumulator,
-    Chamber,
-    CheckValve,
-    ConicalSeat,
-    ConstantForce,
-    EndStop,
-    LinearStopLaw,
-    Network,
-    Orifice,
-    PipeFriction,
-    PressureFace,
-    PressureLoss,
-    PulsatingFlow,
-    Pump,
-    ReliefValve,
-    RigidMass,
-    Rows,
-    RubbingLaw,
-    SpoolEdge,
-    VariableOrifice,
-    library_fluid,
-    simulate_network,
-)
 from numba import types
 from numba.core.registry import cpu_target
 
+from klack.contact.rubbing_law import RubbingLaw
 from klack.contact.yielding_law import YieldingLaw
+from klack.hydraulics.accumulator import Accumulator
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.conical_seat import ConicalSeat
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pipe_friction import PipeFriction
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_loss import PressureLoss
+from klack.hydraulics.pulsating_flow import PulsatingFlow
+from klack.hydraulics.pump import Pump
+from klack.hydraulics.relief_valve import ReliefValve
+from klack.hydraulics.spool_edge import SpoolEdge
+from klack.hydraulics.variable_orifice import VariableOrifice
 from klack.hydraulics.wall_compliance import Wall
 from klack.machine.compiling.jit import inner, njit
 from klack.machine.compiling.tangent_number import tangent_number, with_tangents
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.network.network import Network
+from klack.network.rows import Rows
 from klack.simulation import tangent_run
+from klack.simulation.network_run import simulate_network
 from klack.simulation.tangent_loop import LANES, lanes_of
 from klack.simulation.tangent_numbers import Direction
 from klack.simulation.tangent_run import TangentRun, run_tangents

@@ -8,28 +8,26 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    Ambient,
-    Chamber,
-    KlackError,
-    Network,
-    Orifice,
-    PressureFace,
-    PressureSource,
-    RigidMass,
-    compile_network,
-    library_fluid,
-    read_case_tree,
-    step_sizes,
-)
 
 from klack.analyses.sensitivities.parameters import slope_space
 from klack.analyses.sensitivities.slopes import SlopeRunner
+from klack.case.any_case import read_case_tree
 from klack.case.key_path import _below, quantity_at
+from klack.errors import KlackError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
 from klack.hydraulics.line import Line
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
 from klack.input.problem import CaseProblem
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient
+from klack.simulation.network_compile import compile_network
 from klack.simulation.static_start import begin_at_rest
+from klack.simulation.step_sizes import step_sizes
 from klack.simulation.tangent_numbers import Direction, slopes_at_rest
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")

@@ -4,20 +4,13 @@ import sys
 
 import numpy as np
 import pytest
-from klack_names import (
-    AxialForce,
-    ContactPair,
-    HertzLaw,
-    LinearLaw,
-    MissingExtraError,
-    Provenance,
-    ReducedSystem,
-    body_model,
-    pair_model,
-)
 
+from klack.contact.laws import HertzLaw, LinearLaw
+from klack.errors import MissingExtraError
+from klack.exchange.modal_model import Provenance, body_model, pair_model
 from klack.exchange.state_space import second_order, state_space, to_control
 from klack.simulation.bodies import rod_body
+from klack.simulation.system import AxialForce, ContactPair, ReducedSystem
 
 ORIGIN = Provenance(case="rod", title="", version="0", created="today")
 FREQUENCY = np.array([0.01, 3.0, 40.0, 200.0, 900.0]) * 1e3 + 1.7  # off the poles

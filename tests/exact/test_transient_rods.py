@@ -30,26 +30,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    FaceFriction,
-    Friction,
-    FullOrderResult,
-    InputError,
-    Mesh,
-    Modes,
-    elastic_body,
-    main,
-    read_case,
-    run_impact,
-)
 from scipy.linalg import eigh
 from scipy.sparse import csr_array
 
+from klack.analyses.impact.run import run_impact
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import Modes
 from klack.bodies.reduction.damping import Damping, LossFactor, ModalDamping, RayleighDamping
+from klack.case import read_case
+from klack.cli.main import main
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
 from klack.contact.mortar import ContactSpace
+from klack.errors import InputError
+from klack.mesh.mesh import Mesh
 from klack.transient.body_damping import body_damping
 from klack.transient.full_order import Scheme, simulate_full_order
+from klack.transient.result import FullOrderResult
 from klack.verification.transient import (
     STEEL,
     blocked_bar,

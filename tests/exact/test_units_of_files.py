@@ -16,22 +16,20 @@ import pytest
 from draws import each
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from klack_names import (
-    InputError,
-    Material,
-    MeshSizing,
-    eigenmodes,
-    elastic_body,
-    read_any_case,
-    read_case,
-    read_mesh_file,
-    run_impact,
-    run_stroke,
-)
 from property_profiles import examples
 
 from klack import units
+from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.run import run_stroke
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.case import read_case
+from klack.case.any_case import read_any_case
+from klack.errors import InputError
+from klack.materials.material import Material
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.profile import Arc, Line, Profile
+from klack.mesh.sizing import MeshSizing
 from klack.mesh.solid import mesh_step, write_step_revolved
 from klack.units import format_si, parse_quantity
 

@@ -22,34 +22,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    ContactPair,
-    InputError,
-    ReducedSystem,
-    build_problem,
-    compare_histories,
-    fixed_body,
-    load_case,
-    read_case,
-    read_valve_case,
-    rigid_mass_body,
-    run_impact,
-    run_stroke,
-    simulate_impact,
-    stroke_content,
-)
 from scipy.sparse import csr_array
 
+from klack.acoustics.comparison import compare_histories
+from klack.analyses.impact.run import run_impact
 from klack.analyses.stroke.analysis import STROKE, yield_told
+from klack.analyses.stroke.content import stroke_content
+from klack.analyses.stroke.run import run_stroke
 from klack.assembling import yielding
+from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import impact_system
+from klack.case import load_case, read_case
+from klack.case.any_case import read_valve_case
 from klack.contact.plasticity.ladder import YieldingContact
 from klack.contact.plasticity.yielding_body import LoadedBody, YieldingBody
 from klack.contact.plasticity.zone import plastic_zone
 from klack.contact.yielding_law import YieldingLaw
+from klack.errors import AccuracyWarning, InputError
 from klack.exchange.modal_model import _without_memory
-from klack.simulation.impact import propose_step
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import propose_step, simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 MASS, SPEED, LOADING, ELASTIC = 3e-3, 0.3, 1e8, 2.5e8
 RATIO = LOADING / ELASTIC

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, read_abaqus
+
+from klack.errors import InputError
+from klack.mesh.files.abaqus.reader import read_abaqus
 
 DATA = Path(__file__).parents[1] / "data"
 BOX = (DATA / "block.inp").read_bytes()

@@ -7,29 +7,27 @@ from pathlib import Path
 import numpy as np
 import pytest
 import zarr
-from klack_names import (
-    IMPACT,
-    ImpactStudy,
-    InputError,
-    ModalDamping,
-    TimeSeries,
-    ValveCase,
-    build_valve,
-    read_any_case,
-    run_impact,
-)
 
 from klack.acoustics.force_response import modal_response, port_forces
 from klack.acoustics.injected import injected_density
 from klack.acoustics.mobility import drive_point_mobility
 from klack.acoustics.mount import Mount, mounted
 from klack.acoustics.surface_bands import face_band_velocity
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
 from klack.analyses.store import RESULT_NAME
 from klack.assembling.structures import radiating_surfaces
+from klack.assembling.valve import build_valve
+from klack.bodies.reduction.damping import ModalDamping
 from klack.bodies.reduction.structure import Structure, build_structure
+from klack.case.any_case import read_any_case
 from klack.case.bodies import SurfaceName
 from klack.case.noise import CaseNoise
 from klack.case.reader import find_case
+from klack.case.valve import ValveCase
+from klack.errors import InputError
+from klack.signals.sampled import TimeSeries
 from klack.verification.one_dimension import half_sines
 from klack.verification.reduction import rod
 from klack.verification.vibration import oscillator, rod_structure

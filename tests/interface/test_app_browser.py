@@ -5,9 +5,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from klack_names import Jobs, OpenFolder
 
 from klack.analyses.catalogue import analysis_in
+from klack.app.folder import OpenFolder
+from klack.app.jobs import Jobs
 from klack.case.reader import find_case
 
 pytest.importorskip("nicegui")

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from klack_names import load_any_case, write_step_revolved
 
+from klack.case.any_case import load_any_case
 from klack.case.reader import find_case, read_case
+from klack.mesh.solid import write_step_revolved
 
 pytest.importorskip("nicegui")
 from app_browser import LONG, require_within, server, settle, slow

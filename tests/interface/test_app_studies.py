@@ -6,8 +6,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from klack_names import Jobs, OpenFolder, read_case_tree, study_of
 from made_study import made_study
+
+from klack.app.folder import OpenFolder
+from klack.app.jobs import Jobs
+from klack.case.any_case import read_case_tree
+from klack.case.study_source import study_of
 
 pytest.importorskip("playwright.sync_api")
 pytest.importorskip("nicegui")

@@ -7,7 +7,6 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 import pytest
 import yaml
-from klack_names import InputError, Jobs, KlackError, OpenFolder, read_case_tree, study_of
 from made_study import made_study
 
 import klack.app.study_points as study_points
@@ -17,6 +16,8 @@ from klack.analyses.study.live import LiveRecord
 from klack.analyses.study.record import NOT_YET, StudyRecord
 from klack.analyses.study.run import asked_points, run_study
 from klack.app.answers import StudyChoice
+from klack.app.folder import OpenFolder
+from klack.app.jobs import Jobs
 from klack.app.state import State
 from klack.app.study_files import (
     beside_case,
@@ -27,6 +28,9 @@ from klack.app.study_files import (
 )
 from klack.app.study_points import StudyPoints, points_json
 from klack.app.texts import checked_text, exchanged_text, study_offer, study_problem, study_text
+from klack.case.any_case import read_case_tree
+from klack.case.study_source import study_of
+from klack.errors import InputError, KlackError
 from klack.machine.progress import PointCount, silent
 from klack.terminal.progress import PROGRESS_FILE, show_progress
 

@@ -16,7 +16,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from klack_names import AccuracyWarning, InputError, Mesh, eigenmodes, lattice_mesh, load_case, main
 from numpy.testing import assert_allclose
 from quoted_output import compare
 
@@ -25,7 +24,13 @@ from klack.analyses.reduction.one_node import node_chart
 from klack.analyses.reduction.run import ReductionStudy, run_reduce
 from klack.assembling.bending import bending_body
 from klack.assembling.bodies import mesh_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.case import load_case
+from klack.cli.main import main
+from klack.errors import AccuracyWarning, InputError
+from klack.mesh.mesh import Mesh
 from klack.terminal.tables import TextTable
+from klack.verification.lattice import lattice_mesh
 
 RODS = (Path(__file__).parents[1] / "data" / "tiny_rods.yaml").read_text(encoding="utf-8")
 LONG_30 = RODS.replace("-40]", "-30]")

@@ -4,13 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import build_problem, first_stiffness, load_case, mode_pools, own_pair, silent
 
 from klack.analyses.impact.body_picture import body_pictures
 from klack.analyses.impact.levels import run_reduced
 from klack.analyses.impact.record import BodyPicture
 from klack.analyses.impact.recovered_motion import recovered_motion
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
+from klack.assembling.reduced_pair import first_stiffness, own_pair
 from klack.bodies.elasticity.stress import StressField, von_mises
+from klack.case import load_case
+from klack.machine.progress import silent
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"
 

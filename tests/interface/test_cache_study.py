@@ -13,32 +13,28 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    Flexibility,
-    ImpactStudy,
-    InputError,
-    Material,
-    MeshSizing,
-    build_problem,
-    eigenmodes,
-    elastic_body,
-    mode_pools,
-    read_case,
-    run_impact,
-    run_reduce,
-    write_step_revolved,
-)
 
 import klack.machine.cache.result_cache as setting
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.reduction.run import run_reduce
 from klack.assembling.generated_mesh import meshed_profiles, meshed_step
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
 from klack.bodies.elasticity import statics
-from klack.case import find_case
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.case import find_case, read_case
 from klack.case.geometry import StepFile
 from klack.case.schema import Case
+from klack.errors import InputError
 from klack.machine.cache.result_cache import result_cache
 from klack.machine.stages import stages_with_cached
+from klack.materials.material import Material
 from klack.mesh.profile import Line, Profile
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import write_step_revolved
 
 pytestmark = pytest.mark.slow
 

@@ -9,24 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    ElasticBody,
-    InputError,
-    Material,
-    Mesh,
-    Surface,
-    build_bodies,
-    elastic_body,
-    lattice_mesh,
-    needle_over_seat,
-    read_abaqus,
-    silent,
-)
 
+from klack.assembling.bodies import build_bodies
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.case import find_case, load_case
 from klack.case.guide import CaseGuide
 from klack.contact.pairing import axial_distance, face_geometry, project_to_surface
+from klack.errors import AccuracyWarning, InputError
 from klack.exchange import calculix_case
 from klack.exchange.calculix_case import calculix_impact, calculix_settings
 from klack.exchange.calculix_deck import (
@@ -37,7 +26,13 @@ from klack.exchange.calculix_deck import (
     start_of_flight,
     write_deck,
 )
+from klack.machine.progress import silent
+from klack.materials.material import Material
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.mesh_model import MeshModel
+from klack.mesh.mesh import Mesh, Surface
+from klack.verification.lattice import lattice_mesh
+from klack.verification.transient import needle_over_seat
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BRASS = Material(name="brass", young=105e9, poisson=0.34, density=8400.0)

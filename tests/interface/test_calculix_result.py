@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import ImpactStudy, InputError
 
 from klack.analyses.comparison.calculix import (
     CALCULIX,
@@ -22,7 +21,9 @@ from klack.analyses.comparison.calculix import (
     energy_balance,
     with_other,
 )
+from klack.analyses.impact.record import ImpactStudy
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
+from klack.errors import InputError
 from klack.exchange.calculix_result import CalculixResult, other_run, read_calculix
 
 BARS = Path(__file__).parents[1] / "data" / "calculix_bars.dat"

@@ -18,11 +18,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from klack_names import InputError, load_any_case, read_any_case
 from mutated_cases import NASTY, changed, leaves, mutated
 from ruamel.yaml import YAML
 
 from klack.case import shipped_cases
+from klack.case.any_case import load_any_case, read_any_case
+from klack.errors import InputError
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
 SEED = int(os.environ.get("KLACK_SEED", "1"))

@@ -6,29 +6,26 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from klack_names import (
-    InputError,
-    groups_of,
-    main,
-    read_case,
-    read_valve_case,
-    silent,
-    simulate_network,
-    tree_of,
-)
 
 import klack
 from klack.analyses.analysis import StoredAnalysis
 from klack.analyses.catalogue import analyses
 from klack.analyses.record import CaseRecord, case_fields, run_fields
 from klack.analyses.sensitivities.record import SensitivityRecord
+from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.strokes import STROKES
+from klack.case import read_case
+from klack.case.any_case import read_valve_case, tree_of
 from klack.case.key_path import quantity_at, split_path
 from klack.case.measurement import CaseCalibration
 from klack.case.points import points_of
 from klack.case.rewriting import rewritten, written_quantity
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
+from klack.machine.progress import silent
 from klack.machine.stages import StageClock
+from klack.simulation.network_run import simulate_network
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 TEXT = SMALL.read_text(encoding="utf-8")

@@ -8,23 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    InputError,
-    load_valve_case,
-    quantity_at,
-    read_case_tree,
-    read_valve_case,
-    run_stroke,
-    tree_of,
-)
 from mutated_cases import NASTY, leaves, mutated
 from mutated_cases import changed as changed_value
 from ruamel.yaml import YAML
 
 import klack
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case, read_case_tree, read_valve_case, tree_of
+from klack.case.key_path import quantity_at
 from klack.case.parts import with_parts
 from klack.case.reader import expanded
 from klack.case.rewriting import moved_files, rewritten
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"

@@ -5,10 +5,11 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from klack_names import InputError, load_any_case, read_any_case
 from pydantic import ValidationError
 
 from klack.case import Case, CaseProblem, find_case, load_case, read_case, shipped_cases
+from klack.case.any_case import load_any_case, read_any_case
+from klack.errors import InputError
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
 TEXT = DRAWN.read_text(encoding="utf-8")

@@ -18,23 +18,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import (
-    InputError,
-    build_valve,
-    load_valve_case,
-    main,
-    read_any_case,
-    read_valve_case,
-)
 from scipy import stats
 from shots_valve import GUIDE, valve_case, valve_text
 
 import klack
 from klack.analyses.stroke.axis import guide_of
 from klack.analyses.stroke_shots.one_stroke import Starts, shots_of_valve
+from klack.assembling.valve import build_valve
 from klack.case import find_case, load_case, read_case
+from klack.case.any_case import load_valve_case, read_any_case, read_valve_case
 from klack.case.distribution import Distribution
 from klack.case.key_path import quantity_at, split_path
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.input.problem import CaseProblem
 
 DATA = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"

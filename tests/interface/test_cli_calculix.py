@@ -10,11 +10,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from klack_names import IMPACT, ConvergenceError, InputError, main
 
 from klack.analyses.comparison.calculix import COMPARISON_COLUMNS
+from klack.analyses.impact.analysis import IMPACT
 from klack.case import find_case
 from klack.cli.commands import parser
+from klack.cli.main import main
+from klack.errors import ConvergenceError, InputError
 from klack.exchange.calculix_run import run_calculix
 
 BARS = Path(__file__).parents[1] / "data" / "calculix_bars.dat"

@@ -7,7 +7,9 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 import pytest
-from klack_names import IMPACT, main
+
+from klack.analyses.impact.analysis import IMPACT
+from klack.cli.main import main
 
 DRAWN = Path(__file__).parents[1] / "data" / "case" / "drawn.yaml"
 

@@ -10,10 +10,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import IMPACT, main, read_case, run_impact
 
 import klack
 from klack.analyses.comparison.impacts_summary import MEASURED_IMPACT
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.run import run_impact
+from klack.case import read_case
+from klack.cli.main import main
 from klack.exchange.results.study_table import result_table
 
 CASE = (Path(__file__).parents[1] / "data" / "struck_rod.yaml").read_text(encoding="utf-8")

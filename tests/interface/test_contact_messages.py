@@ -30,41 +30,29 @@ import numpy as np
 import psutil
 import pytest
 import yaml
-from klack_names import (
-    AccuracyWarning,
-    HertzLaw,
-    HuntCrossley,
-    InputError,
-    LinearLaw,
-    Material,
-    Mesh,
-    Surface,
-    TableLaw,
-    ValveCase,
-    case_models,
-    contact_space,
-    gonthier_coefficient,
-    load_any_case,
-    load_valve_case,
-    main,
-    mesh_meridian,
-    read_valve_case,
-    run_stroke,
-    silent,
-    touching_shift,
-    tree_of,
-)
 
 from klack.analyses.linearisation.run import run_linearisation
 from klack.analyses.operating_point.run import run_operating_points
+from klack.analyses.stroke.run import run_stroke
 from klack.assembling.bodies import mesh_body, place_meshes
 from klack.assembling.generated_mesh import coarsest_sound, meshed_for_case
 from klack.assembling.given_shapes import require_given_shapes, require_usual_sizes
 from klack.assembling.valve import mesh_valve_bodies
 from klack.case import find_case, load_case, read_case
+from klack.case.any_case import load_any_case, load_valve_case, read_valve_case, tree_of
+from klack.case.valve import ValveCase
+from klack.cli.main import main
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
+from klack.contact.mortar import contact_space, touching_shift
 from klack.contact.statics import COARSE, size_over_half_width, static_contact
 from klack.contact.submodel import local_stiffness
+from klack.errors import AccuracyWarning, InputError
+from klack.exchange.case_models import case_models
 from klack.machine import memory
+from klack.machine.progress import silent
+from klack.materials.material import Material
+from klack.mesh.meridian import mesh_meridian
+from klack.mesh.mesh import Mesh, Surface
 from klack.mesh.profile import Line, Profile
 from klack.mesh.quality import PoorElementError
 from klack.mesh.sizing import MeshSizing, Refinement

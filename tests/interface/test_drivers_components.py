@@ -5,29 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    Ambient,
-    BoostDriver,
-    DriveProfile,
-    EndStop,
-    InputError,
-    LinearReluctance,
-    MagneticBranch,
-    MagneticCircuit,
-    Network,
-    PeakHold,
-    PulseWidth,
-    RigidMass,
-    Rows,
-    Solenoid,
-    TwoPoint,
-    VoltageStep,
-    VoltageTable,
-    component_class,
-    simulate_network,
-)
 from pydantic import ValidationError
 
+from klack.errors import InputError
+from klack.magnetics.boost_driver import BoostDriver
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
+from klack.magnetics.drive_profile import DriveProfile
 from klack.magnetics.driver import (
     DriveCourse,
     DriveProgram,
@@ -38,7 +21,20 @@ from klack.magnetics.driver import (
     driver_of,
 )
 from klack.magnetics.flux_table import circuit_numbers, current_weights
+from klack.magnetics.peak_hold import PeakHold
+from klack.magnetics.pwm import PulseWidth
+from klack.magnetics.reluctance import LinearReluctance
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
+from klack.magnetics.voltage_table import VoltageTable
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.catalogue import component_class
+from klack.network.network import Network
+from klack.network.rows import Ambient, Rows
+from klack.simulation.network_run import simulate_network
 
 PEAK_HOLD = {
     "boost_voltage": 65.0,

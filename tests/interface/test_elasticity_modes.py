@@ -18,22 +18,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy.linalg
-from klack_names import (
-    ElasticBody,
-    ElementBlock,
-    Flexibility,
-    InputError,
-    Material,
-    Mesh,
-    assemble,
-    available_backends,
-    eigenmodes,
-    elastic_body,
-    factorize,
-    lattice_mesh,
-)
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 from threadpoolctl import threadpool_limits
+
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.factorization import available_backends, factorize
+from klack.bodies.elasticity.statics import Flexibility
+from klack.errors import InputError
+from klack.materials.material import Material
+from klack.mesh.mesh import ElementBlock, Mesh
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 LINES = [np.linspace(0, 2e-3, 3), np.linspace(0, 2e-3, 3), np.linspace(0, 9e-3, 11)]

@@ -4,23 +4,21 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import (
-    STROKE,
-    Ambient,
-    Chamber,
-    Inertance,
-    Network,
-    Orifice,
-    PressureSource,
-    RigidMass,
-    library_fluid,
-    load_valve_case,
-    run_stroke,
-    simulate_network,
-)
 
+from klack.analyses.stroke.analysis import STROKE
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient
 from klack.simulation.flow_channels import with_present_names
+from klack.simulation.network_run import simulate_network
 
 
 @pytest.fixture(scope="module")

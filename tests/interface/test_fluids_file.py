@@ -12,21 +12,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    ConvergenceError,
-    FluidChoice,
-    InputError,
-    fluid_table,
-    read_valve_case,
-)
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 from scipy.integrate import quad
 
+from klack.case.any_case import read_valve_case
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.hydraulics.fluid import Fluid
+from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.fluid_definition import FluidDefinition
 from klack.hydraulics.fluid_library import FLUIDS, find_fluid, library_fluid
+from klack.hydraulics.fluid_table import fluid_table
 from klack.hydraulics.liquid import Murnaghan, TabulatedLiquid
 from klack.hydraulics.mixture import EntrainedGas, Vapour
 from klack.hydraulics.property_table import read_property_table

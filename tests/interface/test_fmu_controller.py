@@ -9,20 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ControlledForce,
-    IncompleteRunError,
-    InputError,
-    Network,
-    RigidMass,
-    Sensor,
-    simulate_network,
-)
 
 import klack
 from klack.analyses.stroke.controllers import controller_files
+from klack.control.sensor import Sensor
+from klack.errors import InputError
+from klack.mechanics.controlled_force import ControlledForce
 from klack.mechanics.fmu_controller import controlled_by_fmu
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.simulation.network_result import IncompleteRunError
+from klack.simulation.network_run import simulate_network
 
 Build = Callable[..., Path]
 SENSORS = {

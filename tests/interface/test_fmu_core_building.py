@@ -7,23 +7,16 @@ import zipfile
 import numpy as np
 import pytest
 from c_compiler import needs_compiler, needs_gcc
-from klack_names import (
-    ConvergenceError,
-    FilmRow,
-    HuntCrossley,
-    InputError,
-    LinearLaw,
-    Provenance,
-    TableLaw,
-    body_model,
-    one_contact,
-    pair_model,
-)
 
+from klack.contact.laws import HuntCrossley, LinearLaw, TableLaw
+from klack.errors import ConvergenceError, InputError
 from klack.exchange.fmu import build, compiler
 from klack.exchange.fmu.build import build_fmu, data_header, source_texts
 from klack.exchange.fmu.model_description import SOURCE_FILES
+from klack.exchange.modal_model import Provenance, body_model, pair_model
+from klack.network.rows import FilmRow
 from klack.simulation.bodies import rod_body
+from klack.verification.one_dimension import one_contact
 
 pytestmark = needs_compiler
 

@@ -6,19 +6,15 @@ from contextlib import suppress
 import numpy as np
 import pytest
 from c_compiler import needs_compiler
-from klack_names import (
-    FilmRow,
-    Provenance,
-    TableLaw,
-    body_model,
-    build_fmu,
-    fmu_variables,
-    modal_propagator,
-    one_contact,
-    pair_model,
-)
 
+from klack.contact.laws import TableLaw
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.fmu.variables import fmu_variables
+from klack.exchange.modal_model import Provenance, body_model, pair_model
+from klack.network.rows import FilmRow
 from klack.simulation.bodies import rod_body
+from klack.simulation.propagator import modal_propagator
+from klack.verification.one_dimension import one_contact
 
 fmpy = pytest.importorskip("fmpy")
 pytestmark = [pytest.mark.slow, needs_compiler]

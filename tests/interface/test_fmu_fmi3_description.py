@@ -9,14 +9,15 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from klack_names import FilmRow, HuntCrossley, LinearLaw, fmu_variables
 
+from klack.contact.laws import HuntCrossley, LinearLaw
 from klack.exchange.fmu.documentation import documentation_files
 from klack.exchange.fmu.model_description import (
     build_description,
     communication_step,
     model_description,
 )
+from klack.exchange.fmu.variables import fmu_variables
 from klack.exchange.modal_model import (
     ModalModel,
     ModelContact,
@@ -24,6 +25,7 @@ from klack.exchange.modal_model import (
     ModelOutput,
     Provenance,
 )
+from klack.network.rows import FilmRow
 
 fmpy = pytest.importorskip("fmpy")
 

@@ -7,9 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compiler import needs_compiler
-from klack_names import build_fmu, case_models, fmu_variables
 
 from klack.case import find_case, load_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.fmu.variables import fmu_variables
 
 fmpy = pytest.importorskip("fmpy")
 pytestmark = needs_compiler

@@ -4,10 +4,12 @@ from pathlib import Path
 
 import pytest
 from c_compiler import needs_compiler
-from klack_names import build_fmu, case_models, fmu_variables
 from pages import blocks, printed
 
 from klack.case import find_case, load_case
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
+from klack.exchange.fmu.variables import fmu_variables
 
 pytest.importorskip("fmpy")
 

@@ -5,10 +5,12 @@ Truth: the full order on the same meshes (reference); the interface level withou
 
 import numpy as np
 import pytest
-from klack_names import InputError, report_content, run_impact
 
+from klack.analyses.impact.content import report_content
 from klack.analyses.impact.pressure_view import friction_views
+from klack.analyses.impact.run import run_impact
 from klack.case import find_case, load_case
+from klack.errors import InputError
 
 pytestmark = pytest.mark.slow
 

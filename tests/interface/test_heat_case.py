@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, ValveCase, find_roles, read_valve_case, silent
 
 import klack
 from klack.analyses.heat.heated_stroke import (
@@ -19,6 +18,11 @@ from klack.analyses.heat.run import HEAT_LOG, run_heat
 from klack.analyses.heat.summary import answer
 from klack.analyses.stroke.run import one_variant
 from klack.assembling.valve import Valve, build_valve
+from klack.case.any_case import read_valve_case
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import find_roles
+from klack.errors import InputError
+from klack.machine.progress import silent
 from klack.verification.heat import SMALL
 
 COLD = {"copper": 293.15, "ambient": 293.15}

@@ -15,39 +15,32 @@ import numpy as np
 import pytest
 from doubts import doubts
 from draws import each
-from klack_names import (
-    Accumulator,
-    AccuracyWarning,
-    Annulus,
-    Chamber,
-    CheckValve,
-    EndStop,
-    FlowSource,
-    HertzLaw,
-    HuntCrossley,
-    Inertance,
-    InputError,
-    LandFace,
-    LinearLaw,
-    Network,
-    Orifice,
-    PressureFace,
-    PressureSource,
-    PulsatingFlow,
-    Pump,
-    ReliefValve,
-    RigidMass,
-    RingFilm,
-    Seat,
-    TableLaw,
-    VariableOrifice,
-    gonthier_coefficient,
-    library_fluid,
-    simulate_network,
-)
 
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
+from klack.errors import AccuracyWarning, InputError
+from klack.hydraulics.accumulator import Accumulator
+from klack.hydraulics.annulus import Annulus
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.check_valve import CheckValve
+from klack.hydraulics.film import RingFilm
+from klack.hydraulics.flow_source import FlowSource
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.inertance import Inertance
+from klack.hydraulics.land_face import LandFace
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.hydraulics.pulsating_flow import PulsatingFlow
+from klack.hydraulics.pump import Pump
+from klack.hydraulics.relief_valve import ReliefValve
+from klack.hydraulics.seat import Seat
+from klack.hydraulics.variable_orifice import VariableOrifice
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
 from klack.network.rows import AMBIENT, GROUND, Ambient, Rows
+from klack.simulation.network_run import simulate_network
 
 OIL = library_fluid("ISO VG 46").at(313.15)
 CHECK = {"cracking_pressure": 5e4, "open_pressure": 2e5, "diameter": 5e-3}

@@ -8,12 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, groups_of, main, study_of
 
 import klack
 from klack.analyses.noise.measures import DESIGN_MEASURES
 from klack.analyses.study import impacts
+from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.evaluation import asked_of
+from klack.case.study_source import study_of
+from klack.cli.main import main
+from klack.errors import InputError
 
 HEAD = "klack: 1\nstudy:\n"
 SPEED, FORCE, DAMPING = "motion.speed", "motion.force", "bodies.ball.damping.modal"

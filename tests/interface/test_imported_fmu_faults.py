@@ -14,10 +14,15 @@ from pathlib import Path
 
 import pytest
 from energy_ledger import allowed
-from klack_names import ConvergenceError, ImportedFmu, Network, RigidMass, main, simulate_network
 
+from klack.cli.main import main
+from klack.errors import ConvergenceError
 from klack.mechanics.fmu_file import describe_fmu
 from klack.mechanics.fmu_slave import FmuSlave, FmuWiring
+from klack.mechanics.imported_fmu import ImportedFmu
+from klack.mechanics.rigid_mass import RigidMass
+from klack.network.network import Network
+from klack.simulation.network_run import simulate_network
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

@@ -6,18 +6,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from klack_names import (
-    ConvergenceError,
-    ImportedFmu,
-    InputError,
-    Network,
-    RigidMass,
-    evaluate,
-    simulate_network,
-)
 
+from klack.errors import ConvergenceError, InputError
 from klack.mechanics.fmu_file import describe_fmu, unpack_fmu
+from klack.mechanics.imported_fmu import ImportedFmu
+from klack.mechanics.rigid_mass import RigidMass
 from klack.network.declaration import read_component
+from klack.network.network import Network
+from klack.network.step_function import evaluate
+from klack.simulation.network_run import simulate_network
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

@@ -16,12 +16,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from klack_names import ConvergenceError, ImportedFmu, InputError, open_recording
 from scipy.sparse import csc_array
 
 from klack.bodies.model_files.matrices import read_matrix
+from klack.errors import ConvergenceError, InputError
+from klack.measurement.recording import open_recording
 from klack.mechanics.fmu_file import inspect_fmu
 from klack.mechanics.fmu_slave import FmuSlave
+from klack.mechanics.imported_fmu import ImportedFmu
 
 pytestmark = pytest.mark.filterwarnings("ignore:Duplicate name")
 

@@ -9,12 +9,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import IMPACT, ConvergenceError, InputError, load_case, main, run_impact
 
 from klack.analyses.comparison.calculix import level_of
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.run import run_impact
 from klack.analyses.incomplete import IncompleteImpactError
 from klack.analyses.noise.source import impact_sources, load_sources
+from klack.case import load_case
+from klack.cli.main import main
 from klack.contact.complementarity import ComplementaritySolver
+from klack.errors import ConvergenceError, InputError
 from klack.transient import full_order, interface_run
 
 pytestmark = pytest.mark.slow

@@ -10,27 +10,24 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from klack_names import (
-    STROKE,
-    Component,
-    ConvergenceError,
-    EndStop,
-    IncompleteRunError,
-    Network,
-    NetworkResult,
-    RigidMass,
-    load_valve_case,
-    main,
-    python_step,
-    simulate_network,
-)
 
 from klack.analyses.noise.source import _notes
 from klack.analyses.stroke import run as stroke
+from klack.analyses.stroke.analysis import STROKE
+from klack.case.any_case import load_valve_case
+from klack.cli.main import main
+from klack.errors import ConvergenceError
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.component import Component
+from klack.network.network import Network
 from klack.network.port import ELEMENT, Port
 from klack.network.rows import Book, Channel, Rows
+from klack.network.step_function import python_step
 from klack.simulation.finite import require_finite
+from klack.simulation.network_result import IncompleteRunError, NetworkResult
+from klack.simulation.network_run import simulate_network
 
 LATE = 30.03e-6  # [s]
 

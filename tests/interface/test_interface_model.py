@@ -4,22 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import (
-    ConvergenceError,
-    Flexibility,
-    InputError,
-    Modes,
-    eigenmodes,
-    free_rod,
-    measure_impact,
-    modal_model,
-    needle_over_seat,
-    rigid_body,
-    rod_between_stops,
-    simulate_interface,
-)
 
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
+from klack.contact.restitution import measure_impact
+from klack.errors import ConvergenceError, InputError
 from klack.transient.interface_model import InterfaceBody, InterfaceContact, interface_model
+from klack.transient.interface_run import simulate_interface
+from klack.verification.interface_bodies import free_rod, modal_model, rigid_body, rod_between_stops
+from klack.verification.transient import needle_over_seat
 
 
 class Distorted(Flexibility):

@@ -15,32 +15,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import (
-    AccuracyWarning,
-    Ambient,
-    Chamber,
-    EntrainedGas,
-    InputError,
-    Junction,
-    Network,
-    Orifice,
-    PressureFace,
-    RigidMass,
-    Rows,
-    compile_network,
-    library_fluid,
-    linear_network,
-    load_valve_case,
-    plain_line,
-    simulate_network,
-    step_sizes,
-)
 
+from klack.case.any_case import load_valve_case
+from klack.errors import AccuracyWarning, InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.junction import Junction
 from klack.hydraulics.line import Line
+from klack.hydraulics.mixture import EntrainedGas
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
 from klack.hydraulics.pressure_source import PressureSource, PressureStep
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.network import Network
+from klack.network.rows import Ambient, Rows
 from klack.simulation.delay_line import compile_lines
+from klack.simulation.linear_network import linear_network
+from klack.simulation.network_compile import compile_network
+from klack.simulation.network_run import simulate_network
+from klack.simulation.step_sizes import step_sizes
 from klack.simulation.tangent_run import run_tangents
+from klack.verification.single_line import plain_line
 
 BORE = {"length": 0.06, "diameter": 2.5e-3, "pressure": 6e5}
 

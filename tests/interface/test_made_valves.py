@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, main
 
 import klack
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.studies.samples import RobustValue
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import AccuracyWarning, FluxMap, ForceMapSolenoid, InputError
 
+from klack.errors import AccuracyWarning, InputError
+from klack.magnetics.flux_map import FluxMap
+from klack.magnetics.force_map_solenoid import ForceMapSolenoid
 from klack.magnetics.map_choice import MapFile
 from klack.magnetics.map_text import LARGEST
 from klack.verification.magnetic_networks import force_of, linkage_of, written

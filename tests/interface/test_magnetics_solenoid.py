@@ -12,36 +12,30 @@ from math import pi
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import (
-    GROUND,
-    AccuracyWarning,
-    Ambient,
-    BoostCapacitor,
-    ForceMapSolenoid,
-    InputError,
-    MagneticBranch,
-    MagneticCircuit,
-    MagneticNetwork,
-    Network,
-    PrescribedMotion,
-    Rows,
-    Solenoid,
-    TwoPoint,
-    VoltageStep,
-    evaluate,
-    run_coil,
-    static_state,
-)
 
+from klack.errors import AccuracyWarning, InputError
+from klack.magnetics.boost_capacitor import BoostCapacitor
 from klack.magnetics.boost_driver import BoostDriver, Shot
+from klack.magnetics.circuit import MagneticBranch, MagneticCircuit
 from klack.magnetics.driver import DriveProgram, Driver, DriveState
+from klack.magnetics.force_map_solenoid import ForceMapSolenoid
 from klack.magnetics.iron import VACUUM_PERMEABILITY as MU0
 from klack.magnetics.iron_choice import IronChoice
 from klack.magnetics.iron_library import iron_curve
+from klack.magnetics.magnetic_network import MagneticNetwork
 from klack.magnetics.reluctance import IronReluctance, LinearReluctance
 from klack.magnetics.remanent_start import magnetised_otherwise
+from klack.magnetics.solenoid import Solenoid
+from klack.magnetics.static import static_state
+from klack.magnetics.two_point import TwoPoint
+from klack.magnetics.voltage_step import VoltageStep
 from klack.magnetics.winding import warm_resistance
+from klack.mechanics.prescribed_motion import PrescribedMotion
+from klack.network.network import Network
+from klack.network.rows import GROUND, Ambient, Rows
+from klack.network.step_function import evaluate
 from klack.verification.coils_in_networks import two_coils
+from klack.verification.drivers import run_coil
 
 INJECTOR = {
     "turns": 60,

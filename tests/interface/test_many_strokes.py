@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import InputError, KlackError, ValveCase
 from rod_valve import ROD
 
 import klack
 from klack.analyses.point_table import NOT_COMPUTED
 from klack.case.points import case_at, checked_parts, points_of
+from klack.case.valve import ValveCase
+from klack.errors import InputError, KlackError
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 PRELOAD = "network.components.spring.preload"

@@ -9,11 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import SHOTS, CaseMeasurement, InputError, main
 
 from klack.analyses.comparison.shots import compare_shots, mean_of_highest
 from klack.analyses.comparison.shots_summary import MEASURED_SHOTS, bias_sentence, drop_verdict
+from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
+from klack.case.measurement import CaseMeasurement
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.measurement.channels import LiftSensor
 from klack.measurement.lift_sensor import sense
 

@@ -11,9 +11,11 @@ Truth: signals whose value at any time of the clock is known.
 
 import numpy as np
 import pytest
-from klack_names import InputError, find_channels, open_recording
 
+from klack.errors import InputError
+from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import common_time, read_channels, windows
+from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

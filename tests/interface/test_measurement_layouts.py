@@ -8,7 +8,11 @@ import sys
 
 import numpy as np
 import pytest
-from klack_names import InputError, MissingExtraError, find_channels, open_recording, read_channels
+
+from klack.errors import InputError, MissingExtraError
+from klack.measurement.find_channels import find_channels
+from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

@@ -13,16 +13,13 @@ import warnings
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    InputError,
-    find_channels,
-    load_stroke_set,
-    open_recording,
-    read_channels,
-)
 
+from klack.errors import AccuracyWarning, InputError
 from klack.measurement.channels import ChannelChoice
+from klack.measurement.find_channels import find_channels
+from klack.measurement.loading import load_stroke_set
+from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

@@ -7,13 +7,15 @@ Truth: a valve that stays closed until it opens has touched nothing before.
 
 import numpy as np
 import pytest
-from klack_names import CaseMeasurement, InputError, TimeSeries
 
 from klack.analyses.comparison.strokes import require_same_way
+from klack.case.measurement import CaseMeasurement
+from klack.errors import InputError
 from klack.measurement.channels import Trigger
 from klack.measurement.cutting import Piece, common_axis, cut_strokes, onto_axis, trigger_level
 from klack.measurement.loading import find_outliers, load_stroke_set
 from klack.measurement.stop_levels import SmoothLift, find_touches
+from klack.signals.sampled import TimeSeries
 
 STEP = 2e-6  # [s]
 TRIGGER = Trigger(channel="current", share=0.5, before="0.2 ms", after="3 ms")

@@ -20,41 +20,37 @@ from types import SimpleNamespace
 import numpy as np
 import psutil
 import pytest
-from klack_names import (
-    ElasticBody,
-    Flexibility,
-    InputError,
-    Material,
-    assemble,
-    available_backends,
-    contact_space,
-    elastic_body,
-    factorize,
-    full_order_receptance,
-    lattice_mesh,
-    mesh_meridian,
-    mesh_revolved,
-    show_progress,
-    sweep,
-)
 from scipy.sparse import csr_array, diags_array, eye_array, kron
 
 from klack.bodies.elasticity import budget as budgets
 from klack.bodies.elasticity import factor_memory
+from klack.bodies.elasticity.assembly import assemble
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.bodies.elasticity.budget import Budget
 from klack.bodies.elasticity.condensation import condensation_memory
 from klack.bodies.elasticity.eigen import block_lanczos, eigenmodes
 from klack.bodies.elasticity.factor_memory import FactorMemoryError
+from klack.bodies.elasticity.factorization import available_backends, factorize
+from klack.bodies.elasticity.statics import Flexibility
+from klack.bodies.reduction.full_order import full_order_receptance
 from klack.bodies.reduction.ports import Port
 from klack.case import find_case
 from klack.contact import statics
+from klack.contact.mortar import contact_space
 from klack.contact.statics import contact_compliance
+from klack.errors import InputError
 from klack.machine import memory
 from klack.machine.memory import available_memory, in_words, require_memory
 from klack.machine.progress import remark, silent
 from klack.machine.stages import StageClock
+from klack.materials.material import Material
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
 from klack.mesh.sizing import MeshSizing, Refinement, element_count
+from klack.mesh.solid import mesh_revolved
+from klack.mesh.swept import sweep
+from klack.terminal.progress import show_progress
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 

@@ -15,10 +15,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import InputError, read_abaqus, read_mesh_file
 
 import klack.mesh.files
+from klack.errors import InputError
+from klack.mesh.files.abaqus.reader import read_abaqus
 from klack.mesh.files.catalogue import FORMATS, MESH_FORMATS, MeshFormat, MeshReader, format_of
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.profile import Arc, Line, Profile
 
 MM = 1e-3

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, read_mesh_file
 
+from klack.errors import InputError
 from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.mesh.files.mesh_file import read_mesh_file
 
 CDB = """/COM,ANSYS RELEASE
 /UNITS,MPA

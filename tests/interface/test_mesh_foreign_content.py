@@ -12,16 +12,13 @@ import numpy as np
 import pytest
 import scipy.io
 from doubts import doubts
-from klack_names import (
-    AccuracyWarning,
-    InputError,
-    corner_volume,
-    main,
-    open_recording,
-    read_mesh_file,
-)
 
 from klack.bodies.model_files.matrices import read_matrix
+from klack.cli.main import main
+from klack.errors import AccuracyWarning, InputError
+from klack.measurement.recording import open_recording
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.quality import corner_volume
 
 MM = 1e-3
 NODES = ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (2, 2, 0), (3, 2, 1))

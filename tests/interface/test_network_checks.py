@@ -5,25 +5,22 @@ from typing import ClassVar
 
 import pytest
 from draws import each
-from klack_names import (
-    Chamber,
-    Component,
-    ConstantForce,
-    ConvergenceError,
-    EndStop,
-    FluidChoice,
-    Gravity,
-    InputError,
-    LinearStopLaw,
-    Network,
-    RigidMass,
-    simulate_network,
-)
 
+from klack.errors import ConvergenceError, InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.force import ConstantForce
+from klack.mechanics.gravity import Gravity
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
 from klack.network.checks import LooseBodyWarning
+from klack.network.component import Component
+from klack.network.network import Network
 from klack.network.port import COIL, COMPLIANCE, FLOW, MOTION, PRESSURE, VOLTAGE, Port, Role
 from klack.network.rows import AMBIENT, GROUND, Rows
+from klack.simulation.network_run import simulate_network
 
 
 class Part(Component):

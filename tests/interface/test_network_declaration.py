@@ -25,32 +25,21 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    GROUND,
-    Book,
-    Chamber,
-    Component,
-    ConstantForce,
-    ConvergenceError,
-    EndStop,
-    FlexibleBody,
-    FluidChoice,
-    InputError,
-    Network,
-    NetworkResult,
-    Orifice,
-    PressureFace,
-    ReducedBody,
-    RigidMass,
-    Rows,
-    python_step,
-    simulate_network,
-)
 from pydantic import ValidationError
 from ruamel.yaml import YAML
 
 import klack
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.errors import ConvergenceError, InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_face import PressureFace
 from klack.input.problem import CaseProblem
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.flexible_body import FlexibleBody
+from klack.mechanics.force import ConstantForce
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
 from klack.network.catalogue import (
     COMPONENTS,
@@ -60,9 +49,15 @@ from klack.network.catalogue import (
     import_component,
     type_words,
 )
+from klack.network.component import Component
 from klack.network.declaration import NetworkSection, read_component
+from klack.network.network import Network
 from klack.network.port import ELEMENT, Port
 from klack.network.protocols import InterfaceLaw, LawNumbers, NetworkFluid
+from klack.network.rows import GROUND, Book, Rows
+from klack.network.step_function import python_step
+from klack.simulation.network_result import NetworkResult
+from klack.simulation.network_run import simulate_network
 from klack.verification.network import whole_valve
 
 SECTION: dict[str, Any] = {

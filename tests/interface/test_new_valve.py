@@ -8,21 +8,19 @@ from math import pi, sqrt
 from pathlib import Path
 
 import pytest
-from klack_names import (
-    InputError,
-    OpenFolder,
-    Profile,
-    load_any_case,
-    run_impact,
-    write_step_revolved,
-)
 
+from klack.analyses.impact.run import run_impact
+from klack.app.folder import OpenFolder
 from klack.app.guard import LARGEST_UPLOAD
 from klack.app.parts import outline_of_table, part_of_step, part_of_table
 from klack.app.plan_review import review
 from klack.app.state import Uploads
 from klack.app.valve_plan import BODIES, EXAMPLES, Plans, ValvePlan
+from klack.case.any_case import load_any_case
 from klack.case.reader import find_case, read_case
+from klack.errors import InputError
+from klack.mesh.profile import Profile
+from klack.mesh.solid import write_step_revolved
 from klack.mesh.step_profile import NotTurnedError, profiles_of_step
 
 PLAN = ValvePlan(

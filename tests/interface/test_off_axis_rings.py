@@ -10,22 +10,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from klack_names import (
-    InputError,
-    NeedleOnRing,
-    build_problem,
-    contact_space,
-    eigenmodes,
-    load_case,
-    report_content,
-    run_impact,
-    run_reduce,
-    silent,
-)
 
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.run import run_impact
+from klack.analyses.reduction.run import run_reduce
 from klack.assembling.off_axis import off_axis_model, ring_contacts, turning_body
+from klack.assembling.problem import build_problem
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.case import load_case
+from klack.contact.mortar import contact_space
 from klack.contact.rings import RingSpace
+from klack.errors import InputError
+from klack.machine.progress import silent
 from klack.transient.impact_recorder import sector_shares
+from klack.verification.ring_bodies import NeedleOnRing
 
 CASE = Path(__file__).parents[2] / "docs/how-to/guided_needle.yaml"
 

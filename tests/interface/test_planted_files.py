@@ -15,13 +15,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, ResultCache, main
 from rigid_valve import write_bench
 
 from klack.analyses.calibration.motion import TRIAL_LOG, Motion, trial_log
 from klack.analyses.catalogue import load_result
 from klack.analyses.shots.one_shot import SHOT_LOG, shot_log
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.machine.cache.entry import Entry
+from klack.machine.cache.result_cache import ResultCache
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="users, links and pipes")
 

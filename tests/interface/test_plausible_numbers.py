@@ -7,11 +7,13 @@ from pathlib import Path
 
 import pytest
 from doubts import doubts
-from klack_names import InputError, main, read_any_case, read_case
 
 from klack.assembling.bodies import wanted_sizes
 from klack.assembling.given_shapes import require_given_shapes, tell_effort
-from klack.case import shipped_cases
+from klack.case import read_case, shipped_cases
+from klack.case.any_case import read_any_case
+from klack.cli.main import main
+from klack.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 RODS = (ROOT / "tests" / "data" / "tiny_rods.yaml").read_text(encoding="utf-8")

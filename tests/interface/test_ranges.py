@@ -12,30 +12,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 from doubts import doubts
-from klack_names import (
-    AccuracyWarning,
-    Ambient,
-    Chamber,
-    ControlledPressure,
-    ConvergenceError,
-    EndStop,
-    FluidChoice,
-    InputError,
-    Junction,
-    LinearStopLaw,
-    Network,
-    PressureFace,
-    PressureSource,
-    RigidMass,
-    library_fluid,
-    read_valve_case,
-    simulate_network,
-)
 
+from klack.case.any_case import read_valve_case
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.controlled_pressure import ControlledPressure
+from klack.hydraulics.fluid_choice import FluidChoice
+from klack.hydraulics.fluid_library import library_fluid
+from klack.hydraulics.junction import Junction
 from klack.hydraulics.line import Line
 from klack.hydraulics.liquid import Murnaghan, TabulatedLiquid, Tait
+from klack.hydraulics.pressure_face import PressureFace
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.mechanics.stop_law import LinearStopLaw
+from klack.network.network import Network
 from klack.network.ranges import Travel, limits_of, value_text
+from klack.network.rows import Ambient
+from klack.simulation.network_run import simulate_network
 
 HEPTANE = library_fluid("n-heptane").at(293.15)
 LAW = LinearStopLaw(kind="linear", stiffness=1e8)

@@ -17,45 +17,40 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from klack_names import (
-    FAMILIES,
-    IMPACT,
-    AccuracyWarning,
-    ByCount,
-    ContactPair,
-    HertzLaw,
-    InputError,
-    LinearLaw,
-    LossFactor,
-    Material,
-    MeshSizing,
-    ReducedSystem,
-    case_models,
-    elastic_body,
-    lattice_mesh,
-    load_any_case,
-    main,
-    mesh_revolved,
-    reduce_body,
-    report_content,
-    run_impact,
-    run_reduce,
-    silent,
-    simulate_impact,
-    unit_system,
-)
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.run import run_impact
 from klack.analyses.reduction.analysis import REDUCTION
+from klack.analyses.reduction.run import run_reduce
 from klack.assembling.assembled_bodies import assembled_body, assembled_from_matrices
 from klack.assembling.bodies import build_bodies, mesh_body
 from klack.assembling.given_pair import build_given_pair
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.reduction.damping import LossFactor
 from klack.bodies.reduction.ports import Port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.selection import ByCount
 from klack.case import load_case, shipped_cases
+from klack.case.any_case import load_any_case
 from klack.case.schema import Case
+from klack.cli.main import main
+from klack.contact.laws import HertzLaw, LinearLaw
+from klack.errors import AccuracyWarning, InputError
+from klack.exchange.case_models import case_models
+from klack.input.unit_systems import unit_system
+from klack.machine.progress import silent
+from klack.materials.material import Material
+from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceTable, Mesh
 from klack.mesh.profile import Line, Profile
+from klack.mesh.sizing import MeshSizing
+from klack.mesh.solid import mesh_revolved
 from klack.simulation.bodies import rod_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 from klack.verification.exchange_files import write_matrices
+from klack.verification.lattice import lattice_mesh
 
 STEEL = {"area": 1e-5, "young": 2.1e11, "density": 7850.0}
 NEEDLE = rod_body("rod", length=0.02, elastic_modes=10, **STEEL)

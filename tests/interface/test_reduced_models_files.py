@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from klack_names import InputError, StateSpace
 from scipy.sparse import coo_array, csc_array
 
 from klack.bodies.model_files.modal_data import read_modal_data
@@ -23,6 +22,8 @@ from klack.bodies.model_files.reduced_models import (
     read_reduced_matrices,
     read_state_space,
 )
+from klack.bodies.reduction.reduced_body import StateSpace
+from klack.errors import InputError
 from klack.simulation.bodies import rod_body
 
 ROD = rod_body(

@@ -2,27 +2,24 @@
 
 import numpy as np
 import pytest
-from klack_names import (
-    ConvergenceError,
-    Flexibility,
-    InputError,
-    ReducedBody,
-    ResultCache,
-    eigenmodes,
-    full_order_receptance,
-    lattice_mesh,
-    reduce_body,
-)
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_array
 
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.reduction import attachment, dynamic_stiffness
 from klack.bodies.reduction.attachment import shift_at
 from klack.bodies.reduction.damping import LossFactor, ModalDamping, RayleighDamping
+from klack.bodies.reduction.full_order import full_order_receptance
 from klack.bodies.reduction.ports import Port, node_observer, pressure_port, surface_port
 from klack.bodies.reduction.receptance import reduced_receptance
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
 from klack.bodies.reduction.selection import ByCount, ByFrequency, ByParticipation, select
 from klack.bodies.reduction.transfer import compare_receptances, mean_level_deviation
+from klack.errors import ConvergenceError, InputError
+from klack.machine.cache.result_cache import ResultCache
+from klack.verification.lattice import lattice_mesh
 from klack.verification.reduction import rod
 
 

@@ -11,18 +11,20 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 import pytest
-from klack_names import ImpactStudy, InputError, quantity
 from plotly.offline import get_plotlyjs
 
 from klack.analyses.impact.content import Content, report_content
 from klack.analyses.impact.figures import charts
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.section_figure import section_figure
 from klack.analyses.impact.wording import answer
+from klack.errors import InputError
 from klack.report.chart import AxisSpec, BarChart, Chart, Curve, Mark, Panel
 from klack.report.html import render_html, write_report
 from klack.report.interactive import plotly_bars, plotly_chart
 from klack.report.pdf import render_pdf, write_pdf
 from klack.report.printed import svg_chart
+from klack.report.wording import quantity
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
 

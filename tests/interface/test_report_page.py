@@ -10,13 +10,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import typst
-from klack_names import ImpactStudy, render_html, render_pdf, report_content
 from matplotlib.axes import Axes
 
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.content import NEXT_STEPS
 from klack.cli.commands import parser
 from klack.report.chart import AxisSpec, Chart, Curve, Panel
+from klack.report.html import render_html
 from klack.report.page import Content, NextStep, Section, Table
+from klack.report.pdf import render_pdf
 
 pytestmark = pytest.mark.slow
 

@@ -13,7 +13,6 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from klack_names import render_html, render_pdf, report_content
 from matplotlib.image import imread
 
 from klack.analyses.impact.contact_map import (
@@ -24,6 +23,7 @@ from klack.analyses.impact.contact_map import (
     contact_map,
     line_load_weights,
 )
+from klack.analyses.impact.content import report_content
 from klack.analyses.impact.pressure_figure import draw_pressure, pressure_figure
 from klack.analyses.impact.pressure_view import (
     PressureView,
@@ -38,6 +38,8 @@ from klack.analyses.impact.record import BodyPicture, ImpactStudy, PressureRecor
 from klack.analyses.impact.solid_figure import solid_figure
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
 from klack.mesh.skin import skin_of_mesh
+from klack.report.html import render_html
+from klack.report.pdf import render_pdf
 
 RADIUS, HALF_WIDTH, PEAK, DURATION = 0.4e-3, 20e-6, 1.5e9, 40e-6  # [m], [m], [Pa], [s]
 TIME = (np.arange(100) + 0.5) * DURATION / 100

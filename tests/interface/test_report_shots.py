@@ -15,11 +15,11 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 from json_schema_check import require_documented
-from klack_names import SHOTS, Chart, InputError, main, render_html, render_pdf
 
 import klack
 from klack.analyses.impact.content import Content
 from klack.analyses.impact.record import PressureRecord
+from klack.analyses.shots.analysis import SHOTS
 from klack.analyses.shots.content import shots_content
 from klack.analyses.shots.figures import distribution_chart
 from klack.analyses.shots.record import RuleVerdict, ShotColumns, ShotsStudy, ShotTraces
@@ -39,8 +39,13 @@ from klack.analyses.stroke_shots.scatter import (
     scattered,
     stroke_answers,
 )
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.exchange.results.dataset import dataset_of
+from klack.report.chart import Chart
+from klack.report.html import render_html
 from klack.report.interactive import plotly_chart
+from klack.report.pdf import render_pdf
 from klack.report.printed import svg_chart
 
 COUNT = 40

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 import pytest
-from klack_names import StepSizes, quantity, render_pdf
 
 from klack.analyses.stroke.analysis import STROKE, first_impact, stroke_answer
 from klack.analyses.stroke.axis import guide_of
@@ -32,6 +31,8 @@ from klack.assembling.body_summary import BodySummary
 from klack.report.chart import BarChart, Chart, RingFrames, frame_text, squeezed, ticks_of
 from klack.report.html import render_html, write_report
 from klack.report.looks import thinned
+from klack.report.pdf import render_pdf
+from klack.report.wording import quantity
 from klack.simulation.film_sectors import sector_pressure
 from klack.simulation.network_result import (
     ChannelData,
@@ -42,6 +43,7 @@ from klack.simulation.network_result import (
     StepCounts,
 )
 from klack.simulation.spatial_impact import FilmLand, FilmMoments, SpatialImpact
+from klack.simulation.step_sizes import StepSizes
 
 HOSTILE = "<script>alert(1)</script> #set page(width: 1cm) $x_1$ \\ & \"'"
 STEP, RECORD, END = 20e-9, 1e-6, 2e-3

@@ -17,7 +17,6 @@ from contextlib import suppress
 from dataclasses import replace
 
 import pytest
-from klack_names import ImpactStudy, render_html, render_pdf, report_content
 from schematic_rules import random_network
 
 from klack.analyses.impact.analysis import (
@@ -27,10 +26,14 @@ from klack.analyses.impact.analysis import (
     estimate_lines,
     study_told,
 )
+from klack.analyses.impact.content import report_content
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.impact.wording import ESTIMATE_COLUMNS, answer, estimate_rows, estimate_sentence
 from klack.analyses.page import schematic_section
 from klack.contact.restitution import Deviation
+from klack.report.html import render_html
 from klack.report.page import Content, Section, Table
+from klack.report.pdf import render_pdf
 from klack.report.spoken import spoken
 from klack.report.wording import listed, quantity, share, signed, signed_share
 from klack.schematic.picture import schematic_svg

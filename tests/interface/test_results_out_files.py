@@ -17,18 +17,12 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from klack_names import (
-    ImpactStudy,
-    InputError,
-    StepSizes,
-    find_channels,
-    open_recording,
-    read_channels,
-)
 
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.stroke.record import StopSummary, StrokeChannels, StrokeStudy, StrokeVariant
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
+from klack.errors import InputError
 from klack.exchange.results.csv_files import write_csv
 from klack.exchange.results.mat import write_mat
 from klack.exchange.results.mdf import write_mdf
@@ -43,6 +37,9 @@ from klack.exchange.results.table import (
     identifiers,
 )
 from klack.measurement.channels import ChannelChoice
+from klack.measurement.find_channels import find_channels
+from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,
@@ -51,6 +48,7 @@ from klack.simulation.network_result import (
     NetworkResult,
     StepCounts,
 )
+from klack.simulation.step_sizes import StepSizes
 
 TITLE = "Ventil für <Öl> & Wasser, 80 µm"
 STEP = 1e-6

@@ -14,19 +14,16 @@ import meshio
 import numpy as np
 import pytest
 import soundfile
-from klack_names import (
-    ElementBlock,
-    InputError,
-    Mesh,
-    TimeSeries,
-    lattice_mesh,
-    simulate_full_order,
-)
 
 from klack.acoustics.wav import full_scale_of, level_statement, wav_bytes, write_wav
+from klack.errors import InputError
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, write_pvd
 from klack.files.whole import whole_files
+from klack.mesh.mesh import ElementBlock, Mesh
+from klack.signals.sampled import TimeSeries
+from klack.transient.full_order import simulate_full_order
 from klack.transient.result import FullOrderResult, MotionOfBody, Snapshots
+from klack.verification.lattice import lattice_mesh
 from klack.verification.transient import STEEL, rod_body, rod_contact
 
 SOLIDS = ("tet4", "tet10", "hex8", "hex20", "wedge6", "wedge15")

@@ -8,22 +8,19 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
-from klack_names import (
-    Chamber,
-    Component,
-    EndStop,
-    Network,
-    Orifice,
-    PressureSource,
-    RigidMass,
-    load_any_case,
-    read_valve_case,
-)
 from rigid_valve import TEXT
 from schematic_rules import FLUID, Actuator, broken_rules, random_network
 
+from klack.case.any_case import load_any_case, read_valve_case
 from klack.case.reader import shipped_cases
+from klack.hydraulics.chamber import Chamber
+from klack.hydraulics.orifice import Orifice
+from klack.hydraulics.pressure_source import PressureSource
+from klack.mechanics.end_stop import EndStop
+from klack.mechanics.rigid_mass import RigidMass
 from klack.mechanics.spring import Spring
+from klack.network.component import Component
+from klack.network.network import Network
 from klack.schematic.picture import Schematic, schematic_of, schematic_svg, with_legend
 from klack.schematic.shapes import text_width
 from klack.schematic.values import value_lines

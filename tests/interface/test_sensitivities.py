@@ -8,11 +8,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from klack_names import InputError, main
 
 import klack
 from klack.analyses.sensitivities.record import MeasureSlopes
 from klack.analyses.sensitivities.run import _doubts, _impacts, _unbounded
+from klack.cli.main import main
+from klack.errors import InputError
 
 pytestmark = pytest.mark.slow  # the loop with derivatives compiles for a minute
 

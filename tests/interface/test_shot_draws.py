@@ -5,13 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, load_case
 from scipy import stats
 
 from klack.analyses.shots.draw import centric_draw, draw_shot, extreme_placements, polar
+from klack.case import load_case
 from klack.case.distribution import Distribution
 from klack.case.schema import Case
 from klack.case.shots import Shots, Waviness
+from klack.errors import InputError
 from klack.mesh.rigid import Pose, rigid_placement
 
 GUIDED = load_case(Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml")

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import Friction, InputError, read_case, silent
 from scipy import stats
 
 from klack.analyses.shots.analysis import SHOTS, shots_to_json
@@ -21,8 +20,12 @@ from klack.analyses.shots.one_shot import ShotOutcome, run_shot, shot_log, simul
 from klack.analyses.shots.record import RESULTS
 from klack.analyses.shots.record import ShotColumns as Shots
 from klack.analyses.shots.run import run_shots, run_shots_on
+from klack.case import read_case
 from klack.case.distribution import Distribution
 from klack.case.schema import Case
+from klack.contact.friction import Friction
+from klack.errors import InputError
+from klack.machine.progress import silent
 
 TEXT = (Path(__file__).parents[2] / "docs" / "how-to" / "guided_needle.yaml").read_text()
 UNIFORM = "{uniform: [0.05, 0.2]}"

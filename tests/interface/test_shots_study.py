@@ -9,16 +9,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from klack_names import groups_of, main, shot_log, silent, study_of
 
 import klack
 from klack.analyses.shots.analysis import shots_to_json
 from klack.analyses.shots.model import build_shots
+from klack.analyses.shots.one_shot import shot_log
 from klack.analyses.shots.record import RESULTS, ShotColumns
 from klack.analyses.shots.run import DroppedShots, drop_shots, run_shots
 from klack.analyses.study import impacts
+from klack.analyses.study.asked_points import groups_of
 from klack.analyses.study.evaluation import asked_of
 from klack.analyses.study.measures import SHOT_NAMES, shot_measure, shot_notes
+from klack.case.study_source import study_of
+from klack.cli.main import main
+from klack.machine.progress import silent
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "how-to"
 NEEDLE = (HOW_TO / "guided_needle.yaml").read_text().replace("  count: 6\n", "  count: 2\n")

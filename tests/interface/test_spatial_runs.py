@@ -5,10 +5,13 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from klack_names import Book, Component, IncompleteRunError, Rows, python_step
 from spatial_needle import ABOVE, BELOW, Needle, move, ring
 
+from klack.network.component import Component
 from klack.network.port import ELEMENT, Port
+from klack.network.rows import Book, Rows
+from klack.network.step_function import python_step
+from klack.simulation.network_result import IncompleteRunError
 
 pytestmark = pytest.mark.slow
 

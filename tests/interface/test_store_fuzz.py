@@ -13,10 +13,12 @@ import sys
 from pathlib import Path
 
 import pytest
-from klack_names import IMPACT, ImpactStudy, InputError
 
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.store import RESULT_NAME
 from klack.bodies.reduction.reduced_body import read_arrays
+from klack.errors import InputError
 
 LONGER = int(os.environ.get("KLACK_LONG", "1"))
 SEED = int(os.environ.get("KLACK_SEED", "1"))

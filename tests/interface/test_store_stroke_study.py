@@ -16,20 +16,12 @@ from typing import Any
 import numpy as np
 import pytest
 import zarr
-from klack_names import (
-    IMPACT,
-    STROKE,
-    ChannelData,
-    EnergyBooks,
-    ImpactEvent,
-    ImpactStudy,
-    InputError,
-    InterfaceRecord,
-    NetworkResult,
-)
 
 from klack.analyses import store as record_store
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
 from klack.analyses.store import RESULT_NAME, RecordFormat, load_record, save_record, stored_format
+from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.record import (
     FluidSummary,
     LineSummary,
@@ -40,6 +32,14 @@ from klack.analyses.stroke.record import (
 )
 from klack.analyses.stroke.times import LiftTimes, Passage
 from klack.assembling.body_summary import BodySummary
+from klack.errors import InputError
+from klack.simulation.network_result import (
+    ChannelData,
+    EnergyBooks,
+    ImpactEvent,
+    InterfaceRecord,
+    NetworkResult,
+)
 
 
 def fill(kind: type, **known: Any) -> Any:

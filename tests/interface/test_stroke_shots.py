@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from klack_names import ConvergenceError, build_valve, find_roles, silent
 from shots_valve import valve_case
 
 import klack.analyses.stroke_shots.one_stroke as one_stroke
@@ -23,6 +22,10 @@ from klack.analyses.stroke_shots.one_stroke import (
 from klack.analyses.stroke_shots.record import StopColumns, StrokeColumns
 from klack.analyses.stroke_shots.run import compute_strokes, run_stroke_shots, stroke_setup
 from klack.assembling.spatial import placement_of
+from klack.assembling.valve import build_valve
+from klack.case.valve_roles import find_roles
+from klack.errors import ConvergenceError
+from klack.machine.progress import silent
 from klack.mesh.rigid import rigid_placement
 from klack.simulation.spatial_impact import SpatialPath
 

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from klack_names import read_valve_case, run_stroke
-
 from klack.analyses.stroke.analysis import STROKE, start_text
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import read_valve_case
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 

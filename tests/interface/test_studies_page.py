@@ -28,26 +28,24 @@ from shutil import copy
 from typing import Any
 
 import pytest
-from klack_names import (
-    IMPACT,
-    CaseMeasurement,
-    ImpactStudy,
-    ImportedFmu,
-    NetworkSection,
-    find_channels,
-    main,
-    open_recording,
-    read_channels,
-)
 from pages import blocks, printed
 from quoted_output import compare
 from ruamel.yaml import YAML
 from scipy.io import loadmat
 
 import klack
+from klack.analyses.impact.analysis import IMPACT
+from klack.analyses.impact.record import ImpactStudy
 from klack.case.geometry import Geometry
+from klack.case.measurement import CaseMeasurement
+from klack.cli.main import main
 from klack.exchange.results.study_table import result_table
+from klack.measurement.find_channels import find_channels
+from klack.measurement.read_channels import read_channels
+from klack.measurement.recording import open_recording
+from klack.mechanics.imported_fmu import ImportedFmu
 from klack.mesh.files.catalogue import MESH_FORMATS
+from klack.network.declaration import NetworkSection
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "how-to" / "studies.md").read_text(encoding="utf-8")

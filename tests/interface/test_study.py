@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, load_any_case, main
 
 import klack
 from klack.analyses.study.analysis import study_to_json
@@ -24,9 +23,12 @@ from klack.analyses.study.evaluation import KeptPoint, point_key
 from klack.analyses.study.kinds import ask
 from klack.analyses.study.points import parameters_of, short_names
 from klack.analyses.study.wording import steps_texts
+from klack.case.any_case import load_any_case
 from klack.case.reader import parse
 from klack.case.study import CaseStudy
 from klack.case.study_source import StudySource
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.report.html import write_report
 from klack.studies.designs import Normal
 

@@ -16,13 +16,16 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import InputError, main, silent, study_of
 
 import klack
 from klack.analyses.study.evaluation import asked_of
 from klack.analyses.study.goals import Bound, Goals
 from klack.analyses.study.gradients import Gradients, require_gradients
 from klack.analyses.study.points import space_of
+from klack.case.study_source import study_of
+from klack.cli.main import main
+from klack.errors import InputError
+from klack.machine.progress import silent
 
 SMALL = Path(__file__).parents[2] / "docs" / "how-to" / "small_valve.yaml"
 PRELOAD = "network.components.spring.preload"

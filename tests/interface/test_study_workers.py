@@ -22,7 +22,6 @@ from unittest.mock import Mock
 import psutil
 import pytest
 from energy_ledger import allowed
-from klack_names import ConvergenceError, InputError, MissingExtraError, ValveCase
 from rod_valve import ROD
 
 import klack
@@ -40,6 +39,8 @@ from klack.analyses.study.where import (
     versions_here,
 )
 from klack.analyses.workers import Failure
+from klack.case.valve import ValveCase
+from klack.errors import ConvergenceError, InputError, MissingExtraError
 
 pytestmark = pytest.mark.slow  # processes that start, clusters, kills
 

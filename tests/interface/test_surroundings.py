@@ -12,10 +12,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from klack_names import InputError, main
 
 import klack
 from klack.analyses.catalogue import load_result
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.terminal.tables import printable
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="mounts and capabilities")

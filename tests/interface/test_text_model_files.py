@@ -9,33 +9,25 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from klack_names import (
-    ContactPair,
-    HertzLaw,
-    HuntCrossley,
-    InputError,
-    LinearLaw,
-    Provenance,
-    ReducedSystem,
-    StateSpace,
-    TableLaw,
-    body_model,
-    case_models,
-    load_any_case,
-    pair_model,
-)
 from scipy.io import loadmat
 
 from klack.assembling.given_bodies import reduced_from_file
 from klack.bodies.model_files.modal_data import read_modal_data
 from klack.bodies.model_files.reduced_models import read_state_space
 from klack.bodies.reduction.from_state_space import body_of_state_space
+from klack.bodies.reduction.reduced_body import StateSpace
 from klack.case import find_case, load_case
+from klack.case.any_case import load_any_case
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw
+from klack.errors import InputError
+from klack.exchange.case_models import case_models
 from klack.exchange.matlab_model import write_matlab
+from klack.exchange.modal_model import Provenance, body_model, pair_model
 from klack.exchange.modelica import modelica_text, write_modelica
 from klack.exchange.state_space import state_space
 from klack.exchange.text_model import write_text
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
+from klack.simulation.system import ContactPair, ReducedSystem
 
 ORIGIN = Provenance(
     case="two rods",

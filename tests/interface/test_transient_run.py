@@ -6,17 +6,13 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.linalg
-from klack_names import (
-    ConvergenceError,
-    ElasticBody,
-    InputError,
-    Modes,
-    available_backends,
-    factorize,
-    measure_impact,
-)
 from scipy.sparse import csr_array, eye_array
 
+from klack.bodies.elasticity.body import ElasticBody
+from klack.bodies.elasticity.eigen import Modes
+from klack.bodies.elasticity.factorization import available_backends, factorize
+from klack.contact.restitution import measure_impact
+from klack.errors import ConvergenceError, InputError
 from klack.transient import full_order
 from klack.transient.full_body import (
     FullBody,

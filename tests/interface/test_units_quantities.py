@@ -15,10 +15,11 @@ from pathlib import Path
 import pint
 import pytest
 from draws import each
-from klack_names import InputError, component_classes
 
 from klack import units
+from klack.errors import InputError
 from klack.input.plain_numbers import plain_numbers
+from klack.network.catalogue import component_classes
 from klack.network.described import described_type
 from klack.terminal.tables import plain_math
 from klack.units import base_powers, format_si, parse_quantity

@@ -5,8 +5,8 @@ import re
 from pathlib import Path
 
 import pytest
-from klack_names import InputError, ValveCase, component_classes, find_roles, read_case
 
+from klack.case import read_case
 from klack.case.any_case import (
     load_any_case,
     load_valve_case,
@@ -14,8 +14,12 @@ from klack.case.any_case import (
     valve_case_schema,
 )
 from klack.case.bodies import CaseBody
+from klack.case.valve import ValveCase
+from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import BodyPort, CaseStop, StrokeRun, ValveBody
+from klack.errors import InputError
 from klack.input.section import Section
+from klack.network.catalogue import component_classes
 
 FILE = Path(__file__).parents[1] / "data" / "case" / "stroke.yaml"
 IMPACT = FILE.with_name("drawn.yaml")

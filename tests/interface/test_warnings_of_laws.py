@@ -3,8 +3,11 @@
 from pathlib import Path
 
 import pytest
-from klack_names import build_valve, load_case, load_valve_case, run_impact
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.valve import build_valve
+from klack.case import load_case
+from klack.case.any_case import load_valve_case
 from klack.contact import local_law
 from klack.machine.stages import collected_warnings
 

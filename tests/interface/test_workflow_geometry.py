@@ -12,16 +12,14 @@ import sys
 from pathlib import Path
 
 import pytest
-from klack_names import (
-    InputError,
-    available_backends,
-    build_bodies,
-    run_impact,
-    silent,
-    write_step_revolved,
-)
 
+from klack.analyses.impact.run import run_impact
+from klack.assembling.bodies import build_bodies
+from klack.bodies.elasticity.factorization import available_backends
 from klack.case import load_case, read_case, shipped_cases
+from klack.errors import InputError
+from klack.machine.progress import silent
+from klack.mesh.solid import write_step_revolved
 
 STEP = """
 klack: 1

@@ -8,15 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import (
-    AccuracyWarning,
-    ConvergenceError,
-    InputError,
-    build_problem,
-    load_case,
-    mode_pools,
-    silent,
-)
 
 from klack.analyses.impact.interface_level import build_guide, build_interface
 from klack.analyses.shots import one_shot
@@ -40,7 +31,12 @@ from klack.analyses.shots.record import FIRST_IMPACT, ShotColumns
 from klack.analyses.shots.run import DroppedShots, judge_rule, run_shots, run_shots_on, shot_doubts
 from klack.analyses.store import stored_format
 from klack.api import Result
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
+from klack.case import load_case
 from klack.case.guide import Placement
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
+from klack.machine.progress import silent
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,10 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from klack_names import corner_volume, lattice_mesh, read_abaqus
+
+from klack.mesh.files.abaqus.reader import read_abaqus
+from klack.mesh.quality import corner_volume
+from klack.verification.lattice import lattice_mesh
 
 meshio = pytest.importorskip("meshio")
 

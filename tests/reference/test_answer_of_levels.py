@@ -9,23 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    AccuracyWarning,
-    ConvergenceError,
-    ImpactStudy,
-    InputError,
-    compare_histories,
-    load_case,
-    read_case,
-    run_impact,
-)
 from threadpoolctl import threadpool_limits
 
+from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact import run as impact
 from klack.analyses.impact.analysis import IMPACT, answer_line, estimate_lines
-from klack.case import find_case
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.case import find_case, load_case, read_case
 from klack.case.impact_sections import LinearLocalLaw, Spring, TransferSweep
 from klack.case.schema import Case
+from klack.errors import AccuracyWarning, ConvergenceError, InputError
 from klack.machine.stages import for_comparison
 
 CASE = Path(__file__).parents[1] / "data" / "small_ball.yaml"

@@ -8,27 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    FaceFriction,
-    Friction,
-    ImpactHistory,
-    Material,
-    build_problem,
-    compare_histories,
-    contact_space,
-    elastic_body,
-    lattice_mesh,
-    measure_impact,
-    silent,
-    simulate_full_order,
-    touching_shift,
-)
 from scipy.sparse import block_diag, coo_array, csr_array, triu
 from scipy.sparse.linalg import norm
 
+from klack.acoustics.comparison import compare_histories
+from klack.assembling.problem import build_problem
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
 from klack.case import find_case, load_case
 from klack.case.schema import Case
+from klack.contact.face_friction import FaceFriction
+from klack.contact.friction import Friction
+from klack.contact.history import ImpactHistory
+from klack.contact.mortar import contact_space, touching_shift
+from klack.contact.restitution import measure_impact
 from klack.exchange.calculix_case import calculix_impact, calculix_settings
 from klack.exchange.calculix_deck import (
     CalculixImpact,
@@ -39,6 +31,10 @@ from klack.exchange.calculix_deck import (
 )
 from klack.exchange.calculix_result import other_run, read_calculix
 from klack.exchange.calculix_run import find_calculix, run_calculix
+from klack.machine.progress import silent
+from klack.materials.material import Material
+from klack.transient.full_order import simulate_full_order
+from klack.verification.lattice import lattice_mesh
 
 pytestmark = [
     pytest.mark.slow,

@@ -9,11 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import build_problem, find_calculix, load_case
 from scipy.sparse import csr_array
 
+from klack.assembling.problem import build_problem
+from klack.case import load_case
 from klack.contact.plasticity.ladder import YieldingContact
 from klack.contact.plasticity.yielding_body import YieldingBody
+from klack.exchange.calculix_run import find_calculix
 
 SPHERES = Path(__file__).parents[1] / "data" / "case" / "yielding_spheres.yaml"
 

@@ -15,19 +15,17 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from klack_names import (
-    InputError,
-    Network,
-    lattice_mesh,
-    load_valve_case,
-    main,
-    quantity,
-    read_mesh_file,
-    simulate_network,
-)
 
+from klack.case.any_case import load_valve_case
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.mesh.files import catalogue as mesh_catalogue
+from klack.mesh.files.mesh_file import read_mesh_file
 from klack.network import catalogue
+from klack.network.network import Network
+from klack.report.wording import quantity
+from klack.simulation.network_run import simulate_network
+from klack.verification.lattice import lattice_mesh
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
 

@@ -4,9 +4,10 @@ import sys
 
 import numpy as np
 import pytest
-from klack_names import FluidChoice, InputError, MissingExtraError
 from pydantic import ValidationError
 
+from klack.errors import InputError, MissingExtraError
+from klack.hydraulics.fluid_choice import FluidChoice
 from klack.hydraulics.liquid import ATMOSPHERE
 
 pytestmark = pytest.mark.slow

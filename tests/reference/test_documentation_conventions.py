@@ -38,19 +38,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    IMPACT,
-    ContactPair,
-    LinearLaw,
-    ReducedSystem,
-    TimeSeries,
-    component_class,
-    fixed_body,
-    measure_impact,
-    rigid_mass_body,
-    simulate_impact,
-    type_words,
-)
 from pages import blocks, numbers, printed
 from quoted_output import compare
 
@@ -62,8 +49,16 @@ from klack.acoustics.spectrum import (
     impulse_spectrum,
 )
 from klack.acoustics.third_octave import band_energies
+from klack.analyses.impact.analysis import IMPACT
 from klack.case import case_schema
 from klack.case.any_case import read_valve_case, valve_case_schema
+from klack.contact.laws import LinearLaw
+from klack.contact.restitution import measure_impact
+from klack.network.catalogue import component_class, type_words
+from klack.signals.sampled import TimeSeries
+from klack.simulation.bodies import fixed_body, rigid_mass_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 DOCS = Path(__file__).parents[2] / "docs"
 MASS, STIFFNESS, SPEED, GAP = 2e-3, 1e9, 0.4, 1e-6  # [kg], [N/m], [m/s], [m]

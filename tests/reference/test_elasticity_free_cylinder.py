@@ -8,9 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import Material, eigenmodes, elastic_body, lattice_mesh
 
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body
+from klack.materials.material import Material
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 RADIUS, LENGTH = 2e-3, 30e-3

@@ -6,9 +6,14 @@ integrate it exactly, so frequencies differ by round-off only.
 
 import numpy as np
 import pytest
-from klack_names import FAMILIES, ElementBlock, Material, Mesh, eigenmodes, elastic_body
 from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
+
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
+from klack.materials.material import Material
+from klack.mesh.families import FAMILIES
+from klack.mesh.mesh import ElementBlock, Mesh
 
 ngsolve = pytest.importorskip("ngsolve")
 

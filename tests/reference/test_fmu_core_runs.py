@@ -17,31 +17,21 @@ import numpy as np
 import pytest
 from c_compiler import needs_compiler
 from energy_ledger import allowed
-from klack_names import (
-    Ambient,
-    Book,
-    FilmRow,
-    HertzLaw,
-    HuntCrossley,
-    LinearLaw,
-    Provenance,
-    Rows,
-    TableLaw,
-    fmu_variables,
-    gonthier_coefficient,
-    interface_motion,
-    one_contact,
-    pair_model,
-    simulate,
-    simulate_network,
-)
 
+from klack.contact.laws import HertzLaw, HuntCrossley, LinearLaw, TableLaw, gonthier_coefficient
 from klack.exchange.fmu.build import build_fmu, source_texts
 from klack.exchange.fmu.compiler import compile_library, this_platform
 from klack.exchange.fmu.model_description import SOURCE_FILES
+from klack.exchange.fmu.variables import fmu_variables
+from klack.exchange.modal_model import Provenance, pair_model
 from klack.mechanics.force import constant_force_step
+from klack.network.rows import Ambient, Book, FilmRow, Rows
 from klack.simulation.bodies import rigid_mass_body, rod_body
+from klack.simulation.impact import simulate
+from klack.simulation.network_run import simulate_network
 from klack.simulation.system import AxialForce, ContactPair, ReducedSystem, ReturnSpring
+from klack.verification.interface_motion import interface_motion
+from klack.verification.one_dimension import one_contact
 
 pytestmark = [pytest.mark.slow, needs_compiler]
 

@@ -20,23 +20,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from c_compiler import needs_compiler, needs_gcc
-from klack_names import (
-    ConstantForce,
-    HuntCrossley,
-    Network,
-    build_fmu,
-    build_problem,
-    build_valve,
-    case_models,
-    load_any_case,
-    mode_pools,
-    silent,
-    simulate,
-    simulate_network,
-)
 
+from klack.assembling.modes import mode_pools
+from klack.assembling.problem import build_problem
 from klack.assembling.reduced_pair import first_stiffness, impact_system, own_pair
+from klack.assembling.valve import build_valve
 from klack.case import find_case, load_case
+from klack.case.any_case import load_any_case
+from klack.contact.laws import HuntCrossley
+from klack.exchange.case_models import case_models
+from klack.exchange.fmu.build import build_fmu
+from klack.machine.progress import silent
+from klack.mechanics.force import ConstantForce
+from klack.network.network import Network
+from klack.simulation.impact import simulate
+from klack.simulation.network_run import simulate_network
 
 pytestmark = [pytest.mark.slow, needs_compiler]
 

@@ -5,23 +5,19 @@ from functools import cache
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    Flexibility,
-    Material,
-    Mesh,
-    Modes,
-    eigenmodes,
-    elastic_body,
-    lattice_mesh,
-    sweep,
-)
 from scipy.sparse import csr_array
 
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import Modes, eigenmodes
 from klack.bodies.elasticity.fourier_body import FourierBody, fourier_body, rows_around
 from klack.bodies.elasticity.loads import order_load, traction_load
+from klack.bodies.elasticity.statics import Flexibility
 from klack.bodies.gauges.fourier_field import field_rows
+from klack.materials.material import Material
+from klack.mesh.mesh import Mesh
+from klack.mesh.swept import sweep
 from klack.verification.elasticity import free_bar_frequencies
+from klack.verification.lattice import lattice_mesh
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 BOTH_WAYS = (0.0, np.pi / 2)

@@ -21,12 +21,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from klack_names import InputError, load_valve_case, read_valve_case, run_stroke
 from pages import HOW_TO, blocks, printed
 
 import klack
 from klack.analyses.heat.run import run_heat
+from klack.analyses.stroke.run import run_stroke
 from klack.case import shipped_cases
+from klack.case.any_case import load_valve_case, read_valve_case
+from klack.errors import InputError
 
 HOW_TO_PARAMETERS = Path(__file__).parents[2] / "docs" / "how-to"
 PAGE = (HOW_TO_PARAMETERS / "parameters-and-parts.md").read_text(encoding="utf-8")

@@ -15,11 +15,13 @@ from math import pi
 
 import numpy as np
 import pytest
-from klack_names import load_valve_case, main, read_valve_case, simulate_network
 from pages import HOW_TO, blocks, numbers, require_parts, run_of
 from ruamel.yaml import YAML
 
 from klack.analyses.operating_point.analysis import OPERATING_POINT
+from klack.case.any_case import load_valve_case, read_valve_case
+from klack.cli.main import main
+from klack.simulation.network_run import simulate_network
 
 PAGE = (HOW_TO / "hydraulic-supply.md").read_text(encoding="utf-8")
 

@@ -21,20 +21,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ImpactStudy,
-    InterfaceContact,
-    Material,
-    run_impact,
-    simulate_full_order,
-    simulate_interface,
-)
 
 from klack.analyses.impact.analysis import IMPACT, estimate_lines
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
 from klack.case import load_case, shipped_cases
 from klack.case.guide import Placement
 from klack.case.schema import Case
 from klack.contact.restitution import Deviation, find_contacts, measure_impact
+from klack.materials.material import Material
+from klack.transient.full_order import simulate_full_order
+from klack.transient.interface_model import InterfaceContact
+from klack.transient.interface_run import simulate_interface
 from klack.verification.interface_bodies import free_rod, modal_model, reduce_bodies, sphere_on_beam
 from klack.verification.transient import (
     STEEL,

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import pytest
 from doubts import doubts
-from klack_names import InputError, build_problem
 
 from klack.analyses.impact.contact_check import check_yield
+from klack.assembling.problem import build_problem
 from klack.case.reader import case_schema, read_case
+from klack.errors import InputError
 from klack.materials.library import MATERIALS, library_material
 
 ROOT = Path(__file__).parents[2]

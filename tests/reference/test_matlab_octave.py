@@ -2,21 +2,14 @@
 
 import numpy as np
 import pytest
-from klack_names import (
-    ContactPair,
-    FilmRow,
-    HertzLaw,
-    LinearLaw,
-    Provenance,
-    ReducedSystem,
-    TableLaw,
-    body_model,
-    modal_propagator,
-    pair_model,
-)
 
+from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
 from klack.exchange.matlab_model import write_matlab
+from klack.exchange.modal_model import Provenance, body_model, pair_model
+from klack.network.rows import FilmRow
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
+from klack.simulation.propagator import modal_propagator
+from klack.simulation.system import ContactPair, ReducedSystem
 
 FILM = FilmRow(cubic=4e-17, linear=2e-7, cut_off=5e-7, suction=1.0)
 STEP, COUNT = 2e-8, 200

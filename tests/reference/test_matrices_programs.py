@@ -17,27 +17,24 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    ElasticBody,
-    Material,
-    Mesh,
-    eigenmodes,
-    elastic_body,
-    lattice_mesh,
-    quadrature,
-    read_mesh_file,
-    shape_functions,
-    unit_system,
-)
 from scipy.io import savemat
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.linalg import norm
 
+from klack.bodies.elasticity.body import ElasticBody, elastic_body
+from klack.bodies.elasticity.eigen import eigenmodes
 from klack.bodies.elasticity.given_matrices import checked_body
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import shape_functions
 from klack.bodies.model_files.system import on_nodes, read_system
 from klack.exchange.calculix_run import find_calculix, run_calculix
+from klack.input.unit_systems import unit_system
+from klack.materials.material import Material
 from klack.mesh.files.ansys.reader import read_ansys_archive
+from klack.mesh.files.mesh_file import read_mesh_file
+from klack.mesh.mesh import Mesh
 from klack.verification.exchange_files import MatrixFiles, write_matrices
+from klack.verification.lattice import lattice_mesh
 
 needs_calculix = pytest.mark.skipif(find_calculix() is None, reason="CalculiX is not installed")
 

@@ -11,15 +11,18 @@ from math import sqrt
 from pathlib import Path
 
 import pytest
-from klack_names import ValveCase, load_stroke_set, load_valve_case, read_valve_case, run_stroke
 from pages import blocks, printed
 from ruamel.yaml import YAML
 
 from klack.analyses.comparison.record import MeasuredStrokeStudy
 from klack.analyses.comparison.strokes import compare_strokes
 from klack.analyses.comparison.strokes_summary import MEASURED_STROKES, agreement
+from klack.analyses.stroke.run import run_stroke
+from klack.case.any_case import load_valve_case, read_valve_case
 from klack.case.key_path import quantity_at, split_path
 from klack.case.reader import shipped_cases
+from klack.case.valve import ValveCase
+from klack.measurement.loading import load_stroke_set
 
 CASE = shipped_cases()["measured"]
 FOLDER = CASE.parent

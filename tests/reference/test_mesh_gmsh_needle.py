@@ -8,8 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import Mesh, quadrature, read_abaqus, shape_functions
 
+from klack.bodies.elasticity.quadrature import quadrature
+from klack.bodies.elasticity.shape_functions import shape_functions
+from klack.mesh.files.abaqus.reader import read_abaqus
+from klack.mesh.mesh import Mesh
 from klack.mesh.quality import mesh_summary, require_connected
 
 MM = 1e-3

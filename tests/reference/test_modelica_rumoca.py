@@ -2,19 +2,14 @@
 
 import numpy as np
 import pytest
-from klack_names import (
-    FilmRow,
-    HertzLaw,
-    LinearLaw,
-    Provenance,
-    TableLaw,
-    body_model,
-    case_models,
-    load_any_case,
-)
 
+from klack.case.any_case import load_any_case
 from klack.case.reader import find_case
+from klack.contact.laws import HertzLaw, LinearLaw, TableLaw
+from klack.exchange.case_models import case_models
+from klack.exchange.modal_model import Provenance, body_model
 from klack.exchange.modelica import modelica_text, write_modelica
+from klack.network.rows import FilmRow
 from klack.simulation.bodies import rod_body
 
 rumoca = pytest.importorskip("rumoca")

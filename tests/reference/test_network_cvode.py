@@ -14,9 +14,11 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from klack_names import FilmRow, fixed_body, rigid_mass_body, steel_rod
 
+from klack.network.rows import FilmRow
+from klack.simulation.bodies import fixed_body, rigid_mass_body
 from klack.verification.interface_motion import film_by_ode, interface_motion
+from klack.verification.one_dimension import steel_rod
 
 pytestmark = pytest.mark.slow
 

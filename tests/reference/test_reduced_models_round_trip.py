@@ -10,32 +10,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.io
-from klack_names import (
-    AccuracyWarning,
-    ByCount,
-    ContactPair,
-    InputError,
-    LinearLaw,
-    Material,
-    MeshSizing,
-    ModalDamping,
-    ReducedBody,
-    ReducedSystem,
-    elastic_body,
-    load_case,
-    mesh_meridian,
-    reduce_body,
-    run_impact,
-    simulate_impact,
-    surface_port,
-    unit_system,
-)
 from scipy.sparse import coo_array
 
+from klack.analyses.impact.run import run_impact
 from klack.assembling.given_bodies import reduced_from_file
+from klack.bodies.elasticity.body import elastic_body
+from klack.bodies.reduction.damping import ModalDamping
+from klack.bodies.reduction.ports import surface_port
+from klack.bodies.reduction.reduce import reduce_body
+from klack.bodies.reduction.reduced_body import ReducedBody
+from klack.bodies.reduction.selection import ByCount
+from klack.case import load_case
 from klack.case.schema import Case
+from klack.contact.laws import LinearLaw
+from klack.errors import AccuracyWarning, InputError
+from klack.input.unit_systems import unit_system
+from klack.materials.material import Material
+from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Line, Profile
+from klack.mesh.sizing import MeshSizing
 from klack.simulation.bodies import rod_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 STEEL = Material(name="steel", young=210e9, poisson=0.3, density=7850.0)
 SEAT = rod_body(

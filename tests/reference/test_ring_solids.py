@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from klack_names import load_case, run_impact
 
+from klack.analyses.impact.run import run_impact
+from klack.case import load_case
 from klack.verification.ring_bodies import NeedleOnRing, solid_over_ring_compliance
 
 pytestmark = pytest.mark.slow

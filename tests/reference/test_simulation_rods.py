@@ -5,16 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from draws import each
-from klack_names import (
-    ContactPair,
-    HertzLaw,
-    LinearLaw,
-    ReducedSystem,
-    measure_impact,
-    simulate_impact,
-)
 
+from klack.contact.laws import HertzLaw, LinearLaw
+from klack.contact.restitution import measure_impact
 from klack.simulation.bodies import fixed_body, rigid_mass_body, rod_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 DATA = Path(__file__).parents[1] / "data"
 UNIT = {"length": 1.0, "area": 1.0, "young": 1.0, "density": 1.0}

@@ -18,22 +18,20 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
-from klack_names import (
-    STROKE,
-    InputError,
-    StressField,
-    build_valve,
-    compile_network,
-    main,
-    read_valve_case,
-    step_sizes,
-)
 from shots_valve import FILE, valve_text
 
+from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.film_frames import recorded_impacts
 from klack.analyses.stroke.run import run_stroke, variant_network
+from klack.assembling.valve import build_valve
+from klack.bodies.elasticity.stress import StressField
+from klack.case.any_case import read_valve_case
+from klack.cli.main import main
+from klack.errors import InputError
 from klack.exchange.results.spatial_series import valve_shapes, write_spatial_series
 from klack.simulation.film_sectors import sector_pressure
+from klack.simulation.network_compile import compile_network
+from klack.simulation.step_sizes import step_sizes
 from klack.transient.tilting_films import film_state
 
 pytestmark = pytest.mark.slow  # one build of a valve, and half a minute where kernels are compiled

@@ -24,26 +24,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from klack_names import (
-    STROKE,
-    AccuracyWarning,
-    ConstantForce,
-    InputError,
-    build_valve,
-    read_case,
-    read_valve_case,
-    run_impact,
-    simulate_interface,
-    simulate_network,
-    stroke_content,
-)
 
+from klack.analyses.impact.run import run_impact
+from klack.analyses.stroke.analysis import STROKE
 from klack.analyses.stroke.axis import axis_over_time_chart, axis_path_chart
+from klack.analyses.stroke.content import stroke_content
 from klack.analyses.stroke.run import run_stroke, variant_network
 from klack.analyses.stroke_shots.run import run_stroke_shots
+from klack.assembling.valve import build_valve
+from klack.case import read_case
+from klack.case.any_case import read_valve_case
+from klack.errors import AccuracyWarning, InputError
 from klack.hydraulics.off_axis_seat import SeatFace, flow_area
 from klack.magnetics.off_axis_gap import guide_ring
+from klack.mechanics.force import ConstantForce
 from klack.mechanics.spring import Spring
+from klack.simulation.network_run import simulate_network
+from klack.transient.interface_run import simulate_interface
 from klack.transient.ring_arcs import ArcWatch, RingArcs
 
 CASE = Path(__file__).parents[2] / "docs" / "how-to" / "stroke_off_axis.yaml"

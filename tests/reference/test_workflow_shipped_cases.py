@@ -27,27 +27,23 @@ import meshio
 import numpy as np
 import pytest
 from energy_ledger import allowed
-from klack_names import (
-    ContactPair,
-    ImpactStudy,
-    InputError,
-    LinearLaw,
-    ReducedSystem,
-    StrokeStudy,
-    StrokeVariant,
-    load_valve_case,
-    run_impact,
-    run_shots,
-    run_stroke,
-    simulate_impact,
-)
 
 import klack
+from klack.analyses.impact.record import ImpactStudy
+from klack.analyses.impact.run import run_impact
+from klack.analyses.shots.run import run_shots
+from klack.analyses.stroke.record import StrokeStudy, StrokeVariant
+from klack.analyses.stroke.run import run_stroke
 from klack.case import find_case, load_case, read_case, shipped_cases
+from klack.case.any_case import load_valve_case
 from klack.case.schema import Case
+from klack.contact.laws import LinearLaw
+from klack.errors import InputError
 from klack.exchange.results.vtk_series import write_impact_series
 from klack.measurement.pulse import measure_pulse
 from klack.simulation.bodies import rod_body
+from klack.simulation.impact import simulate_impact
+from klack.simulation.system import ContactPair, ReducedSystem
 
 pytestmark = pytest.mark.slow
 

@@ -5,9 +5,11 @@ from pathlib import Path
 
 import pytest
 from doubts import doubts
-from klack_names import InputError, build_problem, read_case
 
 from klack.analyses.impact.contact_check import check_yield
+from klack.assembling.problem import build_problem
+from klack.case import read_case
+from klack.errors import InputError
 
 DATA = Path(__file__).parents[1] / "data" / "case"
 SPHERES = DATA / "yielding_spheres.yaml"
