@@ -14,8 +14,8 @@ from pathlib import Path
 
 from klack.case.measurement import CaseMeasurement
 from klack.errors import InputError
+from klack.measurement.files.opening import open_recording
 from klack.measurement.loading import load_stroke_set
-from klack.measurement.recording import open_recording
 
 warnings.simplefilter("ignore")
 

@@ -20,7 +20,7 @@ from scipy.sparse import csc_array
 
 from klack.bodies.model_files.matrices import read_matrix
 from klack.errors import ConvergenceError, InputError
-from klack.measurement.recording import open_recording
+from klack.measurement.files.opening import open_recording
 from klack.mechanics.fmu_file import inspect_fmu
 from klack.mechanics.fmu_slave import FmuSlave
 from klack.mechanics.imported_fmu import ImportedFmu

@@ -12,10 +12,10 @@ from ruamel.yaml import YAML
 from klack.case.measurement import CaseMeasurement
 from klack.errors import AccuracyWarning, InputError
 from klack.measurement.channels import ROLES, ChannelChoice
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.loading import load_stroke_set
 from klack.measurement.read_channels import common_time, read_channels, windows
-from klack.measurement.recording import open_recording
 from klack.measurement.unit_text import roles_of_unit, unit_factor
 from klack.units import TIME
 

@@ -15,9 +15,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from klack.errors import InputError
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
-from klack.measurement.recording import open_recording
 
 TIME = 2e-6 * np.arange(60)  # [s]
 LIFT = 80.0 * (1.0 - np.cos(2e4 * TIME))  # [um]

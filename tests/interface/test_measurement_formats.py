@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import common_time, read_channels, windows
-from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

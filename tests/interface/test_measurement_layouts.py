@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from klack.errors import InputError, MissingExtraError
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
-from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

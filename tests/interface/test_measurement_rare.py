@@ -16,10 +16,10 @@ import pytest
 
 from klack.errors import AccuracyWarning, InputError
 from klack.measurement.channels import ChannelChoice
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.loading import load_stroke_set
 from klack.measurement.read_channels import read_channels
-from klack.measurement.recording import open_recording
 
 asammdf = pytest.importorskip("asammdf")
 h5py = pytest.importorskip("h5py")

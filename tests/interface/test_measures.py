@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 from draws import each
 
-from klack.analyses.catalogue import ANALYSES, analyses, named
+from klack.analyses.catalogue import ANALYSES, analyses
 from klack.analyses.json_results import result_schema
 from klack.analyses.measures import Column, Measure, json_of
+from klack.analyses.named import named
 
 DOCS = Path(__file__).parents[2] / "docs"
 MEASURES = {of: found for a in analyses() for of, found in a.measures.items()}

@@ -16,7 +16,7 @@ from doubts import doubts
 from klack.bodies.model_files.matrices import read_matrix
 from klack.cli.main import main
 from klack.errors import AccuracyWarning, InputError
-from klack.measurement.recording import open_recording
+from klack.measurement.files.opening import open_recording
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.mesh.quality import corner_volume
 

@@ -37,9 +37,9 @@ from klack.exchange.results.table import (
     identifiers,
 )
 from klack.measurement.channels import ChannelChoice
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
-from klack.measurement.recording import open_recording
 from klack.simulation.network_result import (
     ChannelData,
     EnergyBooks,

@@ -153,7 +153,7 @@ def test_no_pickle_is_opened(tmp_path: Path):
 
 def test_a_pickle_in_a_measurement_is_not_opened(tmp_path: Path):
     """HDF5, MATLAB and CSV readers meet a pickle under their own ending."""
-    from klack.measurement.recording import open_recording
+    from klack.measurement.files.opening import open_recording
 
     raw = pickle.dumps([Bomb(tmp_path / "hacked")])
     for ending in ("csv", "h5", "mat", "mf4", "tdms", "uff", "npz", "npy", "txt"):

@@ -40,9 +40,9 @@ from klack.case.geometry import Geometry
 from klack.case.measurement import CaseMeasurement
 from klack.cli.main import main
 from klack.exchange.results.study_table import result_table
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import find_channels
 from klack.measurement.read_channels import read_channels
-from klack.measurement.recording import open_recording
 from klack.mechanics.imported_fmu import ImportedFmu
 from klack.mesh.files.catalogue import MESH_FORMATS
 from klack.network.declaration import NetworkSection

@@ -30,14 +30,8 @@ from klack.analyses.study.asked_points import AskedPoints
 from klack.analyses.study.computing import Agenda
 from klack.analyses.study.dask_workers import DaskTasks
 from klack.analyses.study.kinds import ask
-from klack.analyses.study.where import (
-    PointOrder,
-    SentCase,
-    Where,
-    _Fitting,
-    answered,
-    versions_here,
-)
+from klack.analyses.study.processes import PointOrder, SentCase, answered, versions_here
+from klack.analyses.study.where import Where, _Fitting
 from klack.analyses.workers import Failure
 from klack.case.valve import ValveCase
 from klack.errors import ConvergenceError, InputError, MissingExtraError
@@ -422,7 +416,7 @@ class TestRefused:
 
     def test_another_version_of_klack(self, cluster: str, monkeypatch: pytest.MonkeyPatch):
         other = dict(versions_here()) | {"klack": "9.9"}
-        monkeypatch.setattr("klack.analyses.study.where.versions_here", lambda: other)
+        monkeypatch.setattr("klack.analyses.study.processes.versions_here", lambda: other)
         with pytest.raises(InputError, match=r"worker tcp://.*got klack 0.1.0, expected klack 9.9"):
             klack.run_many(SMALL, [{}], ["impacts"], dask=cluster)
 

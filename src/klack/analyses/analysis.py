@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
-from klack.analyses.catalogue import named
 from klack.analyses.measures import Measure
+from klack.analyses.named import named
 from klack.analyses.store import RecordFormat, load_record, save_record
 from klack.report.page import Content
 from klack.terminal.tables import Notes, TextTable

@@ -2,22 +2,16 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from klack.analyses.named import named
 from klack.errors import InputError
 
 if TYPE_CHECKING:
     from klack.analyses.analysis import Analysis, StoredAnalysis
 
-__all__ = ["ANALYSES", "Entry", "analyses", "analysis_in", "commands", "load_result", "named"]
-
-
-def named(place: str) -> Any:
-    """What a module below :mod:`klack.analyses` calls so: ``"noise.content:noise_content"``."""
-    module, _, name = place.partition(":")
-    return getattr(import_module(f"klack.analyses.{module}"), name)
+__all__ = ["ANALYSES", "Entry", "analyses", "analysis_in", "commands", "load_result"]
 
 
 @dataclass(frozen=True, slots=True)

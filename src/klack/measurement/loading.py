@@ -21,9 +21,10 @@ from klack.measurement.cutting import (
     whole_piece,
 )
 from klack.measurement.differentiation import noise_floor
+from klack.measurement.files.opening import open_recording
 from klack.measurement.find_channels import FoundChannel, find_channels
 from klack.measurement.read_channels import common_time, read_channels, windows
-from klack.measurement.recording import Recording, open_recording
+from klack.measurement.recording import Recording
 from klack.measurement.stroke_measures import MeasuredStroke, Rejection, StrokeSet
 
 __all__ = ["MeasurementSection", "find_outliers", "load_stroke_set"]

@@ -41,7 +41,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.arrays import Vector
-from klack.machine.compiling.jit import Marked, intrinsic, njit
+from klack.machine.compiling.jit import intrinsic, njit
+from klack.machine.compiling.marked import Marked
 
 __all__ = [
     "StepFunction",

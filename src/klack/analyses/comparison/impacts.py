@@ -17,8 +17,9 @@ from klack.bodies.gauges.gauge import GaugeKind, GaugeRecord
 from klack.errors import AccuracyWarning, InputError
 from klack.machine.progress import Progress, silent
 from klack.machine.stages import StageClock, collected_warnings
+from klack.measurement.files.opening import open_recording
 from klack.measurement.pulse import Pulse, fit_pulse, measure_pulse
-from klack.measurement.recording import ChannelInfo, Recording, open_recording, some_names
+from klack.measurement.recording import ChannelInfo, Recording, some_names
 from klack.measurement.unit_text import no_unit, plain_unit, unit_factor
 from klack.signals.low_pass import LowPass
 from klack.units import LENGTH, PRESSURE, SPEED

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from klack.analyses.catalogue import named
 from klack.analyses.ending import Ending
+from klack.analyses.named import named
 from klack.errors import require_positive
 from klack.terminal.options import (
     WANTED_RESULT,

@@ -14,7 +14,7 @@ from uuid import uuid4
 import klack
 from klack.analyses.study.asked_points import AskedPoints, PointRow, groups_of
 from klack.analyses.study.computing import Agenda, PointWorkers, Tally
-from klack.analyses.study.where import Answer, PointOrder, SentCase, answered, died_row
+from klack.analyses.study.processes import Answer, PointOrder, SentCase, answered, died_row
 from klack.analyses.workers import Failure, unwrapped
 from klack.case.any_case import AnyCase, CaseTree
 from klack.errors import ConvergenceError, InputError, MissingExtraError

@@ -35,7 +35,7 @@ from klack.errors import InputError
 from klack.files.own import caller
 from klack.machine.compiling.compiled_folder import compiled_folder, is_trusted, warn_once
 from klack.machine.compiling.compilers import InnerCode
-from klack.machine.compiling.jit import Marked
+from klack.machine.compiling.marked import Marked
 from klack.machine.compiling.turn import Turn, take_turn
 
 __all__ = ["CompiledStore"]
