@@ -24,6 +24,10 @@ __all__ = ["audio_band", "click_pressure", "minimum_phase_filter", "pressure_tra
 def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex128]:
     r"""Frequency response of minimum phase with a given magnitude.
 
+    A magnitude alone does not say when a filter answers.  Of all causal and stable filters of one
+    magnitude the minimum-phase one gathers its energy first; its phase is the Hilbert transform of
+    the logarithm of its magnitude (Oppenheim and Schafer, Discrete-Time Signal Processing, ch. 12).
+
     .. math:: \ln H = \mathcal F\{ w_n\, \mathcal F^{-1}\{\ln |H|\} \}, \qquad
               w_0 = w_{N/2} = 1,\ w_n = 2 \ (0 < n < N/2),\ w_n = 0 \ (n > N/2)
 

@@ -34,6 +34,17 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,60}")
 def outline_of_table(body: str, text: str) -> dict[str, Any]:
     """Outline as a case has it, in mm: ``start`` and ``edges``.
 
+    Each row is a corner of the outline in mm, and says which surface leads to it and, for an arc,
+    where its centre lies::
+
+        r, z, surface, centre r, centre z
+        0, -0.6
+        0.6, 0, tip, 0, 0
+        2.5, 1.9, taper
+
+    The outline closes by itself; commas, semicolons, tabs or blanks separate, and a comma is a
+    decimal sign where semicolons or tabs separate.
+
     Raises
     ------
     InputError

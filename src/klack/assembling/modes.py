@@ -151,6 +151,9 @@ _FRACTION = 0.6180339887498949  # of the golden section: no two nodes get nearly
 def shape_marks(shapes: Floats) -> Floats:
     """Sum of each shape with fixed weights between -1 and 1, shape (m,).
 
+    A mode may come out with the other sign, and a pair of equal frequencies turned, where it is
+    computed anew with other libraries; modal coordinates of before then belong to other shapes.
+
     Parameters
     ----------
     shapes : array, shape (n_dof, m)

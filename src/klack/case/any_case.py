@@ -43,6 +43,11 @@ OwnComponents = Iterable[type[Component]]
 def load_valve_case(path: str | Path, components: OwnComponents = ()) -> ValveCase:
     """Read and check the case file of a whole valve; see :func:`klack.case.reader.load_case`.
 
+    Apart from :mod:`klack.case.reader`, because the components of a network take a while to import.
+
+    A case file runs no code.  Components of the user's own are classes that the caller hands over;
+    the file names them ``package.module:Class``.
+
     Parameters
     ----------
     path : str or Path

@@ -31,7 +31,13 @@ _OF_NUMBERS = re.compile(r"[-+]?\.?[0-9][0-9A-Fa-fox_.:+-]*")
 
 
 class UnboundedTree(ComposerError):
-    """A tree of too many values or levels, or one that holds itself; with its place."""
+    """A tree of too many values or levels, or one that holds itself; with its place.
+
+    A hundred bytes of aliases can stand for more values than a machine holds, a mapping can hold
+    itself, five thousand brackets keep the parser busy for a while, and so do a million digits.
+    The composer of ruamel.yaml sees every node once, so that is where they are counted: each alias
+    with all that it stands for.
+    """
 
     def __init__(self, problem: str, mark: Any) -> None:
         super().__init__(None, None, problem, mark)

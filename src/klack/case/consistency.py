@@ -33,7 +33,11 @@ _ON_SURFACES = ("guide", "opposite", "shots", "noise", "measurement")
 
 
 def check_port(key: Key, surface: SurfaceName, body: CaseBody) -> None:
-    """Check that a body without surfaces has a port or node set of that name."""
+    """Check that a body without surfaces has a port or node set of that name.
+
+    Such bodies meet at one port each.  What needs faces (point by point contact, placement, guide,
+    sound) is refused here, before anything is read.
+    """
     if body.reduced is not None:
         known, what = list(body.reduced.ports), "port"
     elif body.geometry.nodes is not None:

@@ -43,6 +43,9 @@ _HEAD = ("parameters", "include", "parts")
 def expanded(data: Any, lines: Lines, path: Path) -> ExpandedCase:
     """Evaluate the expressions of a case and put its parts in place.
 
+    Everything below sees plain values, components and connections: a part of the network gives the
+    same rows as the same components written out.
+
     Parameters
     ----------
     data : mapping

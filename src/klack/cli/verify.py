@@ -27,7 +27,13 @@ _WIDTH = 100
 
 
 def print_groups() -> None:
-    """One sentence per group."""
+    """One sentence per group.
+
+    A check needs its name, its source and five numbers; side by side they do not fit into the 100
+    columns of a terminal, and hundreds of rows hide the one that matters.  So the table has one row
+    per group; what failed and what came closest to its tolerance follows in full; ``--all`` prints
+    all checks in that form, and ``--html`` makes a table of them that can be searched.
+    """
     width = max(map(len, COVERS)) + 2
     for group, sentence in COVERS.items():
         indent = " " * width

@@ -79,6 +79,10 @@ def _declared(declaration: str, items: list[str], words: str) -> str:
 class ContactText:
     """Lines of one contact.
 
+    Without a film the contact force is a function of the gap: in series with a compliance ``D`` it
+    solves ``F = f(-gap - D F)`` inside a function.  A film in series with a compliance has its
+    compression ``e`` as a state, see :func:`contact_text`.
+
     Parameters
     ----------
     suffix : str

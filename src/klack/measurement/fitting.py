@@ -244,7 +244,23 @@ def follow_profiles(
     covariance: ShotCovariance,
     indices: Sequence[int],
 ) -> list[Profile]:
-    """Follow the profiles of some parameters, both sides of all of them side by side.
+    r"""Follow the profiles of some parameters, both sides of all of them side by side.
+
+    One parameter is moved from its best value step by step and all others are fitted again at each.
+    The sum of squares on this path, ``S_p``, shows bent and one-sided uncertainty that standard
+    errors cannot (Raue et al. 2009).  It is brought to the scale on which the scatter between
+    strokes counts,
+
+    .. math:: \Lambda(z_j) = (S_p(z_j) - S_{min}) \, \frac{(H^{-1})_{jj}}{C_{jj}}, \qquad
+              H = J^T W J ,
+
+    so that near the best value ``Lambda = (z_j - \hat z_j)^2 / C_jj`` with the covariance *C* of
+    whole strokes (the vertical adjustment of Chandler & Bate 2007).  The 95 % interval is where
+    ``Lambda`` stays below the square of Student's quantile; for a linear model it is the one of the
+    standard error.
+
+    The others are fitted by Gauss-Newton steps with the Jacobian of the best fit, kept up to date
+    by Broyden's (1965) rank-one formula: two or three evaluations a point.
 
     Parameters
     ----------

@@ -43,6 +43,17 @@ _FEWEST = 6
 def find_outliers(time: NDArray[np.float64], lift: Matrix) -> dict[int, str]:
     """Reasons by the row of the stroke.
 
+    Only what is beyond doubt is discarded: scatter from shot to shot is the matter to be measured.
+
+    ========== ===============================================================================
+    no motion  lift moves by less than 20 % of the median way
+    clipped    ten samples or more stay at the largest or smallest value, while the median stroke
+               exceeds it by five standard deviations of the noise
+    noise      more than 3 times the median noise of the set
+    shape      RMS distance from the median stroke above 4 times the median distance, and above
+               it by 6 standard deviations (from the median absolute deviation); 6 strokes or more
+    ========== ===============================================================================
+
     Parameters
     ----------
     time : array, shape (n,) [s]

@@ -223,7 +223,13 @@ _FIT_SETTLED = 1e-6  # of the length
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PulseFit:
-    """Best shift and factor.
+    r"""Best shift and factor.
+
+    .. math:: \min_{\tau, a} \sum_k \left[ a\, y(t_k + \tau) - x(t_k) \right]^2, \qquad
+        a(\tau) = \frac{\sum x y}{\sum y^2}
+
+    from a little before the front of the measured pulse to a little behind its end.  In a linear
+    bar the factor is that of the speed.
 
     Parameters
     ----------

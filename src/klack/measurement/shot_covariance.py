@@ -177,6 +177,11 @@ _MOST_PART = 0.3
 class Identifiability:
     """Identifiability from the sensitivities alone, without scatter.
 
+    With the Jacobian scaled by the bounds, ``J`` by ``z``, and weights *W*, the singular values of
+    ``W^1/2 J`` say by how many standard deviations of the data the model moves when a combination
+    of parameters (the right singular vector) crosses its bounds; small ones are combinations that
+    the data do not see (Bellman & Aström 1970; Belsley, Kuh & Welsch 1980, ch. 3).
+
     Parameters
     ----------
     singular_values : array, shape (p,) [-]

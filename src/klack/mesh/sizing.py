@@ -172,6 +172,10 @@ def element_count(
 ) -> dict[str, float]:
     """Elements that each wanted size causes.
 
+    A size of 1 um instead of 1 mm makes a thousand million times as many tetrahedra.  The estimate
+    is 0.5 to 1.5 of what netgen makes at a single size; the grading between two sizes is left out.
+    Compared with the memory is what mesh, stiffness and mass of so many elements take.
+
     Parameters
     ----------
     sizing : MeshSizing

@@ -35,6 +35,9 @@ __all__ = ["Schematic", "schematic_of", "schematic_svg", "with_legend"]
 class Schematic:
     """A drawn network, in px.
 
+    Read from left to right: sources, lines and chambers of the fluid, what joins fluid and bodies,
+    the bodies, springs, stops and magnets, drivers.  See :mod:`klack.schematic.columns`.
+
     Parameters
     ----------
     symbols : tuple of Symbol

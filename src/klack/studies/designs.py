@@ -264,7 +264,11 @@ class Range:
 
 @dataclass(frozen=True, slots=True)
 class Normal:
-    """Gauss's distribution, cut off five standard deviations from its mean (6e-7 of it)."""
+    """Gauss's distribution, cut off five standard deviations from its mean (6e-7 of it).
+
+    Each maps a share of probability to a value (inversion; Devroye 1986, chapter II.2), so that a
+    design of points in the unit cube serves them all.
+    """
 
     mean: float
     deviation: float

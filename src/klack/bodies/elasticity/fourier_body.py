@@ -216,6 +216,11 @@ _TO_MERIDIAN = np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])  # U = a + b, W
 def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float = 0.0) -> csr_array:
     r"""Read at given angles what rows read from the half section: traces on rings.
 
+    They act on the degrees of freedom of :class:`klack.bodies.elasticity.fourier_body.FourierBody`;
+    their transposes give the forces that do the same work.  ``towards`` is the angle of the
+    direction in which the body bends, from the x axis: with 0° and 90° both motions of an order are
+    there.
+
     A row :math:`g` that reads :math:`g_r u_r + g_z u_z`, such as the normal displacement of a
     contact point of axisymmetric bodies (``ContactSpace.G_a``), reads
     :math:`(g_r U + g_z W) \cos n (\theta - \theta_0)` at the angle :math:`\theta`.

@@ -140,7 +140,20 @@ Floats = NDArray[np.float64]
 
 
 class NearLoads:
-    """Loads of one body with their answers.
+    r"""Loads of one body with their answers.
+
+    Of a body with flexibility F, loads :math:`f_i` and their answers :math:`u_i = F f_i`, the
+    combination :math:`u = \sum_i c_i u_i` with
+
+    .. math:: \sum_j (f_i^T u_j)\, c_j = u_i^T f, \qquad
+        e^2 = \frac{f^T F f - \sum_i c_i\, u_i^T f}{f^T F f}
+
+    is the nearest answer to a further load f in the norm of the strain energy (Galerkin's method;
+    Strang & Fix 1973, ch. 1), and e its relative error in that norm.  The energy :math:`f^T F f /
+    2` is known beforehand where the body is condensed to the places that the load acts on.
+
+    It is meant for pressures that widen with the force, seen from a distance: their difference is
+    in balance, and its answer decays away from where it acts (Saint-Venant).
 
     Examples
     --------

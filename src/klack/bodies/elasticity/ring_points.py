@@ -165,7 +165,22 @@ def _by_difference(spectrum: Floats, is_sine: NDArray[np.bool_], count: int) -> 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RingSections:
-    """Sections of a shaft of revolution.
+    r"""Sections of a shaft of revolution.
+
+    A section is one or two rings of nodes around a height *h*, with weights *w* whose sum is 1 and
+    whose mean height is *h*.  Its displacement is the weighted mean round the rings; its rotation
+    is that of the rigid motion which is nearest to the displacement of the rings with the same
+    weights. Of the amplitudes U, V, W of a Fourier order
+    (:mod:`klack.bodies.elasticity.fourier_body`) the mean leaves
+
+    .. math:: u_z = \sum w W, \quad \varphi_z = \frac{\sum w r V}{\sum w r^2} \quad (n = 0), \qquad
+        u_x = \sum w a, \quad
+        \varphi_y = \frac{\sum w (\zeta a - \tfrac12 r W)}{\sum w (\zeta^2 + \tfrac12 r^2)} \quad
+        (n = 1),
+
+    with the height :math:`\zeta` above *h*, for a body that bends towards *x*, and nothing of
+    higher orders.  The transposes are the forces and moments, spread evenly round the rings, that
+    do work on them.
 
     Parameters
     ----------

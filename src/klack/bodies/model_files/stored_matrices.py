@@ -153,6 +153,10 @@ class _Arrays:
 def read_numpy_matrix(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     """Read one matrix.
 
+    Understood are ``scipy.sparse.save_npz`` (one matrix), full arrays by name (``K``, ``M``), and
+    sparse ones as ``K_data``, ``K_indices``, ``K_indptr`` or ``K_data``, ``K_row``, ``K_col``.
+    Arrays ``node`` and ``direction`` say what the rows are.
+
     Raises
     ------
     InputError
@@ -228,6 +232,8 @@ _MATLAB_HINT = "save it again: save('model.mat', 'K', 'M', '-v7')."
 
 def read_matlab_matrix(path: Path, name: str | None, role: Role | None) -> SystemMatrix:
     """Read one matrix; ``name`` may be ``structure.field``.
+
+    Those of version 7.3 are HDF5 and need h5py.
 
     Raises
     ------

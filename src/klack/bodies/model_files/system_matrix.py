@@ -253,6 +253,10 @@ _TURNED = {"r": 1, "ur": 1}
 def read_row_places(path: Path) -> RowPlaces:
     """Read the table.
 
+    Understood are ``node.direction`` (CalculiX ``.dof``), ``node, direction`` and ``row, node,
+    direction`` (the mapping that ANSYS HBMAT writes).  A direction is 1 to 6, x, y, z, UX, UY, UZ,
+    R or Z, or ROTX ... for rotations.
+
     Raises
     ------
     InputError

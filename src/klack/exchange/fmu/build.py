@@ -31,6 +31,9 @@ __all__ = ["build_fmu", "data_header", "source_texts"]
 def data_header(model: ModalModel, guid: str) -> str:
     """Text of the header.
 
+    Names and counts are seen by every source file; the arrays only by the one that defines
+    ``KLACK_ARRAYS`` before.  Every number has 17 digits, so the compiler reads the same double.
+
     Parameters
     ----------
     model : ModalModel

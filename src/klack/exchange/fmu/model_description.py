@@ -48,6 +48,9 @@ def feels_speed(contact: ModelContact) -> bool:
 class Dependencies:
     """Value references of unknowns and of what they depend on, all in increasing order.
 
+    An importing program finds algebraic loops and the pattern of its Jacobian from these lists.  No
+    output depends directly on an input: forces act on velocities, and those on displacements.
+
     Parameters
     ----------
     outputs, derivatives : tuple of int

@@ -158,7 +158,12 @@ _OF_THE_FILE = re.compile(r"(wf_|ni_|dimension|class$|name$|_netcdf|crest)", re.
 
 
 def unpacked(about: About) -> Callable[[Vector], Vector] | None:
-    """Function from stored numbers to values; None if they are the values."""
+    """Function from stored numbers to values; None if they are the values.
+
+    Known are those of netCDF: ``value = stored * scale_factor + add_offset``; stored numbers equal
+    to ``_FillValue`` or ``missing_value``, or outside ``valid_min`` to ``valid_max``, are missing.
+    Any other key that sounds like a scale makes the numbers doubtful: what it means is not guessed.
+    """
     factor, offset = _number(about, _FACTOR, 1.0), _number(about, _OFFSET, 0.0)
     missing = [value for key in _MISSING if isinstance(value := about.get(key), float)]
     low, high = _number(about, "valid_min", -np.inf), _number(about, "valid_max", np.inf)

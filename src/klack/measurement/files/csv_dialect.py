@@ -329,6 +329,10 @@ _Said = Mapping[str, tuple[str, list[str]]]
 class TableHeader:
     """Values for all channels together, or one for each; none where the file says nothing.
 
+    Oscilloscopes and loggers write a word and its values, one for all channels or one for each:
+    ``Sample Interval,1e-9``, ``Vertical Units,V,A``, ``Delta_X 1e-5 1e-5``, ``t0 = -5e-3``, or
+    ``Start,Increment`` above two numbers.
+
     Parameters
     ----------
     starts, steps : tuple of float [s]

@@ -43,6 +43,10 @@ _CELL = 40  # bytes of a faulty cell shown
 class NumberTable:
     """Columns of numbers.
 
+    The file is gone through once to count rows and to find faults.  Tables of moderate size stay in
+    memory as numbers; of larger ones only the places of the blocks are kept, and blocks are parsed
+    again when they are asked for.
+
     Parameters
     ----------
     path : Path

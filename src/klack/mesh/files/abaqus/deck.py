@@ -57,7 +57,13 @@ class Placement:
 
 
 def read_placement(keyword: Keyword) -> Placement:
-    """Placement of an *INSTANCE; without data lines it is left where the part is drawn."""
+    r"""Placement of an *INSTANCE; without data lines it is left where the part is drawn.
+
+    The data lines of *INSTANCE hold a translation :math:`t` and, in a second line, two points
+    :math:`a, b` of an axis and an angle in degrees.  The translation comes first:
+
+    .. math:: x' = R\,(x + t - a) + a .
+    """
     rows = [[number(line, t) for t in line.fields] for line in keyword.lines() if line.fields]
     if [len(row) for row in rows] not in ([], [3], [3, 7]):
         raise InputError(

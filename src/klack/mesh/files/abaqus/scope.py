@@ -19,7 +19,7 @@ _SMALLEST = 1e-9  # sine of the angle between axes, relative length
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeSystem:
-    """Frame of node coordinates.
+    r"""Frame of node coordinates, :math:`x = a + x_1' e_1 + x_2' e_2 + x_3' e_3`.
 
     Parameters
     ----------

@@ -32,7 +32,12 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """Family, and the nodes of the ANSYS element in its order."""
+    """Family, and the nodes of the ANSYS element in its order.
+
+    Corners of a brick are I J K L M N O P, mid nodes Q to X of the two quadrilaterals and Y Z A B
+    between them.  A wedge has K = L and O = P, a tetrahedron K = L and M = N = O = P, a pyramid M =
+    N = O = P (ANSYS element reference, SOLID185 and SOLID186).
+    """
 
     family: str
     order: tuple[int, ...]

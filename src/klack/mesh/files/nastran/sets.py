@@ -178,7 +178,10 @@ class _Definition:
 
 
 class Frames:
-    """All coordinate systems of a file.
+    r"""All coordinate systems of a file.
+
+    A system is given by three points: A its origin, B on its z axis, C in its x-z plane.  Angles
+    are in degrees; the spherical angle :math:`\theta` is measured from the z axis.
 
     Parameters
     ----------
