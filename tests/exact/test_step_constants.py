@@ -49,9 +49,9 @@ PLAIN = (-1, 0, 1, 2)  # kinds of a law: such numbers stand for other things as 
 NUMBER = r"(?<![\w.])(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?(?![\w.])"
 USERS = (
     "contact.laws",
-    "exchange.fmu.data_header",
+    "exchange.fmu.build",
     "exchange.matlab_model",
-    "exchange.modelica_contact",
+    "exchange.modelica",
     "exchange.state_space",
     "simulation.contact_step",
     "simulation.interface_step",

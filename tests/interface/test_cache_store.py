@@ -33,7 +33,7 @@ from klack.assembling.generated_mesh import entry_of_mesh, mesh_of_entry
 from klack.errors import CacheWarning, InputError
 from klack.machine.cache.content import content_key
 from klack.machine.cache.entry import DamagedEntry, Entry, read_entry, write_entry
-from klack.machine.cache.remember import origin, remembered
+from klack.machine.cache.remember import origin, remembered, source_files
 from klack.machine.cache.result_cache import ResultCache, result_cache
 from klack.mesh.meridian import mesh_meridian
 from klack.mesh.profile import Arc, Line, Profile
@@ -244,6 +244,14 @@ def test_the_origin_is_the_same_as_long_as_nothing_changes(monkeypatch):
     origin.cache_clear()
 
     assert first == again != other
+
+
+def test_sources_that_are_not_there_change_no_key_in_silence(tmp_path):
+    """A folder that was moved would drop out of the key; then edits of it were not noticed."""
+    (tmp_path / "empty").mkdir()
+    for name in ("empty", "none", "none.py"):
+        with pytest.raises(FileNotFoundError, match="no source of klack"):
+            source_files(tmp_path / name)
 
 
 LARGE = 10**9

@@ -239,8 +239,8 @@ def test_every_word_stands_for_one_class():
 def test_every_component_of_the_domains_is_registered():
     registered = {path for _, path in COMPONENTS}
     existing = set()
-    for domain in ("mechanics", "hydraulics", "pneumatics", "magnetics", "thermal"):
-        folder = Path(klack.__file__).parent / domain
+    for domain in ("mechanics", "hydraulics", "hydraulics.gas", "magnetics", "thermal"):
+        folder = Path(klack.__file__).parent.joinpath(*domain.split("."))
         for info in iter_modules([str(folder)]):
             module = import_module(f"klack.{domain}.{info.name}")
             existing |= {

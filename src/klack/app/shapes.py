@@ -15,7 +15,8 @@ from klack.app.plan_review import review
 from klack.app.valve_plan import ValvePlan
 from klack.case.any_case import tree_of
 from klack.errors import InputError
-from klack.viewer.source import body_view, view_of_case, view_of_source
+from klack.viewer.drawn import body_view, view_of_case
+from klack.viewer.source import view_of_source
 from klack.viewer.view import View, payload_of
 
 __all__ = ["LARGEST_SCENE", "Shapes", "packed_scene"]

@@ -86,7 +86,7 @@ def run_stroke(
     Parameters
     ----------
     variants : sequence of str
-        Among :data:`klack.case.valve.VARIANTS`; those of the case by default.
+        Among :data:`klack.case.levels.VARIANTS`; those of the case by default.
     after : StrokeStudy, optional
         Continue from the end of this study of the same case, for another duration.
     progress : callable

@@ -16,7 +16,7 @@ from klack.machine.cache.entry import Entry
 from klack.machine.cache.result_cache import ResultCache
 from klack.machine.cores import available_cores
 
-__all__ = ["origin", "remembered"]
+__all__ = ["origin", "remembered", "source_files"]
 
 
 FORMAT = 1
@@ -26,7 +26,10 @@ _DISTRIBUTIONS = (
     *("numpy", "scipy", "numba", "netgen-mesher", "netgen-occt"),
     *("mkl", "pypardiso", "ngsolve"),
 )
-_SOURCES = ("cache", "mesh", "elasticity", "contact", "reduction")
+_SOURCES = (
+    *("machine/cache", "mesh", "bodies/elasticity", "contact", "bodies/reduction"),
+    "materials/material.py",
+)
 _THREADS = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_CBWR")
 
 
@@ -48,11 +51,18 @@ def origin() -> str:
     )
 
 
+def source_files(place: Path) -> list[Path]:
+    """Files of Python of a folder, or the file itself; never none, which would change no key."""
+    found = [place] if place.is_file() else list(place.rglob("*.py"))
+    if not found:
+        raise FileNotFoundError(f"no source of klack in {place}")
+    return found
+
+
 def _sources() -> str:
     root = Path(klack.__file__).parent
-    paths = [path for name in _SOURCES for path in (root / name).rglob("*.py")]
     digest = hashlib.sha256()
-    for path in sorted([*paths, root / "materials/material.py"]):
+    for path in sorted(path for name in _SOURCES for path in source_files(root / name)):
         digest.update(f"{path.relative_to(root).as_posix()}\n".encode())
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()
