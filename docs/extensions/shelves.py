@@ -66,7 +66,7 @@ def setup(app: Sphinx) -> ExtensionMetadata:
 
 def _read(app: Sphinx, page: str, content: list[str]) -> None:
     if page == "reference/api":
-        content[0] += "\n```{toctree}\n:hidden:\n:glob:\n\napi/*\n```\n"
+        content[0] += "\n```{toctree}\n:hidden:\n:glob:\n\napi/*\napi/*/*\n```\n"
     if page != "index":
         return
     blocks = []
