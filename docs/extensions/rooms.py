@@ -1,7 +1,8 @@
 """Pages of the Python API: one page for each room of klack.
 
-A page ``reference/api/<room>.md`` (or ``<room>/<part>.md``) says in words what the room is for; below them stands here what
-its modules list in ``__all__``: first a table of names, then their docstrings.
+A page ``reference/api/<room>.md`` (or ``<room>/<part>.md``) says in words what the room is for;
+below them stands here what its modules list in ``__all__``: first a table of names, then their
+docstrings.
 """
 
 import ast

@@ -28,7 +28,7 @@ _TOLD = 40
 
 
 _COLUMN = JsonForm(
-    "ColumnJson",
+    "HeatColumnJson",
     "One quantity of all points.",
     Key("unit", str, "SI; 1 for a pure number."),
     Key("values", list[Real], "One per point; null where there is none."),

@@ -45,7 +45,7 @@ from klack.terminal.tables import TextTable
 __all__ = ["STUDY", "study_to_json"]
 
 
-class ColumnJson(TypedDict):
+class StudyColumnJson(TypedDict):
     """A parameter, what follows from parameters, or a measure, at every point."""
 
     unit: Annotated[str, Field(description="SI; 1 for a pure number, empty for words.")]
@@ -142,9 +142,9 @@ class StudyJson(TypedDict):
     design: str
     points: int
     failed: int
-    parameters: dict[str, ColumnJson]
-    linked: dict[str, ColumnJson]
-    measures: dict[str, ColumnJson]
+    parameters: dict[str, StudyColumnJson]
+    linked: dict[str, StudyColumnJson]
+    measures: dict[str, StudyColumnJson]
     sensitivities: Annotated[
         dict[str, dict[str, IndexJson]],
         Field(description="Sobol's indices by measure and parameter, of Saltelli's design."),
@@ -289,7 +289,7 @@ def _indices(item: Sensitivity | StudySurrogate, k: int) -> IndexJson:
     }
 
 
-def _column(item: StudyColumn) -> ColumnJson:
+def _column(item: StudyColumn) -> StudyColumnJson:
     values: list[Any] = [number_or_none(value) for value in item.values]
     if item.words:
         values = [item.words[int(value)] for value in item.values]
