@@ -32,6 +32,7 @@ from klack.exchange.results.spatial_series import valve_shapes, write_spatial_se
 from klack.simulation.film_sectors import sector_pressure
 from klack.simulation.network_compile import compile_network
 from klack.simulation.step_sizes import step_sizes
+from klack.transient.placed_bodies import rigid_coordinates
 from klack.transient.tilting_films import film_state
 
 pytestmark = pytest.mark.slow  # one build of a valve, and half a minute where kernels are compiled
@@ -162,12 +163,13 @@ def test_a_film_tilts_as_the_needle_does_also_over_the_edge_of_a_face():
     moving = valve.spatial.of(compile_network(rows, sizes), sizes)
     faces = valve.spatial.model
     first, last = next(contact[1:] for contact in faces.contacts if contact[0] == "opening")
+    shapes = faces.rigid[:, : moving.rigid_count]
     slid = 0
     for turn in np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False):
         placement = np.zeros(6)
         placement[:2] = 5e-6 * np.cos(turn), 5e-6 * np.sin(turn)
         placement[3:5] = -8e-4 * np.sin(turn), 8e-4 * np.cos(turn)
-        moving.q[: moving.rigid_count] = moving.coordinates(placement)
+        moving.q[: moving.rigid_count] = rigid_coordinates(shapes, placement)
         moving.take_gaps()
         slid += np.count_nonzero(moving.gap0[first:last] > 1e-3)
         lift, *tilts = film_state(moving.films, 0, moving.q)
