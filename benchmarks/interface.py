@@ -15,7 +15,6 @@ import numpy as np
 from klack.acoustics.comparison import compare_histories
 from klack.analyses.impact.full_level import run_full
 from klack.analyses.impact.interface_level import (
-    ExactGaps,
     build_interface,
     exact_gaps,
     simulate_case,
@@ -25,6 +24,7 @@ from klack.assembling.problem import build_problem
 from klack.case import load_case, shipped_cases
 from klack.case.guide import Placement
 from klack.case.schema import Case
+from klack.contact.gap_update import PlacedGaps
 from klack.contact.history import ImpactHistory
 from klack.machine.progress import silent
 from klack.transient.interface_model import InterfaceModel
@@ -57,7 +57,7 @@ def line(name: str, reference: ImpactHistory, history: ImpactHistory, seconds: f
     )
 
 
-def shared_model() -> tuple[InterfaceModel, ExactGaps, float]:
+def shared_model() -> tuple[InterfaceModel, PlacedGaps, float]:
     """Model of the centred meshes, its gaps at any placement, and the height of first touch."""
     case = placed(Placement())
     contact = case.contact.model_copy(update={"reach": _SPARE_REACH})
