@@ -23,7 +23,7 @@ _INSIDE = ("_kernel", "_step", "_rows")
 def modules(room: str) -> list[str]:
     """Names of the modules of a room (a package or a single module) that belong to the API."""
     if (PACKAGE / f"{room}.py").is_file():
-        return [f"klack.{room}"]
+        return [f"klack.{room.replace('/', '.')}"]
     files = sorted((PACKAGE / room).rglob("*.py"), key=lambda f: (len(f.parts), f))
     names = [
         ".".join(("klack", *file.relative_to(PACKAGE).with_suffix("").parts)) for file in files

@@ -146,7 +146,8 @@ def test_drops_are_read_as_they_were_thrown(drops):
 
     assert [d.name for d in found.distributions] == ["restitution", "rebound height"]
     # noise of 50 nm on flights of 0.4 ms, 160 samples
-    assert (restitution.measured, restitution.computed) == pytest.approx((SAME, SAME), abs=0.005)
+    for values in (restitution.measured, restitution.computed):
+        assert values == pytest.approx(SAME, abs=0.005)
     expected = 0.5 * (SAME * SPEED) ** 2 / DECELERATION
     assert risen.measured == pytest.approx(expected, rel=0.01)
     assert risen.computed == pytest.approx(expected, rel=0.01)

@@ -3,6 +3,7 @@
 Truth: the imports in the source, and the order of the rooms that ``docs/import_map.py`` states.
 """
 
+import ast
 import importlib.util
 import re
 from pathlib import Path
@@ -60,6 +61,20 @@ def test_picture_and_page_are_fresh(graph):
     assert MAP.picture(graph) == MAP.PICTURE.read_text(encoding="utf-8"), FRESH
     assert MAP.page(page, graph) == page, FRESH
     assert MAP.table(graph) in page
+
+
+def test_no_module_binds_a_name_twice():
+    """The second constant of a name would count for code that was written for the first."""
+    for file in MAP.PACKAGE.rglob("*.py"):
+        bound = [
+            name.id
+            for statement in ast.parse(file.read_text("utf-8")).body
+            if isinstance(statement, ast.Assign)
+            for target in statement.targets
+            for name in ast.walk(target)
+            if isinstance(name, ast.Name) and isinstance(name.ctx, ast.Store)
+        ]
+        assert len(bound) == len(set(bound)), file
 
 
 PLANTED = {

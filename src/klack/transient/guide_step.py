@@ -242,7 +242,7 @@ def rub_guide(modes: Modes, rub: GuideRub, before: Vector, step: Step) -> float:
     return answer
 
 
-_ROUNDS, _HALVINGS = 40, 12
+_ROUNDS, _SMALLER = 40, 12
 _FOUND, _NEARLY = 1e-11, 1e-6  # places that do not fit, over the clearance
 
 
@@ -357,7 +357,7 @@ def _search(
         rounds += 1
         change = np.linalg.solve(np.eye(n) - soft @ slopes, left)
         share, now = 1.0, size
-        for _ in range(_HALVINGS):
+        for _ in range(_SMALLER):
             tried = u + share * change
             force, slopes = _bearings(
                 films, bore, before, tried.reshape((heights, 2)), step, slides

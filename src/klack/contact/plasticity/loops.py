@@ -321,7 +321,7 @@ def loops_of_entry(entry: Entry) -> YieldingLoops:
     )
 
 
-_STATES, _PLACES = 129, 65
+_FINE, _PLACES = 129, 65
 """Of the tables: the elastic curve within 1e-4 of the force, the loss within 1e-4 of itself."""
 
 _LITTLE = 1e-2
@@ -362,7 +362,7 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
         shapes[i] = along(places)
     # faces as made meet at a weighted gap that a coarse mesh closes late
     parted = np.array([one.set for one in loops.openings]) - loops.openings[0].set
-    fine = largest[0] + (largest[-1] - largest[0]) * (np.arange(_STATES) / (_STATES - 1)) ** 2
+    fine = largest[0] + (largest[-1] - largest[0]) * (np.arange(_FINE) / (_FINE - 1)) ** 2
     closing, shape = (
         scipy.interpolate.PchipInterpolator(largest, force)(fine),
         scipy.interpolate.PchipInterpolator(largest, shapes)(fine),
