@@ -117,5 +117,5 @@ def test_the_map_prints_for_mermaid(graph):
     text = MAP.mermaid(graph)
 
     assert text.startswith("flowchart TD\n")
-    assert "    contact --> elasticity\n" in text
+    assert "    contact --> bodies\n" in text
     assert "    mesh --> ground\n" in text
