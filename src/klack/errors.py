@@ -15,7 +15,6 @@ __all__ = [
     "MissingExtraError",
     "foreign_reading",
     "optional_package",
-    "refuse",
     "refuse_if",
     "require_nonnegative",
     "require_positive",
@@ -111,13 +110,6 @@ def foreign_reading(where: str, what: str, hint: str) -> Iterator[None]:
         raise InputError(
             where, got=f"{what} that cannot be read ({said})", expected="a whole file", hint=hint
         ) from error
-
-
-def refuse(*rules: tuple[object, KlackError]) -> None:
-    """Raise the error of the first rule that is broken: pairs of whether it is, and its error."""
-    for broken, error in rules:
-        if broken:
-            raise error
 
 
 def require_positive(where: str, value: float, unit: str) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from klack.case.bodies import CaseBody
-from klack.errors import InputError, refuse, require_positive
+from klack.errors import InputError, require_positive
 from klack.mesh.mesh import Mesh
 
 __all__ = ["held_nodes", "sector_nodes", "surface_nodes"]
@@ -42,26 +42,20 @@ def sector_nodes(
     InputError
         For an axisymmetric mesh, sectors that overlap, or a sector without a node.
     """
-    refuse(
-        (
-            mesh.dimension != 3,
-            InputError(
-                f"sector_nodes: surface '{surface}'",
-                got="an axisymmetric mesh",
-                expected="a solid mesh, because sectors are not axisymmetric",
-                hint="hold the whole surface, or sweep the meridian to a solid first.",
-            ),
-        ),
-        (
-            count < 1,
-            InputError(
-                "sector_nodes: count",
-                got=str(count),
-                expected="at least one sector",
-                hint="three sectors act like a chuck.",
-            ),
-        ),
-    )
+    if mesh.dimension != 3:
+        raise InputError(
+            f"sector_nodes: surface '{surface}'",
+            got="an axisymmetric mesh",
+            expected="a solid mesh, because sectors are not axisymmetric",
+            hint="hold the whole surface, or sweep the meridian to a solid first.",
+        )
+    if count < 1:
+        raise InputError(
+            "sector_nodes: count",
+            got=str(count),
+            expected="at least one sector",
+            hint="three sectors act like a chuck.",
+        )
     require_positive("sector_nodes: width_rad", width_rad, "rad")
     pitch = 2 * np.pi / count
     if width_rad > pitch * (1 + 1e-12):

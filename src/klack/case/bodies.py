@@ -19,7 +19,7 @@ from klack.case.geometry import Geometry, MeshSettings, Support
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import PARAMETERS, Written
 from klack.case.plausible import GO_ON, Number
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, key_text, nearest, one_of
 from klack.input.section import Count, Name, NamedSection, PlainName, Section, Text
 from klack.materials.hardening import (
@@ -409,28 +409,20 @@ class Reduction(Section):
         cls, shifts: Mapping[str, tuple[float, ...]]
     ) -> Mapping[str, tuple[float, ...]]:
         for body, frequencies in shifts.items():
-            refuse(
-                (
-                    not 1 <= len(frequencies) <= _MOST_SHIFTS,
-                    CaseProblem(
-                        (body,),
-                        got=f"{len(frequencies)} shifts",
-                        expected=f"1 to {_MOST_SHIFTS} frequencies",
-                        hint="two are usual for a free body; leave the body out for its "
-                        "residual mode.",
-                    ),
-                ),
-                (
-                    len(set(frequencies)) < len(frequencies),
-                    CaseProblem(
-                        (body,),
-                        got="the same shift twice",
-                        expected="different frequencies",
-                        hint="each adds one mode per contact; a second one at its place adds "
-                        "nothing.",
-                    ),
-                ),
-            )
+            if not 1 <= len(frequencies) <= _MOST_SHIFTS:
+                raise CaseProblem(
+                    (body,),
+                    got=f"{len(frequencies)} shifts",
+                    expected=f"1 to {_MOST_SHIFTS} frequencies",
+                    hint="two are usual for a free body; leave the body out for its residual mode.",
+                )
+            if len(set(frequencies)) < len(frequencies):
+                raise CaseProblem(
+                    (body,),
+                    got="the same shift twice",
+                    expected="different frequencies",
+                    hint="each adds one mode per contact; a second one at its place adds nothing.",
+                )
         return shifts
 
     def choice(self, body: str) -> ModeChoice:

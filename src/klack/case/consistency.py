@@ -10,7 +10,6 @@ from klack.case.outputs import check_outputs
 from klack.case.valve_roles import find_roles
 from klack.case.valve_sections import ValveSections
 from klack.contact.friction import MOST_FRICTION
-from klack.errors import refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import format_si
 
@@ -81,62 +80,48 @@ def check_given(case: ImpactSections) -> None:
                 hint=f"remove '{section}', or give '{name}' a mesh.",
                 on_key=True,
             )
-    refuse(
-        (
-            not case.motion.placement.is_centred,
-            CaseProblem(
-                ("motion", "placement"),
-                got=f"an off-axis placement with '{name}', {what}",
-                expected="a centred body: a port moves along the axis alone",
-                hint="remove 'placement'.",
-                on_key=True,
-            ),
-        ),
-        (
-            case.run.transfer is not None,
-            CaseProblem(
-                ("run", "transfer"),
-                got=f"transfer functions of the full order with '{name}', {what}",
-                expected="bodies that klack reduces itself",
-                hint="remove 'transfer'.",
-                on_key=True,
-            ),
-        ),
-        (
-            case.reduction.shifts,
-            CaseProblem(
-                ("reduction", "shifts"),
-                got=f"shifts of attachment modes with '{name}', {what}",
-                expected="two meshed bodies: there are no attachment modes without",
-                hint="remove 'shifts'.",
-                on_key=True,
-            ),
-        ),
-    )
+    if not case.motion.placement.is_centred:
+        raise CaseProblem(
+            ("motion", "placement"),
+            got=f"an off-axis placement with '{name}', {what}",
+            expected="a centred body: a port moves along the axis alone",
+            hint="remove 'placement'.",
+            on_key=True,
+        )
+    if case.run.transfer is not None:
+        raise CaseProblem(
+            ("run", "transfer"),
+            got=f"transfer functions of the full order with '{name}', {what}",
+            expected="bodies that klack reduces itself",
+            hint="remove 'transfer'.",
+            on_key=True,
+        )
+    if case.reduction.shifts:
+        raise CaseProblem(
+            ("reduction", "shifts"),
+            got=f"shifts of attachment modes with '{name}', {what}",
+            expected="two meshed bodies: there are no attachment modes without",
+            hint="remove 'shifts'.",
+            on_key=True,
+        )
     _check_law(case, name, what)
     forms = ("crown", "waviness", "tilt", "roughness")
     form = next((key for key in forms if getattr(case.contact, key)), None)
-    refuse(
-        (
-            not case.contact.faces.is_none,
-            CaseProblem(
-                ("contact", "friction" if case.contact.friction else "static_friction"),
-                got=f"friction with '{name}', {what}",
-                expected="no friction: without a surface nothing is known of its slip",
-                hint="leave it out, or give the body a mesh.",
-            ),
-        ),
-        (
-            form is not None,
-            CaseProblem(
-                ("contact", str(form)),
-                got=f"the key '{form}' of faces with '{name}', {what}",
-                expected="bodies with surfaces",
-                hint=f"remove '{form}', or give '{name}' a mesh.",
-                on_key=True,
-            ),
-        ),
-    )
+    if not case.contact.faces.is_none:
+        raise CaseProblem(
+            ("contact", "friction" if case.contact.friction else "static_friction"),
+            got=f"friction with '{name}', {what}",
+            expected="no friction: without a surface nothing is known of its slip",
+            hint="leave it out, or give the body a mesh.",
+        )
+    if form is not None:
+        raise CaseProblem(
+            ("contact", str(form)),
+            got=f"the key '{form}' of faces with '{name}', {what}",
+            expected="bodies with surfaces",
+            hint=f"remove '{form}', or give '{name}' a mesh.",
+            on_key=True,
+        )
     for i, level in enumerate(case.run.levels):
         if level not in GIVEN_LEVELS:
             raise CaseProblem(
@@ -204,27 +189,22 @@ def check_consistency(case: ImpactSections) -> None:
     ):
         check(case)
     centred = case.motion.placement.is_centred and case.guide is None and case.shots is None
-    refuse(
-        (  # worn faces are those of a centred impact
-            case.contact.worn is not None and not (centred and case.has_surfaces),
-            CaseProblem(
-                ("contact", "worn"),
-                got="worn faces of bodies that meet off-axis, or of given models",
-                expected="a centred impact of bodies with meshes",
-                hint="remove 'worn', or the placement, guide or shots.",
-                on_key=True,
-            ),
-        ),
-        (
-            "lumped" in case.run.levels and case.lumped is None,
-            CaseProblem(
-                ("run", "levels"),
-                got="the level 'lumped' without a section 'lumped'",
-                expected="its stiffness",
-                hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the level.",
-            ),
-        ),
-    )
+    # worn faces are those of a centred impact
+    if case.contact.worn is not None and not (centred and case.has_surfaces):
+        raise CaseProblem(
+            ("contact", "worn"),
+            got="worn faces of bodies that meet off-axis, or of given models",
+            expected="a centred impact of bodies with meshes",
+            hint="remove 'worn', or the placement, guide or shots.",
+            on_key=True,
+        )
+    if "lumped" in case.run.levels and case.lumped is None:
+        raise CaseProblem(
+            ("run", "levels"),
+            got="the level 'lumped' without a section 'lumped'",
+            expected="its stiffness",
+            hint="add 'lumped: {stiffness: 1e9 N/m}', or remove the level.",
+        )
 
 
 def require_known(
@@ -281,27 +261,21 @@ def check_surface(case: CaseFile, key: Key, surface: SurfaceName) -> None:
 
 def _check_roles(case: ImpactSections) -> None:
     moving, stop = case.contact.between
-    refuse(
-        (
-            moving.body == stop.body,
-            CaseProblem(
-                ("contact", "between"),
-                got=f"{moving} and {stop}, two surfaces of one body",
-                expected="surfaces of two bodies",
-                hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
-            ),
-        ),
-        (
-            case.moving_body.fixed,
-            CaseProblem(
-                ("bodies", moving.body, "fixed"),
-                got=f"supports of '{moving.body}', the body that moves",
-                expected="no supports there",
-                hint="remove 'fixed', or swap the two surfaces in contact.between.",
-                on_key=True,
-            ),
-        ),
-    )
+    if moving.body == stop.body:
+        raise CaseProblem(
+            ("contact", "between"),
+            got=f"{moving} and {stop}, two surfaces of one body",
+            expected="surfaces of two bodies",
+            hint=f"name a surface of {one_of(n for n in case.bodies if n != moving.body)}.",
+        )
+    if case.moving_body.fixed:
+        raise CaseProblem(
+            ("bodies", moving.body, "fixed"),
+            got=f"supports of '{moving.body}', the body that moves",
+            expected="no supports there",
+            hint="remove 'fixed', or swap the two surfaces in contact.between.",
+            on_key=True,
+        )
     models = [case.bodies[s.body].geometry.dimension for s in case.contact.between]
     if models[0] != models[1] and case.has_surfaces:
         flat, solid = (moving, stop) if models[0] == 2 else (stop, moving)
@@ -360,27 +334,21 @@ def _check_local_law(case: ImpactSections) -> None:
     correction, law = case.reduction.correction, case.contact.local_law.kind
     if not case.has_surfaces:
         return  # in given_consistency
-    refuse(
-        (
-            correction == "consistent" and law != "consistent",
-            CaseProblem(
-                ("contact", "local_law", "kind"),
-                got=f"a {law} law with the correction 'consistent'",
-                expected="the law 'consistent', which carries the residual compliance",
-                hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
-            ),
-        ),
-        (
-            correction != "consistent" and law == "consistent",
-            CaseProblem(
-                ("reduction", "correction"),
-                got=f"the correction '{correction}' with a consistent local law",
-                expected="a local law of the kind linear, hertz or submodel",
-                hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
-                "correction 'consistent'.",
-            ),
-        ),
-    )
+    if correction == "consistent" and law != "consistent":
+        raise CaseProblem(
+            ("contact", "local_law", "kind"),
+            got=f"a {law} law with the correction 'consistent'",
+            expected="the law 'consistent', which carries the residual compliance",
+            hint="remove local_law, or set 'reduction: {correction: attachment}' for it.",
+        )
+    if correction != "consistent" and law == "consistent":
+        raise CaseProblem(
+            ("reduction", "correction"),
+            got=f"the correction '{correction}' with a consistent local law",
+            expected="a local law of the kind linear, hertz or submodel",
+            hint="add 'contact: {local_law: {kind: submodel, size: 1 mm}}', or use the "
+            "correction 'consistent'.",
+        )
 
 
 def _check_opposite(case: ImpactSections) -> None:
@@ -390,26 +358,20 @@ def _check_opposite(case: ImpactSections) -> None:
         check_surface(case, ("opposite", "between", i), surface)
     stop, moving = case.opposite.between
     between = [surface.body for surface in case.contact.between]
-    refuse(
-        (
-            moving.body != between[0] or stop.body in between,
-            CaseProblem(
-                ("opposite", "between"),
-                got=f"{stop} and {moving}",
-                expected=f"a surface of the third body, then one of '{between[0]}', which moves",
-                hint="the upper stop is a separate body.",
-            ),
-        ),
-        (
-            case.bodies[stop.body].geometry.dimension != case.dimension,
-            CaseProblem(
-                ("bodies", stop.body, "geometry", "model"),
-                got=f"'{stop.body}' of another dimension than the moving body",
-                expected="all bodies axisymmetric or all three-dimensional",
-                hint="take 'model: swept' with 'layers: 18'.",
-            ),
-        ),
-    )
+    if moving.body != between[0] or stop.body in between:
+        raise CaseProblem(
+            ("opposite", "between"),
+            got=f"{stop} and {moving}",
+            expected=f"a surface of the third body, then one of '{between[0]}', which moves",
+            hint="the upper stop is a separate body.",
+        )
+    if case.bodies[stop.body].geometry.dimension != case.dimension:
+        raise CaseProblem(
+            ("bodies", stop.body, "geometry", "model"),
+            got=f"'{stop.body}' of another dimension than the moving body",
+            expected="all bodies axisymmetric or all three-dimensional",
+            hint="take 'model: swept' with 'layers: 18'.",
+        )
 
 
 def _check_roughness(case: ImpactSections) -> None:
@@ -424,21 +386,15 @@ def _check_roughness(case: ImpactSections) -> None:
         (("contact", "local_law"), contact.local_law.kind != "consistent", "a given local law"),
         (("opposite",), case.opposite is not None, "an upper stop"),
     ]
-    refuse(
-        *(
-            (
-                is_there,
-                CaseProblem(
-                    ("contact", "roughness"),
-                    got=f"rough faces and {what} ({'.'.join(map(str, key))})",
-                    expected="one of them: no level has a layer of asperities together with that",
-                    hint="remove one of them; contact.crown goes with all.",
-                    on_key=True,
-                ),
+    for key, is_there, what in others:
+        if is_there:
+            raise CaseProblem(
+                ("contact", "roughness"),
+                got=f"rough faces and {what} ({'.'.join(map(str, key))})",
+                expected="one of them: no level has a layer of asperities together with that",
+                hint="remove one of them; contact.crown goes with all.",
+                on_key=True,
             )
-            for key, is_there, what in others
-        )
-    )
 
 
 def _check_solid_only(case: ImpactSections) -> None:
@@ -453,21 +409,15 @@ def _check_solid_only(case: ImpactSections) -> None:
         (("contact", "tilt"), case.contact.tilt, "a tilt between the faces"),
         (("contact", "waviness", "direction"), straight, "straight waves on the faces"),
     ]
-    refuse(
-        *(
-            (
-                is_there,
-                CaseProblem(
-                    key,
-                    got=f"{what} of axisymmetric bodies",
-                    expected="three-dimensional bodies",
-                    hint="take 'model: swept' with 'layers: 18' for both of them.",
-                    on_key=True,
-                ),
+    for key, is_there, what in asked:
+        if is_there:
+            raise CaseProblem(
+                key,
+                got=f"{what} of axisymmetric bodies",
+                expected="three-dimensional bodies",
+                hint="take 'model: swept' with 'layers: 18' for both of them.",
+                on_key=True,
             )
-            for key, is_there, what in asked
-        )
-    )
 
 
 def _check_off_axis(case: ImpactSections) -> None:
@@ -486,21 +436,15 @@ def _check_off_axis(case: ImpactSections) -> None:
         (("contact", "roughness"), case.contact.roughness is not None, "rough faces"),
         (("outputs",), bool(case.outputs), "sensors, whose angle is not known,"),
     ]
-    refuse(
-        *(
-            (
-                is_there,
-                CaseProblem(
-                    key,
-                    got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
-                    expected="faces without roughness, and no sensors",
-                    hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
-                    on_key=True,
-                ),
+    for key, is_there, what in asked:
+        if is_there:
+            raise CaseProblem(
+                key,
+                got=f"{what} of axisymmetric bodies off-axis (motion.placement)",
+                expected="faces without roughness, and no sensors",
+                hint=f"remove '{key[-1]}', or take 'model: swept' with 'layers: 18' for both.",
+                on_key=True,
             )
-            for key, is_there, what in asked
-        )
-    )
 
 
 def _check_ends(case: ImpactSections) -> None:
@@ -510,29 +454,22 @@ def _check_ends(case: ImpactSections) -> None:
             continue
         key: Key = ("bodies", name, "non_reflecting")
         stop = case.contact.stop
-        refuse(
-            (
-                case.shots is not None or case.opposite is not None,
-                CaseProblem(
-                    key,
-                    got="a non-reflecting end together with 'shots' or 'opposite'",
-                    expected="neither of them: both are for the interface level",
-                    hint="remove non_reflecting.",
-                    on_key=True,
-                ),
-            ),
-            (
-                name != stop.body or not body.has_surfaces or not isinstance(body.material, str),
-                CaseProblem(
-                    key,
-                    got=f"a non-reflecting end of '{name}'",
-                    expected=f"one of '{stop.body}', the body that is hit, meshed and of one "
-                    "material",
-                    hint="the body that moves would be braked by it from the start.",
-                    on_key=True,
-                ),
-            ),
-        )
+        if case.shots is not None or case.opposite is not None:
+            raise CaseProblem(
+                key,
+                got="a non-reflecting end together with 'shots' or 'opposite'",
+                expected="neither of them: both are for the interface level",
+                hint="remove non_reflecting.",
+                on_key=True,
+            )
+        if name != stop.body or not body.has_surfaces or not isinstance(body.material, str):
+            raise CaseProblem(
+                key,
+                got=f"a non-reflecting end of '{name}'",
+                expected=f"one of '{stop.body}', the body that is hit, meshed and of one material",
+                hint="the body that moves would be braked by it from the start.",
+                on_key=True,
+            )
         check_surface(case, key, SurfaceName(body=name, surface=body.non_reflecting))
         held = [support.surface for support in body.fixed or ()]
         if body.non_reflecting in (stop.surface, *held):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from klack.case.key_path import Quantity, quantity_at, split_path
 from klack.case.measurement import CalibrationParameter
 from klack.case.valve_sections import ValveSections
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.units import Kind, format_si
 
@@ -111,26 +111,20 @@ def _resolved(case: ValveSections, name: str, item: CalibrationParameter) -> Fre
     bounds = {side: _bound(places, where, side, getattr(item, side)) for side in ("lower", "upper")}
     lower, upper = bounds["lower"], bounds["upper"]
     unit = first.kind.unit
-    refuse(
-        (
-            not lower < upper,
-            CaseProblem(
-                (*where, "upper"),
-                got=format_si(upper, unit),
-                expected=f"more than the lower bound, {format_si(lower, unit)}",
-                hint="swap them, or check the units.",
-            ),
-        ),
-        (
-            not lower <= first.value <= upper,
-            CaseProblem(
-                where,
-                got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
-                expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
-                hint="the search begins at the value of the case: change it, or the bounds.",
-            ),
-        ),
-    )
+    if not lower < upper:
+        raise CaseProblem(
+            (*where, "upper"),
+            got=format_si(upper, unit),
+            expected=f"more than the lower bound, {format_si(lower, unit)}",
+            hint="swap them, or check the units.",
+        )
+    if not lower <= first.value <= upper:
+        raise CaseProblem(
+            where,
+            got=f"bounds from {format_si(lower, unit)} to {format_si(upper, unit)}",
+            expected=f"bounds around {format_si(first.value, unit)}, the value in the case",
+            hint="the search begins at the value of the case: change it, or the bounds.",
+        )
     return FreeParameter(name, tuple(places), lower, upper, first.value)
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 from klack.input.section import Count, InputPath, Name, Number, Section
 from klack.mesh.profile import Arc, Line, Profile
@@ -238,26 +238,20 @@ class Geometry(Section):
             "mesh": ("solid", "axisymmetric"),
             "nodes": ("solid", "axisymmetric"),
         }[kind]
-        refuse(
-            (
-                kind == "profile" and self.model is None,
-                CaseProblem(
-                    (),
-                    got="a profile without model",
-                    expected="model: axisymmetric, swept or solid",
-                    hint="start with axisymmetric; swept for bodies held in sectors.",
-                ),
-            ),
-            (
-                self.model is not None and self.model not in allowed,
-                CaseProblem(
-                    ("model",),
-                    got=f"model {self.model} for a {kind}",
-                    expected=f"one of: {', '.join(allowed)}",
-                    hint="a profile can be turned into any of the three models.",
-                ),
-            ),
-        )
+        if kind == "profile" and self.model is None:
+            raise CaseProblem(
+                (),
+                got="a profile without model",
+                expected="model: axisymmetric, swept or solid",
+                hint="start with axisymmetric; swept for bodies held in sectors.",
+            )
+        if self.model is not None and self.model not in allowed:
+            raise CaseProblem(
+                ("model",),
+                got=f"model {self.model} for a {kind}",
+                expected=f"one of: {', '.join(allowed)}",
+                hint="a profile can be turned into any of the three models.",
+            )
         if self.model == "swept" and self.layers is None:
             hint = "use 18: contact of turned parts needs few layers."
             raise CaseProblem((), got="a swept body without layers", expected="layers", hint=hint)

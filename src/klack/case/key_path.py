@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from klack.case.distribution import Distribution
 from klack.case.origin import ExpandedCase
 from klack.case.parameters import ParameterValue
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.input.section import Section
 from klack.units import RATIO, Kind, parse_quantity
@@ -158,27 +158,20 @@ def _require_of_case(case: Section, key: Key) -> None:
         return
     place = ".".join(map(str, key))
     copy = found.origin(key).copy
-    refuse(
-        (
-            copy,
-            CaseProblem(
-                (),
-                got=f"'{place}', which stands in the part '{copy}'",
-                expected="a key of the case itself",
-                hint="make it a parameter of the part, and name include.N.with.PARAMETER (N "
-                "from 0).",
-            ),
-        ),
-        (
-            not found.behind(key),
-            CaseProblem(
-                (),
-                got=f"'{place}', which no value of the case follows from",
-                expected="a parameter that the case uses",
-                hint="use it in an expression: '= ...'.",
-            ),
-        ),
-    )
+    if copy:
+        raise CaseProblem(
+            (),
+            got=f"'{place}', which stands in the part '{copy}'",
+            expected="a key of the case itself",
+            hint="make it a parameter of the part, and name include.N.with.PARAMETER (N from 0).",
+        )
+    if not found.behind(key):
+        raise CaseProblem(
+            (),
+            got=f"'{place}', which no value of the case follows from",
+            expected="a parameter that the case uses",
+            hint="use it in an expression: '= ...'.",
+        )
 
 
 def _advice(key: Key, node: Any) -> str:

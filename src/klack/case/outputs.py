@@ -6,7 +6,6 @@ from typing import Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from klack.bodies.gauges.gauge import GaugeKind
-from klack.errors import refuse
 from klack.input.problem import CaseProblem
 from klack.input.section import Count, Name, Number, Section
 from klack.signals.low_pass import LowPass
@@ -125,33 +124,25 @@ def check_outputs(
             if isinstance(output.direction, str)
             else len(output.direction) == dimension
         )
-        refuse(
-            (
-                other,
-                CaseProblem(
-                    ("outputs",),
-                    got=f"outputs together with '{other}'",
-                    expected="bodies that the contact alone acts on, with their meshes",
-                    hint=f"remove outputs, or '{other}'.",
-                    on_key=True,
-                ),
-            ),
-            (
-                len(output.at) != dimension,
-                CaseProblem(
-                    ("outputs", i, "at"),
-                    got=f"{len(output.at)} coordinates",
-                    expected=f"[{', '.join(axes)}] of '{output.body}'",
-                    hint="coordinates are those of the drawing.",
-                ),
-            ),
-            (
-                not fits,
-                CaseProblem(
-                    ("outputs", i, "direction"),
-                    got=f"{output.direction}",
-                    expected=f"one of: {', '.join(known)}, or {dimension} numbers",
-                    hint=f"'{output.body}' has the coordinates {', '.join(axes)}.",
-                ),
-            ),
-        )
+        if other:
+            raise CaseProblem(
+                ("outputs",),
+                got=f"outputs together with '{other}'",
+                expected="bodies that the contact alone acts on, with their meshes",
+                hint=f"remove outputs, or '{other}'.",
+                on_key=True,
+            )
+        if len(output.at) != dimension:
+            raise CaseProblem(
+                ("outputs", i, "at"),
+                got=f"{len(output.at)} coordinates",
+                expected=f"[{', '.join(axes)}] of '{output.body}'",
+                hint="coordinates are those of the drawing.",
+            )
+        if not fits:
+            raise CaseProblem(
+                ("outputs", i, "direction"),
+                got=f"{output.direction}",
+                expected=f"one of: {', '.join(known)}, or {dimension} numbers",
+                hint=f"'{output.body}' has the coordinates {', '.join(axes)}.",
+            )

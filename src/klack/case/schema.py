@@ -11,7 +11,7 @@ from pydantic import model_validator
 from klack.case.consistency import check_consistency, check_noise
 from klack.case.impact_sections import ImpactSections
 from klack.case.levels import LEVELS, OFF_AXIS_LEVELS, ROUGH_LEVELS, Level
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 
 __all__ = ["Case"]
@@ -32,26 +32,20 @@ class Case(ImpactSections):
         for level in wanted:
             if level != "full":
                 self.require_ends(f"the level '{level}'")
-            refuse(
-                (
-                    level not in LEVELS,
-                    InputError(
-                        "level",
-                        got=f"'{level}'",
-                        expected=f"one of: {one_of(LEVELS)}",
-                        hint=nearest(level, LEVELS, "see klack impact --help."),
-                    ),
-                ),
-                (
-                    level == "lumped" and self.lumped is None,
-                    InputError(
-                        f"{self._path or 'case'}: lumped",
-                        got="no section 'lumped'",
-                        expected="its stiffness, required by the level 'lumped'",
-                        hint="add 'lumped: {stiffness: 1e9 N/m}'.",
-                    ),
-                ),
-            )
+            if level not in LEVELS:
+                raise InputError(
+                    "level",
+                    got=f"'{level}'",
+                    expected=f"one of: {one_of(LEVELS)}",
+                    hint=nearest(level, LEVELS, "see klack impact --help."),
+                )
+            if level == "lumped" and self.lumped is None:
+                raise InputError(
+                    f"{self._path or 'case'}: lumped",
+                    got="no section 'lumped'",
+                    expected="its stiffness, required by the level 'lumped'",
+                    hint="add 'lumped: {stiffness: 1e9 N/m}'.",
+                )
         left_out = [level for level in wanted if level not in ROUGH_LEVELS]
         if self.contact.roughness is not None and left_out:
             raise InputError(

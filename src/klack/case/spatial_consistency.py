@@ -5,7 +5,7 @@ from math import isfinite
 
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, ValveRoles
 from klack.case.valve_sections import ValveSections
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import CaseProblem, Key
 from klack.network.across import OffAxisPart
 from klack.network.component import Component
@@ -85,28 +85,22 @@ def check_motion(case: ValveSections, meetings: Mapping[str, Meeting], roles: Va
     parts = case.network.components
     for name, part in parts.items():
         at: Key = ("network", "components", name)
-        refuse(
-            (
-                part.type in _MOVES,
-                CaseProblem(
-                    at,
-                    got=f"a {part.type} in a motion in three dimensions",
-                    expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
-                    hint="draw it as a body, or use motion: axial.",
-                ),
-            ),
-            (
-                part.type in _FRICTION,
-                CaseProblem(
-                    at,
-                    got="friction along the axis beside a motion in three dimensions",
-                    expected="a section 'guide' with friction: side forces make it there",
-                    hint="remove this component; guide: {surface: ..., heights: ..., clearance: "
-                    "..., "
-                    "friction: 0.1}.",
-                ),
-            ),
-        )
+        if part.type in _MOVES:
+            raise CaseProblem(
+                at,
+                got=f"a {part.type} in a motion in three dimensions",
+                expected=f"bodies with all their freedoms: {{type: {FLEXIBLE_BODY}}}",
+                hint="draw it as a body, or use motion: axial.",
+            )
+        if part.type in _FRICTION:
+            raise CaseProblem(
+                at,
+                got="friction along the axis beside a motion in three dimensions",
+                expected="a section 'guide' with friction: side forces make it there",
+                hint="remove this component; guide: {surface: ..., heights: ..., clearance: "
+                "..., "
+                "friction: 0.1}.",
+            )
         if part.type == END_STOP:
             _check_stop(case, name, part)
     _check_ends(case, meetings, roles)
@@ -246,28 +240,22 @@ def _check_placement(case: ValveSections) -> None:
     at = case.placement
     if at is None or at.seed is None:
         return
-    refuse(
-        (
-            not at.is_centred,
-            CaseProblem(
-                ("placement", "seed"),
-                got="a seed beside a given position",
-                expected="one of them",
-                hint="remove the seed, or eccentricity and tilt.",
-                on_key=True,
-            ),
-        ),
-        (
-            case.guide is None,
-            CaseProblem(
-                ("placement", "seed"),
-                got="a seed without a guide",
-                expected="a guide, whose clearance bounds the position",
-                hint="add a section 'guide', or give eccentricity and tilt.",
-                on_key=True,
-            ),
-        ),
-    )
+    if not at.is_centred:
+        raise CaseProblem(
+            ("placement", "seed"),
+            got="a seed beside a given position",
+            expected="one of them",
+            hint="remove the seed, or eccentricity and tilt.",
+            on_key=True,
+        )
+    if case.guide is None:
+        raise CaseProblem(
+            ("placement", "seed"),
+            got="a seed without a guide",
+            expected="a guide, whose clearance bounds the position",
+            hint="add a section 'guide', or give eccentricity and tilt.",
+            on_key=True,
+        )
 
 
 def require_bodies(case: ValveSections, variants: tuple[str, ...], where: str) -> None:

@@ -7,7 +7,6 @@ from pydantic import BeforeValidator, Field, Strict, model_validator
 
 from klack.case.levels import Level, Variant
 from klack.case.parameters import as_written
-from klack.errors import refuse
 from klack.input.problem import CaseProblem, one_of
 from klack.input.section import Count, InputPath, Number, Section, Text
 
@@ -68,29 +67,23 @@ class StudyParameter(Section):
             "fixed": self.fixed,
         }
         found = [name for name, value in given.items() if value is not None]
-        refuse(
-            (
-                found not in (["from", "to"], ["normal"], ["values"], ["fixed"]),
-                CaseProblem(
-                    (),
-                    got=f"the keys {one_of(found)}" if found else "no values",
-                    expected="one of: {from: 8 N, to: 20 N}, {normal: {mean: 12 N, sd: 1 N}}, "
-                    "{values: [8 N, 12 N]}, {fixed: 12 N}",
-                    hint="a range has both ends."
-                    if len(found) < 2
-                    else f"keep one of {one_of(found)}.",
-                ),
-            ),
-            (
-                self.scale == "log" and found != ["from", "to"],
-                CaseProblem(
-                    ("scale",),
-                    got="log without a range",
-                    expected="{from: 0.1 um, to: 10 um, scale: log}",
-                    hint="remove it, or give 'from' and 'to'.",
-                ),
-            ),
-        )
+        if found not in (["from", "to"], ["normal"], ["values"], ["fixed"]):
+            raise CaseProblem(
+                (),
+                got=f"the keys {one_of(found)}" if found else "no values",
+                expected="one of: {from: 8 N, to: 20 N}, {normal: {mean: 12 N, sd: 1 N}}, "
+                "{values: [8 N, 12 N]}, {fixed: 12 N}",
+                hint="a range has both ends."
+                if len(found) < 2
+                else f"keep one of {one_of(found)}.",
+            )
+        if self.scale == "log" and found != ["from", "to"]:
+            raise CaseProblem(
+                ("scale",),
+                got="log without a range",
+                expected="{from: 0.1 um, to: 10 um, scale: log}",
+                hint="remove it, or give 'from' and 'to'.",
+            )
         return self
 
 

@@ -13,7 +13,7 @@ from klack.case.reader import Lines
 from klack.case.spatial_consistency import require_bodies
 from klack.case.valve_consistency import check_thermal, check_valve
 from klack.case.valve_sections import ValveSections
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.input.problem import nearest, one_of
 from klack.network.catalogue import source_digests
 
@@ -63,26 +63,20 @@ class ValveCase(ValveSections):
     def require_variants(self, variants: tuple[str, ...]) -> tuple[Variant, ...]:
         """Check that this case can run the variants; return them without repetition."""
         for variant in variants:
-            refuse(
-                (
-                    variant not in VARIANTS,
-                    InputError(
-                        "variant",
-                        got=f"'{variant}'",
-                        expected=f"one of: {one_of(VARIANTS)}",
-                        hint=nearest(variant, VARIANTS, "see klack stroke --help."),
-                    ),
-                ),
-                (
-                    variant.endswith("lumped") and self.lumped is None,
-                    InputError(
-                        f"{self.path or 'case'}: lumped",
-                        got="no section 'lumped'",
-                        expected=f"its stiffness, because the variant '{variant}' is asked for",
-                        hint="add 'lumped: {stiffness: 1e9 N/m}'.",
-                    ),
-                ),
-            )
+            if variant not in VARIANTS:
+                raise InputError(
+                    "variant",
+                    got=f"'{variant}'",
+                    expected=f"one of: {one_of(VARIANTS)}",
+                    hint=nearest(variant, VARIANTS, "see klack stroke --help."),
+                )
+            if variant.endswith("lumped") and self.lumped is None:
+                raise InputError(
+                    f"{self.path or 'case'}: lumped",
+                    got="no section 'lumped'",
+                    expected=f"its stiffness, because the variant '{variant}' is asked for",
+                    hint="add 'lumped: {stiffness: 1e9 N/m}'.",
+                )
         require_bodies(self, variants, str(self.path or "case"))
         return tuple(v for v in VARIANTS if v in variants)
 

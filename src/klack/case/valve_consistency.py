@@ -13,7 +13,6 @@ from klack.case.spatial_consistency import check_motion
 from klack.case.thermal import CaseThermal
 from klack.case.valve_roles import END_STOP, FLEXIBLE_BODY, Meeting, find_meetings, find_roles
 from klack.case.valve_sections import ValveSections
-from klack.errors import refuse
 from klack.input.problem import CaseProblem, Key, nearest, one_of
 from klack.network.component import Component
 from klack.network.described import kind_of_field
@@ -32,60 +31,47 @@ def check_shots_of_valve(case: ValveSections) -> None:
     if shots.eccentricity is None:
         given, other = other, given
     placed = case.placement is not None
-    refuse(
-        (
-            case.motion == "axial",
-            CaseProblem(
-                ("shots",),
-                got="shots of a needle that moves along its axis",
-                expected="motion: three-dimensional, and a guide: along the axis all strokes are "
-                "alike",
-                hint="add 'motion: three-dimensional' and 'guide', or remove this section.",
-                on_key=True,
-            ),
-        ),
-        (
-            case.guide is None,
-            CaseProblem(
-                ("shots",),
-                got="shots without a guide",
-                expected="a section 'guide', whose clearance bounds the position of the needle",
-                hint="add 'guide: {surface: ..., heights: [..., ...], clearance: ...}'.",
-                on_key=True,
-            ),
-        ),
-        (
-            (shots.eccentricity is None) != (shots.tilt is None),
-            CaseProblem(
-                ("shots", given),
-                got=f"{given} without {other}, and a guide",
-                expected="both of them, or none: the guide then limits the placement",
-                hint=f"add '{other}' (0 is possible), or remove '{given}'.",
-                on_key=True,
-            ),
-        ),
-        (
-            placed and not shots.carry,
-            CaseProblem(
-                ("placement",),
-                got="a placement beside shots, each of which has one of its own",
-                expected="one of them",
-                hint="remove 'placement': shots draw it from shots.seed. With shots.carry: true "
-                "the first stroke starts from it.",
-                on_key=True,
-            ),
-        ),
-        (
-            placed and shots.draws_position,
-            CaseProblem(
-                ("shots", "eccentricity"),
-                got="a drawn position beside a placement",
-                expected="one of them: the first stroke starts from it",
-                hint="remove 'placement', or shots.eccentricity and shots.tilt.",
-                on_key=True,
-            ),
-        ),
-    )
+    if case.motion == "axial":
+        raise CaseProblem(
+            ("shots",),
+            got="shots of a needle that moves along its axis",
+            expected="motion: three-dimensional, and a guide: along the axis all strokes are alike",
+            hint="add 'motion: three-dimensional' and 'guide', or remove this section.",
+            on_key=True,
+        )
+    if case.guide is None:
+        raise CaseProblem(
+            ("shots",),
+            got="shots without a guide",
+            expected="a section 'guide', whose clearance bounds the position of the needle",
+            hint="add 'guide: {surface: ..., heights: [..., ...], clearance: ...}'.",
+            on_key=True,
+        )
+    if (shots.eccentricity is None) != (shots.tilt is None):
+        raise CaseProblem(
+            ("shots", given),
+            got=f"{given} without {other}, and a guide",
+            expected="both of them, or none: the guide then limits the placement",
+            hint=f"add '{other}' (0 is possible), or remove '{given}'.",
+            on_key=True,
+        )
+    if placed and not shots.carry:
+        raise CaseProblem(
+            ("placement",),
+            got="a placement beside shots, each of which has one of its own",
+            expected="one of them",
+            hint="remove 'placement': shots draw it from shots.seed. With shots.carry: true "
+            "the first stroke starts from it.",
+            on_key=True,
+        )
+    if placed and shots.draws_position:
+        raise CaseProblem(
+            ("shots", "eccentricity"),
+            got="a drawn position beside a placement",
+            expected="one of them: the first stroke starts from it",
+            hint="remove 'placement', or shots.eccentricity and shots.tilt.",
+            on_key=True,
+        )
 
 
 def check_valve(case: ValveSections) -> None:
@@ -239,26 +225,20 @@ def _check_laws(case: ValveSections) -> None:
     for name, part in case.network.components.items():
         if part.type != END_STOP or not is_consistent(part):
             continue
-        refuse(
-            (
-                name not in case.stops,
-                CaseProblem(
-                    ("network", "components", name, "law"),
-                    got="a consistent law, but no surfaces to compute it from",
-                    expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
-                    hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
-                ),
-            ),
-            (
-                case.reduction.correction != "consistent",
-                CaseProblem(
-                    ("reduction", "correction"),
-                    got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
-                    expected="the correction 'consistent'",
-                    hint="or give the end stop a linear law.",
-                ),
-            ),
-        )
+        if name not in case.stops:
+            raise CaseProblem(
+                ("network", "components", name, "law"),
+                got="a consistent law, but no surfaces to compute it from",
+                expected=f"the surfaces of the stop: stops: {{{name}: {{between: ...}}}}",
+                hint=f"add them (bodies of this case: {one_of(case.bodies)}), or give a law.",
+            )
+        if case.reduction.correction != "consistent":
+            raise CaseProblem(
+                ("reduction", "correction"),
+                got=f"'{case.reduction.correction}' with the consistent law of '{name}'",
+                expected="the correction 'consistent'",
+                hint="or give the end stop a linear law.",
+            )
 
 
 def _check_friction(case: ValveSections) -> None:

@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from klack.assembling.placement import first_touch_of_meshes
 from klack.bodies.elasticity.body import ElasticBody
 from klack.contact.pairing import axial_distance, face_thickness
-from klack.errors import InputError, refuse, require_positive
+from klack.errors import InputError, require_positive
 from klack.materials.material import Material
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import FaceTable, Mesh, Surface
@@ -130,26 +130,20 @@ class CalculixSettings:
         require_positive("CalculiX: step", self.step, "s")
         require_positive("CalculiX: penalty", self.penalty, "Pa/m")
         require_positive("CalculiX: stick", self.stick, "")
-        refuse(
-            (
-                not self.duration >= self.step,
-                InputError(
-                    "CalculiX: duration",
-                    got=f"{self.duration:g} s",
-                    expected=f"the time of one step ({self.step:g} s) or more",
-                    hint="check the units; an impact of steel parts lasts 5 to 50 us.",
-                ),
-            ),
-            (
-                not -1.0 / 3.0 <= self.alpha <= 0.0,
-                InputError(
-                    "CalculiX: alpha",
-                    got=f"{self.alpha:g}",
-                    expected="a value from -1/3 to 0",
-                    hint="0 for no numerical damping, -0.05 is the default of CalculiX.",
-                ),
-            ),
-        )
+        if not self.duration >= self.step:
+            raise InputError(
+                "CalculiX: duration",
+                got=f"{self.duration:g} s",
+                expected=f"the time of one step ({self.step:g} s) or more",
+                hint="check the units; an impact of steel parts lasts 5 to 50 us.",
+            )
+        if not -1.0 / 3.0 <= self.alpha <= 0.0:
+            raise InputError(
+                "CalculiX: alpha",
+                got=f"{self.alpha:g}",
+                expected="a value from -1/3 to 0",
+                hint="0 for no numerical damping, -0.05 is the default of CalculiX.",
+            )
 
 
 def default_penalty(impact: CalculixImpact) -> float:

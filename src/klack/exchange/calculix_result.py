@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from klack.analyses.comparison.calculix import OtherRun
 from klack.contact.history import BodyEnergy, EnergyLedger, ImpactHistory
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.exchange.calculix_deck import LOWER, UPPER
 from klack.input.section import instead_of_file
 
@@ -246,13 +246,10 @@ def _force(
         )
     axial, sideways = next(iter(tables.force.values()))
     time = np.array(axial.time)
-    refuse(
-        (
-            not (time[0] > 0 and np.all(np.diff(time) > 0)),
-            _refuse(path, "times that do not grow", "one step of one run"),
-        ),
-        (len(time) < 4, _refuse(path, f"{len(time)} increments", "a whole impact")),
-    )
+    if not (time[0] > 0 and np.all(np.diff(time) > 0)):
+        raise _refuse(path, "times that do not grow", "one step of one run")
+    if len(time) < 4:
+        raise _refuse(path, f"{len(time)} increments", "a whole impact")
     return time, np.array(axial.value), np.array(sideways.value)
 
 

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.exchange.modal_model import ModalModel
 from klack.exchange.results.table import identifiers
 from klack.files.whole import whole_files
@@ -44,26 +44,20 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
                 hint="rename a body of the case.",
             )
     for model in models:
-        refuse(
-            (
-                len(model.name) > LONGEST,
-                InputError(
-                    str(folder),
-                    got=f"the model name '{model.name}' of {len(model.name)} characters",
-                    expected=f"at most {LONGEST}, so that MATLAB accepts it with a suffix",
-                    hint="give the case or the body a shorter name.",
-                ),
-            ),
-            (
-                model.mode_count == 0,
-                InputError(
-                    f"model '{model.name}'",
-                    got="no modes",
-                    expected="a body that can move",
-                    hint="a rigid wall needs no model: leave it out.",
-                ),
-            ),
-        )
+        if len(model.name) > LONGEST:
+            raise InputError(
+                str(folder),
+                got=f"the model name '{model.name}' of {len(model.name)} characters",
+                expected=f"at most {LONGEST}, so that MATLAB accepts it with a suffix",
+                hint="give the case or the body a shorter name.",
+            )
+        if model.mode_count == 0:
+            raise InputError(
+                f"model '{model.name}'",
+                got="no modes",
+                expected="a body that can move",
+                hint="a rigid wall needs no model: leave it out.",
+            )
     with whole_files(folder) as stage:
         yield stage
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.machine.memory import require_memory
 from klack.mesh.families import FAMILIES
 from klack.mesh.mesh import ElementBlock, FaceBlock, Mesh, Surface
@@ -114,26 +114,20 @@ def sweep(meridian: Mesh, layers: int, start_angle: float = 0.0) -> Mesh:
 
 def _require_sweepable(meridian: Mesh, layers: int) -> None:
     families = sorted({block.family for block in meridian.blocks})
-    refuse(
-        (
-            families != ["tri6"],
-            InputError(
-                "sweep: meridian",
-                got=f"elements {', '.join(families) or 'none'}",
-                expected="tri6 only",
-                hint="make the meridian with mesh_meridian.",
-            ),
-        ),
-        (
-            layers < 6,
-            InputError(
-                "sweep: layers",
-                got=str(layers),
-                expected="at least 6 around the circumference",
-                hint="12 to 24 are usual.",
-            ),
-        ),
-    )
+    if families != ["tri6"]:
+        raise InputError(
+            "sweep: meridian",
+            got=f"elements {', '.join(families) or 'none'}",
+            expected="tri6 only",
+            hint="make the meridian with mesh_meridian.",
+        )
+    if layers < 6:
+        raise InputError(
+            "sweep: layers",
+            got=str(layers),
+            expected="at least 6 around the circumference",
+            hint="12 to 24 are usual.",
+        )
 
 
 def _ring(meridian: Mesh, layers: int) -> _Ring:

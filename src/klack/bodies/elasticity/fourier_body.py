@@ -32,7 +32,7 @@ from scipy.sparse import csr_array, eye_array, kron
 from klack.bodies.elasticity.assembly import assemble_order
 from klack.bodies.elasticity.body import checked_nodes, require_support
 from klack.bodies.elasticity.rigid_motions import held_best, on_axis, orthonormal_in_mass
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.materials.material import Material
 from klack.mesh.mesh import Mesh
 
@@ -175,26 +175,20 @@ def fourier_body(
         leave a rigid motion free: a held point of the axis does not keep a body from turning.
     """
     where = f"body '{name}': Fourier order {order}"
-    refuse(
-        (
-            mesh.dimension != 2,
-            InputError(
-                where,
-                got="a solid",
-                expected="the half section of a body of revolution",
-                hint="modes of all orders are among those of a solid already.",
-            ),
-        ),
-        (
-            order < 0,
-            InputError(
-                where,
-                got=f"{order}",
-                expected="0 or more",
-                hint="1 is bending; -1 is the same motion.",
-            ),
-        ),
-    )
+    if mesh.dimension != 2:
+        raise InputError(
+            where,
+            got="a solid",
+            expected="the half section of a body of revolution",
+            hint="modes of all orders are among those of a solid already.",
+        )
+    if order < 0:
+        raise InputError(
+            where,
+            got=f"{order}",
+            expected="0 or more",
+            hint="1 is bending; -1 is the same motion.",
+        )
     nodes = checked_nodes(name, mesh, fixed_nodes)
     K, M = assemble_order(mesh, materials, order)
     held = (3 * nodes[:, None] + np.arange(3)).ravel()

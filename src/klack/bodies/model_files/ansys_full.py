@@ -20,7 +20,7 @@ from klack.bodies.model_files.system_matrix import (
     choose_matrix,
     symmetric_matrix,
 )
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 
 __all__ = ["read_ansys_full"]
 
@@ -151,21 +151,15 @@ def _places(
     marks, _ = file.integers(at)
     equations, directions = int(head[_EQUATIONS]), int(head[_DOFS])
     uniform = len(counts) == len(nodes) and bool(np.all(counts == len(labels)))
-    refuse(
-        (
-            not uniform or directions != len(labels) or equations != len(nodes) * len(labels),
-            InputError(
-                str(file.path),
-                got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
-                expected="nodes that all have the same degrees of freedom",
-                hint="export a model of solid elements alone; no mass, contact or beam elements.",
-            ),
-        ),
-        (
-            len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)),
-            _damaged(file.path, "inconsistent nodes, directions or marks"),
-        ),
-    )
+    if not uniform or directions != len(labels) or equations != len(nodes) * len(labels):
+        raise InputError(
+            str(file.path),
+            got=f"{equations} equations of {len(nodes)} nodes with {len(labels)} directions",
+            expected="nodes that all have the same degrees of freedom",
+            hint="export a model of solid elements alone; no mass, contact or beam elements.",
+        )
+    if len(marks) != equations or np.any(nodes < 1) or np.any((labels < 1) | (labels > 6)):
+        raise _damaged(file.path, "inconsistent nodes, directions or marks")
     rows = RowPlaces(
         np.repeat(nodes, len(labels)).astype(np.int64),
         np.tile(labels, len(nodes)).astype(np.int64),

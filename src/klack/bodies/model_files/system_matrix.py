@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 
 __all__ = [
     "Role",
@@ -288,13 +288,10 @@ def read_row_places(path: Path) -> RowPlaces:
         node.append(place[0])
         direction.append(place[1])
     places = RowPlaces(np.array(node, dtype=np.int64), np.array(direction, dtype=np.int64))
-    refuse(
-        (not node, _wrong(str(path), "no rows")),
-        (
-            len(np.unique(8 * places.node + places.direction)) < len(node),
-            _wrong(str(path), "the same node and direction twice"),
-        ),
-    )
+    if not node:
+        raise _wrong(str(path), "no rows")
+    if len(np.unique(8 * places.node + places.direction)) < len(node):
+        raise _wrong(str(path), "the same node and direction twice")
     return places
 
 

@@ -21,7 +21,7 @@ from klack.assembling.valve import build_valve_bodies, valve_parts
 from klack.bodies.elasticity.body import ElasticBody
 from klack.bodies.elasticity.stress import StressField, von_mises
 from klack.case.valve import ValveCase
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.exchange.results.table import file_stems
 from klack.exchange.results.vtk_series import stress_grid
 from klack.exchange.results.vtu import SeriesFile, VtuGrid, grid_piece, write_grid, write_pvd
@@ -323,18 +323,12 @@ def _parts(
 def _require_same(name: str, found: BodyShapes, q: Floats, marks: Floats) -> None:
     """Refuse coordinates of other shapes: mesh, sign or pairing of modes may differ."""
     here = shape_marks(found.shapes)
-    refuse(
-        (
-            found.shapes.shape[1] != q.shape[1],
-            _other_bodies(
-                f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
-            ),
-        ),
-        (
-            len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()),
-            _other_bodies(f"modes of '{name}' with other shapes than those of the result"),
-        ),
-    )
+    if found.shapes.shape[1] != q.shape[1]:
+        raise _other_bodies(
+            f"{found.shapes.shape[1]} modes of '{name}', and {q.shape[1]} in the result"
+        )
+    if len(marks) != len(here) or np.any(np.abs(here - marks) > _SAME * np.abs(here).max()):
+        raise _other_bodies(f"modes of '{name}' with other shapes than those of the result")
 
 
 def _other_bodies(got: str) -> InputError:

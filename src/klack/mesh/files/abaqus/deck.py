@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import AccuracyWarning, InputError, refuse
+from klack.errors import AccuracyWarning, InputError
 from klack.mesh.families import FAMILIES
 from klack.mesh.files.abaqus.keywords import DataLine, Keyword, read_keywords
 from klack.mesh.files.abaqus.numbers import is_integer, number, records
@@ -89,26 +89,20 @@ def read_placement(keyword: Keyword) -> Placement:
 
 def add_instance(root: Scope, name: str, part: Scope, placement: Placement, place: str) -> None:
     """Put an instance into the assembly; its sets and surfaces are called ``name.set``."""
-    refuse(
-        (
-            name.upper() in root.instances,
-            InputError(
-                f"{place}: *INSTANCE",
-                got=f"a second instance '{name[:80]}'",
-                expected="every name once",
-                hint="give every instance its own name.",
-            ),
-        ),
-        (
-            root.nodes.count + part.nodes.count > LARGEST_NODES,
-            InputError(
-                f"{place}: *INSTANCE",
-                got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
-                expected=f"at most {LARGEST_NODES}",
-                hint="leave out unneeded instances.",
-            ),
-        ),
-    )
+    if name.upper() in root.instances:
+        raise InputError(
+            f"{place}: *INSTANCE",
+            got=f"a second instance '{name[:80]}'",
+            expected="every name once",
+            hint="give every instance its own name.",
+        )
+    if root.nodes.count + part.nodes.count > LARGEST_NODES:
+        raise InputError(
+            f"{place}: *INSTANCE",
+            got=f"{root.nodes.count + part.nodes.count} nodes with this instance",
+            expected=f"at most {LARGEST_NODES}",
+            hint="leave out unneeded instances.",
+        )
     _require_revolution(part, placement, place)
     node, element = root.nodes.count, root.elements.count
     root.instances[name.upper()] = Instance(name, part, node, element)

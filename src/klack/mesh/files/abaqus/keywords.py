@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.mesh.files.plausible import LARGEST_BYTES
 
 __all__ = ["DataLine", "Keyword", "Segment", "read_keywords"]
@@ -254,26 +254,20 @@ class _Source:
             path = (self._folder / file.replace("\\", "/")).resolve()
         except (OSError, RuntimeError):  # a name that is too long, links in a circle
             path = Path("/")
-        refuse(
-            (
-                not path.is_relative_to(self._folder),
-                InputError(
-                    f"{place}: *INCLUDE",
-                    got=f"the file '{file[:200]}'",
-                    expected="a file in the folder of the main file or below it",
-                    hint="copy it next to the main file.",
-                ),
-            ),
-            (
-                len(above) > _DEEPEST or path in [p.resolve() for p in above],
-                InputError(
-                    f"{place}: *INCLUDE",
-                    got=f"'{file}', which is included from itself or {len(above)} levels deep",
-                    expected=f"includes without a loop and up to {_DEEPEST} levels deep",
-                    hint="write the model into one file.",
-                ),
-            ),
-        )
+        if not path.is_relative_to(self._folder):
+            raise InputError(
+                f"{place}: *INCLUDE",
+                got=f"the file '{file[:200]}'",
+                expected="a file in the folder of the main file or below it",
+                hint="copy it next to the main file.",
+            )
+        if len(above) > _DEEPEST or path in [p.resolve() for p in above]:
+            raise InputError(
+                f"{place}: *INCLUDE",
+                got=f"'{file}', which is included from itself or {len(above)} levels deep",
+                expected=f"includes without a loop and up to {_DEEPEST} levels deep",
+                hint="write the model into one file.",
+            )
         return path
 
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from klack.errors import InputError, refuse
+from klack.errors import InputError
 from klack.mesh.files.plausible import LARGEST_BYTES, read_bytes
 from klack.mesh.files.text_columns import TextLines
 
@@ -80,50 +80,38 @@ def text_with_includes(path: Path) -> tuple[bytes, tuple[tuple[int, str, int], .
 
 
 def _require_text(file: Path, data: bytes, size: int) -> None:
-    refuse(
-        (
-            b"\0" in data[:4096],
-            InputError(
-                str(file),
-                got="a binary file",
-                expected=_KIND,
-                hint="export the mesh as bulk data (.bdf) from the preprocessor.",
-            ),
-        ),
-        (
-            size > LARGEST_BYTES,
-            InputError(
-                str(file),
-                got=f"{size / 1e9:.3g} GB with all includes",
-                expected=f"at most {LARGEST_BYTES / 1e9:.3g} GB",
-                hint="write the mesh only, without results or steps.",
-            ),
-        ),
-    )
+    if b"\0" in data[:4096]:
+        raise InputError(
+            str(file),
+            got="a binary file",
+            expected=_KIND,
+            hint="export the mesh as bulk data (.bdf) from the preprocessor.",
+        )
+    if size > LARGEST_BYTES:
+        raise InputError(
+            str(file),
+            got=f"{size / 1e9:.3g} GB with all includes",
+            expected=f"at most {LARGEST_BYTES / 1e9:.3g} GB",
+            hint="write the mesh only, without results or steps.",
+        )
 
 
 def _below(place: str, folder: Path, name: str, depth: int, seen: set[Path]) -> Path:
     path = (folder / name).resolve()
-    refuse(
-        (
-            not path.is_relative_to(folder),
-            InputError(
-                f"{place}: INCLUDE",
-                got=f"the file '{name}'",
-                expected="a file in the folder of the main file or below it",
-                hint="copy it next to the main file.",
-            ),
-        ),
-        (
-            depth > _DEEPEST or path in seen,
-            InputError(
-                f"{place}: INCLUDE",
-                got=f"'{name}' for the second time, or {depth} levels deep",
-                expected=f"every file included once, and up to {_DEEPEST} levels deep",
-                hint="write the model into one file.",
-            ),
-        ),
-    )
+    if not path.is_relative_to(folder):
+        raise InputError(
+            f"{place}: INCLUDE",
+            got=f"the file '{name}'",
+            expected="a file in the folder of the main file or below it",
+            hint="copy it next to the main file.",
+        )
+    if depth > _DEEPEST or path in seen:
+        raise InputError(
+            f"{place}: INCLUDE",
+            got=f"'{name}' for the second time, or {depth} levels deep",
+            expected=f"every file included once, and up to {_DEEPEST} levels deep",
+            hint="write the model into one file.",
+        )
     return path
 
 
