@@ -2,7 +2,7 @@
 
 Truth: energy, mass, momentum, reciprocity and repetition of runs of a whole valve.
 
-A small valve as a network: the books of its run, and variants against hand-made networks.
+A small valve as a network: the energy balance of its run, and variants against hand-made networks.
 
 Truth: conservation. A run in pieces, with its state handed on, has the impacts of the whole run.
 
@@ -585,7 +585,7 @@ def test_energy_that_is_no_number_is_a_failure(numbers):
 
 
 def test_every_solver_is_judged():
-    """Each hands its books over, and the suite knows a limit for each."""
+    """Each reports its energy balance, and the suite knows a limit for each."""
     folder = Path(energy_balance.__file__).parents[1]
     for name, file in SOLVERS.items():
         assert f'check_energy_balance(\n        "{name}"' in (folder / file).read_text(), name

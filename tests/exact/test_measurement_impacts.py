@@ -1,10 +1,10 @@
-"""Recordings: impacts, sensors, pulses laid over each other.
+"""Recordings: impacts, sensors, pulses compared.
 
 Truth: exact parabolas between impacts, with known speeds, times and heights.
 
 Truth: the low pass D y = x solved by hand (step, ramp, sine), polynomials, sines.
 
-Pulses with a plateau, and a computed pulse laid over a measured one.
+Pulses with a plateau, and a computed pulse fitted to a measured one.
 
 Truth: exact.  A trapezoid has its length, rise and plateau by construction; a copy of it with
 another factor and shift is found again.
