@@ -158,7 +158,7 @@ def run_calibration(
                 counted=np.ones(strokes.time.size, dtype=bool),
                 duration=case.run.duration,
             )
-            found = _calibrate(case, section, strokes, shown, clock)
+            found, doubts = _calibrate(case, section, strokes, shown, clock)
             evaluations = len(pool.used)
             resumed = sum(key in pool.used for key in list(log.done)[:resumed])
     return CalibrationStudy(
@@ -169,7 +169,7 @@ def run_calibration(
         strokes=tuple(stroke.name for stroke in strokes.strokes),
         rejected=tuple(f"{item.name}: {item.reason}" for item in strokes.rejected),
         variant=section.variant,
-        warnings=(*strokes.notes, *notes, *found.pop("doubts")),
+        warnings=(*strokes.notes, *notes, *doubts),
         time=strokes.time,
         evaluations=evaluations,
         resumed=resumed,
@@ -244,10 +244,10 @@ def _calibrate(
     strokes: StrokeSet,
     whole: StrokeModel,
     clock: StageClock,
-) -> dict[str, Any]:
+) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Fit, judge and follow the parameters; ``whole`` computes all samples of a stroke.
 
-    What the record tells of it, and doubts.
+    Fields of the record, and doubts.
     """
     parameters = whole.parameters
     start = np.array([p.start for p in parameters])
@@ -295,7 +295,12 @@ def _calibrate(
         _impacts_of(time, after["lift"], whole.sensor_of(values)),
     )
     names = [p.name for p in parameters]
-    return dict(
+    doubts = (
+        *restless,
+        *_doubts(fit, misfit, strokes.count, len(names), impacts, windows),
+        *identifiability_warnings(names, fit.z, seen, covariance),
+    )
+    fields = dict(
         parameters=_parameters(parameters, fit, covariance),
         correlation=covariance.correlation,
         design_correlation=seen.correlation,
@@ -313,12 +318,8 @@ def _calibrate(
         degrees=covariance.degrees,
         iterations=fit.iterations,
         converged=fit.converged,
-        doubts=(
-            *restless,
-            *_doubts(fit, misfit, strokes.count, len(names), impacts, windows),
-            *identifiability_warnings(names, fit.z, seen, covariance),
-        ),
     )
+    return fields, doubts
 
 
 def _repeatable(
