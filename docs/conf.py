@@ -44,10 +44,10 @@ nb_mime_priority_overrides = [("html", "text/html", 0), ("html", "image/png", 1)
 
 # docstrings
 napoleon_google_docstring = False
-napoleon_use_param = False  # types are words with shapes and units, not names to look up
+napoleon_use_param = False  # one list: name, shape and unit, meaning
 napoleon_use_rtype = False
 autodoc_default_options = {"exclude-members": "model_config, model_post_init"}  # of pydantic
-autodoc_typehints = "none"  # units and shapes stand in the text; types in the source beside it
+autodoc_typehints = "signature"  # shapes and units stand in the text
 toc_object_entries = False  # thousands of names in every sidebar are no map
 maximum_signature_line_length = 88
 autosummary_generate = False  # tables only

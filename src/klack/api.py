@@ -67,7 +67,7 @@ class CaseOnHand:
     ----------
     checked : Case or ValveCase
         Typed, all numbers in SI: ``case.checked.motion.speed``.
-    tree : CaseTree
+    tree
         The text.
     """
 
@@ -104,7 +104,7 @@ class CaseOnHand:
 
         Parameters
         ----------
-        key : str
+        key
             From the top of the case: ``"network.components.spring.preload"``.
         value : str or number
             As the case file would have it: ``"14 N"``.
@@ -165,9 +165,9 @@ class Number:
     ----------
     value : float, int, bool or None
         In ``unit``; None where the run does not have it.
-    unit : str
+    unit
         SI, ``"1"`` for a pure number.
-    measure : Measure
+    measure
         Name, symbol, definition, source.
     """
 
@@ -191,7 +191,7 @@ class Result:
     ----------
     record : ImpactStudy, StrokeStudy, ShotsStudy, NoiseStudy, ...
         Everything, as arrays and small records, in SI.
-    analysis : Analysis
+    analysis
         How it is stored and told.
     """
 
@@ -233,7 +233,7 @@ class Result:
 
         Parameters
         ----------
-        run : str, optional
+        run
             Level or variant; the one that is the answer by default.
 
         Returns
@@ -418,22 +418,22 @@ def run_many(
     case : str, Path or CaseOnHand
     points : sequence of mappings, or mapping of sequences
         Keys of the case to values with their units, for each point; or lists of values by key.
-    measures : sequence of str
+    measures
         ``"opening_time"``; of the first impact on the stop ``seat`` ``"seat.peak_force"``, of the
         second one ``"seat.2.peak_force"``; of an impact of two bodies ``"peak_force"``.
-    variant : str, optional
+    variant
         Of a stroke; the first one of the case by default.
-    level : str, optional
+    level
         Of an impact; ``"reduced"`` by default.
-    threads : int, optional
+    threads
         All available cores by default; always 1 with components in Python and FMUs, and for
         impacts.
-    workers : int, optional
+    workers
         Processes in place of threads; in a script, the call stands under
         ``if __name__ == "__main__":``.
     dask : str, Client or Cluster of distributed, optional
         Cluster in place of threads, also the address of its scheduler, or a file with that.
-    progress : callable
+    progress
         Called with a stage and the share of the points that are done.
 
     Raises
@@ -485,20 +485,19 @@ def run_study(
         Of a whole valve, or of an impact.
     study : path, optional
         File with a section ``study``; that of the case by default.
-    made : int, optional
+    made
         Instead of the design of the study: so many valves made after the case, with the scatter of
         its section ``robust``.
     folder : path, optional
         Where computed points are kept, so that an interrupted study resumes.
-    threads : int, optional
+    threads
         All available cores by default.
-    workers : int, optional
+    workers
         Processes in place of threads: faster for impacts, and where measures of the noise, or
         several geometries, are asked for.  In a script, the call stands under
         ``if __name__ == "__main__":``.
     dask : str, Client or Cluster of distributed, optional
         Cluster in place of threads, also the address of its scheduler, or a file with that.
-    progress : callable
 
     Raises
     ------
@@ -555,17 +554,16 @@ def sensitivities(
     study : path, optional
         File with a section ``study``, whose parameters and measures are meant; that of the case by
         default.
-    parameters : sequence of str, optional
+    parameters
         Keys of the case, or some of the parameters of the study.
-    measures : sequence of str, optional
+    measures
         ``"closing_time"``, ``"seat.peak_force"``.
-    variant : str, optional
+    variant
         Of a stroke.
-    level : str, optional
+    level
         Of an impact; ``"reduced"`` by default.
-    check : bool
+    check
         Whether further strokes, two of them with all parameters changed by 1 %, are compared.
-    progress : callable
 
     Raises
     ------
@@ -660,9 +658,9 @@ def noise_of(*results: Result, names: Sequence[str] = (), progress: Progress = s
 
     Parameters
     ----------
-    *results : Result
+    *results
         Of impacts and strokes; the first one is the one to compare with.
-    names : sequence of str
+    names
         Of the designs.
     """
     from klack.analyses.noise.analysis import NOISE
@@ -723,12 +721,12 @@ def compare(
 
     Parameters
     ----------
-    result : Result
+    result
         Of :func:`run_stroke`, :func:`run_shots` or :func:`run_impact`.
     measurement : path, sequence of paths, or mapping of variant to path
     case : str, Path or CaseOnHand, optional
         Whose section ``measurement`` is used; that of the result by default.
-    level, output : str
+    level, output
         Of an impact; its output may be left out where there is one.
     """
     from klack.analyses.comparison.impacts import compare_impact

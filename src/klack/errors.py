@@ -34,11 +34,11 @@ class InputError(KlackError, ValueError):
 
     Parameters
     ----------
-    where : str
+    where
         File, line, key or function and argument.
-    got, expected : str
+    got, expected
         What came and what can be used, with units.
-    hint : str
+    hint
         What to try, one sentence.
     """
 

@@ -96,18 +96,17 @@ class Kind:
 
     Parameters
     ----------
-    name : str
+    name
         With its article, as an error says it: ``"a length"``.
-    unit : str
+    unit
         SI unit of the number that klack computes with.
-    example : str
-    common : tuple of str
+    common
         Units that an error proposes.
-    factors : mapping of str to float
+    factors
         Complete list of accepted units, for kinds that their dimension does not tell apart.
-    bare : bool
+    bare
         True if a number without a unit is meant.
-    smallest, largest : float
+    smallest, largest
         Bounds of the size of a value that is not zero, in ``unit``: wider than anything a valve,
         a building or a laboratory has, and so narrow that areas, volumes, energies and their
         quotients stay far from the ends of double precision.
@@ -264,15 +263,12 @@ class QuantityError(InputError):
 
     Parameters
     ----------
-    where : str
-    value : object
+    value
         What came.
-    kind : Kind
-    hint : str
+    hint
         May hold the example of the kind, which whoever knows the key can exchange.
-    came : str
+    came
         More about what came.
-    expected : str, optional
     """
 
     def __init__(
@@ -293,8 +289,7 @@ def parse_quantity(value: object, kind: Kind, where: str = "quantity") -> float:
     ----------
     value : str, int, float or Computed
         What the user wrote, or what an expression gave.
-    kind : Kind
-    where : str
+    where
         Key or argument, for the error.
 
     Returns
@@ -581,12 +576,12 @@ def format_si(value: float, unit: str, digits: int = 4) -> str:
 
     Parameters
     ----------
-    value : float
+    value
         In ``unit``.
-    unit : str
+    unit
         SI unit without prefix; ``"-"`` or ``""`` writes the plain number.  Temperatures, rates
         (1/s), powers (m^2) and what is counted in kg get no prefix.
-    digits : int
+    digits
         Significant digits.
 
     Examples

@@ -21,10 +21,6 @@ def first_impact(history: ImpactHistory) -> TimeSeries:
     """Force of the first impact alone [N], from the record before touch to the one after release.
 
     Time counts from first touch.
-
-    Parameters
-    ----------
-    history : ImpactHistory
     """
     measures = measure_impact(history)
     end = measures.first_touch + measures.total_contact_time
@@ -45,7 +41,6 @@ def impact_third_octaves(history: ImpactHistory, *, high: float | None = None) -
 
     Parameters
     ----------
-    history : ImpactHistory
     high : float [Hz] or None
         ``None``: a tenth of the record rate.
     """
@@ -60,10 +55,6 @@ def compare_histories(reference: ImpactHistory, candidate: ImpactHistory) -> Dev
     """Deviation of the first impact of ``candidate`` from that of ``reference``.
 
     Both are aligned at first touch and averaged over the coarser of the two record steps.
-
-    Parameters
-    ----------
-    reference, candidate : ImpactHistory
     """
     a, b = measure_impact(reference), measure_impact(candidate)
     high = _RESOLVED / max(reference.step, candidate.step)

@@ -19,11 +19,11 @@ class CumulativeEnergy:
 
     Parameters
     ----------
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
         From ``f_1`` to ``f_2``.
-    share : array, shape (k,) [-]
+    share (k,) [-]
         From 0 to 1.
-    total : float [unit^2 s]
+    total [unit^2 s]
         Energy between ``f_1`` and ``f_2``, N^2 s for a force.
     """
 
@@ -36,7 +36,7 @@ class CumulativeEnergy:
 
         Parameters
         ----------
-        share : float [-]
+        share [-]
             Above 0 and below 1.
         """
         if not 0.0 < share < 1.0:
@@ -57,9 +57,9 @@ def cumulative_energy(density: Spectrum, *, low: float, high: float) -> Cumulati
 
     Parameters
     ----------
-    density : Spectrum
+    density
         One-sided, from :func:`klack.acoustics.spectrum.energy_spectral_density`.
-    low, high : float [Hz]
+    low, high [Hz]
         Limits ``f_1`` and ``f_2``; say them beside a share, which depends on them.  A force that
         stays has no energy of finite size from 0 Hz on.
 

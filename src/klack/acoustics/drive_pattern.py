@@ -23,11 +23,11 @@ def drive_pattern(click: TimeSeries, rate: float, duration: float) -> TimeSeries
 
     Parameters
     ----------
-    click : TimeSeries
+    click
         Its first value comes first in the pattern.
-    rate : float [Hz]
+    rate [Hz]
         Clicks per second, ``r``.
-    duration : float [s]
+    duration [s]
         Of the pattern; clicks that begin before its end are in it, tails beyond are cut off.
     """
     require_positive("drive_pattern: rate", rate, "Hz")

@@ -40,7 +40,7 @@ class BandDensity:
 
     Parameters
     ----------
-    low, high : float [Hz]
+    low, high [Hz]
         The bands within these limits.
     frequency, values : array, shape (k,) [Hz], [N^2 s/Hz]
         A little beyond both limits.
@@ -59,9 +59,9 @@ def force_densities(
 
     Parameters
     ----------
-    force : TimeSeries
+    force
         Means over intervals; held at its first and last value outside.
-    low, high : float [Hz]
+    low, high [Hz]
         Bands within these limits; at most a tenth of the sampling rate.
     """
     numbers = band_numbers(low, min(high, 0.1 / force.step))
@@ -99,9 +99,9 @@ def force_bands(force: TimeSeries, *, low: float = LOWEST, high: float = HIGHEST
 
     Parameters
     ----------
-    force : TimeSeries
+    force
         See :func:`force_densities`.
-    low, high : float [Hz]
+    low, high [Hz]
     """
     return density_bands(force_densities(force, low=low, high=high))
 
@@ -128,9 +128,9 @@ def averaged(force: TimeSeries, step: float) -> TimeSeries:
 
     Parameters
     ----------
-    force : TimeSeries
+    force
         Means over intervals.
-    step : float [s]
+    step [s]
         Rounded to a multiple of the step of the force.
     """
     size = max(1, round(step / force.step))

@@ -41,7 +41,6 @@ def port_forces(
 
     Parameters
     ----------
-    structure : Structure
     stop_forces : mapping of stop name to TimeSeries [N]
         Above zero when the stop presses.
     """
@@ -106,24 +105,22 @@ class ModalResponse:
 
     Parameters
     ----------
-    body : str
-    port_names : tuple of str
-    injected : array, shape (p,) [J]
+    injected (p,) [J]
         Work of each port's force on the modes.
-    energy_before : float [J]
+    energy_before [J]
         Of the static equilibrium at the start.
-    modal_energy : array, shape (m,) [J]
+    modal_energy (m,) [J]
         Kinetic and strain energy of each mode at the end.
-    dissipated : array, shape (m,) [J]
+    dissipated (m,) [J]
         Lost in the damping of each mode.
-    ringing : array, shape (m,) [J]
+    ringing (m,) [J]
         Energy of each mode at the end about its equilibrium under the last force: what it will
         still lose if that force stays.
-    stored : array, shape (n + 1,) [J]
+    stored (n + 1,) [J]
         Energy of all modes at the ends of the intervals.
-    blocked_force : TimeSeries [N]
+    blocked_force [N]
         Axial force on the hold, means over the intervals; along +z from the forces.
-    sample_time : array, shape (k,) [s]
+    sample_time (k,) [s]
     modal_displacement, modal_velocity : array, shape (k, m) [m sqrt(kg)], [m sqrt(kg)/s]
         States at the sample times.
     """
@@ -167,7 +164,7 @@ def modal_response(
 
     Parameters
     ----------
-    structure : Structure
+    structure
         Rigidly held, or on a mount (:func:`klack.acoustics.mount.mounted`).
     forces : mapping of port name to TimeSeries [N]
         Along +z, means over intervals whose middles are their times, all on one grid.  The first
@@ -233,8 +230,7 @@ def surface_velocity(structure: Structure, response: ModalResponse) -> Floats:
 
     Parameters
     ----------
-    structure : Structure
-    response : ModalResponse
+    response
         With samples.
     """
     return np.asarray(response.modal_velocity @ structure.face_shapes.T.astype(np.float64))

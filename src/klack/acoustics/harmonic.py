@@ -30,12 +30,12 @@ class HarmonicResponse:
 
     Parameters
     ----------
-    frequency : array, shape (k,) [Hz]
-    fields : complex array, shape (k, b)
+    frequency (k,) [Hz]
+    fields (k, b)
         Of the surface fields of the structure: ``q'`` of the modes [1/(sqrt(kg) ...)], ``i omega``
         of the static rest of the loaded port, and the velocity of the support.
-    support_velocity : complex array, shape (k,) [m/(N s)]
-    support_force : complex array, shape (k,) [-]
+    support_velocity (k,) [m/(N s)]
+    support_force (k,) [-]
         Axial force on the support: of a rigid hold the blocked force.
     """
 
@@ -57,10 +57,8 @@ def harmonic_response(
 
     Parameters
     ----------
-    structure : Structure
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
         Zero or above.
-    port : str
     mount, plate : Mount, Plate or None
         What is below the held surfaces.
     """

@@ -36,7 +36,7 @@ def injected_density(
 
     Parameters
     ----------
-    structure : Structure
+    structure
         With damping in every mode.
     forces : mapping of port name to TimeSeries [N]
         Along +z, means over intervals, constant within them; held at the last value afterwards.

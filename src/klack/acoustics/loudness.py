@@ -29,20 +29,20 @@ class Loudness:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Every 2 ms, on the time axis of the sound.
-    loudness : array, shape (n,) [sone]
-    maximum : float [sone]
+    loudness (n,) [sone]
+    maximum [sone]
         The loudest moment, ``N_max``.
-    percentile_5 : float [sone]
+    percentile_5 [sone]
         ``N_5``, exceeded in 5 % of the time.  Of a single click it depends on how much silence is
         recorded with it; compare drive patterns.
-    level : float [phon]
+    level [phon]
         Loudness level of the maximum.
-    sharpness : float [acum]
+    sharpness [acum]
         DIN 45692 of the specific loudness summed over the whole sound; 0 where the sound is too
         faint for it.
-    note : str
+    note
         Empty, or what is to be said beside the numbers.
     """
 
@@ -62,7 +62,7 @@ def time_varying_loudness(pressure: TimeSeries) -> Loudness:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
         At 48 kHz; its level counts, so it must be in pascal.
 
     Raises
@@ -103,7 +103,7 @@ def loudness_level(loudness: float) -> float:
 
     Parameters
     ----------
-    loudness : float [sone]
+    loudness [sone]
 
     Examples
     --------

@@ -48,13 +48,12 @@ def transfer_mobility(
 
     Parameters
     ----------
-    structure : Structure
-    output, source : str
+    output, source
         Names of ports.
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
     mount, plate : Mount, Plate or None
         What is below the held surfaces.
-    residual : bool
+    residual
         Add the static rest of the modes left out.
 
     Returns

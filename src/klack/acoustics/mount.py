@@ -31,9 +31,9 @@ class Mount:
 
     Parameters
     ----------
-    stiffness : float [N/m]
+    stiffness [N/m]
         Along the axis.
-    loss_factor : float [-]
+    loss_factor [-]
     mass : float [kg] or None
         Of all that moves on it; the mass of the structure without.
     """
@@ -78,7 +78,7 @@ def support_mobility(
 
     Parameters
     ----------
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
     mount, plate : Mount, Plate or None
     """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
@@ -100,9 +100,8 @@ def mounted(structure: Structure, mount: Mount) -> Structure:
 
     Parameters
     ----------
-    structure : Structure
+    structure
         Rigidly held.
-    mount : Mount
     """
     mass, m = moved_mass(structure, mount), len(structure.omega)
     M, K = np.eye(m + 1), np.diag([*structure.omega**2, mount.stiffness])

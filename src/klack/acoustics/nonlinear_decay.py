@@ -34,7 +34,7 @@ def nonlinear_decay(core: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    core : array, shape (bands, n) [sone/Bark]
+    core (bands, n) [sone/Bark]
         Every 0.5 ms, zero or more; silence before the first and after the last value.
 
     Returns

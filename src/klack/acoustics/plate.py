@@ -31,8 +31,8 @@ class Air:
 
     Parameters
     ----------
-    density : float [kg/m^3]
-    sound_speed : float [m/s]
+    density [kg/m^3]
+    sound_speed [m/s]
     """
 
     density: float = 1.204
@@ -62,11 +62,10 @@ class Plate:
 
     Parameters
     ----------
-    thickness : float [m]
-    area : float [m^2]
+    thickness [m]
+    area [m^2]
         Of one side.
-    material : Material
-    loss_factor : float [-]
+    loss_factor [-]
         Of the mounted plate.
     """
 
@@ -118,9 +117,8 @@ class Plate:
 
         Parameters
         ----------
-        frequency : array, shape (k,) [Hz]
+        frequency (k,) [Hz]
             Above zero.
-        air : Air
         """
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
         radiation = 2.0 * air.impedance * self.efficiency(frequency, air)
@@ -148,11 +146,11 @@ def baffled_plate_efficiency(
 
     Parameters
     ----------
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
         Above zero.
-    coincidence : float [Hz]
-    area : float [m^2]
-    sound_speed : float [m/s]
+    coincidence [Hz]
+    area [m^2]
+    sound_speed [m/s]
     """
     f = np.asarray(frequency, dtype=float)
     c, fc, side = sound_speed, coincidence, float(np.sqrt(area))

@@ -48,11 +48,10 @@ class PowerTransfer:
 
     Parameters
     ----------
-    port : str
-    frequency : array, shape (k,) [Hz]
-    names : tuple of str
+    frequency (k,) [Hz]
+    names
         Groups of the surface, then ``"plate"`` if there is one.
-    values : array, shape (n, k) [W/N^2]
+    values (n, k) [W/N^2]
     """
 
     port: str
@@ -84,16 +83,14 @@ def power_transfer(
 
     Parameters
     ----------
-    structure : Structure
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
         Above zero; fine enough for the resonances, whose half-power width is ``2 zeta f``.
-    port : str
+    port
         Where the force acts along z.
     mount, plate : Mount, Plate or None
         What is below the held surfaces.
     efficiency : "piston" or "unity"
         Of the surface of the body; the plate has its own.
-    air : Air, optional
     """
     air = air or Air()
     answer = harmonic_response(structure, frequency, port, mount=mount, plate=plate)
@@ -136,9 +133,9 @@ def piston_efficiency(
 
     Parameters
     ----------
-    frequency : array, shape (k,) [Hz]
-    area : float [m^2]
-    sound_speed : float [m/s]
+    frequency (k,) [Hz]
+    area [m^2]
+    sound_speed [m/s]
 
     Examples
     --------

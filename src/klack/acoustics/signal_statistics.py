@@ -46,7 +46,7 @@ def a_weighting(frequency: ArrayLike) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    frequency : array [Hz]
+    frequency [Hz]
 
     Examples
     --------
@@ -65,7 +65,7 @@ def a_weighted(pressure: TimeSeries) -> TimeSeries:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
     """
     n = scipy.fft.next_fast_len(pressure.values.size + int(_PADDING / pressure.step), real=True)
     f = scipy.fft.rfftfreq(n, pressure.step)
@@ -97,15 +97,15 @@ class SoundStatistics:
 
     Parameters
     ----------
-    peak_level : float [dB re 20 uPa]
+    peak_level [dB re 20 uPa]
         Of the unweighted peak.
-    exposure_level, exposure_level_A : float [dB re (20 uPa)^2 s]
+    exposure_level, exposure_level_A [dB re (20 uPa)^2 s]
         Energy of the whole record; per click where the record is one.
-    equivalent_level_A : float [dB re 20 uPa]
+    equivalent_level_A [dB re 20 uPa]
         Energy mean over the record.
-    kurtosis, crest_factor : float [-]
+    kurtosis, crest_factor [-]
         Over the whole record, see there.
-    duration : float [s]
+    duration [s]
         Of the record, which kurtosis, crest factor and equivalent level depend on.
     """
 
@@ -123,7 +123,7 @@ def sound_statistics(pressure: TimeSeries) -> SoundStatistics:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
     """
     weighted = a_weighted(pressure)
     return SoundStatistics(
@@ -145,10 +145,6 @@ def kurtosis(series: TimeSeries) -> float:
     3 for Gaussian noise, 1.5 for a sine; high for rare clicks.  A click of fixed shape in a record
     ``k`` times as long has ``k`` times the kurtosis: compare records of the same length, or drive
     patterns.  0 for a constant.
-
-    Parameters
-    ----------
-    series : TimeSeries
     """
     x = series.values - series.values.mean()
     second = float(np.mean(x**2))
@@ -159,10 +155,6 @@ def crest_factor(series: TimeSeries) -> float:
     """Peak over root mean square; sqrt(2) for a sine; 0 for silence.
 
     Grows with the square root of the length of the record for a single click.
-
-    Parameters
-    ----------
-    series : TimeSeries
     """
     rms = float(np.sqrt(np.mean(series.values**2)))
     return float(np.max(np.abs(series.values)) / rms) if rms > 0.0 else 0.0
@@ -173,7 +165,7 @@ def peak_level(pressure: TimeSeries) -> float:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
     """
     return _level(float(np.max(np.abs(pressure.values))) ** 2 / PRESSURE_REFERENCE**2)
 
@@ -185,7 +177,7 @@ def sound_exposure_level(pressure: TimeSeries) -> float:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
     """
     return _level(float(np.sum(pressure.values**2)) * pressure.step / EXPOSURE_REFERENCE)
 
@@ -195,7 +187,7 @@ def equivalent_level(pressure: TimeSeries) -> float:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
     """
     return _level(float(np.mean(pressure.values**2)) / PRESSURE_REFERENCE**2)
 
@@ -209,8 +201,8 @@ def pressure_third_octaves(
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
-    low, high : float [Hz]
+    pressure [Pa]
+    low, high [Hz]
         From the band at 20 Hz to that at 20 kHz.
     """
     finest = 0.1 * low  # of the lowest band's width, a quarter of low

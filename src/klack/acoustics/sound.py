@@ -33,7 +33,7 @@ def minimum_phase_filter(magnitude: NDArray[np.float64]) -> NDArray[np.complex12
 
     Parameters
     ----------
-    magnitude : array, shape (N/2 + 1,)
+    magnitude (N/2 + 1,)
         At N/2 + 1 frequencies, evenly from 0 to half the sampling rate; above zero everywhere.
         The cepstrum must have died out within N/2 samples, so N is taken much longer than the
         filter rings.
@@ -89,20 +89,20 @@ def click_pressure(
 
     Parameters
     ----------
-    force : TimeSeries [N]
+    force [N]
         Means over its steps; no longer than those of the sound.
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
         Increasing; a value at 0 is ignored.
-    transfer : array, shape (k,) [W/N^2]
+    transfer (k,) [W/N^2]
         Radiated power per mean square force ``T``, zero or more.  In between it is interpolated
         monotonically in logarithms; below the first frequency it falls with ``f^4`` (surface held
         by a stiffness, smaller than the wave length), above the last it stays.
-    distance : float [m]
-    density : float [kg/m^3]
-    sound_speed : float [m/s]
-    rate : float [Hz]
+    distance [m]
+    density [kg/m^3]
+    sound_speed [m/s]
+    rate [Hz]
         Of the sound.
-    tail : float [s]
+    tail [s]
         Sound after the end of the force record.
 
     Returns
@@ -157,11 +157,11 @@ def pressure_transfer(
 
     Parameters
     ----------
-    f : array, shape (N/2 + 1,) [Hz]
+    f (N/2 + 1,) [Hz]
         Evenly from 0 to half the rate.
     frequency, squared : array, shape (k,) [Hz], [Pa^2/N^2]
         Interpolated as in :func:`click_pressure`.
-    rate : float [Hz]
+    rate [Hz]
     """
     first = f[1]
     level = _interpolated(np.maximum(f, first), frequency, squared)
@@ -177,8 +177,8 @@ def audio_band(f: NDArray[np.float64], *, rate: float = 48_000.0) -> NDArray[np.
 
     Parameters
     ----------
-    f : array [Hz]
-    rate : float [Hz]
+    f [Hz]
+    rate [Hz]
         Other rates than 48 kHz shift the limits in proportion.
     """
     x = np.clip((f / rate - _PASS) / (_STOP - _PASS), 0.0, 1.0)

@@ -49,12 +49,7 @@ _Zoom = Callable[[NDArray[np.float64]], NDArray[np.complex128]]
 
 
 def force_series(history: ImpactHistory) -> TimeSeries:
-    """Contact force of a history as a time series [N].
-
-    Parameters
-    ----------
-    history : ImpactHistory
-    """
+    """Contact force of a history as a time series [N]."""
     return TimeSeries(
         step=history.step,
         values=history.force,
@@ -69,8 +64,7 @@ def half_cosine_tail(series: TimeSeries, *, length: float) -> TimeSeries:
 
     Parameters
     ----------
-    series : TimeSeries
-    length : float [s]
+    length [s]
     """
     count = round(length / series.step)
     if not 0 < count <= series.values.size:
@@ -95,12 +89,12 @@ def impulse_spectrum(
 
     Parameters
     ----------
-    series : TimeSeries
+    series
         Starts and ends near zero (see :func:`half_cosine_tail`).
-    resolution : float [Hz]
+    resolution [Hz]
         Largest distance of the frequencies; zeros are padded to reach it.  Padding interpolates the
         spectrum, it adds no information.
-    interval_means : bool
+    interval_means
         The values are means over their steps (histories are): the ``sinc`` of that mean is divided
         out up to half the sampling rate.  ``False``: the values are samples.
     """
@@ -146,12 +140,12 @@ def change_spectrum(
 
     Parameters
     ----------
-    series : TimeSeries [unit]
+    series [unit]
         At least two values per period of ``high``.
-    high : float [Hz]
-    count : int
+    high [Hz]
+    count
         Of the frequencies, from 0 to ``high``.
-    origin : float [s]
+    origin [s]
         Time ``t_0`` that phases belong to.
 
     Returns
@@ -212,9 +206,9 @@ def force_spectrum(series: TimeSeries, *, high: float, resolution: float | None 
 
     Parameters
     ----------
-    series : TimeSeries
+    series
         Means over its steps.
-    high : float [Hz]
+    high [Hz]
         Last frequency; record at least twice as many values per second.
     resolution : float [Hz] or None
         Largest distance of the frequencies; ``None``: an eighth of the inverse length of the
@@ -237,7 +231,7 @@ def energy_spectral_density(spectrum: Spectrum) -> Spectrum:
 
     Parameters
     ----------
-    spectrum : Spectrum
+    spectrum
         From :func:`impulse_spectrum`, in N s; the density is in N^2 s/Hz = (N s)^2.
     """
     return Spectrum(
@@ -253,7 +247,7 @@ def impulse_level(spectrum: Spectrum) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    spectrum : Spectrum
+    spectrum
         In N s.
     """
     smallest = np.finfo(float).tiny
@@ -265,7 +259,7 @@ def density_level(density: Spectrum) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    density : Spectrum
+    density
         From :func:`energy_spectral_density`, in N^2 s/Hz.
     """
     smallest = np.finfo(float).tiny

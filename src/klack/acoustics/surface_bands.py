@@ -47,10 +47,10 @@ class RadiatedBands:
 
     Parameters
     ----------
-    names : tuple of str
+    names
         Groups of the surface, then ``"plate"`` if there is one.
-    bands : array, shape (n, 2) [Hz]
-    energy : array, shape (g, n) [J]
+    bands (n, 2) [Hz]
+    energy (g, n) [J]
     """
 
     names: tuple[str, ...]
@@ -79,9 +79,8 @@ class SurfaceSpectra:
 
     Parameters
     ----------
-    structure : Structure
     mount, plate : Mount, Plate or None
-    bands : array, shape (n, 2) [Hz]
+    bands (n, 2) [Hz]
     parts : tuple
         Spectra, decade by decade.
     """
@@ -158,10 +157,9 @@ def surface_spectra(
 
     Parameters
     ----------
-    structure : Structure
     forces : mapping of port name to TimeSeries [N]
         Along +z, means over intervals; held at their first and last values outside.
-    bands : array, shape (n, 2) [Hz]
+    bands (n, 2) [Hz]
         Lower and upper edges, ascending.
     mount, plate : Mount, Plate or None
         What is below the held surfaces.
@@ -187,7 +185,7 @@ def face_band_velocity(
     ----------
     structure, forces, bands, mount, plate
         See :func:`surface_spectra`.
-    period : float [s]
+    period [s]
         From click to click.
 
     Returns
@@ -218,7 +216,6 @@ def radiated_bands(
     structure, forces, bands, mount, plate
         See :func:`surface_spectra`.
     efficiency : "piston" or "unity"
-    air : Air, optional
     """
     spectra = surface_spectra(structure, forces, bands, mount=mount, plate=plate)
     return spectra.radiated(efficiency=efficiency, air=air)

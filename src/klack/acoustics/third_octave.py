@@ -34,10 +34,10 @@ class ThirdOctaves:
 
     Parameters
     ----------
-    number : int array, shape (n,)
+    number (n,)
         ``k``: 0 is the band at 1 kHz.
-    middle, low, high : array, shape (n,) [Hz]
-    energy : array, shape (n,) [unit^2 s]
+    middle, low, high (n,) [Hz]
+    energy (n,) [unit^2 s]
         Integral of the energy spectral density over the band, N^2 s for a force, Pa^2 s for a
         sound.
     """
@@ -58,7 +58,7 @@ class ThirdOctaves:
 
         Parameters
         ----------
-        reference : float [unit^2 s]
+        reference [unit^2 s]
             Of a sound (20 uPa)^2 s.
         """
         smallest = np.finfo(float).tiny
@@ -87,7 +87,7 @@ def band_numbers(low: float, high: float) -> NDArray[np.int64]:
 
     Parameters
     ----------
-    low, high : float [Hz]
+    low, high [Hz]
     """
     if not 0.0 < low < high:
         raise InputError(
@@ -120,10 +120,10 @@ def band_energies(density: Spectrum, *, low: float, high: float) -> ThirdOctaves
 
     Parameters
     ----------
-    density : Spectrum
+    density
         From :func:`klack.acoustics.spectrum.energy_spectral_density`; linear between its
         frequencies.
-    low, high : float [Hz]
+    low, high [Hz]
         Bands within these limits, see :func:`band_numbers`; not above the last frequency.
     """
     frequency, values = density.frequency, np.real(density.values)

@@ -21,8 +21,8 @@ def full_scale_of(*pressures: TimeSeries, headroom: float = 6.0) -> float:
 
     Parameters
     ----------
-    *pressures : TimeSeries [Pa]
-    headroom : float [dB]
+    *pressures [Pa]
+    headroom [dB]
         Between the highest peak of all and full scale.
 
     Returns
@@ -57,10 +57,9 @@ def write_wav(path: Path, pressure: TimeSeries, *, full_scale: float) -> None:
 
     Parameters
     ----------
-    path : Path
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
         At 48 kHz.
-    full_scale : float [Pa]
+    full_scale [Pa]
         Pressure of the largest number that the file can hold; see :func:`full_scale_of`.
 
     Raises
@@ -76,8 +75,8 @@ def wav_bytes(pressure: TimeSeries, *, full_scale: float) -> bytes:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
-    full_scale : float [Pa]
+    pressure [Pa]
+    full_scale [Pa]
     """
     import soundfile
 

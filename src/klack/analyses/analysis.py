@@ -36,13 +36,13 @@ class Analysis(Generic[Kept]):
     ----------
     json : type
         Of what ``to_json`` returns: a typed dictionary whose ``schema`` names it.
-    to_json : callable
+    to_json
         Its numbers, SI, the unit in the key.
-    told : callable
+    told
         What a terminal shows of it: tables, lines and notes, in their order.
     measures : mapping of str to tuple of Measure
         Its catalogue, by what they are of.
-    measured : callable
+    measured
         What its measures are of: levels, variants, impacts, shots, by name.
     """
 
@@ -59,12 +59,12 @@ class StoredAnalysis(Analysis[Kept]):
 
     Parameters
     ----------
-    form : RecordFormat
+    form
         How the record is stored.
-    page : str
+    page
         Function that makes the report of a record, ``"noise.content:noise_content"``; loaded with
         all its figures when a report is asked for.
-    renewed : callable
+    renewed
         Brings what an earlier version has stored to what this one stores.
     """
 
@@ -77,7 +77,7 @@ class StoredAnalysis(Analysis[Kept]):
 
         Parameters
         ----------
-        result, case : str
+        result, case
             Folder of the result, and what it was computed from, as typed at a terminal: for the
             commands that the report names.
         """
@@ -99,7 +99,7 @@ class StoredAnalysis(Analysis[Kept]):
 
         Parameters
         ----------
-        folder : Path
+        folder
             The folder given to :meth:`save`, or the store itself.
 
         Raises

@@ -20,14 +20,14 @@ class Entry:
 
     Parameters
     ----------
-    place : str
+    place
         Of its :class:`~klack.analyses.analysis.Analysis`, ``"shots.analysis:SHOTS"``.
-    form : str
+    form
         Name of the format of its record; empty where none is stored.
-    example : str
+    example
         Of its command, ``"klack shots demo-shots"``: the function ``shots`` of the module
         ``command`` in the same folder; empty without one.
-    others : tuple of str
+    others
         Examples of further commands in that module.
     """
 

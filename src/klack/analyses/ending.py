@@ -55,9 +55,9 @@ def write_result(
 
     Parameters
     ----------
-    save : callable
+    save
         Writes the result into a folder.
-    unfinished : LogForm, optional
+    unfinished
         Finished parts that are not needed any more once the result stands.
 
     Returns
@@ -83,7 +83,7 @@ def add_report(page: "Callable[[], Content]", folder: Path, mark: Mark | None) -
 
     Parameters
     ----------
-    page : callable
+    page
         Makes the report.
     mark : mark
         Of the result, from :func:`write_result`.
@@ -123,9 +123,9 @@ class Ending(Shown):
 
     Parameters
     ----------
-    report : bool
+    report
         Whether pages are written.
-    case : str
+    case
         What the result is computed from, as typed at a terminal; empty if not from one case.
     """
 
@@ -173,11 +173,11 @@ class Ending(Shown):
 
         Parameters
         ----------
-        beside : callable, optional
+        beside
             Writes further files into a folder, and returns their names.
-        unfinished : LogForm, optional
+        unfinished
             Finished parts that are not needed any more once the result stands.
-        incomplete : Exception, optional
+        incomplete
             Raised at the end: why the record is not all that was asked for.
         """
         from klack.machine.stages import stages_with_cached

@@ -17,7 +17,7 @@ class IncompleteImpactError(ConvergenceError):
 
     Parameters
     ----------
-    study : ImpactStudy
+    study
         Says in its ``failures`` and its warnings what is missing.
     """
 

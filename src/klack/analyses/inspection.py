@@ -107,11 +107,11 @@ def inspect_file(
 
     Parameters
     ----------
-    path : Path
+    path
         With one of the endings of :data:`INSPECTED`.
     unit_length : float [m] or None
         Of a mesh whose file does not name it.
-    matrix : str or None
+    matrix
         Name of one matrix in a file of several; all of them without.
 
     Raises

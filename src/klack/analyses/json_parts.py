@@ -49,13 +49,13 @@ class Key(NamedTuple):
     type : type, or the shape of the entry
         A :class:`JsonForm` stands for an object, ``[FORM]`` for a list of such objects,
         ``{str: FORM}`` for objects by name, ``(FORM, None)`` for one that may be null.
-    words : str
+    words
         What the name does not say.
     of : str or callable
         What it is read from, what the record calls so by default.
-    depth : int
+    depth
         From how far above it is inherited.
-    after : str
+    after
         Key that it follows in the schema, where that has another order than the object.
     """
 
@@ -76,13 +76,13 @@ class JsonForm:
 
     Parameters
     ----------
-    name : str
+    name
         Of its type in the schema.
-    words : str
+    words
         What it is.
-    keys : Key
+    keys
         In their order; in the schema inherited ones come first.
-    module : str
+    module
         Of its type, where another type has the same name.
     """
 

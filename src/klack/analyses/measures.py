@@ -72,13 +72,13 @@ class Column:
 
     Parameters
     ----------
-    unit : str
+    unit
         In which people read it; empty for a pure number.
-    factor : float
+    factor
         From SI to that unit.
-    form : str
+    form
         Format of the number.
-    head : str
+    head
         Instead of the name of the measure.
     """
 
@@ -104,43 +104,43 @@ class Measure(Generic[Of]):
 
     Parameters
     ----------
-    key : str
+    key
         In JSON, before its unit; ``json_name`` is used where that differs.
-    name : str
+    name
         In words, those of the key by default; ``title`` is what a report calls it where that
         differs.
-    symbol : str
+    symbol
         In formulas.
-    unit : str
+    unit
         SI, ``"1"`` for a pure number; empty where ``unit_of`` tells it of each thing.
-    definition : str
+    definition
         One sentence; ``note`` may add to it in a glossary.
-    source : str
+    source
         Page of the documentation; see :func:`described_in`.
-    read : callable
+    read
         Its value [unit], nan or None where it does not exist; what stands under its key by
         default.
-    kind : str
+    kind
         A ``"number"``, a ``"whole"`` number or a ``"truth"`` value.
-    form : str
+    form
         How a report prints it: a ``"quantity"`` with ``digits`` significant digits and a prefix,
         ``"fixed"`` decimals, a ``"share"`` in per cent, a ``"power"`` of ten, a ``"count"``, which
         is that of whole numbers, or with a sign.
-    column : Column, optional
+    column
         Of tables on a terminal that show it.
-    given : callable
+    given
         Whether a record stands for it as defined; elsewhere it is left out of JSON.
-    remark : callable
+    remark
         Behind the value in tables, for example that it was cut off; a second line of it, after a
         line break, stands in reports only.
-    deviation : str
+    deviation
         How two runs are compared: by their ``"relative"`` or plain ``"difference"``, by the
         ``"factor"`` between them, or by its level in dB, of an ``"amplitude"`` or an ``"energy"``.
-    page : bool
+    page
         Whether it stands among the key numbers of a report.
-    absent : str
+    absent
         What tables say where there is no value.
-    unit_of, digits_of : callable, optional
+    unit_of, digits_of
         Unit of the value of one thing, empty for a pure number; its significant digits.
     """
 

@@ -31,13 +31,13 @@ def page_of(
 
     Parameters
     ----------
-    kind : str
+    kind
         What was computed.
-    subtitle : iterable of str
+    subtitle
         What else stands before date and version.
-    answer : str
+    answer
         In one paragraph.
-    numbers : Table
+    numbers
         The key numbers.
     definitions, limits : tuple of (term, text)
     """

@@ -28,13 +28,13 @@ class PointColumn:
 
     Parameters
     ----------
-    name : str
+    name
         Key of the case, or name of a measure.
-    unit : str
+    unit
         SI; ``"1"`` for pure numbers, empty for texts.
-    values : array, shape (points,)
+    values (points,)
         Numbers, nan where there is none; of a key without unit what is written there.
-    measure : Measure, optional
+    measure
         With its definition.
     """
 
@@ -55,19 +55,19 @@ class PointTable:
 
     Parameters
     ----------
-    case : str
+    case
         Name of the case.
-    variant : str
+    variant
         That was computed.
-    points : tuple of PointColumn
+    points
         Keys that points exchange, in SI; nan or None where a point leaves the case as it is.
-    measures : tuple of PointColumn
+    measures
         In the order in which they were asked for; nan where a run does not have the number.
-    failures : tuple of str
+    failures
         Why a point has no measures: the error of its run; empty where it was computed.
     warnings : tuple of tuple of str
         Doubts about the numbers of each point.
-    steps : tuple of PointColumn
+    steps
         Of strokes: how often their steps were halved, and the largest change over what the accuracy
         promises that is left with steps twice as long (certified up to 0.5).
     """
@@ -223,7 +223,7 @@ class RunsInterrupted(KeyboardInterrupt):
 
     Parameters
     ----------
-    table : PointTable
+    table
         What was computed until then; the other points say that they were not computed.
     """
 

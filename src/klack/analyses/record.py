@@ -29,13 +29,13 @@ class Record:
 
     Parameters
     ----------
-    version : str
+    version
         Of klack; ``versions`` holds those of the libraries.
-    created : str
+    created
         ISO 8601.
-    wall_time : float [s]
+    wall_time [s]
         Of the whole analysis.
-    stage_times : mapping of str to float [s]
+    stage_times [s]
     """
 
     title: str
@@ -71,13 +71,13 @@ class CaseRecord(Record):
 
     Parameters
     ----------
-    case : str
+    case
         Name.
-    case_text : str
+    case_text
         The file itself.
-    own_components : mapping of str to str
+    own_components
         Components that are not part of klack: first digits of the SHA-256 of their code, by name.
-    case_notes : tuple of str
+    case_notes
         What the case by itself gives reason to say; added to the warnings.
     """
 

@@ -62,11 +62,11 @@ def with_columns(
 
     Parameters
     ----------
-    measures : iterable of Measure
+    measures
         In the order in which the columns are stored.
-    later : collection of str
+    later
         Columns that earlier versions have not stored.
-    filled : float
+    filled
         What stands in such a column instead.
     """
     members = [

@@ -19,15 +19,15 @@ class Statistic:
 
     Parameters
     ----------
-    key : str
+    key
         In the name of a measure.
-    name : str
+    name
         In words.
-    definition : str
+    definition
         Of the values of the sample.
-    of : callable
+    of
         Of values, shape (n,), n > 0; not a number where one of them is none.
-    fewest : int
+    fewest
         Values that it takes to tell more than their ends.
     """
 
@@ -102,7 +102,7 @@ def moments(
 
     Parameters
     ----------
-    values : array, shape (n,)
+    values (n,)
         Nan where there is none.
     """
     known = values[np.isfinite(values)]

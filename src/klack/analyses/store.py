@@ -40,15 +40,15 @@ class RecordFormat:
 
     Parameters
     ----------
-    name : str
+    name
         Written into the store.
     kind : type
         Frozen dataclass of numbers, words, arrays and further such records.
-    command : str
+    command
         That makes it, for messages.
-    units : mapping of str to str
+    units
         By name of the array; a name not listed is stored without a unit.
-    tables : tuple of str
+    tables
         Members that are long tuples of one kind of record without arrays: an array per field.
     """
 
@@ -79,9 +79,9 @@ def load_record(folder: Path, form: RecordFormat, *, largest: int = _LARGEST) ->
 
     Parameters
     ----------
-    folder : Path
+    folder
         The folder given to :func:`save_record`, or the store itself.
-    largest : int [byte]
+    largest [byte]
         Of all arrays together; more is refused before it is read.
 
     Raises

@@ -40,15 +40,15 @@ class LogForm(Generic[Key, Part]):
 
     Parameters
     ----------
-    file : str
+    file
         Name in the folder of the results.
-    format : str
+    format
         With its version; a file of another one is written over.
-    parts : str
+    parts
         In words, for messages.
-    data : callable
+    data
         Key and part as JSON has them; the shortest text of a double is read back exactly.
-    read : callable
+    read
         The same back.
     """
 
@@ -94,9 +94,9 @@ class UnfinishedLog(Closing, Generic[Key, Part]):
 
     Parameters
     ----------
-    folder : Path or None
+    folder
         Made if it does not exist; None keeps the parts in memory only.
-    mark : str
+    mark
         What :func:`fingerprint` says.  A file with another one is written over.
     """
 
@@ -232,9 +232,9 @@ def fingerprint(case: "AnyCase", parts: Iterable[bytes], source: str | None = No
     ----------
     case : Case or ValveCase
         Meshes and drawings of its bodies are read.
-    parts : iterable of bytes
+    parts
         Seeds, measured values, ...
-    source : str, optional
+    source
         What counts of the text of the case; all of it by default.
     """
     digest = sha256()

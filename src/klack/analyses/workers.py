@@ -74,9 +74,9 @@ class WorkerPool(Closing):
 
     Parameters
     ----------
-    workers : int
+    workers
         Processes at most; they start when there is work for them.
-    given : object
+    given
         Sent to each of them once.
     """
 
@@ -108,7 +108,7 @@ class WorkerPool(Closing):
 
         Parameters
         ----------
-        compute : callable
+        compute
             Of a module, with one argument.
 
         Raises
@@ -139,12 +139,12 @@ class WorkerPool(Closing):
 
         Parameters
         ----------
-        compute : callable
+        compute
             Of a module, with one argument.
-        take : callable
+        take
             Next item for a process, which it gets as a thing to compare with others; None if there
             is none.
-        attempts : int
+        attempts
             Processes that an item may end, until that is its answer.
 
         Raises
@@ -363,15 +363,15 @@ class LoggedWork(Closing, Generic[Key, Part]):
 
     Parameters
     ----------
-    run : callable
+    run
         Of a module: part of what is given and an item.
-    given : object
+    given
         Sent to each process once.
-    workers : int
+    workers
         Processes; 1 computes in this one.
-    name : callable
+    name
         What an error calls the part of a key.
-    fewest : int
+    fewest
         Parts that make up for the start of a second process.
     """
 
@@ -438,7 +438,7 @@ def grouped_doubts(doubts: Iterable[tuple[int, Iterable[str]]], shots: str) -> l
     ----------
     doubts : iterable of (int, iterable of str)
         Number of each shot, and its doubts.
-    shots : str
+    shots
         What they are called, ``"shots"``.
 
     Examples

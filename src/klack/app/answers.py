@@ -67,10 +67,9 @@ class Number:
 
     Parameters
     ----------
-    key, name, unit : str
-    value : float or None
+    value
         In ``unit``.
-    difference : str
+    difference
         How a difference is given: ``"%"`` of the pinned one, ``"us"``, ``"dB"`` or ``"1"``.
     """
 
@@ -87,23 +86,21 @@ class Answer:
 
     Parameters
     ----------
-    force, lift : tuple of Curve
+    force, lift
         Over time in us (impact) or ms (stroke); force in N, lift in um.
-    time_unit : str
-    bands : array [Hz]
+    bands [Hz]
         Middle frequencies.
-    levels : array [dB]
+    levels [dB]
         Of the force, re 1e-12 N^2 s.
-    numbers : tuple of Number
-    wav, ghost_wav : bytes
+    wav, ghost_wav
         The click now and that of the pinned design, to one full scale; empty if nothing radiates.
-    scale : str
+    scale
         Full scale of both in words.
-    doubts : tuple of str
+    doubts
         Why the numbers are doubtful; shown at once.
-    seconds : float
+    seconds
         That it took.
-    run : str
+    run
         Level or variant of a result.
     """
 
@@ -127,9 +124,8 @@ class Judgement:
 
     Parameters
     ----------
-    grade : str
+    grade
         ``"good"``, ``"fair"``, ``"out"`` of range, or ``"none"`` where there is no estimate.
-    words : str
     """
 
     grade: str
@@ -142,11 +138,11 @@ class Hearing:
 
     Parameters
     ----------
-    number, pinned : Number
+    number, pinned
         Loudness now, and of the pinned design.
-    spectrogram : tuple of arrays
+    spectrogram
         Time [ms], frequency [kHz], level [dB re 20 uPa].
-    pattern_wav : bytes
+    pattern_wav
         The click as often as the drive pattern of the case has it, to the full scale of the clicks.
     """
 
@@ -162,11 +158,9 @@ class Heard:
 
     Parameters
     ----------
-    point : int
-    wav, base_wav : bytes
+    wav, base_wav
         To one full scale, which ``scale`` has in words.
-    scale : str
-    level, base_level : float [dB(A)]
+    level, base_level [dB(A)]
         Sound exposure levels.
     """
 
@@ -184,12 +178,9 @@ class ResultCard:
 
     Parameters
     ----------
-    command, title, case, created : str
-    numbers : tuple of Number
-    doubts : tuple of str
-    compares : bool
+    compares
         Whether two of its kind can be compared.
-    has_points : bool
+    has_points
         Whether it is a study, whose points have a page.
     """
 
@@ -209,17 +200,15 @@ class Slider:
 
     Parameters
     ----------
-    key : str
+    key
         ``"motion.speed"``.
-    place : Key
-    label : str
-    unit : str
+    unit
         SI; empty for a pure number.
-    low, high, start, step : float
+    low, high, start, step
         In ``unit``.
-    needs_mesh : bool
+    needs_mesh
         Whether bodies follow from it, so that it does not move here.
-    written : str
+    written
         What the case has there.
     """
 
@@ -245,13 +234,11 @@ class Opened:
 
     Parameters
     ----------
-    title : str
-    kind : str
+    kind
         ``"impact"`` or ``"stroke"``.
-    sliders : tuple of Slider
-    run : str
+    run
         Level or variant.
-    first : Answer
+    first
         At the values of the case, which is pinned.
     """
 
@@ -268,8 +255,7 @@ class MeasureOffer:
 
     Parameters
     ----------
-    name, unit, definition : str
-    is_first : bool
+    is_first
         Whether it is ticked at first.
     """
 
@@ -285,12 +271,11 @@ class StudyOffer:
 
     Parameters
     ----------
-    title, kind : str
+    title, kind
         Of the case.
-    parameters : tuple of Slider
+    parameters
         Numbers of the case.
-    measures : tuple of MeasureOffer
-    designs : mapping of str to str
+    designs
         Designs, with what they are for.
     """
 
@@ -309,11 +294,8 @@ class StudyChoice:
     ----------
     ranges : mapping of str to pair of str
         Lowest and highest value, with their units, by the key of the case.
-    measures : tuple of str
-    objectives : mapping of str to str
+    objectives
         ``"minimise"`` or ``"maximise"``.
-    design : str
-    points : int
     """
 
     ranges: Mapping[str, tuple[str, str]]
@@ -329,21 +311,17 @@ class FormField:
 
     Parameters
     ----------
-    key : str
-    place : Key
-    section, label : str
-    written : str
+    written
         As the file has it; empty where it does not have the key.
-    kind : str
+    kind
         ``"a length"``; empty for words and plain numbers.
-    example : str
+    example
         Of a quantity.
-    limits : str
+    limits
         ``"> 0"``.
-    choices : tuple of str
+    choices
         Words that the schema allows; empty where it allows any.
-    description : str
-    default : str
+    default
         What counts where the file does not have the key.
     """
 
@@ -366,15 +344,15 @@ class Checked:
 
     Parameters
     ----------
-    error : str
+    error
         Its message; empty for a valid case.
-    title, kind : str
+    title, kind
         Of a valid case; ``"impact"`` or ``"stroke"``; ``"study"`` of a study in a file of its own.
-    fields : tuple of FormField
+    fields
         Of a valid case.
-    has_study, has_objectives : bool
+    has_study, has_objectives
         Whether there is a study, with something to search for.
-    case : str
+    case
         Case that a study names.
     """
 
@@ -389,12 +367,7 @@ class Checked:
 
 @dataclass(frozen=True, kw_only=True)
 class FaceFacts:
-    """A face of a part, for a list.
-
-    Parameters
-    ----------
-    name, words : str
-    """
+    """A face of a part, for a list."""
 
     name: str
     words: str
@@ -406,11 +379,11 @@ class PartFacts:
 
     Parameters
     ----------
-    words : str
+    words
         Size, volume, solids.
-    faces, solid_faces : tuple of FaceFacts
+    faces, solid_faces
         Of the half section, and of the solid; empty where there is none.
-    not_turned : str
+    not_turned
         Why there is no half section; empty where there is one.
     """
 
@@ -426,11 +399,11 @@ class Finding:
 
     Parameters
     ----------
-    grade : str
+    grade
         ``"good"``, ``"doubt"`` or ``"error"``.
-    what, words, advice : str
+    what, words, advice
         Name of the check, what was found, and what to do; no advice for what is good.
-    step : int
+    step
         Of the guide, where it is changed.
     """
 
@@ -447,10 +420,9 @@ class Review:
 
     Parameters
     ----------
-    findings : tuple of Finding
-    text : str
+    text
         Of the case; empty where an error stands in its way.
-    steps : tuple of str
+    steps
         Bodies whose STEP files the case names, as ``needle.step`` beside it.
     """
 

@@ -349,13 +349,8 @@ class _Computed:
 
     Parameters
     ----------
-    source : NoiseSource
-    bands : tuple of ThirdOctaves
+    bands
         Of the forces of its stops.
-    pressure : TimeSeries or None
-    force, lift : tuple of Curve
-    numbers : tuple of Number
-    doubts : tuple of str
     """
 
     source: NoiseSource
@@ -417,9 +412,9 @@ class Explorer:
 
         Parameters
         ----------
-        values : mapping of str to float
+        values
             Of sliders that are off their place in the case.
-        pin : bool
+        pin
             Compare later positions with this one.
         """
         begin = perf_counter()

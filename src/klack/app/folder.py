@@ -49,15 +49,15 @@ class Found:
 
     Parameters
     ----------
-    cases : tuple of str
+    cases
         Files, by their path from the folder.
-    results : tuple of str
+    results
         Folders that hold a result.
-    is_whole : bool
+    is_whole
         False where there is more than was looked at.
-    steps : tuple of str
+    steps
         STEP files.
-    odd : tuple of str
+    odd
         What has the name of a case, a STEP file or a folder and is not looked into, with the
         reason.
     """
@@ -74,7 +74,7 @@ class OpenFolder:
 
     Parameters
     ----------
-    path : Path
+    path
         An existing folder.
     """
 

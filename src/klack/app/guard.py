@@ -79,16 +79,15 @@ class Access:
 
     Parameters
     ----------
-    host : str
+    host
         Address that the server listens on.
-    port : int
-    token : str
+    token
         In the URL that is printed; gives the session cookie in exchange where no password does.
-    session : str
+    session
         Value of the cookie.
-    gate : PasswordGate or None
+    gate
         Where other machines may connect: gives the cookie instead of the token.
-    names : tuple of str
+    names
         Host names by which browsers may call the server.
     """
 
@@ -217,8 +216,7 @@ class Guard:
     Parameters
     ----------
     app : ASGI application
-    access : Access
-    largest : int [byte]
+    largest [byte]
         Of the body of a request.
     """
 

@@ -62,24 +62,23 @@ class Job:
 
     Parameters
     ----------
-    name : str
+    name
         Of its folder.
-    command, case, out : str
+    command, case, out
         Command of klack; case file and result by their path from the folder.
-    started : float [s]
+    started [s]
         Since 1970.
-    state : str
-    stage : str
+    stage
         What it does now.
-    fraction : float
+    fraction
         Of the stage.
-    code : int or None
+    code
         Exit code, when it has ended.
-    told : str
+    told
         The last of what it printed.
-    study : str
+    study
         File of the study, by its path from the folder; empty if it stands in the case.
-    points : PointCount or None
+    points
         Of a study that has begun to compute.
     """
 
@@ -98,12 +97,7 @@ class Job:
 
 
 class Jobs:
-    """All runs of a folder.
-
-    Parameters
-    ----------
-    folder : OpenFolder
-    """
+    """All runs of a folder."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder

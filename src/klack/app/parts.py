@@ -140,13 +140,10 @@ class Part:
 
     Parameters
     ----------
-    name : str
-    path : Path or None
+    path
         STEP file; None for a drawing.
     profiles : mapping of str to Profile, or None
         Half section of each solid; None for a part that is not turned.
-    content : StepContent or None
-    not_turned : str
     """
 
     name: str

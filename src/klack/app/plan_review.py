@@ -39,12 +39,7 @@ _LOSS = "0.2 %"  # loss factor of steel parts: 0.1 to 0.5 %
 
 @dataclass(frozen=True, kw_only=True)
 class BodySizes:
-    """Element sizes of a body [m].
-
-    Parameters
-    ----------
-    size, contact, extent : float
-    """
+    """Element sizes of a body [m]."""
 
     size: float
     contact: float
@@ -62,11 +57,10 @@ def case_text(
 
     Parameters
     ----------
-    plan : ValvePlan
     profiles : mapping of body to profiles, or None
         Half sections; None for a body that stays in its STEP file.
     sizes : mapping of body to BodySizes
-    duration : float [s]
+    duration [s]
     files : mapping of body to str
         STEP files as the case names them.
     """
@@ -204,16 +198,15 @@ class _Meeting:
 
     Parameters
     ----------
-    touch : Touch
-    force : float [N]
+    force [N]
         Estimate from above.
-    half_width : float [m]
+    half_width [m]
         By Hertz under that force; nan where the shape does not say.
-    radius : float [m]
+    radius [m]
         Of the ring of first touch; 0 for a point, nan for a whole zone.
-    sharp : str
+    sharp
         Where a sharp edge touches; empty for smooth faces.
-    duration : float [s]
+    duration [s]
     """
 
     touch: Touch
@@ -229,9 +222,8 @@ def review(plan: ValvePlan, parts: Mapping[str, Part], place: Path) -> Review:
 
     Parameters
     ----------
-    plan : ValvePlan
     parts : mapping of body to Part
-    place : Path
+    place
         Of the case file; it need not be there.
     """
     findings = list(_sizes_of_parts(parts))

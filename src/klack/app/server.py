@@ -84,13 +84,11 @@ def serve(
 
     Parameters
     ----------
-    folder : Path
-    host : str
-    port : int
+    port
         0 takes a free one.
-    password : str or None
+    password
         Needed where the host is not this machine.
-    ready : callable
+    ready
         Called with the access once the port is ours.
 
     Raises

@@ -31,12 +31,7 @@ _START = b"ISO-10303-21"
 
 
 class Uploads:
-    """Files under names that cannot be guessed; their own names are never used as names.
-
-    Parameters
-    ----------
-    folder : OpenFolder
-    """
+    """Files under names that cannot be guessed; their own names are never used as names."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder
@@ -111,9 +106,9 @@ class Sounds:
 
     Parameters
     ----------
-    most : int
+    most
         Kept; older ones are forgotten.
-    place, ending : str
+    place, ending
         Of their addresses.
     """
 
@@ -136,12 +131,7 @@ class Sounds:
 
 
 class Notes:
-    """Notes on cases and results, and texts that are not saved yet; all in ``.klack-app``.
-
-    Parameters
-    ----------
-    folder : OpenFolder
-    """
+    """Notes on cases and results, and texts that are not saved yet; all in ``.klack-app``."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder
@@ -175,10 +165,9 @@ class Notes:
 
         Parameters
         ----------
-        of : str
-        known : str or None
+        known
             What the caller has kept, or found.
-        text : str or None
+        text
             None once it is saved.
 
         Returns
@@ -205,12 +194,7 @@ class Notes:
 
 
 class State:
-    """Of one server.
-
-    Parameters
-    ----------
-    folder : OpenFolder
-    """
+    """Of one server."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self.folder, self.jobs, self.notes = folder, Jobs(folder), Notes(folder)

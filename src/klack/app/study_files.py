@@ -73,11 +73,11 @@ def result_of_study(command: str, study: str, case: str = "") -> str:
 
     Parameters
     ----------
-    command : str
+    command
         ``"study"`` or ``"optimise"``.
-    study : str
+    study
         File of the study, or case with a study in it.
-    case : str
+    case
         Chosen for a study that names none.
 
     Examples
@@ -101,10 +101,9 @@ def beside_case(folder: OpenFolder, job: Job | None, name: str, text: str) -> st
 
     Parameters
     ----------
-    folder : OpenFolder
-    job : Job or None
+    job
         That made the study.
-    name, text : str
+    name, text
         Of the case, as the study has it.
     """
     if job is not None:
@@ -149,13 +148,13 @@ class PointsSource:
 
     Parameters
     ----------
-    folder : Path or None
+    folder
         With a record of a study; None before there is one.
-    job : Job or None
+    job
         The latest one that writes, or wrote, the result.
-    is_live : bool
+    is_live
         Whether the record is that of a study that runs or was stopped.
-    mark : str
+    mark
         Changes with the record.
     """
 

@@ -54,17 +54,16 @@ class Front:
 
     Parameters
     ----------
-    ways : mapping of str to str
+    ways
         ``"minimise"`` or ``"maximise"``, by the objective.
-    bounds : tuple of str
+    bounds
         In words.
-    points : tuple of int
+    points
         By the first objective.
-    best : int
+    best
         -1 without a front.
-    kept : bool array or None
+    kept
         Points that keep all bounds; None where there are none.
-    feasible : bool
     """
 
     ways: dict[str, str]
@@ -325,11 +324,10 @@ class Listener:
 
         Parameters
         ----------
-        folder : str
+        folder
             Of the result.
-        near : str
+        near
             Folder of the case, for the files that it names.
-        point : int
 
         Raises
         ------

@@ -51,29 +51,29 @@ class ValvePlan:
 
     Parameters
     ----------
-    name : str
+    name
         Of the folder that the case will have.
-    step : int
+    step
         Where the guide stands.
-    source : str
+    source
         ``"step"`` or ``"table"``.
-    needle_file, housing_file : str
+    needle_file, housing_file
         STEP files by their path from the folder.
-    needle_label, housing_label : str
+    needle_label, housing_label
         Names that uploaded files had.
-    needle_table, housing_table : str
+    needle_table, housing_table
         Rows of a drawing, see :mod:`klack.app.parts`.
-    model : str
+    model
         ``"half"`` for the half section of turned parts, ``"solid"``.
-    needle_contact, housing_contact : str
+    needle_contact, housing_contact
         Faces that meet.
-    held, radiating : tuple of str
+    held, radiating
         Faces of the housing; all that are left radiate where none is chosen.
-    needle_material, housing_material : str
+    needle_material, housing_material
         Of the library.
-    speed, force, gap : str
+    speed, force, gap
         Quantities with their units.
-    noise : bool
+    noise
         Whether mount and plate are assumed, so that the click can be played.
     """
 
@@ -128,8 +128,7 @@ class ValvePlan:
 
         Parameters
         ----------
-        body, face : str
-        role : str
+        role
             ``"contact"``, ``"held"``, ``"radiating"``, or empty for none.
         """
         plan = self
@@ -172,12 +171,7 @@ class ValvePlan:
 
 
 class Plans:
-    """The plan of a folder, in ``.klack-app``; whole at every moment.
-
-    Parameters
-    ----------
-    folder : OpenFolder
-    """
+    """The plan of a folder, in ``.klack-app``; whole at every moment."""
 
     def __init__(self, folder: OpenFolder) -> None:
         self._folder = folder

@@ -26,7 +26,7 @@ class Worker:
 
     Parameters
     ----------
-    kind : str
+    kind
         Class of the object, ``package.module:Class``, made without arguments.
     """
 

@@ -31,9 +31,7 @@ class AssembledBody:
 
     Parameters
     ----------
-    body : ElasticBody
-    report : MatrixReport
-    notes : tuple of str
+    notes
         Of the readers: which triangle was stored, where the rows are named, ...
     """
 
@@ -72,10 +70,9 @@ def assembled_body(case: CaseFile, name: str, mesh: Mesh | None = None) -> Assem
 
     Parameters
     ----------
-    case : CaseFile
-    name : str
+    name
         Of a body with the key ``matrices``.
-    mesh : Mesh, optional
+    mesh
         Its mesh where the case has placed it, shifted or turned; as drawn without.
 
     Raises

@@ -75,17 +75,17 @@ class BodyPair:
 
     Parameters
     ----------
-    upper, lower : ElasticBody
+    upper, lower
         The moving body and the one that it hits.
-    upper_surface, lower_surface : Surface
+    upper_surface, lower_surface
         Where they meet.
-    pose : Pose
+    pose
         Where the upper body stands, compared with its drawing.
-    gauges : tuple of Gauge
+    gauges
         On either body.
-    form : FaceForm or None
+    form
         Of both faces, which their meshes do not have.
-    layer : AsperityLayer or None
+    layer
         Of both faces.
     """
 
@@ -148,14 +148,13 @@ class PlacedMeshes:
 
     Parameters
     ----------
-    upper, lower : Mesh
-    upper_surface, lower_surface : Surface
+    upper_surface, lower_surface
         Where they meet.
-    pose : Pose
+    pose
         Where the upper body stands, compared with its drawing.
-    form : FaceForm or None
+    form
         Of both faces, which their meshes do not have.
-    touch : Touch or None
+    touch
         First touch of the bodies as drawn; None where no mesh is refined there.
     """
 
@@ -349,12 +348,10 @@ def mesh_body(
 
     Parameters
     ----------
-    body : CaseBody
-    name : str
     places : tuple of (r, z) or (x, y, z) [m], optional
         Where it is refined.  Without, a first mesh to look at: finer than asked for where its
         elements would be poor.
-    places_at : callable, optional
+    places_at
         The places that a case with another general size [m] would have.
     """
     geometry = body.geometry
@@ -549,10 +546,9 @@ def warn_far_touch(name: str, away: float, extent: float) -> None:
 
     Parameters
     ----------
-    name : str
-    away : float [m]
+    away [m]
         From the place of the refinement.
-    extent : float [m]
+    extent [m]
         Of the refinement.
 
     Warns

@@ -20,13 +20,12 @@ class BodySummary:
 
     Parameters
     ----------
-    name, model, source, support, material : str
+    name, model, source, support, material
         ``model`` is ``"3-D"`` or ``"axisymmetric"``; ``source`` says where the geometry came from.
-    mass : float [kg]
-    nodes, elements, dofs : int
-    frequencies : array [Hz]
+    mass [kg]
+    frequencies [Hz]
         Elastic eigenfrequencies that the reduction keeps, lowest first.
-    compliance_share : float [-]
+    compliance_share [-]
         Share of the static compliance at the contact that the kept modes carry.
     """
 

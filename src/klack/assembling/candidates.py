@@ -57,8 +57,7 @@ class CondensedSpace:
 
     Parameters
     ----------
-    space : ContactSpace
-    upper, lower : array, shape (nc, nc) [m/N]
+    upper, lower (nc, nc) [m/N]
     """
 
     space: ContactSpace
@@ -86,9 +85,8 @@ class Candidates:
 
     Parameters
     ----------
-    pair : BodyPair
+    pair
         Only meshes, surfaces and their form matter; they need not touch.
-    upper, lower : Flexibility
     """
 
     def __init__(self, pair: BodyPair, upper: Flexibility, lower: Flexibility) -> None:

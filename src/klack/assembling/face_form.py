@@ -26,7 +26,6 @@ def form_of_faces(
 
     Parameters
     ----------
-    case : Case
     upper, surface, lower, other
         Meshes and named surfaces that meet, the upper one where it is at the start but for its
         height.

@@ -22,7 +22,6 @@ def place_gauges(case: Case, bodies: Mapping[str, tuple[Mesh, Pose | None]]) -> 
 
     Parameters
     ----------
-    case : Case
     bodies : mapping of body name to (Mesh, Pose or None)
         Mesh in its place, and how it came there from its drawing; None where it was not moved.
 

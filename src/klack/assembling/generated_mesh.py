@@ -64,11 +64,9 @@ def meshed_for_case(
 
     Parameters
     ----------
-    body : str
-    sizing : MeshSizing
-    mesher : callable
+    mesher
         Makes the mesh of a sizing.
-    at_size : callable, optional
+    at_size
         All that the case would ask for with another general size [m], its refinements where the
         bodies would be found to touch then; without, only that size changes.
 

@@ -36,8 +36,7 @@ def reduced_from_file(case: CaseFile, name: str) -> ReducedBody:
 
     Parameters
     ----------
-    case : CaseFile
-    name : str
+    name
         Of a body with the key ``reduced``.
 
     Raises

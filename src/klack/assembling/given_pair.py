@@ -35,11 +35,10 @@ class GivenPair:
 
     Parameters
     ----------
-    upper, lower : ReducedBody
     ports : pair of str
     law : LinearLaw or HertzLaw
         Of the contact zone, as the case gives it.
-    series_compliance : float [m/N]
+    series_compliance [m/N]
         What the modes of both bodies miss, in series with the law.
     summaries : pair of BodySummary
     """

@@ -53,10 +53,9 @@ def require_given_shapes(
 
     Parameters
     ----------
-    case : CaseFile
-    read : callable
+    read
         Reads the finished mesh, or the nodes, of a body by its name.
-    progress : callable
+    progress
         Told what is in doubt, at once.
 
     Returns
@@ -135,11 +134,10 @@ def tell_effort(
 
     Parameters
     ----------
-    case : CaseFile
     shapes : mapping of body to GivenShape
     sizings : mapping of body to MeshSizing
         Of the bodies that klack meshes.
-    progress : callable
+    progress
         Told at once.
 
     Warns
@@ -182,8 +180,7 @@ def require_usual_sizes(case: CaseFile, extents: Mapping[str, float]) -> None:
 
     Parameters
     ----------
-    case : CaseFile
-    extents : mapping of str to float [m]
+    extents [m]
         Longest side of the box around each body.
 
     Raises

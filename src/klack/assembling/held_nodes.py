@@ -22,14 +22,13 @@ def sector_nodes(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         Of dimension 3.
-    surface : str
-    count : int
+    count
         Number of sectors, spread evenly over the circumference.
-    width_rad : float [rad]
+    width_rad [rad]
         Angle that each sector covers.
-    first_rad : float [rad]
+    first_rad [rad]
         Angle of the middle of the first sector, from the x axis towards y.
 
     Returns

@@ -60,15 +60,13 @@ def static_ladder(
 
     Parameters
     ----------
-    candidates : Candidates
-    energy : float [J]
+    energy [J]
         That the contact must be able to store.
-    closing : float [N]
+    closing [N]
         Force that keeps working while the bodies approach.
-    reach : float or None [m]
+    reach [m]
         Largest gap of candidate points; found when None.
-    progress : callable
-    worn : WornFaces or None
+    worn
         None for faces as made.
     """
     progress("static contact", 0.0)

@@ -113,7 +113,6 @@ def kept_modes(
 
     Parameters
     ----------
-    problem : ContactProblem
     pools : mapping of body name to Modes
     ports : pair of Port, optional
         Contact ports, for modes chosen by participation; near the highest force without.
@@ -156,7 +155,7 @@ def shape_marks(shapes: Floats) -> Floats:
 
     Parameters
     ----------
-    shapes : array, shape (n_dof, m)
+    shapes (n_dof, m)
     """
     weights = 2.0 * ((1.0 + np.arange(len(shapes))) * _FRACTION % 1.0) - 1.0
     return np.asarray(weights @ shapes)

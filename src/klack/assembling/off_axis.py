@@ -64,12 +64,11 @@ def ring_contacts(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         Of bodies of revolution, centred.
-    placement : Placement
-    count : int
+    count
         Angles of every ring.
-    reach : float [m]
+    reach [m]
         Largest gap of a contact point, counted from the smallest one.
 
     Returns
@@ -236,11 +235,11 @@ def turned(
     Parameters
     ----------
     case : Case or ValveCase
-    body : ElasticBody
+    body
         Half section.
-    axial : Modes
+    axial
         That the centred case keeps.
-    sections : RingSections, optional
+    sections
         Of its shaft, in a guide.
     """
     choice = selection_of(case.reduction.choice(body.name))
@@ -265,10 +264,9 @@ def off_axis_model(
 
     Parameters
     ----------
-    problem : ContactProblem
     kept : mapping of body name to Modes
         Axial modes that the centred case keeps.
-    contacts : sequence of RingContact
+    contacts
         From :func:`ring_contacts`.
     """
     case, pair, above = problem.case, problem.pair, problem.opposite
@@ -318,9 +316,9 @@ def off_axis_space(
         Points of the centred contact.
     farthest : sequence of array, shape (6,) [m], [rad]
         Rigid placements of the moving body: translation of ``centre`` and rotation vector.
-    off_axis : float [m]
+    off_axis [m]
         Largest distance from the axis among them.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         Centre of mass of the moving body.
     upper_moves
         Whether that is the upper one.

@@ -36,7 +36,7 @@ class Touch:
     ----------
     upper, lower : tuple of (r, z) rings or (x, y, z) points [m]
         Empty for a flat zone that touches all at once: there is no place to refine.
-    clearance : float [m]
+    clearance [m]
         Travel of the upper body until it touches; negative when they overlap.
     """
 
@@ -54,7 +54,7 @@ def first_touch_of_profiles(
     ----------
     upper, lower : iterables of Profile
         Meridians of the two bodies, as drawn.
-    surface_a, surface_b : str
+    surface_a, surface_b
         Names of the edges that touch.
 
     Raises
@@ -131,10 +131,9 @@ def first_touch_of_meshes(
 
     Parameters
     ----------
-    upper, lower : Mesh
+    upper, lower
         Solids.
-    surface_a, surface_b : Surface
-    tolerance : float [m]
+    tolerance [m]
         Sectors whose clearance exceeds the least one by more than this do not touch.
 
     Raises

@@ -41,12 +41,11 @@ def pressure_limit(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         With its factorisations.
-    loops : YieldingLoops or None
+    loops
         Its static loops, of bodies in the meridian plane.
-    progress : callable
-    more : float, optional [-]
+    more [-]
         Force per length of the most loaded sector over the mean, up to which the limit is needed;
         that of the static contact without.
 
@@ -86,11 +85,11 @@ def meridian_case(case: Case, half_width: float, more: float) -> Case | None:
 
     Parameters
     ----------
-    case : Case
+    case
         Of bodies of three dimensions.
-    half_width : float [m]
+    half_width [m]
         Of their contact.
-    more : float [-]
+    more [-]
         Force per length of the most loaded sector over the mean: the limit must reach so far.
     """
     bodies = {name: _in_the_plane(body, half_width) for name, body in case.bodies.items()}

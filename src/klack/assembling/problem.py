@@ -46,13 +46,11 @@ class OppositeStop(Closing):
 
     Parameters
     ----------
-    body : ElasticBody
+    body
         The upper stop, placed at the gap of the case.
-    surface, moving_surface : Surface
+    surface, moving_surface
         Of the stop and of the moving body.
-    flexibility : Flexibility
-    static : StaticContact
-    space : ContactSpace
+    space
         Its contact points with the gaps of the start; body a is the stop.
     """
 
@@ -80,13 +78,10 @@ def build_opposite(
 
     Parameters
     ----------
-    case : Case
-    pair : BodyPair
+    pair
         The other two bodies, placed.
-    moving : Flexibility
+    moving
         Of the moving body.
-    progress : callable
-    threads : int, optional
 
     Returns
     -------
@@ -151,15 +146,14 @@ class PlacedBodies(Closing):
 
     Parameters
     ----------
-    case : Case
+    case
         With its gap, also where that is only drawn.
-    pair : BodyPair
-    flexibility_upper, flexibility_lower : Flexibility
+    flexibility_upper, flexibility_lower
         Static solutions of both bodies; close them with :meth:`close` before a full-order run
         to give their memory back.
-    candidates : Candidates
+    candidates
         Points where they can touch, with what is known of them.
-    opposite : OppositeStop or None
+    opposite
         Upper stop.
     """
 
@@ -197,10 +191,9 @@ class ContactProblem(PlacedBodies):
 
     Parameters
     ----------
-    space : ContactSpace
-    static : StaticContact
+    static
         Ladder of static contact states beyond the highest force of the impact.
-    condensed : CondensedSpace
+    condensed
         Compliance of each body at these points.
     """
 
@@ -271,9 +264,9 @@ class ContactProblem(PlacedBodies):
 
         Parameters
         ----------
-        space : ContactSpace
+        space
             Those that did not reach far enough.
-        error : ReachError
+        error
             Raised again where the case gives the reach, or has an upper stop.
         """
         if self.case.contact.reach is not None or self.opposite is not None:
@@ -335,11 +328,9 @@ def contact_problem(case: Case, bodies: PlacedBodies, progress: Progress) -> Con
 
     Parameters
     ----------
-    case : Case
+    case
         Of these bodies, in these places; its speed, forces and law may be others than theirs, not
         where there is an upper stop.
-    bodies : PlacedBodies
-    progress : callable
     """
     case = _with_gap(case, bodies.case.contact.gap)
     static, condensed = static_ladder(

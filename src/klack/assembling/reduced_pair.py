@@ -73,17 +73,16 @@ class ReducedPair:
 
     Parameters
     ----------
-    upper, lower : ReducedBody
     ports : pair of Port
         Contact ports of the upper and of the lower body, resultant +1 N along z each.
     law : contact law
-    local : LocalLaw or None
+    local
         The consistent law with its shares; None for another kind.
-    pattern_force : float [N]
+    pattern_force [N]
         Force at which the pressure pattern of the port was taken.
     static : StaticContact or RubbingContact
         Of the full bodies, with the friction that ``law`` has.
-    rubbing : RubbingFit or None
+    rubbing
         The law with memory of faces with friction, made of ``local`` and static loops.
 
     Faces that yield have a :class:`klack.contact.yielding_law.YieldingLaw`, beside the elastic one
@@ -200,15 +199,14 @@ def reduce_pair(
 
     Parameters
     ----------
-    problem : ContactProblem
     pools : mapping of body name to Modes
     correction : "consistent", "attachment" or "none"
     selection : mapping of body name to ModeSelection
-    stiffness : float [N/m]
+    stiffness [N/m]
         Of the local contact, for corrections that do not compute their own law.
-    recovery : bool
+    recovery
         Keep the displacement of all named surfaces.
-    loops : YieldingLoops or None
+    loops
         Of faces that yield, for the consistent law; None for elastic bodies.
     """
     static = _static(problem, correction)
@@ -307,10 +305,9 @@ def friction_doubt(case: Case, *, has_memory: bool, correction: str = "none") ->
 
     Parameters
     ----------
-    case : Case
-    has_memory : bool
+    has_memory
         Its law closes and opens on two curves.
-    correction : str
+    correction
         Of its modes.
     """
     faces = case.contact.faces
@@ -394,12 +391,10 @@ def impact_system(
 
     Parameters
     ----------
-    case : Case
-    upper, lower : ReducedBody
     law : contact law
     ports : pair of str
         Where they meet, on the upper and on the lower body.
-    series_compliance : float [m/N]
+    series_compliance [m/N]
         In series with the law.
     """
     contact = ContactPair(

@@ -35,13 +35,11 @@ def static_loops(
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Of the same bodies without friction.
-    pair : BodyPair
-    upper, lower : Flexibility
-    friction : float [-]
+    friction [-]
         Above 0.
-    key : str
+    key
         Of the friction in the case, for words.
 
     Warns
@@ -72,10 +70,9 @@ def fitted_loops(rubbing: RubbingContact, local: LocalLaw, *, key: str) -> Rubbi
 
     Parameters
     ----------
-    rubbing : RubbingContact
-    local : LocalLaw
+    local
         Of ``rubbing.closing``.
-    key : str
+    key
         Of the friction in the case, for words.
 
     Warns

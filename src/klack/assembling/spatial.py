@@ -69,11 +69,9 @@ def tilting_film(
 
     Parameters
     ----------
-    stop : str
-    film : FilmShape
     space : ContactSpace or RingSpace
         Contact points of the stop, centred, all round.
-    reach : float [m]
+    reach [m]
         Their largest gap in touch.
     """
     slope, land, cubic = 1.0, None, 1.0
@@ -115,16 +113,15 @@ class Meeting:
 
     Parameters
     ----------
-    name : str
     space : ContactSpace or RingSpace
         Contact points.
-    reach : float [m]
+    reach [m]
         Largest gap of those of the centred bodies in touch.
-    arm : array, shape (3,) [m]
+    arm (3,) [m]
         Their middle from the centre of mass of the needle.
     gaps : RigidGaps or RingGaps
         At any rigid placement.
-    upper_moves : bool
+    upper_moves
         Whether the needle is the upper body.
     """
 
@@ -238,11 +235,8 @@ def valve_of_meetings(
 
     Parameters
     ----------
-    case : ValveCase
-    model : InterfaceModel
+    model
         With the contacts of the meetings.
-    meetings : sequence of Meeting
-    guide : Guide or None
     placement : array, shape (6,) [m], [rad]
         Of the needle at the start.
     """

@@ -63,8 +63,7 @@ class RingValve:
 
     Parameters
     ----------
-    spatial : SpatialValve
-    reduced : mapping of str to ReducedBody
+    reduced
         Its bodies with the modes of all orders, as the model has them.
     """
 
@@ -91,7 +90,7 @@ def build_spatial_rings(
     ----------
     case, roles, bodies, pools, ports, contacts
         As of :func:`klack.assembling.spatial.build_spatial`.
-    reduced : mapping of str to ReducedBody
+    reduced
         In their motion along the axis.
 
     Raises
@@ -262,9 +261,9 @@ def in_all_orders(body: ReducedBody, points: RevolvedPoints) -> ReducedBody:
 
     Parameters
     ----------
-    body : ReducedBody
+    body
         In its motion along the axis.
-    points : RevolvedPoints
+    points
         The same body, with the same elastic modes of order 0.
     """
     own, rigid = points.body, points.body.rigid.shape[1]

@@ -66,19 +66,18 @@ class StopContact:
 
     Parameters
     ----------
-    name : str
-    pair : BodyPair
+    pair
         Both bodies as they touch; the meshes are moved copies, the matrices are shared.
-    static : StaticContact
+    static
         Without friction.
     ports : pair of Port
         Of the upper and of the lower body, resultant +1 N along z each, named like the surface.
-    pattern_force : float [N]
+    pattern_force [N]
         Force at which the pressure pattern of the ports was taken: the peak of an impact at the
         speed of the case.
-    rubbing : RubbingContact or None
+    rubbing
         The same with friction between the faces.
-    loops : YieldingLoops or None
+    loops
         Of faces that yield.
     """
 
@@ -107,13 +106,13 @@ class StopFaces:
 
     Parameters
     ----------
-    local : LocalLaw
+    local
         While the faces close, with its shares.
     law : TableLaw, RubbingLaw or YieldingLaw
         All that the modes miss; with memory where faces have friction or yield.
     faces : TableLaw, RubbingLaw or YieldingLaw
         The same without the bulk, which a film presses on as well.
-    bulk : float [m/N]
+    bulk [m/N]
         Series compliance behind ``faces``.
     """
 

@@ -45,10 +45,10 @@ def impact_structures(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         With its factorisations.
     pools : mapping of body name to Modes
-    own : ReducedPair
+    own
         Its ports push here.
     near : mapping of body name to NearLoads, optional
         Of earlier impacts of these bodies: what is left to the modes away from the contact may
@@ -94,7 +94,6 @@ def valve_structures(
 
     Parameters
     ----------
-    case : ValveCase
     bodies, ports, pools, flexibilities : mapping by name of the body
     contacts : mapping of stop name to StopContact
     """
@@ -119,9 +118,7 @@ def radiating_surfaces(
 
     Parameters
     ----------
-    noise : CaseNoise or None
-    body : ElasticBody
-    held : sequence of str
+    held
         Names of all held bodies.
     contacts : names
         Surfaces of the body that hit or hold something; they count only if they are asked for.

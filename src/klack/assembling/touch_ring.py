@@ -20,14 +20,7 @@ _SAME_HEIGHT = 5e-4  # of the width of the bodies: clearances that differ by les
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TouchingSide:
-    """One of two bodies that meet.
-
-    Parameters
-    ----------
-    body : CaseBody
-    mesh : Mesh
-    surface : str
-    """
+    """One of two bodies that meet."""
 
     body: CaseBody
     mesh: Mesh

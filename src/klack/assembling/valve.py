@@ -63,19 +63,17 @@ class Valve:
 
     Parameters
     ----------
-    case : ValveCase
-    bodies : mapping of str to ElasticBody
-    reduced : mapping of str to ReducedBody
+    reduced
         With all their ports.
-    contacts : mapping of str to StopContact
+    contacts
         By end stop.
-    laws : mapping of str to StopFaces
+    laws
         Consistent laws, of the end stops that have one.
-    network : Network
+    network
         With the bodies and laws filled in: the variant ``wet``.
-    structures : tuple of Structure
+    structures
         Held bodies as sources of sound.
-    spatial : SpatialValve or None
+    spatial
         Bodies that meet point by point, of a motion in three dimensions.
     """
 
@@ -97,9 +95,7 @@ def build_valve(
 
     Parameters
     ----------
-    case : ValveCase
-    progress : callable
-    threads : int, optional
+    threads
         Of the solvers, which decide the last bits; all cores by default.  Bodies of few unknowns
         take one in any case, which is faster: their bits are the same on any number of cores.
 
@@ -122,11 +118,8 @@ class ValveParts:
 
     Parameters
     ----------
-    bodies : mapping of str to ElasticBody
-    flexibilities : mapping of str to Flexibility
+    flexibilities
         To be closed.
-    pools : mapping of str to Modes
-    contacts : mapping of str to StopContact
     ports : mapping of str to list of Port
     """
 

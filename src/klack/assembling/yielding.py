@@ -69,9 +69,7 @@ def fitted_limit(loops: YieldingLoops, space: ContactSpace, C: Floats) -> Pressu
 
     Parameters
     ----------
-    loops : YieldingLoops
-    space : ContactSpace
-    C : array, shape (nc, nc) [m/N]
+    C (nc, nc) [m/N]
         Elastic compliance of both bodies at its points.
 
     Returns
@@ -188,17 +186,15 @@ def law_loops(
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Of the elastic bodies, beyond that energy.
-    upper, lower : LoadedBody
-    wider : callable
+    wider
         Contact points of the same surfaces that reach further, or the error again.
-    energy : float [J]
-    closing : float [N]
+    energy [J]
+    closing [N]
         Force that keeps working while the bodies approach.
-    beside : str
+    beside
         Key of what else the law has, and so has no yield; empty for nothing.
-    progress : callable
 
     Warns
     -----
@@ -282,15 +278,14 @@ def loops_with_yield(
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Of the elastic bodies, beyond that energy: it says where they may yield first.
-    space : ContactSpace
+    space
         Of that contact, or wider.
-    C : array, shape (nc, nc) [m/N]
+    C (nc, nc) [m/N]
         Elastic compliance of both bodies at its points.
-    upper, lower : LoadedBody
-    energy : float [J]
-    closing : float [N]
+    energy [J]
+    closing [N]
         Force that keeps working while the bodies approach.
 
     Raises
@@ -324,9 +319,9 @@ def tell_elastic(case: CaseFile, what: str) -> None:
 
     Parameters
     ----------
-    case : CaseFile
+    case
         For the materials of its bodies.
-    what : str
+    what
         That is computed, with its verb: ``the deck is of``.
 
     Warns

@@ -85,10 +85,6 @@ class CaseTree:
 
     Parameters
     ----------
-    path : Path
-    text : str
-    data : mapping
-    lines : Lines
     components : mapping of str to type
         Of the user's own, by the words that the case may name them with.  A worker process knows
         a class of a script under another module, so that the word is kept.

@@ -27,10 +27,10 @@ def fitting_example(case: type[Section], data: Any, key: Key, kind: Kind) -> str
     Parameters
     ----------
     case : type of Section
-    data : mapping
+    data
         The parsed file, which need not be a valid case.
     key : tuple of str and int
-    kind : Kind
+    kind
         Whose example is taken where the field tells nothing.
     """
     field = _field_at(case, data, key)

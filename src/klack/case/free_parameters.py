@@ -18,10 +18,8 @@ class FreeParameter:
 
     Parameters
     ----------
-    name : str
-    places : tuple of Quantity
+    places
         Keys of the case that get its value.
-    lower, upper, start : float
     """
 
     name: str

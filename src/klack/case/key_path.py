@@ -24,9 +24,9 @@ class Quantity:
     Parameters
     ----------
     key : tuple of str and int
-    kind : Kind
+    kind
         Of quantity; its unit is that of all values here.
-    value : float
+    value
         In the case as it is.
     """
 

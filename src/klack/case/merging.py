@@ -47,14 +47,13 @@ def filled(data: Any, key: Key, scope: Scope, origin: Origin, found: dict[Key, F
 
     Parameters
     ----------
-    data : object
     key : tuple of str and int
         In the expanded case.
-    scope : mapping
+    scope
         Names that expressions may use.
-    origin : Origin
+    origin
         Of the data.
-    found : dict
+    found
         Takes the expressions by their keys in the expanded case.
 
     Raises
@@ -101,12 +100,11 @@ def argument_values(item: CaseInclude, number: int, scope: Scope, origin: Origin
 
     Parameters
     ----------
-    item : CaseInclude
-    number : int
+    number
         Of the copy, from 1.
-    scope : mapping
+    scope
         Of the file that includes the part.
-    origin : Origin
+    origin
         Of the include.
 
     Raises
@@ -189,14 +187,13 @@ class Merging:
 
     Parameters
     ----------
-    data : dict
+    data
         Plain data, without expressions; takes the sections of the parts.
-    texts : mapping of str to str
+    texts
         Files of the parts by their names.
-    folder : Path
+    folder
         Of the case.
-    checked : callable
-    origins, expressions : dict
+    origins, expressions
         By key of the expanded case; take what comes from the parts.
     """
 

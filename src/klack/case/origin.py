@@ -19,11 +19,9 @@ class Origin:
 
     Parameters
     ----------
-    path : Path
-    lines : Lines
     key : tuple of str and int
         In that file.
-    copy : str
+    copy
         Name of the included part; empty for the case itself.
     """
 
@@ -50,9 +48,9 @@ class Filled:
 
     Parameters
     ----------
-    text : str
+    text
         Expression.
-    sources : frozenset of Key
+    sources
         Parameters of the case, and arguments of its includes, that the value follows from.
     """
 
@@ -66,7 +64,6 @@ class ExpandedCase:
 
     Parameters
     ----------
-    data : mapping
     origins : mapping of key to Origin
         Of the case itself, under the empty key, and of all that comes from parts.
     expressions : mapping of key to Filled

@@ -100,10 +100,9 @@ def check_outputs(
 
     Parameters
     ----------
-    outputs : tuple of CaseOutput
     dimensions : mapping of body name to int
         2 for axisymmetric bodies, 3 for solids.
-    other : str
+    other
         Section of the case whose forces a gauge does not see; empty if there is none.
     """
     names: set[str] = set()

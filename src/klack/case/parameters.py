@@ -47,11 +47,10 @@ class ParameterValue:
 
     Parameters
     ----------
-    value : float [SI]
-    dimension : Dimension
-    text : str
+    value [SI]
+    text
         As the case has it: ``1.3 mm``, ``2 * d_seat``.
-    sources : frozenset of Key
+    sources
         Parameters of the case, and arguments of its includes, that it follows from; its own.
     """
 
@@ -96,13 +95,13 @@ def parameters_of_text(
     Parameters
     ----------
     written : mapping of str to str or number
-    where : callable
+    where
         File, line and name of a parameter, for errors.
-    given : mapping, optional
+    given
         Values that replace those of the text; of the same dimension where the text has one.
     section : tuple
         Key of the parameters of a case, whose values follow from themselves; empty for a part.
-    where_given : callable
+    where_given
         File, line and name of a given value, for errors.
 
     Raises

@@ -53,11 +53,8 @@ def self_contained(text: str, path: Path, data: Any, lines: Lines) -> tuple[str,
 
     Parameters
     ----------
-    text : str
-    path : Path
-    data : mapping
+    data
         Parsed text; values at some keys may have been exchanged since.
-    lines : Lines
 
     Raises
     ------
@@ -94,10 +91,9 @@ def part_name(folder: str, file: str, where: str) -> str:
 
     Parameters
     ----------
-    folder : str
+    folder
         Of the file that includes it, relative to that of the case.
-    file : str
-    where : str
+    where
         File, line and key of the include, for errors.
 
     Raises

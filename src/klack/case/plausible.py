@@ -22,13 +22,13 @@ class Range:
 
     Parameters
     ----------
-    unit : str
+    unit
         SI, without prefix.
     usual : pair of float
         Outside: in doubt.
     possible : pair of float
         Outside: an error.
-    reason : str
+    reason
         Why, as one clause.
     """
 

@@ -42,10 +42,9 @@ class PointKey:
 
     Parameters
     ----------
-    name : str
+    name
         As given, ``"network.components.spring.preload"``.
-    place : Key
-    kind : Kind or None
+    kind
         Of its quantity; None for a key without unit, such as a name.
     """
 
@@ -73,7 +72,7 @@ class Points:
 
     Parameters
     ----------
-    keys : tuple of PointKey
+    keys
         All that occur.
     written : tuple of mapping of str to value
         What each point exchanges by the name of the key, as a case file would have it.
@@ -100,7 +99,7 @@ def points_of(case: AnyCase, tree: CaseTree, given: GivenPoints) -> Points:
     ----------
     case : Case or ValveCase
         As it is, without any of the points.
-    tree : CaseTree
+    tree
         The same as it was written.
     given : sequence of mappings, or mapping of sequences
 
@@ -133,10 +132,9 @@ def checked_parts(tree: CaseTree, case: ValveCase, places: Iterable[Key]) -> Cas
 
     Parameters
     ----------
-    tree : CaseTree
-    case : ValveCase
+    case
         What the tree holds, checked.
-    places : iterable of Key
+    places
         That points touch.
     """
     touched = set(places)
@@ -168,9 +166,9 @@ def case_at(
     ----------
     kind : type
         ValveCase, or Case of an impact.
-    tree : CaseTree
+    tree
         As written.
-    parts : CaseTree
+    parts
         The same from :func:`checked_parts`.
     changes : mapping of Key to value
 

@@ -48,10 +48,8 @@ def expanded(data: Any, lines: Lines, path: Path) -> ExpandedCase:
 
     Parameters
     ----------
-    data : mapping
+    data
         With the texts of all included files in its section ``parts``.
-    lines : Lines
-    path : Path
 
     Raises
     ------

@@ -33,10 +33,9 @@ def rewritten(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> st
 
     Parameters
     ----------
-    tree : CaseTree
     values : mapping of key to str
         What is written there instead.
-    header : str
+    header
         Comment lines in front of the text.
     """
     root = YAML().compose(StringIO(tree.text))
@@ -142,10 +141,9 @@ def with_values(tree: CaseTree, values: Mapping[Key, str], header: str = "") -> 
 
     Parameters
     ----------
-    tree : CaseTree
     values : mapping of key to str
         What is written there.
-    header : str
+    header
         Comment lines in front of the text.
 
     Raises

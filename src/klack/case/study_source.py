@@ -22,10 +22,7 @@ class StudySource:
 
     Parameters
     ----------
-    study : CaseStudy
-    path : Path
-    lines : Lines
-    text : str
+    text
         Of a file of its own; empty if the study stands in the case.
     """
 

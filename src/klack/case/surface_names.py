@@ -26,7 +26,6 @@ def require_surface_names(case: CaseFile, known: Mapping[str, Collection[str]]) 
 
     Parameters
     ----------
-    case : CaseFile
     known : mapping of body name to names of surfaces
 
     Raises

@@ -29,9 +29,9 @@ class ValveRoles:
 
     Parameters
     ----------
-    needle, point : str
+    needle, point
         Component that moves, and its point whose displacement is the lift.
-    seat, opening_stop : str
+    seat, opening_stop
         End stops that end its way down and up, perhaps of another body that it pushes or rests on;
         empty if there is none.
     """
@@ -62,8 +62,7 @@ def find_roles(case: ValveSections, network: Network | None = None) -> ValveRole
 
     Parameters
     ----------
-    case : ValveSections
-    network : Network, optional
+    network
         That of the case where it has been joined already.
 
     Raises

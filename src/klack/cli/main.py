@@ -51,7 +51,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
     Parameters
     ----------
-    argv : sequence of str
+    argv
         Arguments after ``klack``; those of the process by default.
     """
     prepare_streams()

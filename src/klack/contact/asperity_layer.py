@@ -53,9 +53,9 @@ class AsperityLayer:
 
     Parameters
     ----------
-    closure : array, shape (n,) [m]
+    closure (n,) [m]
         Rising from 0.
-    pressure : array, shape (n,) [Pa]
+    pressure (n,) [Pa]
         Rising from 0.
     """
 
@@ -68,13 +68,13 @@ class AsperityLayer:
 
         Parameters
         ----------
-        rms : float [m]
+        rms [m]
             sigma, of the heights of both faces together.
-        radius : float [m]
+        radius [m]
             beta, of the summits.
-        density : float [-]
+        density [-]
             eta beta sigma.
-        modulus : float [Pa]
+        modulus [Pa]
             E*.
         """
         separation = np.linspace(_HIGHEST, _DEEPEST, _POINTS)
@@ -100,7 +100,7 @@ class AsperityLayer:
 
         Parameters
         ----------
-        closure, before : array, shape (n,) [m]
+        closure, before (n,) [m]
             At the end and at the start of a step; below 0 where open.
 
         Returns
@@ -143,15 +143,14 @@ def press(
 
     Parameters
     ----------
-    layer : AsperityLayer
-    area : array, shape (n,) [m^2]
-    C : array, shape (n, n) [m/N]
+    area (n,) [m^2]
+    C (n, n) [m/N]
         Symmetric positive definite compliance of the bodies.
-    q : array, shape (n,) [m]
+    q (n,) [m]
         Gaps without forces.
-    before : array, shape (n,), optional [m]
+    before (n,) [m]
         Gaps at the start of a step: the forces then are those whose work is the change of energy.
-    start : array, shape (n,), optional [m]
+    start (n,) [m]
         First guess of the gaps.
 
     Returns

@@ -38,7 +38,7 @@ class ComplementaritySolver:
 
     Parameters
     ----------
-    A : array, shape (n, n) [m/N]
+    A (n, n) [m/N]
         Symmetric positive definite compliance.  It is copied.
     """
 
@@ -66,9 +66,9 @@ class ComplementaritySolver:
 
         Parameters
         ----------
-        q : array, shape (n,) [m]
+        q (n,) [m]
             Gaps without contact forces.
-        active : bool array, shape (n,), optional
+        active (n,)
             First guess; without it the points with q < 0.
 
         Returns
@@ -154,11 +154,11 @@ def _bordered(
 
     Parameters
     ----------
-    known : array, shape (k, k)
+    known (k, k)
         :math:`L_{11}`.
-    beside : array, shape (k, m)
+    beside (k, m)
         :math:`A_{12}`.
-    corner : array, shape (m, m)
+    corner (m, m)
         :math:`A_{22}`.
     """
     if not len(corner):
@@ -187,11 +187,11 @@ def solve_lcp(
 
     Parameters
     ----------
-    A : array, shape (n, n) [m/N]
+    A (n, n) [m/N]
         Symmetric positive definite compliance.
-    q : array, shape (n,) [m]
+    q (n,) [m]
         Gaps without contact forces.
-    active : bool array, shape (n,), optional
+    active (n,)
         First guess.
 
     Returns

@@ -33,14 +33,14 @@ class Waves:
 
     Parameters
     ----------
-    amplitude : float [m]
+    amplitude [m]
         Half of the height from valley to crest.
-    length : float [m]
+    length [m]
         From crest to crest.
-    direction : float or None [rad]
+    direction [rad]
         Along which straight waves follow each other, from x towards y; None for waves round the
         centre, as turning leaves them.
-    phase : float [rad]
+    phase [rad]
         Of the centre: 0 on a crest, pi in a valley.
     """
 
@@ -61,16 +61,15 @@ class FaceForm:
 
     Parameters
     ----------
-    centre : tuple of float [m]
+    centre [m]
         x and y of the centre of the face; 0 and 0 in the meridian plane.
-    radius : float [m]
+    radius [m]
         R, from the centre to the outermost point of the face.
-    crown : float [m]
+    crown [m]
         h, height of the centre above the edge.
-    waves : Waves or None
-    tilt : float [rad]
+    tilt [rad]
         alpha, between the two faces.
-    tilt_direction : float [rad]
+    tilt_direction [rad]
         Towards which the gap opens, from x towards y.
     """
 

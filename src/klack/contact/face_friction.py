@@ -20,7 +20,6 @@ class FaceFriction:
 
     Parameters
     ----------
-    law : Friction
     T_a, T_b : sparse array, shape (ways nc, dofs of a), (ways nc, dofs of b) [-]
         Displacement of a past b, ``T_a u_a + T_b u_b``: all points in the first direction, then in
         the second one (:func:`klack.contact.mortar.tangent_rows`).
@@ -57,8 +56,6 @@ class FaceFriction:
 
         Parameters
         ----------
-        law : Friction
-        space : ContactSpace
         mesh_a, surface_a, mesh_b, surface_b
             As given to :func:`klack.contact.mortar.contact_space`.
         """
@@ -73,7 +70,6 @@ def lifted_offset(rows: csr_array, dimension: int) -> NDArray[np.float64]:
     ----------
     rows : sparse array, shape (ways nc, dofs of the body)
         ``T_a`` or ``T_b`` of :class:`FaceFriction`.
-    dimension : int
     """
     along = np.zeros(rows.shape[1])
     along[dimension - 1 :: dimension] = 1.0
@@ -87,7 +83,7 @@ def with_still_directions(C: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    C : array, shape (m, m) [m/N]
+    C (m, m) [m/N]
     """
     own = np.diag(C)
     still = own == 0.0

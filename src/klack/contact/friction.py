@@ -35,11 +35,11 @@ class Friction:
 
     Parameters
     ----------
-    kinetic : float [-]
+    kinetic [-]
         While the faces slip.
-    static : float [-]
+    static [-]
         While they stick, at least ``kinetic``.
-    speed : float [m/s]
+    speed [m/s]
         Speed of slip over which the static value fades to the kinetic one; 0: at once.
 
     Raises

@@ -56,10 +56,9 @@ class ListedFaces:
 
     Parameters
     ----------
-    faces : CurvedFaces
-    first, listed : int array
+    first, listed
         Faces near each line, up to a motion of ``within`` [m].
-    within : float [m]
+    within [m]
     """
 
     faces: CurvedFaces
@@ -122,18 +121,18 @@ class RingGaps:
 
     Parameters
     ----------
-    hats : HatQuadrature
+    hats
         On the half section of the slave side.
-    angle : array, shape (n,) [rad]
-    near : ListedFaces
+    angle (n,) [rad]
+    near
         Of the half section of the other side, for each point at each angle.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         Point that a rotation leaves in place.
-    slave_moves : bool
+    slave_moves
         True if body a carries the hats.
-    form : array, shape (p,) [m]
+    form (p,) [m]
         Growth of the gaps by the form of the faces.
-    away : float [m]
+    away [m]
         Gap of a hat that no longer faces the master.
     """
 
@@ -162,14 +161,13 @@ class RingGaps:
 
         Parameters
         ----------
-        section : ContactSpace
         mesh_a, surface_a : the body that will be moved
         mesh_b, surface_b : the other one
-        angle : array, shape (n,) [rad]
+        angle (n,) [rad]
             Of the points of every ring.
-        centre : array, shape (3,) [m]
+        centre (3,) [m]
             Point that a rotation leaves in place, usually the centre of mass of a.
-        form : FaceForm, optional
+        form
             That ``section`` was built with, of revolution.
         """
         slave, master, away = slave_and_master(section, (mesh_a, surface_a), (mesh_b, surface_b))
@@ -256,15 +254,15 @@ class RigidGaps:
     position, normal : array, shape (p, 3) [m], [-]
         Integration points of the slave side.
     weight : sparse array, shape (nc, p) [m^2]
-    near : ListedFaces
+    near
         Of the master side.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         Point that a rotation leaves in place.
-    slave_moves : bool
+    slave_moves
         True if body a carries the hats.
-    form : array, shape (p,) [m]
+    form (p,) [m]
         Growth of the gaps by the form of the faces, which moves with the slave side.
-    away : float [m]
+    away [m]
         Gap of a hat that no longer faces the master: the extent of both surfaces.
     """
 
@@ -293,12 +291,11 @@ class RigidGaps:
 
         Parameters
         ----------
-        space : ContactSpace
         mesh_a, surface_a : the body that will be moved
         mesh_b, surface_b : the other one
-        centre : array, shape (3,) [m]
+        centre (3,) [m]
             Point that a rotation leaves in place, usually the centre of mass of a.
-        form : FaceForm, optional
+        form
             That ``space`` was built with.
 
         Raises
@@ -355,7 +352,7 @@ class PlacedGaps:
     ----------
     contacts : tuple of RigidGaps or RingGaps
         Each with the centre of mass of the moving body as its ``centre``.
-    is_upper : tuple of bool
+    is_upper
         Whether the moving body is body a there; else a is moved the opposite way.
     """
 

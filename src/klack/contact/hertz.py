@@ -17,11 +17,11 @@ def line_half_width(load: float, curvature: float, modulus: float) -> float:
 
     Parameters
     ----------
-    load : float [N/m]
+    load [N/m]
         F', normal force per length of the line.
-    curvature : float [1/m]
+    curvature [1/m]
         Relative, across the line: sum of both bodies, convex positive.
-    modulus : float [Pa]
+    modulus [Pa]
         E* with 1/E* = (1 - nu_a^2)/E_a + (1 - nu_b^2)/E_b.
 
     Raises
@@ -49,10 +49,10 @@ def point_radius(force: float, curvature: float, modulus: float) -> float:
 
     Parameters
     ----------
-    force : float [N]
-    curvature : float [1/m]
+    force [N]
+    curvature [1/m]
         Relative: sum of both bodies, convex positive.
-    modulus : float [Pa]
+    modulus [Pa]
         E* as in :func:`line_half_width`.
 
     Raises

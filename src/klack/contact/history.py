@@ -20,16 +20,15 @@ class BodyEnergy:
 
     Parameters
     ----------
-    name : str
-    translation : float [J]
+    translation [J]
         Kinetic energy of the centre of mass along z, ``m v_cm^2 / 2``.
-    vibration : float [J]
+    vibration [J]
         All other kinetic energy, and the strain energy.
-    strain : float [J]
+    strain [J]
         The part of ``vibration`` that is strain energy.
-    frequency : array, shape (m,) [Hz]
+    frequency (m,) [Hz]
         Undamped frequency of each elastic mode, empty for a solver that has none.
-    modal : array, shape (m,) [J]
+    modal (m,) [J]
         Kinetic and strain energy of each elastic mode.
     """
 
@@ -52,25 +51,25 @@ class EnergyLedger:
 
     Parameters
     ----------
-    initial : float [J]
+    initial [J]
         Kinetic and strain energy of all bodies at the start.
-    bodies : tuple of BodyEnergy
+    bodies
         At the end.
-    contact : float [J]
+    contact [J]
         Stored in the contacts at the end (0 after separation).
-    contact_dissipation : float [J]
+    contact_dissipation [J]
         Lost in contact damping, including work clipped where a law would have pulled.
-    damping : float [J]
+    damping [J]
         Lost in modal damping.
-    work : float [J]
+    work [J]
         Done on the bodies by constant forces.
-    spring : float [J]
+    spring [J]
         Change of the energy stored in springs to ground.
-    friction : float [J]
+    friction [J]
         Lost in friction of the faces, never below zero.
-    plastic : float [J]
+    plastic [J]
         Lost to faces that yield; a tenth of it stays in them as energy of residual stress.
-    radiated : float [J]
+    radiated [J]
         Carried away through non-reflecting ends, never below zero.
     """
 
@@ -141,34 +140,33 @@ class ImpactHistory:
 
     Parameters
     ----------
-    step : float [s]
+    step [s]
         Length of an interval; a multiple of the integration step.
-    force : array, shape (n,) [N]
+    force (n,) [N]
         Mean contact force over the interval, pushes a in +z and b in -z; >= 0, but for faces that
         friction keeps from parting.
-    gap : array, shape (n,) [m]
+    gap (n,) [m]
         Mean gap over the interval, negative where closed (for a full-order contact: the
         pressure-weighted or area-weighted mean).
-    velocity_a, velocity_b : array, shape (n + 1,) [m/s]
+    velocity_a, velocity_b (n + 1,) [m/s]
         Centre-of-mass velocity along z; zero for a supported body.
-    speed : float [m/s]
+    speed [m/s]
         Relative speed of approach at the start, above zero.
-    mass_a, mass_b : float [kg]
+    mass_a, mass_b [kg]
         ``mass_b`` is ``inf`` for a supported body.
-    ledger : EnergyLedger
     peak_force : array, shape (n,) [N], optional
         Largest force of any integration step within the interval; the mean where not given.
     displacement_a, displacement_b : array, shape (n + 1,) [m], optional
         Of the contact ports along z; empty where not given.
     external_force : array, shape (n,) [N], optional
         Mean axial force on body a from outside the contact (springs, constant forces), + in z.
-    longest_period : float [s]
+    longest_period [s]
         Of the elastic modes of body a; 0 for a rigid body.  Separates clusters of sub-contacts.
-    pressed : float [m]
+    pressed [m]
         Largest local indentation since the faces were new, of a law that yields; else 0.
-    solver : str
+    solver
         What computed this, in words.
-    start : float [s]
+    start [s]
         Time of the first interval's beginning.
     """
 

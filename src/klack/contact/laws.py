@@ -37,13 +37,12 @@ class FlatLaw:
 
     Parameters
     ----------
-    kind : int
+    kind
         ``LAW_LINEAR``: ``parameters = [k]``; ``LAW_HERTZ``: ``[K, n]``; ``LAW_TABLE``: ``[n]``
         followed by six numbers for each of ``n`` intervals: its start, the force there, the factors
         of ``s``, ``s^2``, ``s^3`` (``s`` from the start of the interval) and the potential there.
         The last interval has no end: it is the linear continuation.
-    parameters : array
-    dissipation : float [-]
+    dissipation [-]
         ``alpha`` of :class:`HuntCrossley`; 0 for an elastic law.
     """
 
@@ -58,7 +57,7 @@ class LinearLaw:
 
     Parameters
     ----------
-    stiffness : float [N/m]
+    stiffness [N/m]
         Local stiffness of the contact zone: *what the modes do not carry already*.
     """
 
@@ -93,8 +92,8 @@ class HertzLaw:
 
     Parameters
     ----------
-    coefficient : float [N/m^n]
-    exponent : float [-]
+    coefficient [N/m^n]
+    exponent [-]
         At least 1.
     """
 
@@ -141,9 +140,9 @@ class TableLaw:
 
     Parameters
     ----------
-    indentation : array, shape (n,) [m]
+    indentation (n,) [m]
         Increasing, not negative; the origin is added where it is missing.
-    force : array, shape (n,) [N]
+    force (n,) [N]
         Increasing with the indentation.
 
     Examples
@@ -227,7 +226,7 @@ class HuntCrossley:
     Parameters
     ----------
     law : LinearLaw, HertzLaw or TableLaw
-    dissipation : float [-]
+    dissipation [-]
         ``alpha``.
     """
 
@@ -279,7 +278,7 @@ def gonthier_coefficient(restitution: float) -> float:
 
     Parameters
     ----------
-    restitution : float [-]
+    restitution [-]
         Above 0, up to 1.
 
     Returns

@@ -46,21 +46,21 @@ class LocalLaw:
 
     Parameters
     ----------
-    law : TableLaw
+    law
         Force over the local indentation; beyond the table its last tangent continues.
-    force : array, shape (n,) [N]
+    force (n,) [N]
         Axial forces of the static ladder.
-    approach : array, shape (n,) [m]
+    approach (n,) [m]
         Approach of the full bodies at these forces.
-    share : array, shape (n,) [-]
+    share (n,) [-]
         Local indentation over approach.
-    tangent_share : array, shape (n,) [-]
+    tangent_share (n,) [-]
         The same for the slopes over the force; the law is monotone while it is above zero.
-    modal_compliance : float [m/N]
+    modal_compliance [m/N]
         What was subtracted.
-    resolved_force : float [N]
+    resolved_force [N]
         Below it the contact is narrower than the elements and a power law continues the curve.
-    exponent : float [-]
+    exponent [-]
         Of that power law.
     """
 
@@ -93,9 +93,9 @@ def consistent_law(static: StaticContact, modal_compliance: float) -> LocalLaw:
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Ladder up to above the highest force of the impact.
-    modal_compliance : float [m/N]
+    modal_compliance [m/N]
         Sum over the retained elastic modes of both bodies of (modal amplitude under the pressure
         pattern)^2 / omega^2; 0 for rigid bodies, whose law is then the whole approach.
 

@@ -86,34 +86,34 @@ class ContactSpace:
     Parameters
     ----------
     G_a, G_b : sparse array, shape (nc, dofs of a), (nc, dofs of b) [-]
-    gap : array, shape (nc,) [m]
+    gap (nc,) [m]
         Initial weighted gaps, positive when open.
-    area : array, shape (nc,) [m^2]
+    area (nc,) [m^2]
         Area of each hat; axisymmetric: of the whole ring.
-    points : array, shape (nc, dimension) [m]
+    points (nc, dimension) [m]
         Slave node of each hat.
-    axial : array, shape (nc,) [-]
+    axial (nc,) [-]
         Change of the gaps per unit translation of a along +z; ``axial @ lam`` is the axial force
         that pushes a to +z and b to -z.
-    rim : bool array, shape (nc,)
+    rim (nc,)
         Hats at the border of the candidates: a neighbour was left out because its gap exceeds
         ``reach``.  None of them may ever carry a force.
-    size : array, shape (nc,) [m]
+    size (nc,) [m]
         Element size across the contact (mean shortest extent of the slave faces at the hat).
     slave : "a" or "b"
         Side that carries the hats, the finer one.
-    nodes : int array, shape (nc,)
+    nodes (nc,)
         Slave node of each hat.
-    reach : float [m]
+    reach [m]
         Largest gap of a candidate, above the smallest one.
-    clearance : float [m]
+    clearance [m]
         Distance that a has to move to -z, rigidly, until the surfaces themselves touch.  The
         weighted gaps close a little later (:attr:`touch`), by about h^2/(50 R) on elements of
         size h and surfaces of relative radius R.
-    beyond : float [m]
+    beyond [m]
         No point that was left out has a smaller gap.  As long as the bodies approach by less, a
         contact at the rim is complete all the same: elements may be wider than the reach.
-    entry : array, shape (nc,) [m]
+    entry (nc,) [m]
         Reach from which on each point is a candidate.
     """
 
@@ -208,7 +208,7 @@ def contact_space(
     ----------
     mesh_a, surface_a : needle
     mesh_b, surface_b : stop or seat
-    reach : float, optional [m]
+    reach [m]
         Largest gap of a contact point, counted from the smallest one; somewhat more than the
         largest expected approach, so that the contact never grows to the rim.  Without it the
         reach is set by cost: the faces with the smallest gaps, up to about 400 contact points
@@ -552,7 +552,7 @@ def tangent_rows(
 
     Parameters
     ----------
-    space : ContactSpace
+    space
         Of these meshes.
     mesh_a, surface_a, mesh_b, surface_b
         As given to :func:`contact_space`.
@@ -605,7 +605,7 @@ def around_rows(
 
     Parameters
     ----------
-    space : ContactSpace
+    space
         Of these meshes, axisymmetric.
     mesh_a, surface_a, mesh_b, surface_b
         As given to :func:`contact_space`.

@@ -52,10 +52,10 @@ class FaceGeometry:
 
     Parameters
     ----------
-    position : array, shape (f, q, d) [m]
-    normal : array, shape (f, q, d) [-]
+    position (f, q, d) [m]
+    normal (f, q, d) [-]
         Outward unit normals.
-    stretch : array, shape (f, q) [m^(d-1)]
+    stretch (f, q) [m^(d-1)]
         Area (axisymmetric: of the full ring, 2 pi r ds) per unit of the reference domain.
     """
 
@@ -70,11 +70,11 @@ class Projection:
 
     Parameters
     ----------
-    block, face : int array, shape (p,)
+    block, face (p,)
         Face block of the surface and face within it; -1 where nothing was met.
-    xi : array, shape (p, d - 1) [-]
+    xi (p, d - 1) [-]
         Reference coordinates on that face.
-    gap : array, shape (p,) [m]
+    gap (p,) [m]
         Distance along the slave normal, negative for a penetration; nan where nothing was met.
     """
 
@@ -96,9 +96,8 @@ def face_geometry(
 
     Parameters
     ----------
-    points : array, shape (n, d) [m]
-    block : FaceBlock
-    xi : array, shape (q, d - 1) [-]
+    points (n, d) [m]
+    xi (q, d - 1) [-]
     """
     N, dN = shape_functions(block.family, xi)
     corners = points[block.connectivity]
@@ -178,7 +177,7 @@ def project_to_surface(
     ----------
     points, normals : array, shape (p, d) [m], [-]
     mesh, surface : the master side
-    deepest : float, optional [m]
+    deepest [m]
         Deepest penetration that counts as one; a tenth of the extent of the master surface unless
         given, since a line that starts beside a ring-shaped seat may meet its far side backwards.
     """

@@ -28,9 +28,9 @@ class PressureLimit:
 
     Parameters
     ----------
-    set : array, shape (m,) [m]
+    set (m,) [m]
         Increasing from 0, two at least.
-    pressure : array, shape (m,) [Pa]
+    pressure (m,) [Pa]
         Increasing, above 0.
 
     Raises

@@ -38,12 +38,12 @@ class ContactPhase:
 
     Parameters
     ----------
-    start, end : float [s]
+    start, end [s]
         First touch and separation, located inside the records.
-    peak_force : float [N]
-    peak_time : float [s]
+    peak_force [N]
+    peak_time [s]
         Middle of the record that holds the peak.
-    first, last : int
+    first, last
         Records ``first <= i < last`` belong to the contact.
     """
 
@@ -66,35 +66,35 @@ class ImpactMeasures:
 
     Parameters
     ----------
-    peak_force : float [N]
+    peak_force [N]
         Largest force of any integration step.
-    peak_time : float [s]
+    peak_time [s]
         Counted from first touch.
-    strongest : int
+    strongest
         Which contact of the cluster has the peak force, counted from 1.
-    first_touch : float [s]
-    contact_time : float [s]
+    first_touch [s]
+    contact_time [s]
         First touch to the end of the first contact.
-    total_contact_time : float [s]
+    total_contact_time [s]
         First touch to the end of the last contact of the cluster.
-    sub_contacts : int
+    sub_contacts
         Contacts in the cluster.
-    impulse : float [N s]
+    impulse [N s]
         Of the cluster.
-    approach_speed, rebound_speed : float [m/s]
+    approach_speed, rebound_speed [m/s]
         Relative speed of the centres of mass, both above zero for an ordinary rebound.
-    restitution : float [-]
+    restitution [-]
         nan where the record ends before separation.
-    restitution_from_impulse : float [-]
+    restitution_from_impulse [-]
         ``J (1/m_a + 1/m_b)/v - 1`` (with the impulse of outside forces): must agree.
-    impulse_residual : float [-]
+    impulse_residual [-]
         ``(J - m_a dv_a + outside) / J`` over the cluster: momentum balance of body a.
-    dissipated_share : float [-]
+    dissipated_share [-]
         Contact dissipation, modal damping and friction of the whole record over the energy of
         approach.
-    vibration_share : float [-]
+    vibration_share [-]
         ``1 - e^2 - dissipated_share``: energy of approach left in vibration.
-    impacts : int
+    impacts
         Clusters in the record.
     """
 
@@ -130,16 +130,16 @@ class Deviation:
 
     Parameters
     ----------
-    peak_force, contact_time, impulse : float [-]
+    peak_force, contact_time, impulse [-]
         Relative to the reference.
-    restitution : float [-]
+    restitution [-]
         Absolute.
-    history_l2 : float [-]
+    history_l2 [-]
         Root mean square force difference over the contact, first touch aligned, over the peak
         force of the reference.
-    third_octave_max_dB : float [dB]
+    third_octave_max_dB [dB]
         Largest level difference over the bands of the reference within 40 dB of its highest band.
-    third_octave_up_to_Hz : float [Hz]
+    third_octave_up_to_Hz [Hz]
         Middle frequency of the highest band compared.
     """
 
@@ -161,8 +161,7 @@ def find_contacts(history: ImpactHistory, *, threshold: float = 5e-3) -> tuple[C
 
     Parameters
     ----------
-    history : ImpactHistory
-    threshold : float [-]
+    threshold [-]
     """
     force = history.force
     peak = float(force.max(initial=0.0))
@@ -188,8 +187,7 @@ def measure_impact(history: ImpactHistory, *, threshold: float = 5e-3) -> Impact
 
     Parameters
     ----------
-    history : ImpactHistory
-    threshold : float [-]
+    threshold [-]
         See :func:`find_contacts`.
     """
     phases = find_contacts(history, threshold=threshold)

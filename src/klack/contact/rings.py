@@ -32,16 +32,16 @@ class RingSpace:
 
     Parameters
     ----------
-    section : ContactSpace
+    section
         Hats of the half section, centred; its gaps do not count.
-    count : int
+    count
         N, angles of every ring.
-    ring, turn : int array, shape (nc,)
+    ring, turn (nc,)
         Hat of each point and number of its angle.
-    gap : array, shape (nc,) [m]
-    rim : bool array, shape (nc,)
+    gap (nc,) [m]
+    rim (nc,)
         Points with a neighbour that was left out, on their ring or beside it.
-    beyond : float [m]
+    beyond [m]
         No point that was left out has a smaller gap.
     """
 
@@ -67,12 +67,12 @@ class RingSpace:
 
         Parameters
         ----------
-        section : ContactSpace
+        section
             Centred, wide enough for all of them.
-        gap : array, shape (hats, N) [m]
+        gap (hats, N) [m]
             Where the bodies are.
-        limit : float [m]
-        where, more : str
+        limit [m]
+        where, more
             Name of the contact, and what else may help, for a message.
 
         Raises
@@ -140,7 +140,6 @@ class RingFriction:
 
     Parameters
     ----------
-    law : Friction
     meridian : pair of csr_array, shape (hats, 2 n_nodes)
         Displacement of a past b in the half section, rows on the upper and on the lower body.
     around, turned : pairs of csr_array, shape (hats, n_nodes), (hats, 2 n_nodes)
@@ -166,8 +165,7 @@ class RingFriction:
 
         Parameters
         ----------
-        law : Friction
-        section : ContactSpace
+        section
             Of these half sections.
         mesh_a, surface_a, mesh_b, surface_b
             As given to :func:`klack.contact.mortar.contact_space`.

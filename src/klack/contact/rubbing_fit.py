@@ -39,10 +39,10 @@ class Loop:
 
     Parameters
     ----------
-    approach : array, shape (m,) [m]
+    approach (m,) [m]
         While they open, falling to first touch.
-    force : array, shape (m,) [N]
-    loss : float [J]
+    force (m,) [N]
+    loss [J]
         Of the whole loop.
     """
 
@@ -59,11 +59,11 @@ class RubbingFit:
     ----------
     law : RubbingLaw or TableLaw
         Without memory where nothing is lost.
-    reverse : float [-]
+    reverse [-]
         Force of slipping back over that of closing, at one approach.
-    loss : float [-]
+    loss [-]
         Share of the work of the largest loop that is lost.
-    error : float [-]
+    error [-]
         Largest error of the loss of a loop, over the work taken.
     """
 
@@ -78,9 +78,9 @@ def rubbing_fit(local: LocalLaw, loops: Sequence[Loop]) -> RubbingFit:
 
     Parameters
     ----------
-    local : LocalLaw
+    local
         Of the bodies while they close with friction.
-    loops : sequence of Loop
+    loops
         The last one from the end of ``local``.
 
     Raises

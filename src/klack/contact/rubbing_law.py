@@ -50,13 +50,13 @@ class RubbingLaw:
 
     Parameters
     ----------
-    onset : array, shape (n,) [m]
+    onset (n,) [m]
         Indentation from which each spring is pressed, increasing, not negative.
-    normal : array, shape (n,) [N/m]
+    normal (n,) [N/m]
         Stiffness of the pressure.
-    strength : array, shape (n,) [N/m]
+    strength (n,) [N/m]
         What friction holds at most, per indentation; not negative.
-    ratio : float [-]
+    ratio [-]
         Stiffness of friction while it holds, over ``strength``; up to 1 nothing slips.
 
     Raises

@@ -80,9 +80,7 @@ def contact_compliance(
 
     Parameters
     ----------
-    space : ContactSpace
-    flexibility_a, flexibility_b : Flexibility
-    faces : FaceFriction, optional
+    faces
         With tangential rows, after those of the gaps.
 
     Returns
@@ -110,8 +108,6 @@ def compliances_of(
 
     Parameters
     ----------
-    space : ContactSpace
-    flexibility_a, flexibility_b : Flexibility
     groups : sequence of int arrays
         Of points, see :func:`klack.bodies.elasticity.condensation.condensed_inverse`.
 
@@ -137,7 +133,6 @@ def condensed_compliance(
     Parameters
     ----------
     rows_a, rows_b : sparse array, shape (n, dofs of a), (n, dofs of b) [-]
-    flexibility_a, flexibility_b : Flexibility
 
     Returns
     -------
@@ -201,20 +196,19 @@ class StaticContact:
 
     Parameters
     ----------
-    space : ContactSpace
-    approach : array, shape (n,) [m]
+    approach (n,) [m]
         Rigid approach from first touch, increasing.
-    force : array, shape (n,) [N]
+    force (n,) [N]
         Axial force.
-    pressures : array, shape (n, nc) [N]
+    pressures (n, nc) [N]
         Forces of the contact points; over ``space.area`` they are pressures.
-    area : array, shape (n,) [m^2]
+    area (n,) [m^2]
         Sum of the hats that carry.
-    active_count : int array, shape (n,)
-    half_width : array, shape (n,) [m]
+    active_count (n,)
+    half_width (n,) [m]
         Half width of a ring contact, or radius of a contact around one point, of the Hertzian
         pressure with the same second moment.
-    compliance : array, shape (nc, nc) [m/N]
+    compliance (nc, nc) [m/N]
         Static compliance of both bodies, condensed to the contact points.
     """
 
@@ -273,10 +267,8 @@ def extended_compliance(
 
     Parameters
     ----------
-    space : ContactSpace
+    space
         Of the same surfaces and the same slave side as ``known.space``.
-    known : StaticContact
-    flexibility_a, flexibility_b : Flexibility
 
     Returns
     -------
@@ -328,15 +320,14 @@ def static_contact(
 
     Parameters
     ----------
-    space : ContactSpace
-    C : array, shape (nc, nc) [m/N]
+    C (nc, nc) [m/N]
         From :func:`contact_compliance`.
-    max_force : float [N]
+    max_force [N]
         The ladder ends at the first approach found that carries at least this much (up to 1 %
         more).  Take it above the highest force of the impact.
-    count : int
+    count
         Number of states.
-    layer : AsperityLayer, optional
+    layer
         Of the faces, in series with the bodies.
 
     Raises
@@ -352,9 +343,7 @@ class ContactLadder:
 
     Parameters
     ----------
-    space : ContactSpace
-    C : array, shape (nc, nc) [m/N]
-    layer : AsperityLayer or None
+    C (nc, nc) [m/N]
     """
 
     def __init__(
@@ -550,15 +539,14 @@ def check_state(
 
     Parameters
     ----------
-    space : ContactSpace
-    approach : float [m]
+    approach [m]
         From first touch.
-    lam : array, shape (nc,) [N]
-    below : float [N]
+    lam (nc,) [N]
+    below [N]
         Highest force known to stay within.
-    needed : float [N]
+    needed [N]
         That is asked for.
-    deepest : float [m]
+    deepest [m]
         Approach that is asked for.
 
     Raises
@@ -588,8 +576,7 @@ def size_over_half_width(static: StaticContact, force: float | None = None) -> f
 
     Parameters
     ----------
-    static : StaticContact
-    force : float, optional [N]
+    force [N]
         Without it the end of the ladder.
 
     Returns
@@ -618,8 +605,7 @@ def ring_radius(space: ContactSpace, lam: NDArray[np.float64]) -> float | None:
 
     Parameters
     ----------
-    space : ContactSpace
-    lam : array, shape (nc,) [N]
+    lam (nc,) [N]
     """
     spread, mean = _closest_ring(lam / lam.sum(), _meridians(space))
     return mean if spread < _RING * mean else None

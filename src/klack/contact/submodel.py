@@ -28,12 +28,12 @@ class LocalStiffness:
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Of the region.
-    stiffness : float [N/m]
+    stiffness [N/m]
         Slope of the least-squares line through the states within ``fit_range``.
-    fit_range : tuple of float [N]
-    size : float [m]
+    fit_range [N]
+    size [m]
         Distance from the contact up to which the bodies deform.
     """
 
@@ -59,14 +59,13 @@ def local_stiffness(
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Of the full bodies; it says where the contact is and up to which force.
-    body_a, body_b : ElasticBody
-    size : float [m]
+    size [m]
         Some half widths of the contact; the result depends on it.
     fit_share : pair of float [-]
         Range of the fit as shares of the highest force.
-    cache : ResultCache, optional
+    cache
         Keeps the compliance of the region for later runs.
     """
     require_positive("contact submodel: size", size, "m")

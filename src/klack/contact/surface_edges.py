@@ -38,13 +38,13 @@ class SurfaceEdges:
 
     Parameters
     ----------
-    line : array, shape (m, 3, d) [m]
+    line (m, 3, d) [m]
         Begin, middle and end of each edge; three times the same point in a half section.
-    angle : array, shape (m,) [rad]
+    angle (m,) [rad]
         Between the outward normals; above 0 where the body is convex.
-    along : array, shape (m, 2, d) [-]
+    along (m, 2, d) [-]
         Unit tangents away from the edge into the face of the surface and into the other one.
-    neighbour : tuple of str or None
+    neighbour
         Name of the surface that the other face belongs to; empty where it has none, None where it
         belongs to the surface itself.
     """
@@ -85,11 +85,6 @@ def surface_edges(mesh: Mesh, surface: Surface) -> SurfaceEdges:
 
     Smooth edges between two of its own faces are left out, those of facets up to 10 degrees, and
     places on the axis of a body of revolution.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    surface : Surface
     """
     own = _rims(mesh, surface.blocks)
     skin = _rims(mesh, _skin_beside(mesh, surface))

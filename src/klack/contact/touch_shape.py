@@ -46,8 +46,7 @@ def relative_curvatures(
 
     Parameters
     ----------
-    space : ContactSpace
-    pressures : array, shape (nc,) [N]
+    pressures (nc,) [N]
         Forces of the contact points.
     sides : triples of mesh, surface and its faces
         Of body a and of body b, as they touch.
@@ -113,8 +112,7 @@ def area_at_once(space: ContactSpace, travel: float) -> float:
 
     Parameters
     ----------
-    space : ContactSpace
-    travel : float [m]
+    travel [m]
     """
     facing = space.axial > 1e-6
     height = space.gap[facing] / space.axial[facing]

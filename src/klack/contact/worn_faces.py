@@ -18,9 +18,9 @@ class WornFaces:
 
     Parameters
     ----------
-    radius : array, shape (n,) [m]
+    radius (n,) [m]
         Distance from the axis of motion, increasing.
-    opening : array, shape (n,) [m]
+    opening (n,) [m]
         Gap that has stayed between both faces, along their normal.  Linear between the radii,
         constant beyond the first and the last.
     """
@@ -34,9 +34,9 @@ def opened_by(space: "ContactSpace", worn: WornFaces | None) -> "ContactSpace":
 
     Parameters
     ----------
-    space : ContactSpace
+    space
         Of faces as made; of two or three dimensions.
-    worn : WornFaces or None
+    worn
         None for faces as made.
     """
     if worn is None:

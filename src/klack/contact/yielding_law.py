@@ -39,16 +39,16 @@ class YieldingLaw:
 
     Parameters
     ----------
-    largest : array, shape (m,) [m]
+    largest (m,) [m]
         Indentations of the states, increasing; nothing has yielded at the first one.
-    set : array, shape (m,) [m]
+    set (m,) [m]
         Indentation at which the faces part after each; 0 at the first.
-    closing : array, shape (m,) [N]
+    closing (m,) [N]
         Force of closing at ``largest``; increasing.
-    shape : array, shape (m, n) [-]
+    shape (m, n) [-]
         Elastic force over ``closing`` at ``n`` places from the set to the largest indentation,
         ``(k / (n - 1))**2`` of the way; from 0 to 1.
-    reached : float [m]
+    reached [m]
         Largest indentation so far; up to the first state nothing has yielded.
 
     Raises

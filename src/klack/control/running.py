@@ -17,8 +17,7 @@ class RunningControl:
 
     Parameters
     ----------
-    act : callable
-    sensors : mapping of str to RunningSensor
+    sensors
         In the order of the channels.
     """
 

@@ -113,13 +113,11 @@ def calculix_settings(
 
     Parameters
     ----------
-    case : Case
-    impact : CalculixImpact
-    step : float, optional [s]
+    step [s]
         That of the full order without.
-    duration : float, optional [s]
+    duration [s]
         That of the case without.
-    penalty : float, optional [Pa/m]
+    penalty [Pa/m]
     """
     return CalculixSettings(
         step=case.run.full_step if step is None else step,

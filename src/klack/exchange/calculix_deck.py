@@ -73,17 +73,16 @@ class CalculixImpact:
 
     Parameters
     ----------
-    title : str
-    upper, lower : ElasticBody
+    upper, lower
         Placed for the start; the upper one flies in -z.
-    upper_surface, lower_surface : Surface
+    upper_surface, lower_surface
         Where they meet.
     materials : mapping of body name to mapping of solid to Material
-    speed : float [m/s]
+    speed [m/s]
         Of the upper body at the place where it is.
-    closing_force : float [N]
+    closing_force [N]
         Constant force on the upper body, positive in -z, spread over it like its weight.
-    friction : float [-]
+    friction [-]
         Coulomb's coefficient between the faces, whether they stick or slip.
     """
 
@@ -104,18 +103,18 @@ class CalculixSettings:
 
     Parameters
     ----------
-    step, duration : float [s]
+    step, duration [s]
         Fixed time increment, and time from the start.
-    penalty : float [Pa/m]
+    penalty [Pa/m]
         Pressure per overclosure; :func:`default_penalty` proposes one.
-    alpha : float [-]
+    alpha [-]
         Of Hilber, Hughes & Taylor (1977), -1/3 to 0: 0 is the trapezoidal rule without any
         numerical damping, -0.05 the default of ccx.
-    solver : str, optional
+    solver
         Equation solver.  At time steps that resolve an impact the mass dominates: ``ITERATIVE
         SCALING`` gave the printed digits of SPOOLES in a third of the time, and is the choice
         without friction; with friction it is ``SPOOLES``.
-    stick : float [-]
+    stick [-]
         Stick slope over penalty.
     """
 

@@ -46,21 +46,21 @@ class CalculixResult:
 
     Parameters
     ----------
-    source : str
+    source
         The file.
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Ends of the increments; the first one is above 0.
-    force : array, shape (n,) [N]
+    force (n,) [N]
         Axial contact force, pressing the bodies apart above zero.
-    sideways : array, shape (n,) [N]
+    sideways (n,) [N]
         Magnitude of the resultant normal to the axis.
     contact_energy : array, shape (n,) [J] or empty
         Stored in the penalty.
     internal, kinetic : mapping of set name to array, shape (n,) [J]
         Strain and kinetic energy of the element sets that were printed.
-    iterations : int or None
+    iterations
         Of all increments together.
-    wall_time : float or None [s]
+    wall_time [s]
     """
 
     source: str
@@ -294,8 +294,7 @@ def other_run(result: CalculixResult, reference: ImpactHistory) -> OtherRun:
 
     Parameters
     ----------
-    result : CalculixResult
-    reference : ImpactHistory
+    reference
         Of the same case, for masses, names, speed and outside force.
 
     Raises
@@ -321,11 +320,11 @@ class _Motion:
 
     Parameters
     ----------
-    force : float [N]
+    force [N]
         From outside, positive in +z.
-    velocity : array, shape (n,) [m/s]
+    velocity (n,) [m/s]
         Of the centre of mass.
-    work : array, shape (n,) [J]
+    work (n,) [J]
         Done by the outside force since the first time.
     """
 

@@ -27,9 +27,9 @@ class CalculixRun:
 
     Parameters
     ----------
-    data : Path
+    data
         The ``.dat`` file with forces and energies.
-    wall_time : float [s]
+    wall_time [s]
     """
 
     data: Path
@@ -76,14 +76,13 @@ def run_calculix(
 
     Parameters
     ----------
-    deck : Path
+    deck
         ``NAME.inp``.
-    duration : float [s]
+    duration [s]
         Simulated time of the deck, for the progress.
-    threads : int
-    time_limit : float, optional [s]
+    time_limit [s]
         Of wall-clock time; the run is stopped beyond it.
-    progress : callable, optional
+    progress
         Called with the fraction done, 0 to 1.
 
     Raises

@@ -35,12 +35,10 @@ class CaseModels:
 
     Parameters
     ----------
-    bodies : tuple of ReducedBody
-    pair : ModalModel
+    pair
         All bodies, their contacts and films; what else drives the needle stays outside.
-    provenance : Provenance
-    step : float [s]
-    outside : tuple of str
+    step [s]
+    outside
         Components of a valve that no model has.
     """
 

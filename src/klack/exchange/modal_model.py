@@ -49,10 +49,9 @@ class Provenance:
 
     Parameters
     ----------
-    case, title : str
-    version : str
+    version
         Of klack.
-    created : str
+    created
         Date and time, ISO 8601.
     meshes : mapping of body name to str
         Elements and degrees of freedom in words.
@@ -71,10 +70,9 @@ class ModelInput:
 
     Parameters
     ----------
-    name : str
+    name
         Made of letters, digits and underscores, as all names of a model.
-    description : str
-    shape : array, shape (m,) [1/sqrt(kg)]
+    shape (m,) [1/sqrt(kg)]
         Modal forces of 1 N.
     """
 
@@ -89,9 +87,8 @@ class ModelOutput:
 
     Parameters
     ----------
-    name, description : str
     quantity : "displacement" [m] or "velocity" [m/s]
-    shape : array, shape (m,) [1/sqrt(kg)]
+    shape (m,) [1/sqrt(kg)]
         Times the modal displacements or velocities.
     offset : float [m] or [m/s]
         Value at ``q = 0``.
@@ -110,15 +107,13 @@ class ModelContact:
 
     Parameters
     ----------
-    name : str
-    shape : array, shape (m,) [1/sqrt(kg)]
+    shape (m,) [1/sqrt(kg)]
         ``gamma`` of the gap.
-    gap : float [m]
+    gap [m]
         At ``q = 0``.
     law : contact law or None
         None: only a film.
-    series_compliance : float [m/N]
-    film : FilmRow or None
+    series_compliance [m/N]
     """
 
     name: str
@@ -135,31 +130,28 @@ class ModalModel:
 
     Parameters
     ----------
-    name : str
+    name
         An identifier: letters, digits and underscores.
     kind : "body" or "pair"
     omega, damping : array, shape (m,) [rad/s], [-]
         Of all modes of all bodies; rigid modes have 0.
-    mode_names : tuple of str
+    mode_names
         ``needle_1``, ``needle_2``, ..., body by body.
     start, start_velocity : array, shape (m,) [m sqrt(kg)], [m/s sqrt(kg)]
         Modal state at the start.
-    rise : array, shape (m,) [sqrt(kg)]
+    rise (m,) [sqrt(kg)]
         Modal displacements of a rigid motion of the moving body of a pair by 1 m along +z.
-    constant : array, shape (m,) [N/sqrt(kg)]
+    constant (m,) [N/sqrt(kg)]
         Modal forces that always act (weight, preload).
-    inputs : tuple of ModelInput
-    outputs : tuple of ModelOutput
-    contacts : tuple of ModelContact
+    contacts
         Of a pair; gap and force of each are outputs of the model as well.
-    residual_compliance : array, shape (n_inputs, n_inputs) [m/N]
+    residual_compliance (n_inputs, n_inputs) [m/N]
         Of a body: what its modes miss of the static compliance between its ports.  Not part of the
         equations; a contact stiffness of the user belongs in series with it.
-    step : float [s]
+    step [s]
         Step of the time integration that gives klack's own accuracy.
-    duration : float [s]
+    duration [s]
         A sensible end of a first simulation.
-    provenance : Provenance
     """
 
     name: str
@@ -206,10 +198,9 @@ def body_model(body: ReducedBody, *, provenance: Provenance, step: float) -> Mod
 
     Parameters
     ----------
-    body : ReducedBody
+    body
         Its observers are further outputs.
-    provenance : Provenance
-    step : float [s]
+    step [s]
         Recommended step.
     """
     m = body.mode_count
@@ -273,19 +264,17 @@ def pair_model(
 
     Parameters
     ----------
-    name : str
-    system : ReducedSystem
+    system
         Its constant forces and springs stay inside the model.
-    moving : str
+    moving
         The needle: a free body.
-    contact_names : sequence of str
+    contact_names
         One per contact of the system.
-    films : sequence of FilmRow or None
+    films
         One per contact; none without.
-    speed : float [m/s]
+    speed [m/s]
         Of the moving body at the start, along +z (negative: closing).
-    step, duration : float [s]
-    provenance : Provenance
+    step, duration [s]
 
     Raises
     ------

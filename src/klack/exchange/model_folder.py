@@ -23,9 +23,9 @@ def model_folder(models: Sequence[ModalModel], folder: Path) -> Iterator[Path]:
 
     Parameters
     ----------
-    models : sequence of ModalModel
+    models
         With distinct names.
-    folder : Path
+    folder
         Made where it is missing; files of the same name are replaced.
 
     Raises

@@ -85,9 +85,8 @@ class ContactText:
 
     Parameters
     ----------
-    suffix : str
+    suffix
         Ending of the names of its variables.
-    declarations, equations : list of str
     """
 
     suffix: str

@@ -55,15 +55,15 @@ class FirstOrder:
     ----------
     A, B, C, D : array, shapes (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
         D is zero: what the modes miss is not in it.
-    residual_feedthrough : array, shape (n_outputs, n_inputs) [m/N]
+    residual_feedthrough (n_outputs, n_inputs) [m/N]
         D with the residual compliance of a body, for those who want it; zero for a pair.
-    constant_rate : array, shape (n,)
+    constant_rate (n,)
         ``x_c``.
-    output_offset : array, shape (n_outputs,)
+    output_offset (n_outputs,)
         ``y_0``.
-    start : array, shape (n,)
+    start (n,)
         State at the start.
-    state_names, state_units, input_names, input_units, output_names, output_units : tuple of str
+    state_names, state_units, input_names, input_units, output_names, output_units
         Modal displacements are in m sqrt(kg).
     """
 
@@ -171,8 +171,7 @@ def to_control(model: ModalModel, *, residual_compliance: bool = False) -> "cont
 
     Parameters
     ----------
-    model : ModalModel
-    residual_compliance : bool
+    residual_compliance
         Put what the modes of a body miss into D.
 
     Raises

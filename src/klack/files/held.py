@@ -31,7 +31,7 @@ class HeldFolder(Closing):
 
     Parameters
     ----------
-    path : Path
+    path
         An existing folder, or a link to one.
 
     Raises

@@ -34,10 +34,10 @@ def open_own_file(path: Path | str, flags: int, *, folder: int | None = None) ->
     ----------
     path : Path or str
         Its last part is not followed if it is a link.
-    flags : int
+    flags
         Of ``os.open``; with ``os.O_CREAT`` it is made if it is not there.  What is made here
         (``os.O_EXCL``) is of the caller, also where the file system shows another user.
-    folder : int, optional
+    folder
         Open folder that a relative path starts at.
 
     Returns

@@ -59,7 +59,7 @@ class Stage(Closing):
 
     Parameters
     ----------
-    folder : HeldFolder
+    folder
         That the files come into.
 
     Raises

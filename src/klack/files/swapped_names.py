@@ -19,9 +19,9 @@ def swap_names(first_folder: int, first: str, second_folder: int, second: str) -
 
     Parameters
     ----------
-    first_folder, second_folder : int
+    first_folder, second_folder
         Open folders.
-    first, second : str
+    first, second
         Names in them; both exist.
 
     Raises

@@ -43,8 +43,7 @@ def whole_file(path: Path, refuse: Refusal | None = None) -> Iterator[Path]:
 
     Parameters
     ----------
-    path : Path
-    refuse : callable, optional
+    refuse
         Turns the error of the system into that of the caller.
 
     Raises
@@ -70,8 +69,7 @@ def whole_files(
 
     Parameters
     ----------
-    folder : Path
-    refuse : callable, optional
+    refuse
         Turns the error of the system into that of the caller.
     beside : mapping of str to mark, optional
         Files that must still be there (:func:`mark_of`) when the new ones move; nothing moves

@@ -82,7 +82,7 @@ class EquationOfState:
 
     Parameters
     ----------
-    name : str
+    name
         With the prefix.
     """
 

@@ -42,7 +42,7 @@ def flow_factor(height: float) -> float:
 
     Parameters
     ----------
-    height : float [-]
+    height [-]
         Gap over composite roughness, ``h/sigma``; a fit for about 0.5 and above.
     """
     return 1.0 - 0.9 * exp(-0.56 * height)
@@ -57,7 +57,7 @@ def mean_flow_factor(lowest: float) -> float:
 
     Parameters
     ----------
-    lowest : float [-]
+    lowest [-]
         Cut-off over composite roughness, ``h_r/sigma``.
 
     Examples
@@ -148,8 +148,8 @@ class Film(Section):
 
         Parameters
         ----------
-        viscosity : float [Pa s]
-        tension : float [Pa]
+        viscosity [Pa s]
+        tension [Pa]
             Pressure around the film less that at which it cavitates.
         """
         cubic, linear = self.coefficients()

@@ -34,18 +34,14 @@ class Fluid:
 
     Parameters
     ----------
-    name : str
-    temperature : float [K]
-    liquid : LiquidLaw
-    base_viscosity : float [Pa s]
+    temperature [K]
+    base_viscosity [Pa s]
         Dynamic, of the liquid at one atmosphere.
-    pressure_viscosity : float [1/Pa]
+    pressure_viscosity [1/Pa]
         ``alpha`` of :func:`~klack.hydraulics.liquid.barus_viscosity`.
-    gas : EntrainedGas
-    vapour : Vapour
-    known_range : PressureRange, optional
+    known_range
         Where more is known of it than what the liquid's law says of itself.
-    viscosity_law : PressureViscosity, optional
+    viscosity_law
         With one, orifices, seats, annuli and channels follow the viscosity over pressure, as do
         lines and films; without, the former keep that at ambient pressure.
 

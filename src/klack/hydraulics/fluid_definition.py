@@ -68,8 +68,8 @@ class MeasuredProperties:
 
     Parameters
     ----------
-    pressure : float [Pa]
-    molar_mass : float [kg/mol]
+    pressure [Pa]
+    molar_mass [kg/mol]
     temperature : tuple [K]
     density : tuple [kg/m^3]
     bulk_modulus : tuple [Pa]
@@ -80,7 +80,7 @@ class MeasuredProperties:
     vapour_pressure : tuple [Pa]
     highest_pressure : tuple [Pa]
         To which the properties hold; between the columns on straight lines.
-    range_source : str
+    range_source
         Where it comes from.
     """
 
@@ -143,20 +143,20 @@ class MineralOil:
 
     Parameters
     ----------
-    density : float [kg/m^3]
+    density [kg/m^3]
         At 15 degC and one atmosphere.
-    expansion : float [1/K]
-    bulk_modulus : float [Pa]
+    expansion [1/K]
+    bulk_modulus [Pa]
         Isentropic, at 20 degC and one atmosphere.
-    bulk_modulus_slope : float [-]
-    softening : float [1/K]
+    bulk_modulus_slope [-]
+    softening [1/K]
         ``b``.
-    walther_a, walther_b : float [-]
-    pressure_viscosity : float [1/Pa]
-    vapour_pressure : float [Pa]
+    walther_a, walther_b [-]
+    pressure_viscosity [1/Pa]
+    vapour_pressure [Pa]
         Held over temperature, unless it has ``boiling``: then that at 20 degC.
-    molar_mass : float [kg/mol]
-    boiling : float [K]
+    molar_mass [kg/mol]
+    boiling [K]
         Heat of vaporisation over the gas constant, ``p_v ~ exp(-boiling/T)``; 0 holds it.
     """
 
@@ -200,16 +200,16 @@ class TaitOil:
 
     Parameters
     ----------
-    density : float [kg/m^3]
+    density [kg/m^3]
         At 0 degC, zero pressure.
-    expansion, softening : float [1/K]
-    bulk_modulus : float [Pa]
+    expansion, softening [1/K]
+    bulk_modulus [Pa]
         ``K_00``, at zero pressure and 0 K.
-    bulk_modulus_slope : float [-]
-    walther_a, walther_b : float [-]
-    pressure_viscosity : float [1/Pa]
-    vapour_pressure : float [Pa]
-    molar_mass : float [kg/mol]
+    bulk_modulus_slope [-]
+    walther_a, walther_b [-]
+    pressure_viscosity [1/Pa]
+    vapour_pressure [Pa]
+    molar_mass [kg/mol]
     """
 
     density: float
@@ -248,10 +248,10 @@ class FixedProperties:
     Parameters
     ----------
     liquid : Murnaghan or TabulatedLiquid
-    viscosity : float [Pa s]
+    viscosity [Pa s]
         Dynamic, at one atmosphere.
-    pressure_viscosity : float [1/Pa]
-    vapour_pressure : float [Pa]
+    pressure_viscosity [1/Pa]
+    vapour_pressure [Pa]
     vapour_density : float [kg/m^3], optional
         Of the saturated vapour; by default of an ideal gas of 0.1 kg/mol.
     """
@@ -282,13 +282,11 @@ class FluidDefinition:
 
     Parameters
     ----------
-    name : str
-    properties : FluidProperties
-    constants : tuple of Constant
+    constants
         What the properties rest on.
-    lowest_temperature, highest_temperature : float [K]
+    lowest_temperature, highest_temperature [K]
         Range in which the constants hold.
-    pressure_range : PressureRange, optional
+    pressure_range
         Absolute pressures for which they hold; by default what the properties or the law of the
         liquid say.
     """
@@ -321,12 +319,12 @@ class FluidDefinition:
 
         Parameters
         ----------
-        temperature : float [K]
+        temperature [K]
         gas_fraction, gas_exponent, release_pressure, saturation_pressure
             See :class:`~klack.hydraulics.mixture.EntrainedGas`; the fraction is at one atmosphere.
-        release_time, absorption_time : float [s]
+        release_time, absorption_time [s]
             Time constants of the gas in chambers, see the same.
-        boiling_half_width : float [Pa]
+        boiling_half_width [Pa]
             See :class:`~klack.hydraulics.mixture.Vapour`.
         """
         low, high = self.lowest_temperature, self.highest_temperature

@@ -41,10 +41,10 @@ def gas_store(
 
     Parameters
     ----------
-    p, ambient, precharge : float [Pa]
-    whole, least : float [m^3]
+    p, ambient, precharge [Pa]
+    whole, least [m^3]
         Of the gas at the precharge, and when the accumulator is full.
-    exponent : float [-]
+    exponent [-]
 
     Returns
     -------

@@ -51,8 +51,7 @@ def fluid_table(fluid: NetworkFluid, ambient_pressure: float) -> Vector:
 
     Parameters
     ----------
-    fluid : NetworkFluid
-    ambient_pressure : float [Pa]
+    ambient_pressure [Pa]
         Where the pressure energy ``g`` counts from, absolute.
 
     Returns
@@ -160,11 +159,11 @@ def fluid_at(table: Vector, p: float, hint: int) -> tuple[float, float, float, i
 
     Parameters
     ----------
-    table : array
+    table
         Of :func:`fluid_table`.
-    p : float [Pa]
+    p [Pa]
         Absolute.
-    hint : int
+    hint
         What the last call returned; 0 for the first.
     """
     i = max(hint, _ROW)
@@ -212,11 +211,11 @@ def pressure_at(table: Vector, rho: float, hint: int) -> tuple[float, int]:
 
     Parameters
     ----------
-    table : array
+    table
         Of :func:`fluid_table`.
-    rho : float [kg/m^3]
+    rho [kg/m^3]
         Values of 0 and less are taken as a trace of vapour.
-    hint : int
+    hint
         As for :func:`fluid_at`; both share their places.
     """
     v = 1.0 / max(rho, _TRACE)

@@ -35,14 +35,14 @@ def guide_film_force(
 
     Parameters
     ----------
-    eccentricity : float [-]
+    eccentricity [-]
         ``eps = e / c``, from 0 to below 1.
-    rate : float [1/s]
+    rate [1/s]
         ``d eps / dt``.
-    whirl : float [1/s]
+    whirl [1/s]
         ``d gamma / dt`` of the direction in which the needle lies; of a journal that turns with
         ``omega`` less ``omega / 2``.
-    ruptured : bool
+    ruptured
         Only the half with a pressure above ambient acts (Booker 1965, Ocvirk's film of 180
         degrees); else the whole film.
 
@@ -66,7 +66,7 @@ def guide_film_damping(x: float, y: float) -> Matrix:
 
     Parameters
     ----------
-    x, y : float [-]
+    x, y [-]
         Place of the needle over the clearance.
     """
     radius = hypot(x, y)
@@ -91,9 +91,9 @@ def guide_film_step(
 
     Parameters
     ----------
-    x0, y0, x1, y1 : float [-]
+    x0, y0, x1, y1 [-]
         Places at both ends over the clearance; the middle lies within it.
-    step : float [s]
+    step [s]
 
     Returns
     -------

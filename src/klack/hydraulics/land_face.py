@@ -28,7 +28,7 @@ def land_areas(inner: float, outer: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    inner, outer : float [m]
+    inner, outer [m]
         Radii, ``0 < inner < outer``.
 
     Returns

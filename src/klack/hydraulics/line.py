@@ -153,8 +153,7 @@ class Line(Component):
 
         Parameters
         ----------
-        fluid : NetworkFluid
-        pressure : float, optional [Pa]
+        pressure [Pa]
             Absolute, about which they run; by default the one that the line was given.
         """
         about = self.pressure if pressure is None else pressure

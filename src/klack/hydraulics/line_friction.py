@@ -42,8 +42,7 @@ class ExponentialWeights:
 
     Parameters
     ----------
-    factors, rates : tuple of float [-]
-    source : str
+    factors, rates [-]
     """
 
     factors: tuple[float, ...]
@@ -91,7 +90,7 @@ def laminar_weight(tau: ArrayLike) -> Values:
 
     Parameters
     ----------
-    tau : array [-]
+    tau [-]
         ``nu t / R^2``, at least 3e-7.
     """
     times = np.asarray(tau, dtype=float)
@@ -115,7 +114,7 @@ def zielke_weight(tau: ArrayLike) -> Values:
 
     Parameters
     ----------
-    tau : array [-]
+    tau [-]
         ``nu t / R^2`` above zero.
 
     Notes
@@ -137,9 +136,9 @@ def vardy_brown_weight(tau: ArrayLike, reynolds: float) -> Values:
 
     Parameters
     ----------
-    tau : array [-]
+    tau [-]
         ``nu t / R^2`` above zero.
-    reynolds : float [-]
+    reynolds [-]
         Of the mean flow, 2e3 to 1e8.
 
     Notes
@@ -158,8 +157,8 @@ def laminar_resistance(length: float, diameter: float, viscosity: float) -> floa
 
     Parameters
     ----------
-    length, diameter : float [m]
-    viscosity : float [Pa s]
+    length, diameter [m]
+    viscosity [Pa s]
         Dynamic.
 
     Examples
@@ -177,10 +176,10 @@ def unsteady_terms(
 
     Parameters
     ----------
-    resistance : float [Pa s/m^3]
+    resistance [Pa s/m^3]
         :func:`laminar_resistance` of the line; a term gains half of it times its factor.
-    diameter : float [m]
-    kinematic_viscosity : float [m^2/s]
+    diameter [m]
+    kinematic_viscosity [m^2/s]
 
     Returns
     -------

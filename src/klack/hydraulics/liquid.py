@@ -42,11 +42,11 @@ class PressureRange:
 
     Parameters
     ----------
-    lowest, highest : float [Pa]
+    lowest, highest [Pa]
         Between them the bulk modulus is right to some 10 %, the speed of sound to 5 %.
-    usable : float [Pa]
+    usable [Pa]
         Above it a number means nothing any more, and a run stops.
-    source : str
+    source
         Where the range comes from.
     """
 
@@ -91,11 +91,11 @@ class Murnaghan:
 
     Parameters
     ----------
-    density_at_reference : float [kg/m^3]
-    bulk_modulus_at_reference : float [Pa]
-    slope : float [-]
+    density_at_reference [kg/m^3]
+    bulk_modulus_at_reference [Pa]
+    slope [-]
         ``m``, 5.7 to 7.4 for water, 9 to 13 for oils and fuels; above 0.
-    reference_pressure : float [Pa]
+    reference_pressure [Pa]
         Absolute.
 
     Examples
@@ -163,10 +163,10 @@ class Tait:
 
     Parameters
     ----------
-    density_at_zero : float [kg/m^3]
+    density_at_zero [kg/m^3]
         Extrapolated to zero absolute pressure.
-    bulk_modulus_at_zero : float [Pa]
-    slope : float [-]
+    bulk_modulus_at_zero [Pa]
+    slope [-]
         ``K'``.
     """
 
@@ -216,9 +216,9 @@ class TabulatedLiquid:
 
     Parameters
     ----------
-    pressure : array, shape (n,) [Pa]
+    pressure (n,) [Pa]
         Absolute, increasing.
-    density : array, shape (n,) [kg/m^3]
+    density (n,) [kg/m^3]
         Increasing.
     """
 
@@ -317,8 +317,8 @@ def walther_viscosity(temperature: ArrayLike, a: float, b: float) -> Values:
 
     Parameters
     ----------
-    temperature : array [K]
-    a, b : float [-]
+    temperature [K]
+    a, b [-]
 
     Examples
     --------
@@ -340,12 +340,12 @@ def barus_viscosity(
 
     Parameters
     ----------
-    viscosity : float [Pa s]
+    viscosity [Pa s]
         At the reference pressure.
-    coefficient : float [1/Pa]
+    coefficient [1/Pa]
         ``alpha``.
-    pressure : array [Pa]
-    reference_pressure : float [Pa]
+    pressure [Pa]
+    reference_pressure [Pa]
     """
     x = np.asarray(pressure, dtype=float) - reference_pressure
     return np.asarray(viscosity * np.exp(coefficient * x))

@@ -49,13 +49,12 @@ class LocalLine:
 
     Parameters
     ----------
-    length, diameter : float [m]
-    stretch : float [1/Pa]
+    length, diameter [m]
+    stretch [1/Pa]
         Growth of the bore area per pressure.
-    friction : str
+    friction
         One of :data:`FRICTIONS`.
-    roughness : float [m]
-    cells : int
+    roughness [m]
     """
 
     length: float

@@ -42,15 +42,15 @@ class EntrainedGas:
 
     Parameters
     ----------
-    fraction : float [-]
+    fraction [-]
         ``alpha``, share of the volume at ``reference_pressure`` with all gas free; usually 1e-4
         to 5e-3, and the least known number of a hydraulic model: identify it.
-    exponent : float [-]
+    exponent [-]
         ``n``: 1 isothermal (slow) to 1.4 adiabatic (fast).
-    reference_pressure : float [Pa]
-    release_pressure, saturation_pressure : float [Pa]
+    reference_pressure [Pa]
+    release_pressure, saturation_pressure [Pa]
         Both or none.
-    release_time, absorption_time : float [s]
+    release_time, absorption_time [s]
         Time constants with which gas leaves and enters the liquid of the chambers of a network,
         see :mod:`klack.hydraulics.gas_release`: both or none, with both pressures.  ``theta`` is
         then the share at equilibrium.
@@ -153,11 +153,11 @@ class Vapour:
 
     Parameters
     ----------
-    pressure : float [Pa]
+    pressure [Pa]
         ``p_v``.
-    density : float [kg/m^3]
+    density [kg/m^3]
         ``rho_v`` of the saturated vapour.
-    half_width : float [Pa]
+    half_width [Pa]
         ``d``: wider is smoother for the solver, narrower nearer to the true plateau.
     """
 

@@ -28,7 +28,7 @@ class NeedleContour:
     ----------
     points : tuple of (float, float) [m], [m]
         From the axis up; the last one far away.
-    edge_start : float [m]
+    edge_start [m]
         Radius where the cone of the tip ends.
     arc : tuple of float, length 5 [m], [m], [m], [rad], [rad]
         Centre, radius, angles of shank and tip; radius 0 without a rounding.

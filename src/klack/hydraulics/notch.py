@@ -163,8 +163,7 @@ def notch_opening(
     ----------
     par : sequence of floats
         From ``base`` on: kind, count, width [m], depth [m], length [m], width at the edge [m].
-    base : int
-    x, c, more : float [m]
+    x, c, more [m]
         Opening, clearance, ``l_e``.
 
     Returns

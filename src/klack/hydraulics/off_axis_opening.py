@@ -35,17 +35,17 @@ def off_axis_opening(
 
     Parameters
     ----------
-    kind : float
+    kind
         0 flat, 1 cone, 2 ball.
-    r : float [m]
+    r [m]
         Radius of the edge.
-    s, c : float
+    s, c
         Sine and cosine of the angle between axis and face.
-    x : float [m]
+    x [m]
         Lift; below zero the faces overlap.
-    ex, ey : float [m]
+    ex, ey [m]
         Offset.
-    tx, ty : float
+    tx, ty
         Slopes of the plane across the axis of the needle.
     """
     length = sqrt(1.0 + tx * tx + ty * ty)

@@ -70,11 +70,11 @@ class SeatFace:
 
     Parameters
     ----------
-    shape : str
+    shape
         flat, cone or ball.
-    radius : float [m]
+    radius [m]
         Of the edge.
-    angle : float [rad]
+    angle [rad]
         Between axis and face at the edge, above 0 and below pi/2; of a flat face pi/2.
     """
 
@@ -104,10 +104,9 @@ def edge_gap(face: SeatFace, placement: ArrayLike, angles: ArrayLike) -> Vector:
 
     Parameters
     ----------
-    face : SeatFace
     placement : array, shape (5,) [m], [m], [m], [-], [-]
         Lift, offset, tilt.
-    angles : array, shape (S,) [rad]
+    angles (S,) [rad]
         Round the edge.
     """
     return _gap(face, _placed(placement), np.asarray(angles, dtype=float))[0]
@@ -118,10 +117,9 @@ def flow_area(face: SeatFace, placement: ArrayLike, *, angles: int = 72) -> floa
 
     Parameters
     ----------
-    face : SeatFace
     placement : array, shape (5,) [m], [m], [m], [-], [-]
         Lift, offset, tilt.
-    angles : int
+    angles
         Points round the edge, at least 8.  Exact to round-off with 72 while nothing overlaps; where
         one side does, the error falls with their square.
     """
@@ -144,9 +142,9 @@ def ring_opening(mean: ArrayLike, swing: ArrayLike, radius: float) -> Vector:
 
     Parameters
     ----------
-    mean, swing : array [m]
+    mean, swing [m]
         ``h`` and ``a``.
-    radius : float [m]
+    radius [m]
 
     Examples
     --------

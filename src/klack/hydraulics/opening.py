@@ -47,12 +47,12 @@ def opening_flow(
 
     Parameters
     ----------
-    p_a, p_b : float [Pa]
-    rho_a, rho_b : float [kg/m^3]
-    area : float [m^2]
+    p_a, p_b [Pa]
+    rho_a, rho_b [kg/m^3]
+    area [m^2]
         Zero or more.
-    discharge : float [-]
-    number : float [s/kg]
+    discharge [-]
+    number [s/kg]
         ``2 / (mu lambda_c)``.
     contraction, vapour : float [-], [Pa]
         See :func:`~klack.hydraulics.orifice.choked_flow`.

@@ -71,9 +71,9 @@ def choked_flow(
         negative.
     supply, density : float [Pa], [kg/m^3]
         Before the restriction.
-    throat : float [m^2]
+    throat [m^2]
         ``C_c A``; zero switches the limit off.
-    vapour : float [Pa]
+    vapour [Pa]
 
     Returns
     -------
@@ -113,12 +113,12 @@ def orifice_flow(
 
     Parameters
     ----------
-    p_a, p_b : float [Pa]
-    rho_a, rho_b : float [kg/m^3]
+    p_a, p_b [Pa]
+    rho_a, rho_b [kg/m^3]
         Only that before the orifice acts.
-    conductance : float [m^2]
+    conductance [m^2]
         ``C_q A``.
-    number : float [m s/kg]
+    number [m s/kg]
         ``2 D_h / (mu lambda_c)``.
     throat, vapour : float [m^2], [Pa]
         See :func:`choked_flow`.

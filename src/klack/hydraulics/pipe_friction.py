@@ -60,11 +60,11 @@ def reynolds_of(x: float, rough: float, first: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    x : float [-]
+    x [-]
         Zero or more.
-    rough : float [-]
+    rough [-]
         ``eps/(3.7 D)``.
-    first : float [-]
+    first [-]
         ``x`` at which turbulent flow is developed.
     """
     if x <= _LAST:

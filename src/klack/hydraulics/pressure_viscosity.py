@@ -50,9 +50,9 @@ class PressureViscosity:
 
     Parameters
     ----------
-    exponent : float [-]
+    exponent [-]
         ``B``.
-    power : float [-]
+    power [-]
         ``Z``; 1 for Barus.
 
     Examples
@@ -121,9 +121,9 @@ def mean_viscosity_ratio(
 
     Parameters
     ----------
-    p_a, p_b : float [Pa]
+    p_a, p_b [Pa]
         Absolute.
-    exponent, power : float [-]
+    exponent, power [-]
         Of :class:`PressureViscosity`.
 
     Returns

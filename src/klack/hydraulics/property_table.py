@@ -79,13 +79,13 @@ class CompressedLiquid:
 
     Parameters
     ----------
-    name : str
+    name
         Of the file, for its range.
-    pressure : array, shape (n,) [Pa]
+    pressure (n,) [Pa]
         Absolute, increasing; at least two.
-    density : float [kg/m^3]
+    density [kg/m^3]
         At the lowest of these pressures.
-    compressibility : array, shape (n,) [1/Pa]
+    compressibility (n,) [1/Pa]
         Above zero.
     """
 
@@ -141,11 +141,11 @@ class PropertyTable:
 
     Parameters
     ----------
-    name : str
+    name
         Of the file.
-    temperature : array, shape (m,) [K]
+    temperature (m,) [K]
         Increasing.
-    pressure : array, shape (n,) [Pa]
+    pressure (n,) [Pa]
         Absolute, increasing.
     density, viscosity : array, shape (m, n) [kg/m^3], [Pa s]
     bulk_modulus : array, shape (m, n) [Pa], optional

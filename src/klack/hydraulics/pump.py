@@ -33,9 +33,8 @@ def swept_share(angle: float, turned: float, pistons: int) -> float:
 
     Parameters
     ----------
-    angle, turned : float [rad]
+    angle, turned [rad]
         At the start, any; and by how much it turns, zero or more.
-    pistons : int
     """
     turns = int(turned / _TURN)
     rest = turned - turns * _TURN

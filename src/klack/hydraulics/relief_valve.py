@@ -29,10 +29,10 @@ def relief_area(drop: float, setting: float, slope: float, largest: float) -> tu
 
     Parameters
     ----------
-    drop, setting : float [Pa]
-    slope : float [m^2/sqrt(Pa)]
+    drop, setting [Pa]
+    slope [m^2/sqrt(Pa)]
         ``k = G sqrt(rho/2)/C_q`` with the gradient ``G`` [m^3/(s Pa)].
-    largest : float [m^2]
+    largest [m^2]
     """
     if drop <= setting:
         return 0.0, 0.0

@@ -203,7 +203,7 @@ def solve_ring(
 
     Parameters
     ----------
-    ring : tuple of array
+    ring
         Of :func:`eliminate_ring`.
     links : array (S, o, o)
     x : array (S, o, n)

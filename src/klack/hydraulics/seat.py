@@ -72,7 +72,7 @@ def gap_flow(drop: float, linear: float, square: float) -> tuple[float, float]:
 
     Parameters
     ----------
-    drop : float [Pa]
+    drop [Pa]
     linear, square : float [Pa s/m^3], [Pa s^2/m^6]
         ``a``, above zero, and ``b``.
     """

@@ -41,12 +41,11 @@ class SeatAcross:
 
     Parameters
     ----------
-    face : SeatFace
-    height : float [m]
+    height [m]
         Of the edge in the drawing of the needle.
-    lift : float [m]
+    lift [m]
         While both ports are at rest.
-    inside : int
+    inside
         0 or 1: node whose pressure is inside the edge.
     """
 

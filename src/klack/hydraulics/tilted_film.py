@@ -52,16 +52,16 @@ class SectorFilm:
 
     Parameters
     ----------
-    inner_radius, outer_radius : float [m]
+    inner_radius, outer_radius [m]
         An inner radius of 0 makes a disc.
     angles : array (S,) [rad]
         Middles of the sectors.
     radii : array (N,) [m]
         Of the circles on which heights are given; of a single one the centre of the pressure of
         parallel faces.
-    spread : float [-]
+    spread [-]
         Mean of ``cos`` over a sector, over that of its middle.
-    shared : int
+    shared
         How many of the functions of the radius have one amplitude for all sectors.
     between : array (G, N) [-]
         Shares of the circles in the height of the points of quadrature.
@@ -123,10 +123,10 @@ def sector_film(
 
     Parameters
     ----------
-    inner_radius, outer_radius : float [m]
-    sectors : int
+    inner_radius, outer_radius [m]
+    sectors
         At least 4; 36 are within 0.5 % of many.
-    circles : int
+    circles
         1: one height across a narrow land; 2: a straight line between both edges, which a rigid
         tilt is; more for faces that bend.
     """
@@ -219,15 +219,14 @@ def sector_forces(
 
     Parameters
     ----------
-    film : SectorFilm
     heights : array (S, N) [m]
         Above 0: gap and what the roughness leaves.
     closing : array (S, N) [m/s]
         ``-dh/dt``.
-    viscosity : float [Pa s]
-    tension : float [Pa]
+    viscosity [Pa s]
+    tension [Pa]
         Largest mean tension of a sector, ``p_ambient - p_cavitation``.
-    inner_pressure, outer_pressure : float [Pa]
+    inner_pressure, outer_pressure [Pa]
         At the edges, above ambient; of a disc only the outer one.
     """
     _require_heights("sector_forces: heights", film, heights)
@@ -263,7 +262,7 @@ def sector_step(
         As of :func:`sector_forces`.
     before, after : array (S, N) [m]
         Heights at both ends of the step, above 0.
-    step : float [s]
+    step [s]
 
     Returns
     -------
@@ -369,13 +368,12 @@ def film_pressure(
 
     Parameters
     ----------
-    land : Land
     mobility : array (S, G) [m^3/(Pa s)]
         ``h^3/12 mu`` at the points of all sectors.
     closing : array (S, N) [m/s]
     head, still : array (G, Q) [Pa m^2], (N,) [N]
         Of the pressures at the edges.
-    tension : float [Pa]
+    tension [Pa]
     held : bool array (S,)
         In: sectors with which the search for those at the limit of tension begins; out: those.
     """
@@ -449,11 +447,11 @@ def film_slopes(
     ----------
     land, mobility, head
         As of :func:`film_pressure`.
-    pressed : Pressed
+    pressed
         Its pressure.
     change : array (S, G) [m^2/(Pa s)]
         Slope of the mobility with the height.
-    rate : float [1/s]
+    rate [1/s]
         How the closing falls with the heights: 1 over a step.
     ways : array (S N, w)
     """

@@ -33,10 +33,10 @@ def tube_compliance(
 
     Parameters
     ----------
-    diameter, thickness : float [m]
+    diameter, thickness [m]
         Inside; of the wall, ``inf`` for a bore in a large body.
-    modulus : float [Pa]
-    poisson : float [-]
+    modulus [Pa]
+    poisson [-]
     ends : "closed", "fixed" or "sliding"
 
     Returns

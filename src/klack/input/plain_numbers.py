@@ -14,7 +14,6 @@ def plain_numbers(text: bytes, kind: type = float) -> NDArray[Any] | None:
 
     Parameters
     ----------
-    text : bytes
     kind : type
         float, or int for whole numbers.
 

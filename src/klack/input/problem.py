@@ -17,8 +17,7 @@ class CaseProblem(InputError):
     ----------
     key : tuple of str and int
         Path from the section that found the problem to the key that causes it.
-    got, expected, hint : str
-    on_key : bool
+    on_key
         True if the key itself is wrong, False if its value is.
     """
 

@@ -51,10 +51,10 @@ class Computed:
 
     Parameters
     ----------
-    value : float [SI]
-    dimension : object
+    value [SI]
+    dimension
         Says by ``fits`` whether the value is a quantity with an SI unit, and in words what it is.
-    text : str
+    text
         The expression.
     """
 

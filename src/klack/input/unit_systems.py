@@ -20,11 +20,11 @@ class UnitSystem:
 
     Parameters
     ----------
-    name : str
+    name
         Length, mass and time: ``"mm t s"``.
-    length : float [m]
-    mass : float [kg]
-    time : float [s]
+    length [m]
+    mass [kg]
+    time [s]
     """
 
     name: str

@@ -41,7 +41,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]], *, at_once: bool = True) -> 
     ----------
     tasks : sequence of callable
         What takes long in them runs outside of the interpreter: solves and products.
-    at_once : bool
+    at_once
         Each with one thread of BLAS; if not, one after the other with all that there are.
     """
     if not at_once:

@@ -51,12 +51,11 @@ def require_memory(where: str, needed: float, *, what: str, hint: str) -> None:
 
     Parameters
     ----------
-    where : str
-    needed : float [byte]
+    needed [byte]
         Estimate of what is taken on top of what is taken now.
-    what : str
+    what
         What takes it, for the message.
-    hint : str
+    hint
         The way out.
 
     Raises

@@ -22,11 +22,11 @@ class PointCount:
 
     Parameters
     ----------
-    done, most : int
+    done, most
         Points that have their values, and all that there will be at most.
-    left : float or None [s]
+    left [s]
         At the rate so far; None before there is one.
-    best : str
+    best
         The best point so far, in words; empty without one.
     """
 

@@ -41,13 +41,7 @@ def stages_with_cached(stage_times: Mapping[str, float]) -> tuple[str, ...]:
 
 
 class StageClock:
-    """Passes progress on and measures how long each stage takes, and what it took from the cache.
-
-    Parameters
-    ----------
-    progress : callable
-    cache : ResultCache, optional
-    """
+    """Passes progress on; measures how long each stage takes and what it took from the cache."""
 
     def __init__(self, progress: Progress, cache: ResultCache | None = None) -> None:
         self._progress, self._cache = progress, cache
@@ -132,9 +126,8 @@ def for_comparison(what: str, compute: Callable[[], Found]) -> Found | None:
 
     Parameters
     ----------
-    what : str
+    what
         What is left out then, begin of a sentence.
-    compute : callable
     """
     try:
         return compute()

@@ -63,8 +63,8 @@ def equal_edges(gap: ArrayLike, shoulder: float) -> tuple[Vector, Vector]:
 
     Parameters
     ----------
-    gap : array [m]
-    shoulder : float [m]
+    gap [m]
+    shoulder [m]
         Length ``t`` of the side faces behind the edges.
 
     Examples
@@ -174,8 +174,8 @@ def round_excess(gap: ArrayLike, inner: float, outer: float) -> tuple[Vector, Ve
 
     Parameters
     ----------
-    gap : array [m]
-    inner, outer : float [m]
+    gap [m]
+    inner, outer [m]
         Radii of core and tube.
     """
     k, weight = _round_spectrum(outer / inner)

@@ -39,23 +39,23 @@ class MagneticBranch:
 
     Parameters
     ----------
-    name : str
+    name
         Such as ``"main gap"`` or ``"leakage"``.
     law : LinearReluctance, GapReluctance or IronReluctance
         :math:`\Theta_b` as callables (``law.mmf``, ``law.slope``, ``law.energy``,
         ``law.energy_slope``, each of flux and gap) and as flat numbers (``law.table()``): ``[R]``
         or piecewise cubics with six numbers per interval, see :mod:`klack.magnetics.reluctance`.
-    eddy : float [S]
+    eddy [S]
         ``S``: eddy currents around the tube oppose its change with the mmf ``S dflux/dt``
         (``1/R_e`` of a shorted turn); the loss is ``S (dflux/dt)^2``.
-    turns : float [-]
+    turns [-]
         ``N``: turns of the coil around this branch, signed by the direction of the branch.
-    circuit : str
+    circuit
         Electric circuit that these turns belong to; empty: that of the magnet's terminals.
-    remanence : float [A]
+    remanence [A]
         :math:`\Theta_0`: constant magnetomotive force along the branch (remanence of the iron, a
         magnet).  It belongs to the stored energy: ``law.energy - remanence * flux``.
-    stops : IronStops, optional
+    stops
         Hysteresis of iron, beside ``law`` as its mean curve.
     """
 
@@ -84,11 +84,10 @@ class MagneticCircuit:
 
     Parameters
     ----------
-    branches : tuple of MagneticBranch
-    loops : array, shape (n_branches, n_loops) [-]
+    loops (n_branches, n_loops) [-]
         0, +1 or -1: ``branch flux = loops @ loop fluxes``.  Independent columns, at most
         :data:`MOST_LOOPS`.
-    main : str
+    main
         Branch whose flux is shown as *the* flux: usually the working gap.
     """
 

@@ -40,13 +40,12 @@ class Coil:
 
     Parameters
     ----------
-    component : str
+    component
         Its magnet.
-    port : str
     magnet : Solenoid, MagneticNetwork or ForceMapSolenoid
-    resistance : float [ohm]
+    resistance [ohm]
         At the temperature of the winding.
-    start_current : float [A]
+    start_current [A]
         With which a run begins.
     """
 
@@ -117,8 +116,7 @@ def driven(network: Network, currents: Mapping[str, float]) -> Network:
 
     Parameters
     ----------
-    network : Network
-    currents : mapping of str to float [A]
+    currents [A]
         By coil, all of them; from 0.
 
     Raises

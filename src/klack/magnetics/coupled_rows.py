@@ -38,15 +38,13 @@ class PlacedMagnet:
 
     Parameters
     ----------
-    component : str
-    magnet : CoupledMagnet
-    armature, base : int
+    armature, base
         Mechanical ports.
-    nodes : tuple of int
+    nodes
         Electric node of each winding.
-    remanent : bool
+    remanent
         Whether hysteretic iron starts as saturation has left it.
-    names_loops : bool
+    names_loops
         Whether the flux of every loop is recorded.
     """
 
@@ -68,8 +66,6 @@ def coupled_rows(
 
     Parameters
     ----------
-    rows : Rows
-    placed : sequence of PlacedMagnet
     shared : mapping of int to (str, Capacitor), optional
         Of the windings that draw from a capacitor which is a component, by electric node: its
         name, and its numbers.

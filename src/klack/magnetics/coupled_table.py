@@ -56,18 +56,17 @@ class Winding:
 
     Parameters
     ----------
-    name : str
+    name
         What its channels and energies are called after; may be empty.
-    owner : str
+    owner
         Component that its magnet is.
-    circuit : str
+    circuit
         That of the branches with its turns.
-    resistance : float [ohm]
+    resistance [ohm]
         At temperature.
-    driver : DriveProgram
-    current : float [A]
+    current [A]
         At the start.
-    capacitor : int, optional
+    capacitor
         Number of the boost capacitor of its output stage; one of its own by default.
     """
 
@@ -86,12 +85,10 @@ class CoupledMagnet:
 
     Parameters
     ----------
-    circuit : MagneticCircuit
-    gap : float [m]
+    gap [m]
         Working gap while both ports are at rest.
-    closing : bool
+    closing
         Whether the gap closes as the armature moves along +z.
-    windings : tuple of Winding
     """
 
     circuit: MagneticCircuit
@@ -112,13 +109,7 @@ class CoupledMagnet:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class CoupledSystem:
-    """Magnets, windings and capacitors that are solved together.
-
-    Parameters
-    ----------
-    magnets : tuple of CoupledMagnet
-    capacitors : tuple of Capacitor
-    """
+    """Magnets, windings and capacitors that are solved together."""
 
     magnets: tuple[CoupledMagnet, ...]
     capacitors: tuple[Capacitor, ...]

@@ -62,13 +62,12 @@ class Switch:
 
     Parameters
     ----------
-    when : When
     value : float [A] or [s]
         Times in the state count from entering it, ``When.TIME`` from the start of the cycle;
         currents count from the target of the state, if it has one.
-    to : str
+    to
         Name of the next state.
-    new_cycle : bool
+    new_cycle
         Whether a new cycle starts with it (``When.TIME`` only): exactly ``value`` after the last.
     """
 
@@ -84,7 +83,7 @@ class DriveCourse:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Not falling; a time that stands twice is a jump.
     value : array, shape (n,) [V] or [A]
         Constant before the first and after the last point.
@@ -117,11 +116,10 @@ class DriveState:
 
     Parameters
     ----------
-    name : str
     voltage : float [V] or DriveCourse
-    switches : tuple of Switch
+    switches
         The first that is due wins.
-    diode : bool
+    diode
         Whether the current cannot turn negative.
     target : DriveCourse [A], optional
         Where the currents of the switches count from; with a constant voltage only.
@@ -140,8 +138,7 @@ class DriveProgram:
 
     Parameters
     ----------
-    states : tuple of DriveState
-    stage : OutputStage, optional
+    stage
         What the current flows through in each state; the voltages of the states are then those
         without current.
 

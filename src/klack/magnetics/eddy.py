@@ -52,9 +52,9 @@ class EddyLadder:
 
     Parameters
     ----------
-    conductances : tuple of float [S]
+    conductances [S]
         ``S_1 .. S_n``, from the surface inwards.
-    reluctances : tuple of float [A/Wb]
+    reluctances [A/Wb]
         ``R_1 .. R_{n-1}``.
     """
 
@@ -82,11 +82,11 @@ def cylinder_ladder(
 
     Parameters
     ----------
-    conductivity : float [S/m]
-    length, radius : float [m]
-    permeability : float [-]
+    conductivity [S/m]
+    length, radius [m]
+    permeability [-]
         Relative, differential; only for more than one term.
-    terms : int
+    terms
         1 to 4.
 
     Examples
@@ -120,12 +120,12 @@ def sheet_ladder(
 
     Parameters
     ----------
-    conductivity : float [S/m]
-    length, thickness, width : float [m]
+    conductivity [S/m]
+    length, thickness, width [m]
         Along the flux, across, and along the face (circumference of a tube).
-    permeability : float [-]
+    permeability [-]
         Relative, differential; only for more than one term.
-    terms : int
+    terms
         1 to 4.
     """
     _check(conductivity, length, thickness, permeability, terms)

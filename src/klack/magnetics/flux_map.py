@@ -49,16 +49,16 @@ class ForceComparison:
     ----------
     current, gap : float [A], [m]
         Point of the largest difference of the forces.
-    given, derived : float [N]
+    given, derived [N]
         Both forces there.
-    share : float [-]
+    share [-]
         Their difference over the largest given force.
-    ratio : float [-]
+    ratio [-]
         Given over derived force on the whole (least squares).
     step : tuple of float [A], [A], [m]
         Two neighbouring currents of the table and the gap between which ``dF`` and
         ``(dpsi/dx) di`` differ most: there the contradiction arises.
-    step_share : float [-]
+    step_share [-]
         That difference over the largest given force.
     """
 
@@ -90,11 +90,11 @@ class FluxMap:
 
     Parameters
     ----------
-    linkage : array, shape (m,) [Wb]
+    linkage (m,) [Wb]
         Evenly spaced from 0.
-    gap : array, shape (n,) [m]
+    gap (n,) [m]
         Increasing.
-    energy, current, slope, mixed : array, shape (m, n)
+    energy, current, slope, mixed (m, n)
         ``W`` [J], ``dW/dpsi`` [A], ``dW/dx`` [N] and ``d2W/dpsi dx`` [A/m] on the grid.
     """
 
@@ -113,11 +113,11 @@ class FluxMap:
 
         Parameters
         ----------
-        current : array, shape (k,) [A]
+        current (k,) [A]
             Increasing from 0 or above; no linkage is assumed at 0.
-        gap : array, shape (n,) [m]
+        gap (n,) [m]
             Increasing.
-        linkage : array, shape (k, n) [Wb]
+        linkage (k, n) [Wb]
             Increasing with the current.
         force : array, shape (k, n) [N], optional
             Negative where it closes the gap; compared only.

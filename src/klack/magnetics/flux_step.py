@@ -449,27 +449,26 @@ def flux_rows(
 
     Parameters
     ----------
-    rows : Rows
     plant : MagneticCircuit or FluxMap
         Of a map, the recorded flux is the linkage.
-    resistance : float [ohm]
+    resistance [ohm]
         Of coil and harness, at temperature.
-    driver : DriveProgram
+    driver
         For example ``driver_of(rows, "terminals")``.
-    gap : float [m]
+    gap [m]
         Working gap ``x`` of circuit or map while both ports are at rest.
-    closing : bool
+    closing
         Whether the gap closes as the armature moves along +z (away from the base).
-    armature, base : int
+    armature, base
         Mechanical ports, perhaps :data:`klack.network.rows.GROUND`.
-    current : float [A]
+    current [A]
         At the start; the fluxes are those that belong to it at the gap at which the armature rests,
         with remanence.
-    gap_range : GapRange, optional
+    gap_range
         That of the tables of the plant by default.
-    channels : tuple of Channel
+    channels
         Recorded besides.
-    remanent : bool
+    remanent
         Whether hysteretic iron starts as saturation has left it, instead of demagnetised.
 
     Raises

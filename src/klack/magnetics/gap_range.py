@@ -21,7 +21,7 @@ class GapRange:
     ----------
     valid : (float, float)
         Where its law holds; stops must keep the armature inside.
-    slack : float
+    slack
         What a contact may give way beyond that before it is warned of.
     usable : (float, float)
         Beyond it a run stops.

@@ -65,11 +65,11 @@ class LoopWidth:
 
     Parameters
     ----------
-    flux_density : array, shape (k,) [T]
+    flux_density (k,) [T]
         From 0, evenly spaced; beyond the last point the width stays as it is there.
     width, slope : array, shape (k,) [A/m], [m/H]
         ``w`` and ``dw/dB`` there: a cubic between.
-    reversal : float [T]
+    reversal [T]
         ``b``: flux density from the demagnetised state at which the last stop yields.
     """
 
@@ -133,10 +133,10 @@ class IronStops:
 
     Parameters
     ----------
-    stiffness : array, shape (n,) [A/Wb]
-    share : array, shape (n,) [-]
+    stiffness (n,) [A/Wb]
+    share (n,) [-]
         Yield of each stop, over that of all.
-    width : array
+    width
         Yield of all stops [A] over the size of the flux, for a compiled loop: ``[m, 1 / step]``,
         four factors for each of ``m`` intervals, and the value beyond the last.
     """
@@ -151,11 +151,11 @@ def constant_width(curve: IronCurve, coercivity: float, initial_permeability: fl
 
     Parameters
     ----------
-    curve : IronCurve
+    curve
         Mean (anhysteretic) curve.
-    coercivity : float [A/m]
+    coercivity [A/m]
         ``H_c``.
-    initial_permeability : float [-]
+    initial_permeability [-]
         Relative permeability of the demagnetised iron for small changes, below that of the curve.
     """
     require_positive("hysteresis: coercivity", coercivity, "A/m")
@@ -174,10 +174,9 @@ def falling_width(
 
     Parameters
     ----------
-    curve : IronCurve
-    coercivity, initial_permeability : float
+    coercivity, initial_permeability
         As in :func:`constant_width`.
-    remanence : float [T]
+    remanence [T]
         ``B_r`` of the major loop.
     """
     require_positive("hysteresis: coercivity", coercivity, "A/m")
@@ -208,9 +207,9 @@ def measured_loop(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCur
 
     Parameters
     ----------
-    flux_density : array [T]
+    flux_density [T]
         From the positive tip to the negative one (or the other way round).
-    field_strength : array [A/m]
+    field_strength [A/m]
         There, on the branch of falling flux density.
 
     Raises

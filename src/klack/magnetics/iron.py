@@ -59,7 +59,7 @@ class IronCurve:
 
     Parameters
     ----------
-    flux_density : array, shape (k,) [T]
+    flux_density (k,) [T]
         Increasing from 0.
     field_strength, slope : array, shape (k,) [A/m], [m/H]
         ``H`` and ``dH/dB`` there.
@@ -105,9 +105,9 @@ def froehlich(saturation: float, permeability: float) -> IronCurve:
 
     Parameters
     ----------
-    saturation : float [T]
+    saturation [T]
         Polarisation ``B_s`` at saturation.
-    permeability : float [-]
+    permeability [-]
         Initial relative permeability, above 1.
 
     Examples
@@ -134,8 +134,8 @@ def tanh_curve(saturation: float, permeability: float) -> IronCurve:
 
     Parameters
     ----------
-    saturation : float [T]
-    permeability : float [-]
+    saturation [T]
+    permeability [-]
         Initial relative permeability, above 1.
     """
     _check_saturation("tanh_curve", saturation, permeability)
@@ -164,9 +164,9 @@ def brauer(k1: float, k2: float, k3: float) -> IronCurve:
 
     Parameters
     ----------
-    k1, k3 : float [m/H]
+    k1, k3 [m/H]
         ``k1 + k3`` is the initial slope ``dH/dB``.
-    k2 : float [1/T^2]
+    k2 [1/T^2]
     """
     for name, value in (("k1", k1), ("k2", k2)):
         require_positive(f"brauer: {name}", value, "m/H" if name == "k1" else "1/T^2")
@@ -194,9 +194,9 @@ def rational_curve(
 
     Parameters
     ----------
-    initial, rise, width, exponent : float [-]
+    initial, rise, width, exponent [-]
         ``mu_i``, ``c_a``, ``c_b``, ``n``.
-    peak_density : float [T]
+    peak_density [T]
         ``B_mu``: where the permeability is highest.
     """
     # an initial permeability below the one at 1 % of the peak would make H jump at B = 0
@@ -218,9 +218,9 @@ def measured(flux_density: ArrayLike, field_strength: ArrayLike) -> IronCurve:
 
     Parameters
     ----------
-    flux_density : array [T]
+    flux_density [T]
         Increasing; the origin is added where it is missing.
-    field_strength : array [A/m]
+    field_strength [A/m]
         Increasing with it.
     """
     B, H = (np.array(v, dtype=float).ravel() for v in (flux_density, field_strength))

@@ -22,11 +22,9 @@ class IronEntry:
 
     Parameters
     ----------
-    description : str
-    initial, peak_density, rise, width, exponent : float
+    initial, peak_density, rise, width, exponent
         Of :func:`klack.magnetics.iron.rational_curve`.
-    source : str
-    verified : bool
+    verified
         True where the numbers were read in the named source.
     """
 

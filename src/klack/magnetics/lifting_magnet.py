@@ -78,7 +78,7 @@ def lifting_magnet(iron: IronCurve | None = None) -> MagneticCircuit:
 
     Parameters
     ----------
-    iron : IronCurve, optional
+    iron
         Another material than 9SMnPb28 for all parts.
     """
     iron = iron or iron_curve(MATERIAL)

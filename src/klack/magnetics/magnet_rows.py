@@ -66,18 +66,15 @@ def magnet_rows(
 
     Parameters
     ----------
-    rows : Rows
-    circuit : MagneticCircuit
-    windings : mapping of str to CoilCircuit
+    windings
         By port, first that of the main circuit, ``terminals``.
-    gap : float [m]
+    gap [m]
         Working gap while both ports are at rest.
-    closing : bool
+    closing
         Whether it closes as the armature moves along +z.
-    gap_range : GapRange
-    remanent : bool
+    remanent
         Whether hysteretic iron starts as saturation has left it.
-    names_loops : bool
+    names_loops
         Whether the flux of every loop is recorded.
 
     Returns

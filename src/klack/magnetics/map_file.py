@@ -45,11 +45,11 @@ class MapTable:
 
     Parameters
     ----------
-    current : array, shape (k,) [A]
+    current (k,) [A]
         Increasing.
-    gap : array, shape (n,) [m]
+    gap (n,) [m]
         Increasing.
-    linkage : array, shape (k, n) [Wb]
+    linkage (k, n) [Wb]
     force : array, shape (k, n) [N], optional
     """
 
@@ -73,10 +73,9 @@ def read_map(path: Path, *, columns: Mapping[str, str | int], units: Mapping[str
 
     Parameters
     ----------
-    path : Path
-    columns : mapping
+    columns
         Quantity -> name or number (from 1) of its column, where the head does not tell.
-    units : mapping
+    units
         Quantity -> unit, in place of that of the head.
 
     Raises

@@ -34,9 +34,9 @@ class CellTable:
 
     Parameters
     ----------
-    where : str
+    where
         File, for errors.
-    head : tuple of str
+    head
         Names of the columns; empty cells where the file has no head.
     rows : tuple of (int, tuple of str)
         Number of the line in the file, and its cells, as many as the head has.

@@ -37,9 +37,7 @@ def circuit_of_network(tubes: Sequence[Tube], main: str, gap: float) -> Magnetic
 
     Parameters
     ----------
-    tubes : sequence of Tube
-    main : str
-    gap : float [m]
+    gap [m]
         Working gap at which every loop has to have a reluctance.
 
     Raises

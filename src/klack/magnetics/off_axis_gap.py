@@ -51,9 +51,9 @@ def eccentric_ring(
 
     Parameters
     ----------
-    inner, outer, length : float [m]
+    inner, outer, length [m]
         Radii, and length along the axis.
-    eccentricity : array [m]
+    eccentricity [m]
         Distance of the axes, at least 0 and below ``outer - inner``.
     """
     e = np.asarray(eccentricity, dtype=float)
@@ -80,10 +80,10 @@ def guide_ring(
 
     Parameters
     ----------
-    inner, outer, length : float [m]
+    inner, outer, length [m]
     place : array, shape (4,) [m], [m], [-], [-]
         Offset in the middle of the ring, and tilt.
-    stations : int
+    stations
         Cross sections; with 32 the slopes are within 1e-8 where an end comes to 90 % of the
         clearance, within 4e-6 at 95 %.
 
@@ -128,11 +128,11 @@ def tilted_ring_face(
 
     Parameters
     ----------
-    inner, outer : float [m]
+    inner, outer [m]
         Radii; an inner radius of 0 makes a disc.
-    gap : array [m]
+    gap [m]
         In the middle.
-    tilt : array [-]
+    tilt [-]
         Slope, with ``|tilt| outer < gap``.
     """
     g, t = np.asarray(gap, dtype=float), np.asarray(tilt, dtype=float)
@@ -160,11 +160,11 @@ def tilted_strip(
 
     Parameters
     ----------
-    length, width : float [m]
+    length, width [m]
         Along the tilt, and across.
-    gap : array [m]
+    gap [m]
         In the middle.
-    tilt : array [-]
+    tilt [-]
         Slope, with ``|tilt| length/2 < gap``.
     """
     g, t = np.asarray(gap, dtype=float), np.asarray(tilt, dtype=float)
@@ -203,7 +203,7 @@ def sector_pulls(areas: Vector, gaps: Vector, mmf: float) -> tuple[Vector, Vecto
     Parameters
     ----------
     areas, gaps : array, shape (S,) [m^2], [m]
-    mmf : float [A]
+    mmf [A]
     """
     require_positive("sector_pulls: smallest gap", float(np.min(gaps)), "m")
     P = face_permeance(1.0, gaps) * areas

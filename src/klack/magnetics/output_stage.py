@@ -56,15 +56,15 @@ class StagePath:
 
     Parameters
     ----------
-    battery : float [V]
+    battery [V]
         Source in the path.
-    clamp : float [V]
+    clamp [V]
         Against the current; its energy is lost.
-    capacitor : int
+    capacitor
         1 if the boost capacitor drives the current, -1 if the current charges it, else 0.
-    diodes : float [V]
+    diodes [V]
         Sum of the forward voltages.
-    switch_resistance, diode_resistance, clamp_resistance : float [ohm]
+    switch_resistance, diode_resistance, clamp_resistance [ohm]
     empty : tuple of float [V] and str, optional
         The driver leaves for that state once the capacitor has fallen to that voltage.
     """
@@ -90,16 +90,16 @@ class Capacitor:
 
     Parameters
     ----------
-    capacitance : float [F]
-    start : float [V]
+    capacitance [F]
+    start [V]
         Voltage of the capacitor at the start.
-    nominal : float [V]
+    nominal [V]
         Up to which it is recharged.
-    power : float [W]
+    power [W]
         Into the capacitor; 0: no recharge.
-    current : float [A]
+    current [A]
         Largest one into the capacitor; 0: no limit.
-    efficiency : float
+    efficiency
         Of the converter.
     """
 
@@ -122,9 +122,9 @@ class OutputStage:
 
     Parameters
     ----------
-    capacitor : Capacitor or None
+    capacitor
         None: the one that the driver shares with others.
-    paths : mapping of str to StagePath
+    paths
         By state.
     """
 

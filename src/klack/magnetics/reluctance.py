@@ -46,7 +46,7 @@ class LinearReluctance:
 
     Parameters
     ----------
-    reluctance : float [A/Wb]
+    reluctance [A/Wb]
         0 for a branch that only carries eddy currents.
     """
 
@@ -85,7 +85,7 @@ class GapReluctance:
 
     Parameters
     ----------
-    points : array, shape (k,) [m]
+    points (k,) [m]
         Working gaps ``x``, increasing.
     reluctance, slope : array, shape (k,) [A/Wb], [A/(Wb m)]
         ``R`` and ``dR/dx`` there: a cubic between (C1), straight beyond both ends.
@@ -166,7 +166,7 @@ class IronReluctance:
 
     Parameters
     ----------
-    points : array, shape (k,) [Wb]
+    points (k,) [Wb]
         Fluxes, increasing from 0.
     mmf_points, slope_points : array, shape (k,) [A], [A/Wb]
         Magnetomotive force and its slope there; a cubic between, straight beyond the last point.

@@ -44,10 +44,9 @@ def remanent_state(
 
     Parameters
     ----------
-    circuit : MagneticCircuit
-    current : float [A]
+    current [A]
         That remains.
-    gap : float [m]
+    gap [m]
     others : mapping of str to float [A], optional
         Currents of further electric circuits that remain; saturated by that of the terminals.
 

@@ -21,9 +21,9 @@ class SharedCapacitors:
     ----------
     capacitors : dict of int to (str, Capacitor)
         Component and numbers, by electric node.
-    drawing : dict of int to int
+    drawing
         Node of a coil -> node of the capacitor that its driver draws from.
-    magnets : list of PlacedMagnet
+    magnets
         With a coil behind such a driver.
     """
 

@@ -39,9 +39,9 @@ class ArmatureRing:
 
     Parameters
     ----------
-    inner, outer, length : float [m]
+    inner, outer, length [m]
         Radii, and length along the axis.
-    height : float [m]
+    height [m]
         Of its middle, in the drawing of the needle.
     centre : (float, float) [m]
         Axis of the bore, from that of the guide.
@@ -76,13 +76,11 @@ class ArmaturePull:
 
     Parameters
     ----------
-    rings : tuple of ArmatureRing
-    faces : tuple of PoleGap
-    loops : int
+    loops
         Fluxes in the state of the element; the first one is that of the gaps.
-    gap : float [m]
+    gap [m]
         Working gap while both ports are at rest, with the residual gap.
-    way : float
+    way
         Its change per way of the armature: -1 if that closes it.
     """
 

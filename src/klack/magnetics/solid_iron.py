@@ -35,9 +35,9 @@ class Shells:
 
     Parameters
     ----------
-    shares : tuple of float [-]
+    shares [-]
         ``w_k``; their sum is 1.
-    turns : tuple of float [-]
+    turns [-]
         ``q_k = S_k/(R tau)``, the first one around all shells.
     """
 

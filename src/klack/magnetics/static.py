@@ -21,14 +21,14 @@ class StaticState:
 
     Parameters
     ----------
-    current : float [A]
-    gap : float [m]
-    loop_fluxes, branch_fluxes : array [Wb]
-    linkage : float [Wb]
+    current [A]
+    gap [m]
+    loop_fluxes, branch_fluxes [Wb]
+    linkage [Wb]
         Of the coil at the terminals, ``psi``.
-    force : float [N]
+    force [N]
         Along the working gap; negative pulls it shut.
-    energy, coenergy : float [J]
+    energy, coenergy [J]
         Their sum is ``psi i``, summed over all circuits.
     """
 

@@ -28,8 +28,8 @@ def steady_fluxes(
     Parameters
     ----------
     plant : MagneticCircuit or FluxMap
-    current : float [A]
-    gap : float [m]
+    current [A]
+    gap [m]
         As the circuit or the map counts it.
     others : mapping of str to float [A], optional
         Currents of further electric circuits of a magnetic circuit.

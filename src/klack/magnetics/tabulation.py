@@ -26,11 +26,10 @@ def hermite_grid(
 
     Parameters
     ----------
-    curve : callable
+    curve
         ``curve(x) -> (value, slope)``, arrays.
-    start, end : float
-    tolerance : float [-]
-    first : int
+    tolerance [-]
+    first
         Points to begin with.
 
     Returns

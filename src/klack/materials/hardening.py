@@ -24,11 +24,11 @@ class Hardening:
 
     Parameters
     ----------
-    yield_stress : float [Pa]
+    yield_stress [Pa]
         Stress of first yield in a tensile test, Y.
-    isotropic : float [Pa]
+    isotropic [Pa]
         Rise of the yield stress per equivalent plastic strain.
-    kinematic : float [Pa]
+    kinematic [Pa]
         Shift of the yield surface per equivalent plastic strain (Prager): the same tensile test,
         an earlier yield when the load is reversed (Bauschinger).
 

@@ -36,11 +36,9 @@ class MaterialEntry:
 
     Parameters
     ----------
-    name : str
-    condition : str
+    condition
         What it is, and how it was treated.
-    young, poisson, density : Constant
-    yield_stress : Constant or None
+    yield_stress
         None for a material that cracks and does not yield.
     """
 

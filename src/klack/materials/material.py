@@ -18,13 +18,12 @@ class Material:
 
     Parameters
     ----------
-    name : str
-    young : float [Pa]
+    young [Pa]
         Young's modulus.
-    poisson : float [-]
+    poisson [-]
         Poisson's ratio, above -1 and below 0.5.
-    density : float [kg/m^3]
-    hardening : Hardening, optional
+    density [kg/m^3]
+    hardening
         Yield stress and what follows; without it the material is elastic at any stress.
     """
 

@@ -18,13 +18,11 @@ class Constant:
 
     Parameters
     ----------
-    label : str
+    label
         What it is, e.g. ``"bulk modulus, isentropic, 20 degC"``.
     value : float or tuple of float
         Several for a table over temperature.
-    unit : str
-    source : str
-    verified : bool
+    verified
         True when the source itself was read or recomputed; False for numbers quoted from memory
         or by a third party, and for estimates, which deserve a look before a result depends on
         them.
@@ -51,11 +49,10 @@ def require_entry(where: str, name: str, library: Mapping[str, _Entry], otherwis
 
     Parameters
     ----------
-    where : str
+    where
         For the error.
-    name : str
     library : mapping of str to entry
-    otherwise : str
+    otherwise
         What to try where no entry has a similar name.
 
     Raises

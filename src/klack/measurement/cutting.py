@@ -43,10 +43,10 @@ class Piece:
 
     Parameters
     ----------
-    start, step : float [s]
+    start, step [s]
         Time of the first sample since the trigger, and spacing.
     values : mapping of role to array, shape (n,) [SI]
-    instant : float [s]
+    instant [s]
         Of the trigger, in the time of the recording.
     """
 
@@ -102,8 +102,7 @@ def cut_strokes(windows: Iterable[Window], trigger: Trigger, level: float) -> It
     ----------
     windows : iterable of mapping of role to TimeSeries
         Each overlaps the one before by ``trigger.before + trigger.after`` and two samples or more.
-    trigger : Trigger
-    level : float [SI]
+    level [SI]
 
     Yields
     ------
@@ -206,9 +205,9 @@ def common_axis(pieces: Sequence[Piece], first: float, last: float) -> Vector:
 
     Parameters
     ----------
-    pieces : sequence of Piece
+    pieces
         At least one.
-    first, last : float [s]
+    first, last [s]
         What is wanted; less where at least half of the pieces have less.
     """
     step = min(piece.step for piece in pieces)

@@ -45,20 +45,20 @@ class VelocityEstimate:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
-    velocity : array, shape (..., n) [m/s]
-    bandwidth : float [Hz]
+    time (n,) [s]
+    velocity (..., n) [m/s]
+    bandwidth [Hz]
         Frequency at which 3 dB are lost, of the window that was used.
-    noise : float [m/s]
+    noise [m/s]
         Standard deviation of the velocity where the lift has white noise of ``lift_noise``.
-    lift_noise : float [m]
+    lift_noise [m]
         Standard deviation of the noise of the lift, from the plateau of its spectrum.
-    delay : float [s]
+    delay [s]
         0: the window is symmetric.
-    window : int
+    window
         Samples of one fit.
-    step : float [s]
-    chosen : bool
+    step [s]
+    chosen
         True if the bandwidth was chosen by the noise.
     """
 
@@ -84,7 +84,7 @@ def velocity_of(
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Uniform.
     lift : array, shape (n,) or (strokes, n) [m]
     bandwidth : float [Hz], optional
@@ -145,8 +145,8 @@ def noise_floor(records: NDArray[np.float64], step: float) -> tuple[NDArray[np.f
 
     Parameters
     ----------
-    records : array, shape (strokes, n) [m]
-    step : float [s]
+    records (strokes, n) [m]
+    step [s]
 
     Returns
     -------

@@ -36,14 +36,14 @@ class FoundChannel:
 
     Parameters
     ----------
-    name : str
+    name
         In the recording.
-    unit : str
+    unit
         Of its values in the file.
-    factor : float [SI unit per unit of the file]
+    factor [SI unit per unit of the file]
         With the scale of the section.
-    offset : float [SI unit]
-    note : str
+    offset [SI unit]
+    note
         What was assumed; empty if the channel was named.
     """
 
@@ -65,7 +65,6 @@ def find_channels(
 
     Parameters
     ----------
-    recording : Recording
     channels : mapping of role to ChannelChoice, optional
         From the section ``measurement``; patterns may match several channels.
     needed : collection of roles

@@ -34,9 +34,9 @@ class FitWindow:
 
     Parameters
     ----------
-    first, last : float [s]
+    first, last [s]
         From the trigger.
-    what : str
+    what
         In words.
     """
 
@@ -55,12 +55,12 @@ def fit_windows(
 
     Parameters
     ----------
-    time : array, shape (k,) [s]
-    strokes : array, shape (n, k) [m]
+    time (k,) [s]
+    strokes (n, k) [m]
         Lift.
     impacts : mapping of "opening" and "seat" to impact times [s]
         Of the mean stroke.
-    count : int
+    count
         Impacts on each stop that are fitted.
     """
     mean = strokes.mean(axis=0)
@@ -107,9 +107,9 @@ def touch_shifts(time: Vector, strokes: NDArray[np.float64], instant: float) -> 
 
     Parameters
     ----------
-    time : array, shape (k,) [s]
-    strokes : array, shape (n, k) [m]
-    instant : float [s]
+    time (k,) [s]
+    strokes (n, k) [m]
+    instant [s]
         Touch of the mean stroke.
     """
     near = (time > instant - _APPROACH) & (time <= instant)
@@ -144,9 +144,9 @@ def sample_weights(strokes: NDArray[np.float64], step: float) -> Vector:
 
     Parameters
     ----------
-    strokes : array, shape (n, m)
+    strokes (n, m)
         One channel.
-    step : float [s]
+    step [s]
     """
     count, samples = strokes.shape
     second = np.diff(strokes, 2, axis=1)

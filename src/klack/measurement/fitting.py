@@ -39,16 +39,14 @@ class Fit:
 
     Parameters
     ----------
-    z : array, shape (p,) [-]
+    z (p,) [-]
         Scaled parameters.
-    model : array, shape (m,)
+    model (m,)
         Of the data there.
-    jacobian : array, shape (m, p)
+    jacobian (m, p)
         Derivatives of the model by ``z``.
-    cost : float [-]
+    cost [-]
         Weighted sum of squares ``S``.
-    converged : bool
-    iterations : int
     """
 
     z: Vector
@@ -74,19 +72,19 @@ def fit_within_bounds(
 
     Parameters
     ----------
-    model : callable
+    model
         See :data:`Model`.
-    data : array, shape (m,)
-    weights : array, shape (m,)
+    data (m,)
+    weights (m,)
         Inverse variances of the data; 0 leaves a sample out.
-    start : array, shape (p,) [-]
+    start (p,) [-]
         Scaled parameters, 0 to 1.
-    free : bool array, shape (p,), optional
+    free (p,)
         Parameters that may move; the others stay at their start, and so do those that the data do
         not see.
-    most : int
+    most
         Most iterations.
-    tolerance : float
+    tolerance
         Relative change of the sum of squares at which it ends.
 
     Returns
@@ -213,17 +211,17 @@ class Profile:
 
     Parameters
     ----------
-    index : int
+    index
         Of the parameter.
-    z : array, shape (k,) [-]
+    z (k,) [-]
         Rising, with the best value among them.
-    excess : array, shape (k,) [-]
+    excess (k,) [-]
         ``Lambda``.
-    others : array, shape (k, p) [-]
+    others (k, p) [-]
         All parameters there.
-    threshold : float [-]
+    threshold [-]
         ``Lambda`` at the ends of the 95 % interval.
-    lower, upper : float [-]
+    lower, upper [-]
         Ends of that interval; the bound where it is not left inside the bounds.
     """
 
@@ -266,10 +264,9 @@ def follow_profiles(
     ----------
     model, data, weights
         As for :func:`klack.measurement.fitting.fit_within_bounds`.
-    fit : Fit
-    covariance : ShotCovariance
+    covariance
         Of the scaled parameters.
-    indices : sequence of int
+    indices
         Parameters that the data see.
     """
     problem = _Problem(data, weights, fit, covariance)

@@ -37,10 +37,10 @@ class Crossing:
 
     Parameters
     ----------
-    time, time_se : float [s]
-    velocity, velocity_se : float [m/s]
+    time, time_se [s]
+    velocity, velocity_se [m/s]
         In the direction of lift.
-    acceleration : float [m/s^2]
+    acceleration [m/s^2]
         In the direction of lift.
     """
 
@@ -57,19 +57,19 @@ class Flight:
 
     Parameters
     ----------
-    reference : float [s]
+    reference [s]
         Turning point of a flight that turns, else the middle.
-    turns : bool
+    turns
         Whether the terms are ``1, s, s^2, s^4, s |s|``; else ``1, s, s^2, ...``
-    coefficients : array, shape (m,)
+    coefficients (m,)
         Of the motion, not of what the sensor shows [SI].
-    covariance : array, shape (m, m)
+    covariance (m, m)
         Of the coefficients.
-    residuals : array, shape (n,) [m]
+    residuals (n,) [m]
         Of the samples, about what the sensor shows of the motion.
-    scale : float [m]
+    scale [m]
         Standard deviation of a sample that the covariance stands for.
-    first, last : float [s]
+    first, last [s]
         Samples that were fitted.
     """
 
@@ -108,8 +108,8 @@ class Flight:
 
         Parameters
         ----------
-        level, level_se : float [m]
-        near : float [s]
+        level, level_se [m]
+        near [s]
             Beginning or end of the flight.
         """
         time = self._meets(level, near)
@@ -187,15 +187,15 @@ def fit_flight(
     ----------
     time, lift : array, shape (n,) [s], [m]
         More samples than terms.
-    degree : int
+    degree
         Of the polynomial of a flight that does not turn.
-    sensor : array [s^i]
+    sensor [s^i]
         :func:`klack.measurement.lift_sensor.sensor_polynomial`.
     turning_point : float [s], optional
         Of a flight that turns.
-    correlation : float [-]
+    correlation [-]
         See :func:`correlation_factor`.
-    floor : float [m]
+    floor [m]
         Least standard deviation of a sample.
     noise : float [m], optional
         Standard deviation about other flights; helps where there are few samples.
@@ -241,7 +241,7 @@ def correlation_factor(residuals: tuple[NDArray[np.float64], ...]) -> float:
 
     Parameters
     ----------
-    residuals : tuple of arrays
+    residuals
         Of several flights, on one sampling step.
     """
     sizes = [r.size for r in residuals]

@@ -43,14 +43,14 @@ class FlightTrain:
 
     Parameters
     ----------
-    level, level_se : float [m]
-    flights : tuple of Flight or None
+    level, level_se [m]
+    flights
         As given, with the joint coefficients and their covariance; the first is the approach.
-    touches, releases : tuple of Crossing or None
+    touches, releases
         Ends of the flights: touch of impact k, and release after it.
-    restitution_se : tuple of float
+    restitution_se
         Per impact; nan where touch or release is missing.
-    shape : FlightShape or None
+    shape
         None without a bounce.
     """
 
@@ -83,14 +83,14 @@ def join_flights(
 
     Parameters
     ----------
-    flights : tuple of Flight or None
+    flights
         The approach to the first impact, then the bounce after each impact; None where a flight
         could not be fitted.
-    level, level_se : float [m]
+    level, level_se [m]
         Of the stop.
-    away : float
+    away
         1 if the needle bounces towards larger lift, -1 towards smaller.
-    known : FlightShape, optional
+    known
         From other strokes of the same valve.
     """
     problem = _Problem(flights, level, level_se, away, known)

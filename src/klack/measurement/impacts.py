@@ -96,14 +96,14 @@ def measure_stroke(
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Uniform.
-    lift : array, shape (n,) [m]
+    lift (n,) [m]
         Rising while the valve opens; as the sensor shows it if there is a sensor.
     seat, opening : float [m], optional
         True lift at which the needle touches the seat and the opening stop; found from where it
         rests without.  ``nan`` for a stop that does not exist.
-    sensor : LiftSensor, optional
+    sensor
         Its sensitivity and offset are taken out, its low pass is undone in the fits.
     shapes : mapping of stop to FlightShape, optional
         What other strokes of the same valve say of the flights (:func:`klack.measurement.

@@ -41,11 +41,10 @@ def sense(
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Uniform.
     lift : array, shape (n,) or (strokes, n) [m]
         True lift at the place of the sensor.
-    sensor : LiftSensor
 
     Returns
     -------
@@ -113,17 +112,17 @@ def recorded_stroke(
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Uniform; before it the valve is at rest.
-    channels : mapping of str to array, shape (n,)
+    channels (n,)
         By role, SI; the lift as it truly is.
-    grid : array, shape (k,) [s]
+    grid (k,) [s]
         From the trigger.
-    sensor : LiftSensor
+    sensor
         Its resolution is left out: rounding averages out over strokes, and has no slope.
-    trigger : Trigger or None
+    trigger
         None: the time of the computation is that of the record.
-    zeroed : bool
+    zeroed
         True if the lift before the trigger is set to zero.
 
     Raises
@@ -154,8 +153,7 @@ def trigger_instant(time: Vector, values: Vector, trigger: Trigger, step: float)
     Parameters
     ----------
     time, values : array, shape (n,) [s], [SI]
-    trigger : Trigger
-    step : float [s]
+    step [s]
         Between two samples of the recorder.
     """
     sign = 1.0 if trigger.slope == "rising" else -1.0

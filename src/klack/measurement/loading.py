@@ -56,8 +56,8 @@ def find_outliers(time: NDArray[np.float64], lift: Matrix) -> dict[int, str]:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
-    lift : array, shape (strokes, n) [m]
+    time (n,) [s]
+    lift (strokes, n) [m]
     """
     step = float(time[1] - time[0])
     way = np.quantile(lift, 0.99, axis=1) - np.quantile(lift, 0.01, axis=1)
@@ -150,12 +150,12 @@ def load_stroke_set(
 
     Parameters
     ----------
-    paths : sequence of Path
+    paths
         Files of one valve: one long recording, one file per stroke, or a mixture.
-    measurement : MeasurementSection, optional
+    measurement
         Channels, trigger, zero; without it channels are found by their names, and every recording
         is one stroke in its own time.
-    progress : callable
+    progress
         Called with the share of the files that is done, 0 to 1.
     roles : collection of roles
         Channels that are read beside that of the trigger; of them the recording must have the lift.

@@ -37,23 +37,23 @@ class Pulse:
 
     Parameters
     ----------
-    sign : float
+    sign
         -1 where the plateau lies below zero; all levels are those of the pulse turned upwards.
-    rest : float
+    rest
         Level before the front, as recorded.
-    plateau : float
+    plateau
         Above the level at rest.
-    front : float [s]
+    front [s]
         Where the front crosses half of the plateau.
-    length : float [s]
+    length [s]
         From there to where the end does.
-    rise, fall : float [s]
+    rise, fall [s]
         From 10 to 90 % of the plateau, and back.
-    peak : float [-]
+    peak [-]
         Highest value over the plateau.
-    ripple : float [-]
+    ripple [-]
         Root mean square of the plateau about its mean, over that.
-    ripple_period : float [s]
+    ripple_period [s]
         From the first to the second crest behind the front; nan without a second one.
     """
 
@@ -79,8 +79,8 @@ def measure_pulse(time: Floats, values: Floats, where: str) -> Pulse:
 
     Parameters
     ----------
-    time, values : array, shape (n,)
-    where : str
+    time, values (n,)
+    where
         For errors.
 
     Raises
@@ -233,11 +233,11 @@ class PulseFit:
 
     Parameters
     ----------
-    shift : float [s]
+    shift [s]
         Computed time minus measured time of the same instant.
-    factor : float [-]
+    factor [-]
         Measured over computed.
-    rms : float [-]
+    rms [-]
         Root mean square of what is left, over the measured plateau.
     """
 
@@ -260,12 +260,11 @@ def fit_pulse(
 
     Parameters
     ----------
-    time, measured : array, shape (n,)
-    pulse : Pulse
+    time, measured (n,)
+    pulse
         Of it.
-    computed_time, computed : array, shape (m,)
-    computed_pulse : Pulse
-    factor : float, optional
+    computed_time, computed (m,)
+    factor
         Kept as it is; fitted by default.
     """
     first = pulse.front - _BEFORE * pulse.length

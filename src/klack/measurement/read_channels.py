@@ -34,9 +34,8 @@ class CommonTime:
 
     Parameters
     ----------
-    start, step : float [s]
-    count : int
-    notes : tuple of str
+    start, step [s]
+    notes
         How channels were brought onto it, and what was assumed of them.
     """
 
@@ -95,10 +94,9 @@ def read_channels(
 
     Parameters
     ----------
-    recording : Recording
     found : mapping of role to FoundChannel
         One entry of :func:`klack.measurement.find_channels.find_channels`.
-    first, last : int
+    first, last
         Samples of the common time, ``last`` not included; the whole of it by default.
 
     Returns
@@ -149,11 +147,10 @@ def windows(
 
     Parameters
     ----------
-    recording : Recording
     found : mapping of role to FoundChannel
-    length : float [s]
+    length [s]
         Of each window; the last may be shorter.
-    overlap : float [s]
+    overlap [s]
         Time that a window shares with the one before; a stroke not longer than this lies whole
         in at least one window.
 

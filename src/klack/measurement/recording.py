@@ -33,23 +33,23 @@ class ChannelInfo:
 
     Parameters
     ----------
-    name : str
+    name
         As in the file, without its unit; different for every channel.
-    unit : str
+    unit
         As the file says; empty if it does not.
-    count : int
+    count
         Number of samples.
-    start : float [s]
+    start [s]
         Time of the first sample.
-    step : float [s]
+    step [s]
         Mean time from sample to sample.
-    clock : str
+    clock
         Name of the stored time; empty if the file gives start and step alone.
-    label : str
+    label
         Name and unit as the file writes them, ``"lift [um]"``.
-    origin : int, optional [ns]
+    origin [ns]
         When its time is zero, as the file says it by date and time of day; since 1970.
-    unapplied : str
+    unapplied
         What the file says of a scale that klack does not know, ``"gain = 0.5"``.
     """
 
@@ -69,10 +69,9 @@ class Recording(Closing):
 
     Parameters
     ----------
-    path : Path
-    channels : tuple of ChannelInfo
+    channels
         In the order of the file, without its time.
-    notes : tuple of str
+    notes
         What was assumed on opening.
     """
 

@@ -75,9 +75,9 @@ class Column:
     Parameters
     ----------
     stop : "opening" or "seat"
-    quantity, unit : str
+    quantity, unit
         Among :data:`QUANTITIES`.
-    values, errors : array, shape (strokes,)
+    values, errors (strokes,)
         nan where a stroke does not have it; standard errors.
     """
 
@@ -124,20 +124,20 @@ class HighestRebound:
 
     Parameters
     ----------
-    index : int
+    index
         Of the stroke.
-    value, error : float
+    value, error
         As measured, with its standard error.
-    count : int
+    count
         Shots it is the highest of.
-    scatter, own_scatter : float
+    scatter, own_scatter
         Standard deviation of the measured values, and of the shots without measurement error.
-    normal_excess : float
+    normal_excess
         Expected measured maximum minus expected true maximum, for normal scatter:
         ``(s - sigma) E_n``; how much too high the highest reading is by measurement error.
-    expected : float
+    expected
         Expected true maximum of n shots, from the shots shrunk by their measurement error.
-    above_median : float
+    above_median
         ``expected`` minus the median: what choosing the highest of n adds.
     """
 
@@ -154,13 +154,7 @@ class HighestRebound:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SetMeasures:
-    """All strokes of a set, read.
-
-    Parameters
-    ----------
-    names : tuple of str
-    strokes : tuple of StrokeMeasures
-    """
+    """All strokes of a set, read."""
 
     names: tuple[str, ...]
     strokes: tuple[StrokeMeasures, ...]
@@ -202,9 +196,8 @@ def first_impact_column(
     Parameters
     ----------
     stop : "opening" or "seat"
-    quantity : str
+    quantity
         Among :data:`QUANTITIES`.
-    firsts : sequence of MeasuredImpact or None
     """
     return Column(
         stop=stop,
@@ -226,10 +219,10 @@ def measure_set(
 
     Parameters
     ----------
-    strokes : StrokeSet
+    strokes
         With the channel ``lift``.
     seat, opening : float [m], optional
-    sensor : LiftSensor, optional
+    sensor
         See :func:`klack.measurement.impacts.measure_stroke`.
 
     Raises
@@ -278,7 +271,7 @@ def highest_rebound(column: Column) -> HighestRebound:
 
     Parameters
     ----------
-    column : Column
+    column
         Usually the rebound heights, or the restitution.
 
     Raises

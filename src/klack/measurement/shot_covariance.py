@@ -50,11 +50,11 @@ class ShotCovariance:
 
     Parameters
     ----------
-    covariance : array, shape (p, p)
+    covariance (p, p)
         inf on the diagonal of parameters that the data do not see.
-    degrees : int
+    degrees
         Degrees of freedom of Student's t.
-    estimates : array, shape (n, p)
+    estimates (n, p)
         Parameters of every stroke alone; empty when they are not known.
     """
 
@@ -99,9 +99,9 @@ def shot_estimates(jacobian: Matrix, weights: Vector, residuals: Matrix) -> Matr
 
     Parameters
     ----------
-    jacobian : array, shape (m, p)
-    weights : array, shape (m,)
-    residuals : array, shape (n, m)
+    jacobian (m, p)
+    weights (m,)
+    residuals (n, m)
         Measured less computed, stroke by stroke.
 
     Returns
@@ -184,11 +184,11 @@ class Identifiability:
 
     Parameters
     ----------
-    singular_values : array, shape (p,) [-]
+    singular_values (p,) [-]
         Falling; of the weighted Jacobian by the scaled parameters.
-    directions : array, shape (p, p) [-]
+    directions (p, p) [-]
         Rows: the combinations that belong to them.
-    correlation : array, shape (p, p) [-]
+    correlation (p, p) [-]
         Of the estimates for independent samples of the weights' variance: a property of what was
         measured, not of how the strokes scatter.
     """
@@ -221,11 +221,9 @@ def identifiability_warnings(
 
     Parameters
     ----------
-    names : sequence of str
-    z : array, shape (p,) [-]
+    z (p,) [-]
         Scaled parameters where the fit ended.
-    found : Identifiability
-    covariance : ShotCovariance
+    covariance
         Of the scaled parameters.
     """
     C, error = covariance.covariance, covariance.standard_error

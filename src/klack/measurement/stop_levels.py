@@ -29,13 +29,13 @@ class SmoothLift:
     Parameters
     ----------
     lift, velocity : array, shape (n,) [m], [m/s]
-    noise : float [m]
+    noise [m]
         White noise of one raw sample.
     lift_noise, velocity_noise : float [m], [m/s]
         Standard deviation that is left in the smoothed ones.
-    half : int
+    half
         Half window [samples].
-    least_height : float [m]
+    least_height [m]
         Motion below this is not told from noise or from vibration.
     """
 
@@ -54,8 +54,8 @@ class StopLevels:
 
     Parameters
     ----------
-    seat, opening : float [m]
-    seat_se, opening_se : float [m]
+    seat, opening [m]
+    seat_se, opening_se [m]
     """
 
     seat: float
@@ -170,9 +170,9 @@ class Touch:
     Parameters
     ----------
     stop : "opening" or "seat"
-    index : int
+    index
         Sample of the turn, or of the arrival if it does not turn.
-    rebounds : bool
+    rebounds
         Whether a rebound above the noise follows.
     """
 
@@ -191,7 +191,6 @@ def find_touches(smooth: SmoothLift, levels: Mapping[Stop, float]) -> tuple[Touc
 
     Parameters
     ----------
-    smooth : SmoothLift
     levels : mapping of stop to float [m]
         Of the stops that exist.
     """

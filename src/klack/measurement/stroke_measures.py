@@ -27,11 +27,11 @@ class FlightShape:
 
     Parameters
     ----------
-    acceleration, acceleration_se : float [m/s^2]
+    acceleration, acceleration_se [m/s^2]
         Towards the stop, at the turning point, mean of rise and fall.
-    stiffness, stiffness_se : float [1/s^2]
+    stiffness, stiffness_se [1/s^2]
         Of the spring, over the mass: change of the acceleration with lift.
-    friction, friction_se : float [-]
+    friction, friction_se [-]
         Over the mean force.
     """
 
@@ -53,21 +53,21 @@ class MeasuredImpact:
     Parameters
     ----------
     stop : "opening" or "seat"
-    time, time_se : float [s]
+    time, time_se [s]
         First touch: the approaching flight reaches the level of the stop.
-    release, release_se : float [s]
+    release, release_se [s]
         The rebounding flight leaves it; nan without a rebound.
-    approach_speed, approach_se : float [m/s]
+    approach_speed, approach_se [m/s]
         Above zero; nan if the flight is too short to be fitted.
-    rebound_speed, rebound_se : float [m/s]
+    rebound_speed, rebound_se [m/s]
         0 where nothing above the noise is seen; nan if the flight is too short to be fitted.
-    restitution, restitution_se : float [-]
+    restitution, restitution_se [-]
         Rebound over approach speed.
-    rebound_height, rebound_height_se : float [m]
+    rebound_height, rebound_height_se [m]
         Largest distance from the stop in the flight after it; nan if the flight ends elsewhere.
-    period, period_se : float [s]
+    period, period_se [s]
         To the next first touch on the same stop; nan after the last.
-    acceleration : float [m/s^2]
+    acceleration [m/s^2]
         Towards the stop, at the release; nan without a fitted rebound.
     """
 
@@ -100,17 +100,17 @@ class StrokeMeasures:
 
     Parameters
     ----------
-    impacts : tuple of MeasuredImpact
+    impacts
         In order of time.
-    seat_level, opening_level : float [m]
+    seat_level, opening_level [m]
         Lift at which the needle rests on the stop; nan for a stop that was not met.
-    level_se : float [m]
+    level_se [m]
         Standard error of the levels.
-    noise : float [m]
+    noise [m]
         Standard deviation of the lift about the fitted flights.
-    least_height : float [m]
+    least_height [m]
         Bounces lower than this are not told from noise, and not counted.
-    notes : tuple of str
+    notes
         What could not be done, and why.
     shapes : mapping of stop to FlightShape
         Of the stops with bounces.
@@ -149,11 +149,11 @@ class MeasuredStroke:
 
     Parameters
     ----------
-    name : str
+    name
         Where it comes from, for example ``"bench.mf4 #12"`` or ``"bench.csv lift_12"``.
-    values : mapping of str to array, shape (n,)
+    values (n,)
         By role (see :data:`klack.measurement.channels.ROLES`), SI, all on the time axis of the set.
-    start : float [s]
+    start [s]
         Time of the trigger in the recording.
     """
 
@@ -176,14 +176,13 @@ class StrokeSet:
 
     Parameters
     ----------
-    source : str
+    source
         Files, in words.
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Uniform, zero at the trigger.
-    strokes : tuple of MeasuredStroke
+    strokes
         Those that are used.
-    rejected : tuple of Rejection
-    notes : tuple of str
+    notes
         What the reader of a report must know: units assumed, channels found by their name, ...
     """
 

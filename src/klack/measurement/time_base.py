@@ -30,16 +30,15 @@ class TimeBase:
 
     Parameters
     ----------
-    start, end : float [s]
+    start, end [s]
         Time of the first and the last sample.
-    step : float [s]
+    step [s]
         Mean step of a uniform time, median step of an uneven one.
-    count : int
-    uniform : bool
+    uniform
         True if the samples can be taken as they are.
-    note : str
+    note
         What was found if it is not perfect, to follow the names of its channels.
-    marks : array, shape (m,) [s]
+    marks (m,) [s]
         Time of every 2^20th sample, by which windows of uneven times are found.
     """
 
@@ -75,12 +74,11 @@ def survey_time(
 
     Parameters
     ----------
-    read : callable
+    read
         Times [s] of samples first to before last.
-    count : int
-    where : str
+    where
         File and channel, for errors.
-    place : callable
+    place
         What a sample is called there, counted from 0.
 
     Raises
@@ -169,9 +167,9 @@ def uniform_step(time: NDArray[np.float64], where: str) -> float:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         At least two times.
-    where : str
+    where
         Named in the error.
 
     Raises

@@ -98,8 +98,8 @@ class UnitFactor:
 
     Parameters
     ----------
-    factor : float [SI unit per unit of the file]
-    offset : float [SI unit]
+    factor [SI unit per unit of the file]
+    offset [SI unit]
         Of units with a zero of their own, such as gauge pressure.
     """
 
@@ -131,11 +131,11 @@ def unit_factor(text: str, quantity: Role | Kind, where: str) -> UnitFactor:
 
     Parameters
     ----------
-    text : str
+    text
         As the file has it, with or without brackets.
     quantity : role or Kind
         What the channel is; ``klack.units.TIME`` for a time.
-    where : str
+    where
         File and channel, for the error.
 
     Raises

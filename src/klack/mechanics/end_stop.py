@@ -99,7 +99,7 @@ class EndStop(Component):
         Parameters
         ----------
         law : ContactLaw, RubbingLaw or YieldingLaw
-        series_compliance : float [m/N]
+        series_compliance [m/N]
         """
         stop = self.model_copy(update={"series_compliance": series_compliance})
         stop._computed = law

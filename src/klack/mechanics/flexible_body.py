@@ -66,10 +66,9 @@ class FlexibleBody(Component):
 
         Parameters
         ----------
-        reduced : ReducedBody
-        points : sequence of str, optional
+        points
             Those of its ports that the network uses; all by default.
-        speed : float [m/s]
+        speed [m/s]
             Of the whole body at the start, along +z; only a free body can have one.
         """
         chosen = tuple(reduced.port_names if points is None else points)
@@ -80,8 +79,7 @@ class FlexibleBody(Component):
 
         Parameters
         ----------
-        reduced : ReducedBody
-        port_map : mapping of str to str, optional
+        port_map
             Port of ``reduced`` for each of :attr:`points`; equal names by default.
 
         Raises

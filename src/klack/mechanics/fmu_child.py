@@ -65,7 +65,7 @@ class Instance(ABC):
 
     Parameters
     ----------
-    library : str
+    library
         Path of its shared library, which is loaded here.
     """
 
@@ -82,7 +82,7 @@ class Instance(ABC):
 
         Parameters
         ----------
-        given : mapping
+        given
             ``token``; ``resources``: a folder; ``parameters``: lists of value reference, kind and
             value; ``inputs``: value references, or None for an input that is not joined;
             ``force``: value reference of the output.

@@ -38,14 +38,13 @@ class FmuController:
 
     Parameters
     ----------
-    fmu : FmuDescription
     inputs : mapping of str to tuple of str and float
         Sensor -> input of the FMU, and the unit of the signal over that of the input.
     output : tuple of str and float
         Output of the FMU, and its unit in V, N or Pa.
-    parameters : mapping of str to float
+    parameters
         Parameters and start values, in the units of the FMU.
-    time_limit : float [s]
+    time_limit [s]
         Of one call.
     """
 
@@ -141,18 +140,18 @@ def controlled_by_fmu(
 
     Parameters
     ----------
-    component : Controlled
+    component
         With its sensors and its sample time; a law that it has is replaced.
     file : str or Path
-    inputs : mapping of str to str, optional
+    inputs
         Sensor -> input of the FMU; the same names by default.  Signals are converted to the units
         that the inputs declare.
-    output : str, optional
+    output
         Output of the FMU; by default the only one, or the one called voltage, force or pressure.
         One without a unit is in V, N or Pa.
-    parameters : mapping of str to float, optional
+    parameters
         Parameters and start values, in the units of the FMU.
-    time_limit : float [s]
+    time_limit [s]
         Longest time that one call of the FMU may take on the clock.
 
     Raises

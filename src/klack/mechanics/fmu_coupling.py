@@ -38,8 +38,7 @@ class FmuCoupling:
 
     Parameters
     ----------
-    slave : FmuSlave
-    coupling_step : float [s]
+    coupling_step [s]
         Shortest time between two exchanges; rounded up to whole steps of the loop.
     extrapolation : "hold" or "linear"
     """

@@ -55,17 +55,16 @@ class FmuDescription:
 
     Parameters
     ----------
-    path : Path
+    path
         Of the ``.fmu``.
     version : 2 or 3
         Of FMI.
-    identifier, token : str
+    identifier, token
         Name of its library; the word that library and description must share.
-    model_exchange : bool
+    model_exchange
         True for an FMU without a solver of its own, which klack cannot run.
-    variable_step : bool
+    variable_step
         Whether steps of communication may differ in length.
-    variables : mapping of str to FmuVariable
     """
 
     path: Path
@@ -162,8 +161,7 @@ def unpack_fmu(fmu: FmuDescription, folder: Path) -> Path:
 
     Parameters
     ----------
-    fmu : FmuDescription
-    folder : Path
+    folder
         An empty one.
 
     Returns

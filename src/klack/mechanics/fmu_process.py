@@ -37,10 +37,10 @@ class FmuProcess(Closing):
 
     Parameters
     ----------
-    given : mapping
+    given
         ``version`` (2 or 3), ``library``, and what :meth:`klack.mechanics.fmu_child.Instance.begin`
         takes.
-    time_limit : float [s]
+    time_limit [s]
         For one call, and for the initialisation.
 
     Raises

@@ -30,7 +30,7 @@ class FmuWiring:
         Name of an input, and its unit in SI units [m or m/s per unit].
     force : tuple of str and float
         Name of an output, and its unit [N per unit].
-    parameters : mapping of str to float
+    parameters
         Parameters and start values, in the units of the FMU.
     """
 
@@ -49,9 +49,7 @@ class FmuSlave:
 
     Parameters
     ----------
-    fmu : FmuDescription
-    wiring : FmuWiring
-    time_limit : float [s]
+    time_limit [s]
         For one call.
     """
 

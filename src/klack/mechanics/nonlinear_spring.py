@@ -127,9 +127,9 @@ def curve_numbers(
 
     Parameters
     ----------
-    breaks : array, shape (n,) [m]
+    breaks (n,) [m]
         Deflections between which the pieces lie; none for a single polynomial about zero.
-    coefficients : array, shape (n + 1, terms) [N/m^j]
+    coefficients (n + 1, terms) [N/m^j]
         Rising powers of the deflection from the origin of the piece: the break below it, for the
         first piece the first break.
     """

@@ -25,18 +25,18 @@ class ElementFamily:
 
     Parameters
     ----------
-    name : str
+    name
         For example ``"tet10"``.
-    dimension : int
+    dimension
         3 for solids, 2 for plane (axisymmetric) elements and for faces of solids, 1 for edges.
-    corners : int
+    corners
         Number of corner nodes; they come first.
     edges : tuple of pairs of int
         Local corner numbers of every edge.  In a quadratic family node ``corners + i`` is the
         middle of edge ``i``.
-    faces : tuple of Face
+    faces
         Sides of codimension one.
-    quadratic : bool
+    quadratic
         True when every edge has a mid node.
     """
 

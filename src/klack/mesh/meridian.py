@@ -45,7 +45,7 @@ def mesh_meridian(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
     Parameters
     ----------
     profiles : mapping of solid name to Profile
-    sizing : MeshSizing
+    sizing
         Refinements are rings (r, z), or points (0, 0, z) on the axis.
 
     Returns

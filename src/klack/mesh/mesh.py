@@ -30,11 +30,11 @@ class ElementBlock:
 
     Parameters
     ----------
-    family : str
+    family
         Key of :data:`klack.mesh.families.FAMILIES`, of dimension 3 or 2.
-    connectivity : int array, shape (n_elements, n_nodes)
+    connectivity (n_elements, n_nodes)
         Node numbers, Abaqus order.
-    solid : str
+    solid
         Name of the solid; the material is chosen by it.
     """
 
@@ -54,9 +54,9 @@ class FaceBlock:
 
     Parameters
     ----------
-    family : str
+    family
         ``line2 line3`` (axisymmetric), ``tri3 tri6 quad4 quad8``.
-    connectivity : int array, shape (n_faces, n_nodes)
+    connectivity (n_faces, n_nodes)
     """
 
     family: str
@@ -90,8 +90,6 @@ class Mesh:
     ----------
     points : array, shape (n, 3) or (n, 2) [m]
         Three columns x, y, z for a solid; two columns r, z for an axisymmetric body (axis r = 0).
-    blocks : tuple of ElementBlock
-    surfaces : mapping of str to Surface
     node_sets : mapping of str to int array
     """
 
@@ -197,11 +195,11 @@ class FaceTable:
 
     Parameters
     ----------
-    keys : int array, shape (n, 4)
+    keys (n, 4)
         Corner nodes in ascending order, -1 in front where there are fewer than four; rows sorted.
-    block, element, side : int array, shape (n,)
+    block, element, side (n,)
         Block, element within the block, and number of the face.
-    shared : bool array, shape (n,)
+    shared (n,)
         True for a face between two elements.
     """
 

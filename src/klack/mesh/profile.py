@@ -32,9 +32,8 @@ class Curve:
     Parameters
     ----------
     start, end : (r, z) [m]
-    name : str
     centre : (r, z) [m] or None
-    angle : float [rad]
+    angle [rad]
         Angle turned from start to end, positive anticlockwise.
     """
 
@@ -186,9 +185,9 @@ class Arc:
     Parameters
     ----------
     end, centre : (r, z) [m]
-    name : str
+    name
         Name of the surface that the arc sweeps; edges of one name make one surface.
-    clockwise : bool or None
+    clockwise
         Sense of travel.  None takes the shorter way; for a half circle the way that stays at
         r >= 0.
     """

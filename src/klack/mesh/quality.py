@@ -43,12 +43,11 @@ class MeshSummary:
 
     Parameters
     ----------
-    nodes, elements : int
     families : mapping of family to number of elements
-    smallest_edge, largest_edge : float [m]
-    worst_quality : float [-]
+    smallest_edge, largest_edge [m]
+    worst_quality [-]
         Smallest scaled Jacobian; 1 ideal, 0 degenerate.
-    worst_element : str
+    worst_element
         Which element has it, and where.
     surfaces : mapping of surface name to number of faces
     """
@@ -116,7 +115,6 @@ def scaled_jacobians(points: NDArray[np.float64], block: ElementBlock) -> NDArra
     Parameters
     ----------
     points : array, shape (n, 2) or (n, 3) [m]
-    block : ElementBlock
     """
     family = block.topology
     x = points[block.connectivity]
@@ -228,10 +226,9 @@ def require_positive_jacobians(
 
     Parameters
     ----------
-    where : str
+    where
         Start of the error text: what made or read the mesh.
-    mesh : Mesh
-    smallest : float [-]
+    smallest [-]
         Every scaled Jacobian must be above it.
     numbers : sequence of int arrays, or None
         Element numbers for the text, one array per block; None counts from 0.

@@ -20,11 +20,11 @@ class Pose:
 
     Parameters
     ----------
-    rotation : array, shape (3,) [rad]
+    rotation (3,) [rad]
         Rotation vector: its direction is the axis, its length the angle.
-    about : array, shape (3,) [m]
+    about (3,) [m]
         Point that the rotation leaves in place, in the drawing.
-    shift : array, shape (3,) [m]
+    shift (3,) [m]
         Translation after the rotation.
     """
 
@@ -85,7 +85,7 @@ def rigid_placement(
     ----------
     aside, lean : array, shape (2,) [m], [rad]
         Position of its axis at the height of ``about``, and slope of the axis.
-    about, centre : array, shape (3,) [m]
+    about, centre (3,) [m]
     """
     rotation = np.array([-lean[1], lean[0], 0.0])  # z x d
     pose = Pose(rotation=rotation, about=about, shift=np.append(aside, 0.0))

@@ -30,9 +30,9 @@ class Refinement:
     ----------
     position : (r, z) or (x, y, z) [m]
         Two numbers are a ring around the axis (a point of the meridian), three a point in space.
-    size : float [m]
+    size [m]
         Edge length of the elements.
-    radius : float [m]
+    radius [m]
         Distance up to which ``size`` holds; beyond it elements grow by the grading.
     """
 
@@ -63,13 +63,13 @@ class MeshSizing:
 
     Parameters
     ----------
-    size : float [m]
+    size [m]
         Largest edge length anywhere.
-    surfaces : mapping of str to float [m]
+    surfaces [m]
         Largest edge length on a named surface.
-    refinements : tuple of Refinement
+    refinements
         Zones of constant small size, typically the contact ring.
-    grading : float [-]
+    grading [-]
         Growth of the edge length per distance from a fine zone, above 0 up to 1: 0.3 is usual,
         0.15 smooth, 0.5 coarse.
 
@@ -178,8 +178,7 @@ def element_count(
 
     Parameters
     ----------
-    sizing : MeshSizing
-    dimension : int
+    dimension
         3 for tetrahedra, 2 for triangles of the half section.
     measure : float [m^3] or [m^2]
         Volume of the body, area of its half section.

@@ -37,19 +37,19 @@ class Skin:
     ----------
     points, normals : array, shape (v, 3) [m], [-]
         Of each vertex.
-    node : int array, shape (v,)
+    node (v,)
         Node of the mesh.
-    angle : array, shape (v,) [rad]
+    angle (v,) [rad]
         To which the half section is turned; empty for a solid.
-    face : int array, shape (v,)
+    face (v,)
         Place among ``faces``; -1 where the surface has no name.
-    faces : tuple of str
+    faces
         Named surfaces.
-    triangles : int array, shape (t, 3)
+    triangles (t, 3)
         Vertices, anticlockwise seen from outside.
-    element_edges : int array, shape (e, 2)
+    element_edges (e, 2)
         Vertices: sides of the elements.
-    creases : int array, shape (k, 2)
+    creases (k, 2)
         Vertices: where two smooth parts or two named surfaces meet, once on either side.
     """
 

@@ -45,7 +45,7 @@ def mesh_step(path: str | Path, sizing: MeshSizing) -> Mesh:
     path : path
         STEP file (AP203, AP214 or AP242); its declared unit of length is respected.  Names of
         solids and faces are kept; those without get ``solid1``, ``face1`` and so on.
-    sizing : MeshSizing
+    sizing
         Refinements are points (x, y, z) or rings (r, z) around the z axis.
 
     Returns
@@ -69,7 +69,7 @@ def mesh_revolved(profiles: Mapping[str, Profile], sizing: MeshSizing) -> Mesh:
     Parameters
     ----------
     profiles : mapping of solid name to Profile
-    sizing : MeshSizing
+    sizing
         Refinements are points (x, y, z) or rings (r, z) around the z axis.
 
     Returns

@@ -20,15 +20,15 @@ class StepPart:
 
     Parameters
     ----------
-    name : str
+    name
         As :func:`~klack.mesh.solid.mesh_step` gives it.
-    named : bool
+    named
         Whether the file says the name; otherwise it is a number of the list of faces.
-    count : int
+    count
         Solids or faces of this name.
     size : float [m^3] or [m^2]
         Volume or area of all of them.
-    low, high : array, shape (3,) [m]
+    low, high (3,) [m]
         Corners of the box around all of them.
     """
 

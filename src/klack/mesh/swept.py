@@ -53,11 +53,11 @@ def sweep(meridian: Mesh, layers: int, start_angle: float = 0.0) -> Mesh:
 
     Parameters
     ----------
-    meridian : Mesh
+    meridian
         Of dimension 2, all elements ``tri6``.
-    layers : int
+    layers
         Elements around the circumference, at least 6.
-    start_angle : float [rad]
+    start_angle [rad]
         Angle of the first layer; two bodies in contact need not match.
 
     Returns

@@ -20,13 +20,13 @@ class SideInputs(NamedTuple):
     ----------
     axis : array, shape (4,) [m], [m], [-], [-]
         ``a_x, a_y, s_x, s_y``, in the middle of the step.
-    ports : array [m]
+    ports [m]
         Displacements of the ports of the row along z, in the middle of the step.
-    state : array
+    state
         Of the row, at the start of the step.
-    ahead : float [s]
+    ahead [s]
         From there to the middle of the step.
-    pressures : array, shape (2,) [Pa]
+    pressures (2,) [Pa]
         Of the nodes of a branch, as they act in the step; zeros for an element.
     """
 
@@ -64,11 +64,11 @@ class OffAxisPart:
     ----------
     key : tuple of str or int
         Where the component is told so.
-    port : str
+    port
         Its port that has to be at the needle.
-    heights : tuple of float [m]
+    heights [m]
         Of its ends, in the drawing of the needle.
-    room : float [m]
+    room [m]
         Way of the axis across itself that it allows at these heights; infinite where nothing can
         touch.
     """

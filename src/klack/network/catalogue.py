@@ -125,7 +125,6 @@ def component_class(word: str, own: Mapping[str, type[Component]] = _NONE) -> ty
 
     Parameters
     ----------
-    word : str
     own : mapping of str to type
         Components of the user's own that may be used, by ``package.module:Class``.
 
@@ -193,7 +192,7 @@ def import_component(word: str) -> type[Component]:
 
     Parameters
     ----------
-    word : str
+    word
         ``package.module:Class``, of the user, never of a file.
 
     Raises

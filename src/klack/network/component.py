@@ -24,9 +24,9 @@ class Component(Section):
 
     Attributes
     ----------
-    type : str
+    type
         Word after ``type:`` in a case file.
-    ports : mapping of str to Port
+    ports
         Override :meth:`port_kinds` when they depend on parameters.
     """
 

@@ -44,7 +44,7 @@ def read_component(value: Any, context: Any = None) -> Component:
     Parameters
     ----------
     value : mapping or Component
-    context : mapping, optional
+    context
         Of pydantic; with one, as in a case file, every number needs its unit.  Its
         ``"components"`` are the classes of the user's own that may be used, by their words.
 

@@ -43,15 +43,13 @@ class DescribedType:
 
     Parameters
     ----------
-    word : str
+    word
         After ``type:`` in a case file.
-    summary : str
-    ports : mapping of str to Port
+    ports
         Empty for one whose ports are its ``points``.
-    keys : mapping of str to DescribedKey
-    equation : str
+    equation
         LaTeX; empty if its docstring has none.
-    source : str
+    source
         Empty if it names none.
     """
 

@@ -14,16 +14,15 @@ class GasChamberRow:
 
     Parameters
     ----------
-    component : str
-    volume : float [m^3]
+    volume [m^3]
         At zero displacements.
-    pressure : float or None [Pa]
+    pressure [Pa]
         At the start; None for that of steady flow.
-    temperature : float [K]
+    temperature [K]
         At the start.
-    heat : float [W/K]
+    heat [W/K]
         Heat flow from the wall per temperature; below zero for a gas as warm as the wall.
-    wall : float [K]
+    wall [K]
     """
 
     component: str
@@ -50,14 +49,13 @@ class GasBranchRow:
 
     Parameters
     ----------
-    component : str
-    a, b : int
+    a, b
         Handles of nodes.
     law : tuple of 6 floats
         See :func:`klack.hydraulics.gas.flow_law.flow_through`.
     lift : (int, int) or None
         Handles of the ports whose distance opens it.
-    table : array, shape (2, n)
+    table (2, n)
         Lifts [m], and the opening that scales the flow; empty without a lift.
     """
 

@@ -31,15 +31,14 @@ class Network:
 
     Parameters
     ----------
-    components : mapping of str to Component
+    components
         By name.
     connections : sequence of sequences of str
         Each lists the ports, ``"component.port"``, that meet in one node; or ``"ground"``,
         ``"ambient"``.
-    ambient : Ambient
-    fluid : NetworkFluid or None
+    fluid
         At its temperature; needed as soon as anything is hydraulic.
-    gas : NetworkGas or None
+    gas
         Needed as soon as anything is pneumatic.
 
     Raises
@@ -190,7 +189,6 @@ class Network:
 
         Parameters
         ----------
-        components : mapping of str to Component
         connections : sequence of sequences of str
             Added; one that shares a port with a connection that is there extends it.
         """
@@ -215,9 +213,9 @@ class Network:
 
         Parameters
         ----------
-        stiffness : float [N/m]
+        stiffness [N/m]
             Of every end stop; 1e9 N/m is usual.
-        restitution : float or None [-]
+        restitution [-]
             Sets the dashpots after Gonthier et al. (2004); no loss without.
         """
         parts = {

@@ -35,11 +35,9 @@ class Node:
 
     Parameters
     ----------
-    index : int
+    index
         Place of its connection in the list.
-    domain : str
-    joints : tuple of Joint
-    word : str
+    word
         ``"ground"`` or ``"ambient"`` if the node is that, else empty.
     """
 

@@ -48,11 +48,10 @@ class Port:
 
     Parameters
     ----------
-    domain : str
+    domain
         ``"mechanical"``, ``"hydraulic"``, ``"pneumatic"``, ``"electric"`` or ``"thermal"``; only
         equal domains can be joined.
-    role : Role
-    optional : bool
+    optional
         Whether it may stay unconnected.
     """
 

@@ -28,9 +28,7 @@ class StopBound:
 
     Parameters
     ----------
-    name : str
-    upper, lower : str or None
-    gap : float [m]
+    gap [m]
     """
 
     name: str
@@ -53,10 +51,6 @@ class Travel:
     chain of bodies that push each other is one stop for all of them.
 
     Limits: rigid contacts, no tilt; springs and films stop nothing.
-
-    Parameters
-    ----------
-    bounds : sequence of StopBound
     """
 
     bounds: Sequence[StopBound]
@@ -79,7 +73,7 @@ class Travel:
 
         Parameters
         ----------
-        factors : mapping of str to float
+        factors
             By the component of the body.
 
         Returns

@@ -55,7 +55,7 @@ class MotionCourse:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Rising.
     displacement, slope : array, shape (n,) [m], [m/s]
         At each of them; both slopes of a jump of the speed are given by two intervals of
@@ -86,9 +86,9 @@ class Ambient:
 
     Parameters
     ----------
-    pressure : float [Pa]
+    pressure [Pa]
         Absolute; reference of pressure forces.
-    temperature : float [K]
+    temperature [K]
     """
 
     pressure: float = 101_325.0
@@ -148,9 +148,9 @@ class StateInput:
 
     Parameters
     ----------
-    owner, quantity, unit : str
+    owner, quantity, unit
         Whose it is, what, and its unit.
-    rates : callable
+    rates
         By index of a state, its rate for one such unit, at the given states.
     """
 
@@ -199,16 +199,15 @@ class ControllerRow:
 
     Parameters
     ----------
-    component : str
-    sensors, channels, units : tuple of str
+    sensors, channels, units
         Name of each sensor, what it reads, and the unit of its signal.
-    period : float [s]
-    begin : callable
+    period [s]
+    begin
         Returns a fresh controller.
     actuator : "voltage", "force" or "pressure"
         The output is the voltage of a coil [V], the first parameter of an element [N], or a
         prescribed pressure [Pa].
-    handle : int
+    handle
         Electric node of the coil, number of the element, or hydraulic node.
     """
 
@@ -289,11 +288,11 @@ class FilmRow:
 
     Parameters
     ----------
-    cubic : float [N s m^2]
-    linear : float [N s]
-    cut_off : float [m]
+    cubic [N s m^2]
+    linear [N s]
+    cut_off [m]
         Above zero; from the roughness.
-    suction : float [N]
+    suction [N]
         Greatest pull while the gap opens, ``(p_ambient - p_cavitation) area``.
     """
 
@@ -326,18 +325,17 @@ class SliderRow:
 
     Parameters
     ----------
-    component : str
-    upper, lower : int
+    upper, lower
         Handles; the friction on the upper port is opposite to its way relative to the lower one.
-    names : tuple of str
+    names
         What the component calls them.
-    coulomb : float [N]
+    coulomb [N]
         Friction at high speeds of slip, beside the viscous one.
-    breakaway : float [N]
+    breakaway [N]
         Largest friction at rest, not below ``coulomb``.
-    stribeck_speed : float [m/s]
+    stribeck_speed [m/s]
         At which the difference of both has decayed to 1/e.
-    viscous : float [N s/m]
+    viscous [N s/m]
     """
 
     component: str
@@ -356,21 +354,20 @@ class LineRow:
 
     Parameters
     ----------
-    a, b : int
-    delay : float [s]
+    delay [s]
         Of the whole line.
-    impedance : float [Pa s/m^3]
+    impedance [Pa s/m^3]
         Of a wave, ``rho a / A``.
-    segments : int
+    segments
         Friction acts between segments and, half each, at both ends.
-    resistance : float [Pa s/m^3]
+    resistance [Pa s/m^3]
         Steady laminar friction of the whole line.
     unsteady_gain, unsteady_rate : array (k,) [Pa s/m^3], [1/s]
         Terms of the frequency-dependent friction of the whole line:
         ``dp = resistance q + sum_k gain_k int exp(-rate_k (t - s)) dq/ds ds``.
-    vapour_pressure : float [Pa]
+    vapour_pressure [Pa]
         Below it a cavity opens between two segments.
-    laminar_flow : float [m^3/s]
+    laminar_flow [m^3/s]
         At which the friction, which is laminar, ends to hold: that of a Reynolds number of 2300.
     """
 
@@ -408,25 +405,22 @@ class WaveRow:
 
     Parameters
     ----------
-    a, b : int
-    step : StepFunction
-    parameters : array
-    states : int
+    states
         Length of the state.
-    start : callable
+    start
         State of the steady flow [kg/s] from a to b between two pressures [Pa].
-    drop : callable
+    drop
         Energy per mass [J/kg] that a flow [kg/s] from a to b loses, given the pressure [Pa] at a,
         and its slope.
-    parts : int
+    parts
         Cells.
-    crossing : float [s]
+    crossing [s]
         No step may be longer: the shortest time of a wave through one of them.
-    failures : mapping of int to str
+    failures
         Meaning of a status.
-    losses : tuple of str
+    losses
         Names of the three losses.
-    doubts : callable
+    doubts
         Sentences on a finished run, of losses and throughput [J], largest Reynolds number and its
         time [s].
     """
@@ -452,11 +446,9 @@ class SideRow:
 
     Parameters
     ----------
-    component : str
-    law : SideLaw
-    element, branch : int
+    element, branch
         Number of the row that the law belongs to; the other one is -1.
-    placement : int
+    placement
         Parameter of that row from which on it takes the placement of the law; -1 if it takes none.
     """
 
@@ -476,35 +468,32 @@ class LimitRow:
 
     Parameters
     ----------
-    component : str
+    component
         Whose quantity it is.
-    quantity : str
+    quantity
         What it is called, as after "the": ``"gap"``.
-    unit : str
+    unit
         SI.
     valid : (float, float)
         Range of the law.  A motion that the stops allow may not leave it; checked before the run.
-    slack : float
+    slack
         What contacts may give way beyond that range before it is warned of, once.
     usable : (float, float)
         Beyond it the run stops.
-    law : str
+    law
         Whose range it is: ``"the magnetic circuit of 'coil'"``; where ranges of several rows bear
         the same name, only the first that is left is warned of.
-    source : str
+    source
         Where the range comes from; may be empty.
-    effect : callable
+    effect
         What is wrong at a value outside, as a sentence.
-    advice : str
+    advice
         What to try.
-    key : str
+    key
         Key of the component that sets the start; empty where no key does.
-    start : float
     ports : tuple of (int, float)
         Handle of a mechanical port, and its factor.
-    node : int, optional
-    channel : str
-    at_start : bool
+    at_start
         Whether it is looked at where a run begins alone.
     """
 

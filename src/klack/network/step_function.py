@@ -248,10 +248,10 @@ def python_step(
 
     Parameters
     ----------
-    function : callable
+    function
         ``function(par, state, inp, out)`` with numpy arrays, the first three read-only; writes
         ``out`` and returns a status or None.  An exception stops the run and is raised again.
-    parameters, states, inputs, outputs : int
+    parameters, states, inputs, outputs
         Lengths of the arrays; see the module text for their contents.
     """
     return _PythonStep(function, (parameters, states, inputs, outputs))

@@ -51,19 +51,19 @@ class RingFrames:
 
     Parameters
     ----------
-    label, unit : str
+    label, unit
         Of the values.
-    time : array, shape (k,)
+    time (k,)
         In ``time_unit``.
-    values : array, shape (k, S)
+    values (k, S)
         Sector ``s`` has its middle at the angle ``2 pi s / S`` from x towards y.
     marked : array of bool, shape (k, S)
         Sectors drawn in grey.
-    mark : str
+    mark
         What grey means.
-    captions : tuple of str
+    captions
         What stands with each moment beside its time.
-    prefix : str
+    prefix
         What stands before the time.
     """
 
@@ -240,13 +240,13 @@ class Chart:
 
     Parameters
     ----------
-    name : str
+    name
         Word for links and file names.
-    title : str
+    title
         What is shown.
-    panels : tuple of Panel
+    panels
         From top to bottom.
-    note : str
+    note
         What the reader has to know and to look for.
     """
 
@@ -307,9 +307,9 @@ class ParallelChart:
 
     Parameters
     ----------
-    axes : tuple of ParallelAxis
+    axes
         From left to right.
-    coloured : int
+    coloured
         Axis whose values give the lines their colours.
     """
 

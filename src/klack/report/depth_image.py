@@ -35,7 +35,7 @@ class Camera:
 
     Parameters
     ----------
-    azimuth, elevation : float [rad]
+    azimuth, elevation [rad]
         Of the viewer, seen from the bodies; z is upwards.
     """
 
@@ -58,7 +58,7 @@ class Window:
 
     Parameters
     ----------
-    left, bottom, pixel : float [m]
+    left, bottom, pixel [m]
         ``pixel`` is the side of one.
     """
 
@@ -75,8 +75,8 @@ class Quarter:
 
     Parameters
     ----------
-    corner : array, shape (3,) [m]
-    normals : array, shape (2, 3)
+    corner (3,) [m]
+    normals (2, 3)
         Both have to point towards the viewer.
     """
 
@@ -90,13 +90,13 @@ class Seen:
 
     Parameters
     ----------
-    body : int array, shape (rows, columns)
+    body (rows, columns)
         Place of the body; -1 where there is none.
-    triangle : int array, shape (rows, columns)
+    triangle (rows, columns)
         Of that body; -1 on a cut face.
-    cut : int array, shape (rows, columns)
+    cut (rows, columns)
         Which plane of the quarter is seen, 0 or 1; -1 on a surface.
-    depth : array, shape (rows, columns) [m]
+    depth (rows, columns) [m]
         Along the line of sight; infinite where there is nothing.
     """
 
@@ -153,11 +153,11 @@ def outlines(surface: Ints, depth: Floats, slope: Floats) -> NDArray[np.bool_]:
 
     Parameters
     ----------
-    surface : int array, shape (rows, columns)
+    surface (rows, columns)
         A number for each smooth surface.
-    depth : array, shape (rows, columns)
+    depth (rows, columns)
         In sides of a pixel.
-    slope : array, shape (rows, columns)
+    slope (rows, columns)
         Change of depth per pixel that the surface itself may have.
     """
     drawn = np.zeros(surface.shape, dtype=bool)

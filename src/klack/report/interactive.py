@@ -42,7 +42,7 @@ def plotly_ring(chart: RingFrames, layout: dict[str, Any]) -> dict[str, Any]:
 
     Parameters
     ----------
-    layout : dict
+    layout
         Looks that all figures share.
     """
     count, unit = chart.sectors, escape(chart.unit)

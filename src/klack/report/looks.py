@@ -101,9 +101,9 @@ def thinned(
 
     Parameters
     ----------
-    x : array, shape (n,)
+    x (n,)
         Rising.
-    y : array, shape (n,)
+    y (n,)
         nan breaks the curve; it is not thinned then.
     window : (low, high), optional
         Only this part of x is kept.

@@ -77,7 +77,7 @@ class Content:
 
     Parameters
     ----------
-    numbers : Table
+    numbers
         The key numbers per level.
     definitions, limits : tuple of (term, text)
     """
@@ -100,7 +100,7 @@ class Content:
 
         Parameters
         ----------
-        result, case : str
+        result, case
             As typed at a terminal; empty if not known.
         """
         known = {"RESULT": result, "CASE": case}

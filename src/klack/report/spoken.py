@@ -22,7 +22,7 @@ def spoken(figure: dict[str, Any]) -> str:
 
     Parameters
     ----------
-    figure : dict
+    figure
         With ``data`` and ``layout`` of ``Plotly.newPlot``, or with parallel ``axes``.
 
     Examples

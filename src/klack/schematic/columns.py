@@ -36,13 +36,13 @@ class Plan:
 
     Parameters
     ----------
-    columns : mapping of str to int
+    columns
         Of every component.
     ports : mapping of str to tuple of PlannedPort
         Of every component, in the order of its class.
-    nodes : mapping of int to Node
+    nodes
         Those that are drawn as wires.
-    homes : mapping of int to int
+    homes
         Column of the component that rules a node, to which its wires lead.
     """
 

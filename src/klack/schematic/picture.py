@@ -40,14 +40,13 @@ class Schematic:
 
     Parameters
     ----------
-    symbols : tuple of Symbol
+    symbols
         One for each component, by its ``component``; marks and junctions have none.
-    labels : tuple of Label
-    leads : tuple of Lead
+    leads
         From the edges of the cells to the symbols.
-    wires : tuple of Wire
+    wires
         One for each node with two ports or more.
-    box : Box
+    box
         Round all of it.
     """
 

@@ -25,10 +25,9 @@ class Run:
 
     Parameters
     ----------
-    node : int
-    left, right : tuple of float
+    left, right
         Heights of its ports in the left and in the right column.
-    low, high : float
+    low, high
         Upper and lower end of its trunk.
     """
 

@@ -29,9 +29,9 @@ class LowPass:
 
     Parameters
     ----------
-    cut_off : float [Hz]
+    cut_off [Hz]
         Where 3 dB are lost.
-    order : int
+    order
         Poles.
     kind : {"bessel", "butterworth"}
     """
@@ -78,10 +78,10 @@ def low_passed(values: Floats, poles: NDArray[np.complex128], step: float) -> Fl
 
     Parameters
     ----------
-    values : array, shape (..., n)
+    values (..., n)
         Samples; before the first one the signal is taken to rest there.
-    poles : complex array, shape (order,) [1/s]
-    step : float [s]
+    poles (order,) [1/s]
+    step [s]
 
     Examples
     --------

@@ -16,13 +16,12 @@ class TimeSeries:
 
     Parameters
     ----------
-    step : float [s]
-    values : array, shape (n,) [unit]
-    unit : str
+    step [s]
+    values (n,) [unit]
+    unit
         For example ``"N"``.
-    start : float [s]
+    start [s]
         Time of the first value.
-    name : str
     """
 
     step: float
@@ -58,13 +57,12 @@ class Spectrum:
 
     Parameters
     ----------
-    frequency : array, shape (k,) [Hz]
+    frequency (k,) [Hz]
         Uniform, from 0.
-    values : array, shape (k,) [unit]
+    values (k,) [unit]
         Complex for a spectrum, real for a density.
-    unit : str
+    unit
         For example ``"N s"``.
-    name : str
     """
 
     frequency: NDArray[np.float64]

@@ -20,9 +20,8 @@ def rigid_mass_body(name: str, mass: float, *, port: str = "contact") -> Reduced
 
     Parameters
     ----------
-    name : str
-    mass : float [kg]
-    port : str
+    mass [kg]
+    port
         Name of its one port.
     """
     require_positive(f"rigid_mass_body '{name}': mass", mass, "kg")
@@ -48,8 +47,7 @@ def fixed_body(name: str, *, port: str = "contact") -> ReducedBody:
 
     Parameters
     ----------
-    name : str
-    port : str
+    port
         Name of its one port.
     """
     return ReducedBody(
@@ -89,12 +87,10 @@ def rod_body(
 
     Parameters
     ----------
-    name : str
     length, area : float [m], [m^2]
     young, density : float [Pa], [kg/m^3]
-    elastic_modes : int
     support : "free" or "bottom"
-    damping : float [-]
+    damping [-]
         Ratio of every elastic mode.
 
     Examples

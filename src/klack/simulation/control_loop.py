@@ -46,12 +46,11 @@ class ControlLoop:
 
     Parameters
     ----------
-    network : CompiledNetwork
+    network
         Its parameters are overwritten.
-    recorder : Recorder
-    look : float [s]
+    look [s]
         Time between two looks at the network.
-    begun : int
+    begun
         Looks before the start of this run, of one that continues.
     """
 

@@ -73,24 +73,24 @@ class Lines(NamedTuple):
 
     Parameters
     ----------
-    step : float [s]
+    step [s]
         Fine step.
-    coarse : int
+    coarse
         Fine steps of a coarse step.
-    near : int
+    near
         Fine steps of a step between both.
     node : array of int, shape (2 n,)
         Hydraulic node of each end.
-    impedance : array, shape (n,) [Pa s/m^3]
-    resistance : array, shape (n,) [Pa s/m^3]
+    impedance (n,) [Pa s/m^3]
+    resistance (n,) [Pa s/m^3]
         Steady friction of one whole lump.
-    vapour : array, shape (n,) [Pa]
+    vapour (n,) [Pa]
         ``P`` in an open cavity, about ambient.
     first_segment : array of int, shape (n + 1,)
         The segments of a line, from a to b, are ``first_segment[line] : first_segment[line + 1]``.
     depth : array of int, shape (s,)
         Samples under way in each wave: whole steps of the delay, plus one.
-    fraction : array, shape (s,) [-]
+    fraction (s,) [-]
         Rest of the delay, in steps.
     start : array of int, shape (s, 2)
         Where the memory of the wave towards b (0) and towards a (1) starts in the samples; it is
@@ -102,15 +102,15 @@ class Lines(NamedTuple):
         Terms of frequency-dependent friction of each line.
     first_memory : array of int, shape (n,)
         Where the memories of a line start; ordered by lump, then by term.
-    impedance_of_term : array, shape (3, k) [Pa s/m^3]
+    impedance_of_term (3, k) [Pa s/m^3]
         Mean ``dp / (q - i)`` of one whole lump over a fine (0), a coarse (1) and a near step (2).
-    decay : array, shape (3, k) [-]
+    decay (3, k) [-]
         Share of ``q - i`` left after such a step.
-    heat : array, shape (3, k) [Pa s^2/m^3]
+    heat (3, k) [Pa s^2/m^3]
         Loss of one whole lump in a step over ``(q - i)^2``.
-    inductance : array, shape (k,) [Pa s^2/m^3]
+    inductance (k,) [Pa s^2/m^3]
         Of one whole lump, ``gain / rate``.
-    lump : array, shape (3, n) [Pa s/m^3]
+    lump (3, n) [Pa s/m^3]
         ``dp / q`` of one whole lump without memory: its resistance and all its terms.
     """
 
@@ -140,19 +140,19 @@ class LineState(NamedTuple):
 
     Parameters
     ----------
-    samples : array [Pa]
+    samples [Pa]
         All waves ``w``, means over fine steps.
     head : array of int, shape (s,)
         Oldest sample under way in both waves of a segment, from its start.
-    memory : array [m^3/s]
+    memory [m^3/s]
         Flows ``i_k`` of the friction terms; counted into the line at its ends, towards b inside.
-    cavity : array, shape (s,) [m^3]
+    cavity (s,) [m^3]
         Vapour between a segment and the next one of its line.
-    incoming : array, shape (s, 2) [Pa]
+    incoming (s, 2) [Pa]
         Scratch: waves that leave each segment in the present step, as in ``Lines.start``.
-    scatter : array, shape (n,) [J]
+    scatter (n,) [J]
         Scratch: energy that interpolation and averaging take in the present step.
-    fastest : array, shape (n,) [m^3/s]
+    fastest (n,) [m^3/s]
         Largest flow through an end since the start of the run, whichever its direction.
     moment : array of int, shape (n, 2)
         Fine steps since then until that flow, and until now.
@@ -178,14 +178,13 @@ def compile_lines(
 
     Parameters
     ----------
-    rows : sequence of LineRow
-    step : float [s]
+    step [s]
         Fine step.
-    coarse : int
+    coarse
         Fine steps of a coarse step; 1 without coarse steps.
-    near : int
+    near
         Fine steps of a step between both.
-    ambient_pressure : float [Pa]
+    ambient_pressure [Pa]
         From which ``P`` counts.
 
     Raises
@@ -255,9 +254,9 @@ def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: Array
 
     Parameters
     ----------
-    pressure : array, shape (2 n,) [Pa]
+    pressure (2 n,) [Pa]
         ``P`` at the ends, about ambient: a and b of each line.
-    flow : array, shape (n,) [m^3/s]
+    flow (n,) [m^3/s]
         From a to b; 0 starts a line at rest.
     """
     ends = np.broadcast_to(np.asarray(pressure, dtype=float), lines.node.shape)
@@ -383,9 +382,9 @@ def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector)
 
     Parameters
     ----------
-    m : int
+    m
         Fine steps of this step: 1, ``lines.near`` or ``lines.coarse``.
-    c, Z : array, shape (2 n,)
+    c, Z (2 n,)
         Written.
     """
     level = _level(lines, m)
@@ -428,11 +427,11 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
 
     Parameters
     ----------
-    m : int
+    m
         As in :func:`lines_incoming`.
-    q : array, shape (2 n,) [m^3/s]
+    q (2 n,) [m^3/s]
         Flow into each end, mean over the step.  The work that came in is ``(c + Z q) q m h``.
-    books : array, shape (n, 3) [J]
+    books (n, 3) [J]
         Losses of each line since the start, see :data:`LINE_LOSSES`; added to.
     """
     level = _level(lines, m)

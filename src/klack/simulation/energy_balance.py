@@ -23,17 +23,17 @@ def check_energy_balance(
 
     Parameters
     ----------
-    run : str
+    run
         What was run, start of the text.
-    residual : float [-]
+    residual [-]
         Residual of the energy balance, over the energy throughput.
-    least_loss : float [-]
+    least_loss [-]
         Smallest entry of the losses, over the energy turned over; below zero it is a source.
-    limit : float [-]
+    limit [-]
         What the solver promises.
-    advice : str
+    advice
         What to try, a clause without full stop.
-    loss_limit : float, optional [-]
+    loss_limit [-]
         What it promises of losses; ``limit`` by default.
 
     Raises

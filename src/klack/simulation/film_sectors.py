@@ -41,17 +41,17 @@ class SectorPressure:
 
     Parameters
     ----------
-    time : array, shape (k,) [s]
+    time (k,) [s]
         Middle of each step.
-    angles : array, shape (S,) [rad]
+    angles (S,) [rad]
         Middles of the sectors, from +x towards +y.
-    pressure : array, shape (k, S) [Pa]
+    pressure (k, S) [Pa]
         Mean over each sector, above ambient.
     cavitates : array of bool, shape (k, S)
         Whether the tension is the largest that the film bears.
-    height : array, shape (k, S) [m]
+    height (k, S) [m]
         Mean height of the film in each sector at the end of the step.
-    axial_force : array, shape (k,) [N]
+    axial_force (k,) [N]
         Of all sectors and of the drag along a cone; to be compared with the recorded one.
     """
 
@@ -68,8 +68,7 @@ def sector_pressure(film: FilmMoments, at: NDArray[np.int64] | None = None) -> S
 
     Parameters
     ----------
-    film : FilmMoments
-    at : int array, optional
+    at
         Moments; all by default.
     """
     land = film.land

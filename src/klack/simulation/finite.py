@@ -15,11 +15,11 @@ def require_finite(run: str, step: float, record: Mapping[str, NDArray[np.floati
 
     Parameters
     ----------
-    run : str
+    run
         What was run, start of the text.
-    step : float [s]
+    step [s]
         From one row of the record to the next.
-    record : mapping of str to array, shape (n, ...)
+    record (n, ...)
         What was recorded, by name; rows in order of time.
 
     Raises

@@ -55,14 +55,13 @@ class BodyBlock:
 
     Parameters
     ----------
-    body : ReducedBody
-    first, last : int
+    first, last
         Its modes are ``first <= i < last``.
-    basis : array, shape (m, m) [-]
+    basis (m, m) [-]
         Own modal coordinates from those of the kernel.
-    rest : array, shape (m,)
+    rest (m,)
         Rest position of the kernel's coordinates (their origin).
-    constant : array, shape (m,)
+    constant (m,)
         Modal force of the constant forces, springs' preload not included.
     springs : tuple of (shape (m,), stiffness, preload)
         In own modal coordinates.
@@ -96,10 +95,9 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
 
     Parameters
     ----------
-    system : ReducedSystem
     velocities : mapping of body name to float [m/s]
         Axial velocity of free bodies at the start, + in z; 0 for those not named.
-    step : float [s]
+    step [s]
     """
     blocks, omega, zeta, pushes, speeds = [], [], [], [], []
     first = 0
@@ -171,8 +169,7 @@ def propose_step(system: ReducedSystem, *, speed: float) -> float:
 
     Parameters
     ----------
-    system : ReducedSystem
-    speed : float [m/s]
+    speed [m/s]
         Of approach; a curved law is stiffest at the deepest indentation.
 
     Returns
@@ -285,21 +282,19 @@ class SystemRecord:
 
     Parameters
     ----------
-    system : ReducedSystem
-    integration_step, step : float [s]
+    integration_step, step [s]
         Of the integration, and of the records.
     force, peak_force, gap : array, shape (n, contacts) [N], [N], [m]
         Mean force, largest force of a step, mean gap of each interval.
-    displacement : array, shape (n + 1, contacts, 2) [m]
+    displacement (n + 1, contacts, 2) [m]
         Of port a and port b of each contact, from the start.
-    velocity : array, shape (n + 1, bodies) [m/s]
+    velocity (n + 1, bodies) [m/s]
         Centre of mass along z; zero for a supported body.
-    external_force : array, shape (n, bodies) [N]
+    external_force (n, bodies) [N]
         Mean axial force of constant forces and springs, + in z.
-    final_position, final_velocity : tuple of array
+    final_position, final_velocity
         Modal coordinates of each body at the end, in its own modes.
-    ledger : EnergyLedger
-    pressed : tuple of float [m]
+    pressed [m]
         Largest indentation of each contact since its faces were new, of laws that yield; else 0.
     """
 
@@ -322,7 +317,7 @@ class SystemRecord:
 
         Parameters
         ----------
-        contact : int
+        contact
             Its place among ``system.contacts``.
         """
         pair = self.system.contacts[contact]
@@ -362,14 +357,13 @@ def simulate(
 
     Parameters
     ----------
-    system : ReducedSystem
     velocities : mapping of body name to float [m/s]
         Axial velocity at the start, + in z; bodies not named are at rest.
-    step : float [s]
+    step [s]
         Of the integration, see :func:`klack.simulation.impact.propose_step`.
-    duration : float [s]
+    duration [s]
         Rounded up to whole records.
-    steps_per_record : int
+    steps_per_record
         Records keep the mean force (the impulse is exact) and the largest force of a step.
 
     Raises
@@ -490,14 +484,12 @@ def simulate_impact(
 
     Parameters
     ----------
-    system : ReducedSystem
-    speed : float [m/s]
+    speed [m/s]
         Of body a of the contact, in -z; everything else is at rest.
-    duration : float [s]
+    duration [s]
     step : float [s] or None
         ``None``: :func:`klack.simulation.impact.propose_step`.
-    steps_per_record : int
-    contact : int
+    contact
         Which contact is returned.
 
     Examples

@@ -122,10 +122,9 @@ def missing_peak(
 
     Parameters
     ----------
-    record : InterfaceRecord
-    peak_time : float [s]
+    peak_time [s]
         Middle of the step with the peak.
-    restitution : float [-]
+    restitution [-]
         Of the impact; nan where it is not over.
 
     Returns
@@ -164,8 +163,7 @@ def late_by_swinging(
 
     Parameters
     ----------
-    record : InterfaceRecord
-    time : float [s]
+    time [s]
         Of a first touch.
 
     Returns

@@ -69,10 +69,9 @@ class ImpactFinder:
 
     Parameters
     ----------
-    rows : Rows
-    start : float [s]
+    start [s]
         Of the run; what is closed then was not hit.
-    step : float [s]
+    step [s]
         The shortest that the run is made of, but for parts of one that is cut.
     """
 
@@ -113,11 +112,11 @@ class ImpactFinder:
 
         Parameters
         ----------
-        time : array, shape (n,) [s]
+        time (n,) [s]
             After the last time that was fed.
-        velocity : mapping of str to array, shape (n,) [m/s]
+        velocity (n,) [m/s]
             Of the centre of mass of each body that moves, at these times, by component.
-        steps : sequence of array, shape (k, 6)
+        steps (k, 6)
             Per interface: start, length [s], contact force, film force [N], gap [m], speed of the
             gap at its start [m/s] of every step in which it carried force, up to the last of these
             times.  The speed is asked where the contact is open or closes; nan where not known.

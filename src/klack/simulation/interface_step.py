@@ -100,8 +100,8 @@ def interface_store(
     ----------
     kind, law_data, law_start
         As in :func:`solve_interface`.
-    series : float [m/N]
-    g, e : float [m]
+    series [m/N]
+    g, e [m]
         Gap of the bodies and compression of the series compliance.
     """
     stored = 0.0
@@ -141,25 +141,25 @@ def solve_interface(
     kind, law_data, law_start
         A contact law as flat numbers, see :class:`klack.contact.laws.FlatLaw`, from
         ``law_data[law_start]`` on; :data:`NO_LAW` for none.
-    chi_over_h : float [1/m]
+    chi_over_h [1/m]
         Dissipation factor of Hunt and Crossley, ``alpha / (v0 h)``; 0 for an elastic law.
     cubic, linear, cut_off, suction
         Film, see :class:`klack.network.rows.FilmRow`; ``cubic = linear = 0`` for none.
-    h : float [s]
+    h [s]
         Step, above 0.
-    G : float [m/N]
+    G [m/N]
         Change of the gap at the end of the step by a unit force during it, above 0.
-    series : float [m/N]
+    series [m/N]
         Compliance in series; 0 for none.
-    g0, g_free : float [m]
+    g0, g_free [m]
         Gap of the bodies at the start, and at the end without this interface's force.
-    e0 : float [m]
+    e0 [m]
         Compression of the series compliance at the start.
-    guess : float [N]
+    guess [N]
         Total force, from the last step or sweep.
-    hint : int
+    hint
         Interval of a table law that was used last.
-    film_before : float [N]
+    film_before [N]
         Film force of the last step, if the contact closed in it; else 0.
 
     Returns
@@ -232,7 +232,7 @@ def open_film(
     ----------
     cubic, linear, cut_off, suction, h, series, e0, guess
         As of :func:`solve_interface`.
-    g0, g1 : float [m]
+    g0, g1 [m]
         Gap of the bodies at the start and at the end, with the compression above 0.
 
     Returns

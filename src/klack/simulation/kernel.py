@@ -424,7 +424,6 @@ def run_steps(
 
     Parameters
     ----------
-    steps_per_record : int
     q, v : array (m,)
         Modal state, overwritten by the state at the end.  Elastic modes are counted from their rest
         position under the constant forces.

@@ -40,8 +40,7 @@ class Limits:
 
     Parameters
     ----------
-    network : CompiledNetwork
-    columns : sequence of str
+    columns
         Names of the recorded columns, displacements of all ports first: see
         :func:`klack.simulation.network_record.record_points`.
     """
@@ -69,8 +68,8 @@ class Limits:
 
         Parameters
         ----------
-        points : array, shape (n, columns)
-        time : array, shape (n,) [s]
+        points (n, columns)
+        time (n,) [s]
 
         Returns
         -------

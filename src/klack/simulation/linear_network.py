@@ -44,10 +44,8 @@ class LinearNetwork:
 
     Parameters
     ----------
-    system : LinearSystem
     adds : mapping of int to (int, float)
         Outputs that one component adds at a place, each with the input there and its sign.
-    doubts : tuple of str
     """
 
     system: LinearSystem
@@ -66,11 +64,11 @@ def linear_network(
 
     Parameters
     ----------
-    network : CompiledNetwork
+    network
         Put to rest, with everything that drives it constant.
-    h : float [s]
+    h [s]
         Step whose laws are linearised, and half of it.
-    held : collection of str
+    held
         Bodies that do not move.
     drives : mapping of str to (str, Rows)
         By the name of an input: its unit, and the rows with one such unit more of it.

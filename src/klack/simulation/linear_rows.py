@@ -52,12 +52,11 @@ class RowPoint:
     Parameters
     ----------
     row : ElementRow or BranchRow
-    state : array
-    y : array [m]
+    y [m]
         Of its ports.
     p, density, compressed : array [Pa], [kg/m^3], [kg/(m^3 Pa)]
         Of both nodes of a branch, with the slope of the density; empty for an element.
-    inputs : array, shape (inputs, parameters)
+    inputs (inputs, parameters)
         Directions in which its parameters change.
     """
 
@@ -90,19 +89,19 @@ class LinearRow:
 
     Parameters
     ----------
-    kept : tuple of int
+    kept
         States that matter: what they are changes what the row does.  Of states that a constraint
         ties to each other (fluxes without eddy currents) some are left, less what the constraint
         makes of ports and pressures.
-    rate : array, shape (kept, columns)
+    rate (kept, columns)
         Their derivatives with time.
-    acts : array, shape (flows + forces, columns)
+    acts (flows + forces, columns)
         Mass flow of a branch, then the forces.
-    channels : array, shape (channels, columns)
+    channels (channels, columns)
         Recorded states.
-    doubt : float
+    doubt
         Difference between the laws of two steps over the largest of their kind.
-    kink : float
+    kink
         The same between the laws to both sides of the point.
     """
 

@@ -64,16 +64,15 @@ class LinearSystem:
 
     Parameters
     ----------
-    A, B, C, D : array
+    A, B, C, D
         From states and inputs to rates and outputs.
-    Bw, Dw : array
+    Bw, Dw
         From waves that arrive.
-    Cz, Dz, Dzw : array
+    Cz, Dz, Dzw
         To waves that leave, from states, inputs and waves that arrive.
-    delays : array [s]
-    waves : tuple of str
+    delays [s]
+    waves
         Component of each delay.
-    states, inputs, outputs : tuple of Signal
     """
 
     A: Matrix
@@ -98,11 +97,11 @@ class Mode:
 
     Parameters
     ----------
-    root : complex [1/s]
+    root [1/s]
         Imaginary part zero or above.
-    uncertainty : float [1/s]
+    uncertainty [1/s]
         By which round-off may move it.
-    participation : mapping of str to float
+    participation
         By component, the largest first; they add up to one.
     """
 

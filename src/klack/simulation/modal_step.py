@@ -161,7 +161,7 @@ def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
     ----------
     W : pointer to rows * ROW numbers
         The block: state, step matrices, pending matrices, scratch, port shapes.
-    n : int
+    n
         Modes in it, a multiple of four.
     F : array (ports,) [N]
         Pending forces; those of this body are ``F[port0:port1]``.
@@ -222,7 +222,7 @@ def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int, row: int) -> f
         Block whose state changes, and the same block for the step of these forces.
     n, F, port0, port1
         As of :func:`advance`.
-    row : int
+    row
         ``ROW_B1`` for constant forces, ``ROW_R1`` for ones that rise by ``F`` about no mean.
 
     Returns

@@ -90,18 +90,15 @@ class CompiledNetwork:
         What stays, with the states of bodies, elements, branches and waves.
     node_state, line_state, interface_state, slider_state
         What changes from step to step.
-    accounts : Accounts
     account_kind : array of int
         ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.rows``.
-    kinks : array [s]
+    kinks [s]
         Of :func:`klack.simulation.step_sizes.kinks`.
-    account_names : tuple of str
-    ports : tuple of PortName
-    node_order : tuple of int
+    node_order
         Handle of every node of the loop.
-    body_blocks : array, shape (bodies + 1,)
+    body_blocks (bodies + 1,)
         First block of each body.
-    moving : MovingBodies or None
+    moving
         Bodies that meet point by point, instead of at interfaces.
     """
 

@@ -51,14 +51,13 @@ class Recorder:
 
     Parameters
     ----------
-    network : CompiledNetwork
-    records : int
+    records
         Of the whole run, beside that of its start.
-    looks : int
+    looks
         Looks at the network in a record; the records of a chunk are one look apart.
-    chunk : int
+    chunk
         Most looks of a chunk.
-    fine : int
+    fine
         Most steps of a chunk.
     """
 
@@ -166,11 +165,11 @@ class Recorder:
 
         Parameters
         ----------
-        acting : array
+        acting
             Forces of elements [N], flows [kg/s], forces of interfaces and of sliders [N], then
             peaks of interfaces [N] and forces of driven bodies [N]; a state of an earlier version
             lacks the last.
-        states : array, optional
+        states
             Recorded states of elements, then of branches; those that the rows hold by default.
         """
         means, peaks = len(self.means), len(self.peaks)
@@ -332,10 +331,9 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
 
     Parameters
     ----------
-    network : CompiledNetwork
-    speeds : array [m/s]
+    speeds [m/s]
         Of all ports, the ground last.
-    h : float [s]
+    h [s]
         Length of that step.
 
     Returns

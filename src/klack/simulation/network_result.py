@@ -31,9 +31,9 @@ class ChannelData:
 
     Parameters
     ----------
-    unit : str
+    unit
         SI.
-    values : array, shape (n,)
+    values (n,)
         At :attr:`NetworkResult.time`; forces and flows are means over the record before, the first
         one the value at the start.
     """
@@ -48,14 +48,14 @@ class InterfaceRecord:
 
     Parameters
     ----------
-    time : array, shape (k,) [s]
+    time (k,) [s]
         Start of the step.
-    step : array, shape (k,) [s]
-    contact_force, film_force : array, shape (k,) [N]
+    step (k,) [s]
+    contact_force, film_force (k,) [N]
         Means over the step, above zero when they press; a film may pull.
-    gap : array, shape (k,) [m]
+    gap (k,) [m]
         At the end of the step, negative when closed; of the bodies, without the series compliance.
-    complete : bool
+    complete
         False when there were more than a million of these steps: the later ones are missing.
         Impacts are found nevertheless, and means of the forces are among the channels.
     """
@@ -74,28 +74,28 @@ class ImpactEvent:
 
     Parameters
     ----------
-    stop : str
+    stop
         Component of the interface.
-    time : float [s]
+    time [s]
         First touch.
-    approach_speed : float [m/s]
+    approach_speed [m/s]
         Closing speed of the centres of mass when the stop begins to be felt: at first touch, or the
         highest one since its film began to press.
-    peak_force : float [N]
+    peak_force [N]
         Of contact and film together.
-    peak_time : float [s]
-    contact_time : float [s]
+    peak_time [s]
+    contact_time [s]
         Closed, all contacts of the impact together; up to rest if the bodies come to rest, which
         is when they have been closed for :func:`~klack.simulation.rest.rest_time`.
-    separation_time : float [s]
+    separation_time [s]
         End of the last contact, with the rest; nan if it stays closed to the end of the run.
-    impulse : float [N s]
+    impulse [N s]
         Of contact and film, while it presses before and pulls after the contact; up to rest.
-    restitution : float [-]
+    restitution [-]
         Opening speed over approach speed of the centres of mass; 0 if the bodies come to rest, nan
         if the run ends in the contact.  With a film the opening speed is the highest one while it
         pulls.
-    energy_loss : float [J]
+    energy_loss [J]
         Kinetic energy of the centre of mass before less after; nan if the run ends in the contact.
     """
 
@@ -174,17 +174,17 @@ class StaticStart:
 
     Parameters
     ----------
-    displacement : mapping of str to float [m]
+    displacement [m]
         By ``"<body>.<port>"``.
-    pressure : mapping of str to float [Pa]
+    pressure [Pa]
         Of each volume, absolute.
-    stated : mapping of str to bool
+    stated
         Whether the case states that pressure; else it is that of steady flow.
-    flow : mapping of str to float [kg/s]
+    flow [kg/s]
         Of each branch and line.
-    residual : mapping of str to float [N]
+    residual [N]
         Force that is left on each free body.
-    notes : tuple of str
+    notes
         What has no steady state, and how it starts instead.
     """
 
@@ -202,11 +202,11 @@ class PressedFaces:
 
     Parameters
     ----------
-    set : float [m]
+    set [m]
         By which they part later than when they were new.
-    force : float [N]
+    force [N]
         Largest force so far; they are elastic up to it.
-    known_force : float [N]
+    known_force [N]
         Up to which their static loops go.
     """
 
@@ -221,17 +221,17 @@ class StepCounts:
 
     Parameters
     ----------
-    fine : int
+    fine
         Fine steps that bodies, elements and fluid took together.
-    flight : int
+    flight
         Macro steps in flight or at rest.
-    near : int
+    near
         Macro steps about a touch, in sub-steps of the bodies.
-    sub : int
+    sub
         These sub-steps.
-    sub_fine : int
+    sub_fine
         Those of them that were fine ones.
-    repeats : int
+    repeats
         Steps done again, since their guess of the forces of elements and fluid had missed too much.
     """
 
@@ -254,35 +254,34 @@ class NetworkResult:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Records, evenly spaced from the start.
-    channels : mapping of str to ChannelData
+    channels
         ``"<component> <label>"``, for example ``"needle velocity"`` (centre of mass),
         ``"needle.tip displacement"``, ``"seat contact force"``, ``"seat film force"``,
         ``"seat gap"``, ``"coil current"``, ``"sac pressure"``, ``"spring.end force"``.
-    interfaces : mapping of str to InterfaceRecord
+    interfaces
         By component.
-    events : tuple of ImpactEvent
+    events
         In order of time.
-    books : EnergyBooks
-    sizes : StepSizes
+    sizes
         Lengths of the steps.
-    steps : StepCounts
+    steps
         How many of them.
-    wall_time : float [s]
+    wall_time [s]
         Of the time loop.
-    state : mapping of str to array
+    state
         Everything needed to continue: the continued run is bit-identical.  An impact that is not
         over is reported again, whole, by the continued run, with the same stop and time.
-    failure : str
+    failure
         Why the run ended before its time, all else is the record up to there; empty if it did not.
-    start : StaticStart or None
+    start
         The equilibrium from which it began; None for a continued or free start.
-    path : SpatialPath or None
+    path
         Way of a needle in three dimensions; not stored with a result.
-    faces : mapping of str to PressedFaces
+    faces
         By component, where faces yield.
-    spatial_impacts : tuple of SpatialImpact or None
+    spatial_impacts
         What was recorded of the first impacts of bodies that meet point by point; empty for a
         motion along the axis, None in results of versions that did not record it.
     """
@@ -323,8 +322,7 @@ class IncompleteRunError(ConvergenceError):
 
     Parameters
     ----------
-    text : str
-    result : NetworkResult
+    result
         With the text as its ``failure``.
     """
 

@@ -114,35 +114,35 @@ def simulate_network(
 
     Parameters
     ----------
-    rows : Rows
+    rows
         From :meth:`klack.network.network.Network.rows`.
-    duration : float [s]
+    duration [s]
         Rounded up to whole records.
     accuracy : "normal" or "fine"
         Chooses the steps.  ``"normal"``: first impacts to 0.05 % and 0.05 us; ``"fine"`` takes
         about four times as long.
     step : float [s], optional
         Fine step, in place of that of the accuracy (20 ns or 5 ns).
-    coarse : int, optional
+    coarse
         Fine steps of a macro step in flight, in place of what
         :func:`klack.simulation.step_sizes.step_sizes` chooses; 1 switches macro steps off: bodies,
         elements and fluid take every fine step together.
-    sizes : StepSizes, optional
+    sizes
         All steps, in place of what the three above choose.
-    record : float [s]
+    record [s]
         Spacing of the records; rounded to whole macro steps.  Impacts do not depend on it: they
         are found during the run, at most 1.5 us (or a macro step) apart.  The memory of a
         run is that of its records, eight bytes per channel, and 50 MB.
     start : "rest" or "free"
         ``"rest"``: bodies start in static equilibrium under all forces of the first moment;
         ``"free"``: undeformed, with the speeds of their rows.
-    state : mapping of str to array, optional
+    state
         :attr:`NetworkResult.state` of a former run of the same network and steps, to continue from;
         ``start`` then has no meaning, time continues, and the energy balance starts there.
-    spatial : SpatialMotion, optional
+    spatial
         Bodies that meet point by point, in place of the interfaces of the network, which only give
         names to what is recorded.
-    progress : callable
+    progress
         Told the fraction done.
 
     Raises

@@ -67,14 +67,14 @@ def largest_friction(
 
     Parameters
     ----------
-    coulomb, excess : float [N]
+    coulomb, excess [N]
         ``Fc`` and ``Fs - Fc``, not negative.
-    stribeck : float [m/s]
-    viscous : float [N s/m]
-    h : float [s]
-    G : float [m/N]
+    stribeck [m/s]
+    viscous [N s/m]
+    h [s]
+    G [m/N]
         Way per force, above 0.
-    way : float [m]
+    way [m]
         Without the force.
     """
     yielding = 1.0 / (1.0 + G * viscous / h)
@@ -110,13 +110,13 @@ def slider_force(
 
     Parameters
     ----------
-    most : float [N]
+    most [N]
         Dry friction at most, see :func:`largest_friction`.
-    viscous : float [N s/m]
-    h : float [s]
-    G : float [m/N]
+    viscous [N s/m]
+    h [s]
+    G [m/N]
         Way per force, above 0.
-    D : float [m/(N s)]
+    D [m/(N s)]
         Speed at the end of the step per force, above 0.
     way, speed : float [m], [m/s]
         Without the force.

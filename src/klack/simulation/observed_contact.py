@@ -33,12 +33,12 @@ class ObservedImpact:
 
     Parameters
     ----------
-    step : float [s]
-    force : array, shape (n,) [N]
+    step [s]
+    force (n,) [N]
         Mean over each step.
-    restitution : float [-]
+    restitution [-]
         Of the centre of mass of the upper body, at the end of the run.
-    energy : float [-]
+    energy [-]
         Of bodies and contact at the end, over that at the start: 1 where the gap is read where the
         force does its work.
     """
@@ -68,15 +68,15 @@ def observed_impact(
 
     Parameters
     ----------
-    upper, lower : ReducedBody
+    upper, lower
         Contact at their first ports.
     outputs : pair of array, shape (m,) [1/sqrt(kg)]
         Modal amplitudes of the displacement along z that the gap is made of, of the upper and of
         the lower body; those of the ports for a reciprocal contact.
-    stiffness : float [N/m]
-    speed : float [m/s]
+    stiffness [N/m]
+    speed [m/s]
         Of the upper body in -z, at first touch.
-    duration, step : float [s]
+    duration, step [s]
 
     Raises
     ------

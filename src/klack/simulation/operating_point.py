@@ -45,23 +45,23 @@ class OperatingPoint:
 
     Parameters
     ----------
-    start : StaticStart
+    start
         Displacements, pressures, flows, and the force that is left on each free body.
-    values : mapping of str to ChannelData
+    values
         Everything that a run records, one value each.
-    state : mapping of str to array
+    state
         From which :func:`~klack.simulation.network_run.simulate_network` continues with steps of
         the usual size.
-    inflow : mapping of str to float [m^3/s]
+    inflow [m^3/s]
         What still flows into each volume, at its density.
-    compliance : mapping of str to float [m/N]
+    compliance [m/N]
         Displacement of each free body per force on it.
-    friction : mapping of str to float [m]
+    friction [m]
         How far away from the point dry friction may hold each body that has some.
-    enclosed : tuple of str
+    enclosed
         Volumes from which no way that is open leads to a known pressure: they have that of the
         start of the search, or share it.
-    stable : bool
+    stable
         Whether a small push of the bodies is answered by a force back, the fluid at rest again.
     """
 
@@ -89,11 +89,11 @@ def operating_point(
 
     Parameters
     ----------
-    rows : Rows
+    rows
         From :meth:`klack.network.network.Network.rows`.
-    first : mapping of str to float [m]
+    first [m]
         Displacement of free bodies from which the search begins, by component; 0 by default.
-    held : collection of str
+    held
         Bodies that are held at that displacement.
 
     Raises

@@ -28,7 +28,7 @@ class Propagator:
 
     Parameters
     ----------
-    step : float [s]
+    step [s]
     A11, A12, A21, A22 : array [-], [s], [1/s], [-]
         State ``(q, q')`` at the end of the step from the state at its start.
     B1, B2 : array [s^2], [s]
@@ -73,11 +73,11 @@ def modal_propagator(
 
     Parameters
     ----------
-    omega : array, shape (m,) [rad/s]
+    omega (m,) [rad/s]
         Undamped angular frequencies, 0 for rigid modes.
-    damping : array, shape (m,) [-]
+    damping (m,) [-]
         Damping ratios, 0 or more.
-    step : float [s]
+    step [s]
     """
     require_positive("modal_propagator: step", step, "s")
     w, z = np.asarray(omega, dtype=float), np.asarray(damping, dtype=float)
@@ -124,9 +124,9 @@ def damping_loss(
 
     Parameters
     ----------
-    omega : array, shape (m,) [rad/s]
-    damping : array, shape (m,) [-]
-    step : float [s]
+    omega (m,) [rad/s]
+    damping (m,) [-]
+    step [s]
     """
     w, z = np.asarray(omega, dtype=float), np.asarray(damping, dtype=float)
     forms = np.zeros((6, w.size))

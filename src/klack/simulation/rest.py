@@ -33,8 +33,7 @@ def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 
     Parameters
     ----------
-    row : InterfaceRow
-    bodies : sequence of BodyRow or None
+    bodies
         Upper and lower one; None is the ground.
 
     Returns
@@ -53,9 +52,9 @@ def bounce_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 
     Parameters
     ----------
-    row : InterfaceRow
+    row
         With a law.
-    bodies : sequence of BodyRow or None
+    bodies
         Upper and lower one; None is the ground.
 
     Returns
@@ -82,10 +81,9 @@ def resting_dissipation(
 
     Parameters
     ----------
-    row : InterfaceRow
-    bodies : sequence of BodyRow or None
+    bodies
         Upper and lower one; None is the ground.
-    indentation : float [m]
+    indentation [m]
         Of the law, by the load.
 
     Returns
@@ -122,8 +120,7 @@ def mobility(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 
     Parameters
     ----------
-    row : InterfaceRow
-    bodies : sequence of BodyRow or None
+    bodies
         Upper and lower one; None is the ground.
 
     Returns

@@ -115,9 +115,9 @@ def call_rows(
 
     Parameters
     ----------
-    rows : StepRows
+    rows
         Elements or branches.
-    t, h : float [s]
+    t, h [s]
         Start and length of the step.
     y, v : array [m], [m/s]
         Of every port at the end of the step; the last one is the ground.

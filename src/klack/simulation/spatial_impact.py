@@ -19,18 +19,18 @@ class FilmLand:
 
     Parameters
     ----------
-    inner_radius, outer_radius : float [m]
+    inner_radius, outer_radius [m]
         Of the land, unrolled where it is a cone.
-    sectors, circles : int
+    sectors, circles
         As of :func:`klack.hydraulics.tilted_film.sector_film`.
-    viscosity : float [Pa s]
-    tension : float [Pa]
+    viscosity [Pa s]
+    tension [Pa]
         Largest mean tension of a sector.
-    lowest : float [m]
+    lowest [m]
         Height that roughness leaves.
-    slope : float [-]
+    slope [-]
         Axial force per force along the lift.
-    shear : float [N s]
+    shear [N s]
         Force over closing speed, times the height, of the flow along a cone: no pressure.
     """
 
@@ -51,10 +51,9 @@ class FilmMoments:
 
     Parameters
     ----------
-    land : FilmLand
-    time, step : array, shape (k,) [s]
+    time, step (k,) [s]
         Start and length of the step.
-    film_force : array, shape (k,) [N]
+    film_force (k,) [N]
         Mean axial force over the step.
     before, after : array, shape (k, 3) [m], [-]
         Lift and both tilts of the land at the start and at the end of the step.
@@ -74,15 +73,15 @@ class ModalMoments:
 
     Parameters
     ----------
-    bodies : tuple of str
+    bodies
         The needle first.
-    counts : tuple of int
+    counts
         Coordinates of each body, rigid ones first.
-    time : array, shape (k,) [s]
+    time (k,) [s]
         The first one is before the first touch.
-    coordinates : array, shape (k, M) [m sqrt(kg)]
+    coordinates (k, M) [m sqrt(kg)]
         Body by body.
-    shape_marks : array, shape (M,) [1/sqrt(kg)]
+    shape_marks (M,) [1/sqrt(kg)]
         By which the shapes of the modes are known again; empty for bodies without meshes.
     """
 
@@ -108,24 +107,24 @@ class SpatialImpact:
 
     Parameters
     ----------
-    number : int
+    number
         Of the impacts of the run that were recorded, from 1, in order of their first touch.
-    stop : str
+    stop
         Component.
-    edges : array, shape (n + 1,) [s]
+    edges (n + 1,) [s]
         Ends of the intervals, from the first touch.
-    sector_force : array, shape (n, S) [N]
+    sector_force (n, S) [N]
         Mean axial force of each sector over each interval.  Sector ``k`` lies between the angles
         ``2 pi k / S`` and ``2 pi (k + 1) / S``, from +x towards +y.
-    radius : float [m]
+    radius [m]
         Mean distance of the force from the axis of the stop.
-    spread : float [m]
+    spread [m]
         Standard deviation of that distance.
-    height : float [m]
+    height [m]
         Mean height of the force, in the drawing of the lower body of the stop.
-    film : FilmMoments or None
+    film
         Of a stop without a film, or whose film no tilt changes.
-    modes : ModalMoments or None
+    modes
         Of the first impacts of a run.
     """
 

@@ -44,11 +44,11 @@ def contacts_at_rest(
 
     Parameters
     ----------
-    kind, law, law0 : array
+    kind, law, law0
         Contact laws, as in :class:`klack.simulation.network_arrays.Interfaces`.
-    series : array [m/N]
+    series [m/N]
         Compliance behind each of them.
-    gap : array [m]
+    gap [m]
         Of the bodies; negative when they press on each other.
     """
     force, slope = np.zeros(gap.size), np.zeros(gap.size)
@@ -245,15 +245,15 @@ def at_rest(
         Where the densities were found last.
     column : array of int, shape (branches,)
         1 for a branch whose flow is a state: an unknown of its own, which is left out here.
-    h : float [s]
+    h [s]
         Length of the step before time zero that sources and states are asked for.
-    y : array [m]
+    y [m]
         Displacement of every port; the last one is the ground.
-    p : array [Pa]
+    p [Pa]
         Of every node.
-    force : array [N]
+    force [N]
         Out: of elements, walls and branches, without the interfaces.
-    inflow : array [kg/s]
+    inflow [kg/s]
         Out.
     size : array [N], then [kg/s]
         Out: the same sums of absolute values, forces first: what their round-off belongs to.

@@ -129,26 +129,26 @@ class SteadySlopes:
 
     Parameters
     ----------
-    shapes : array, shape (r, n) [1/sqrt(kg)]
-    axial : array, shape (r,) [sqrt(kg)]
+    shapes (r, n) [1/sqrt(kg)]
+    axial (r,) [sqrt(kg)]
         Coordinate of each rigid mode per metre of its body along +z.
-    body : tuple of str
+    body
         Component of the body of each rigid mode.
     moves : array of bool, shape (r,)
         False for a body that is held.
-    compliance : array, shape (n, n) [m/N]
+    compliance (n, n) [m/N]
         Static one of the elastic modes.
     force_by_port, force_by_pressure : array, shapes (n, n) [N/m], (n, f) [m^2]
     flow_by_port, flow_by_pressure : array, shapes (f, n) [kg/(s m)], (f, f) [kg/(s Pa)]
         Of what flows into the free volumes, without columns.
-    volumes : tuple of str
+    volumes
         Components of the free volumes.
-    density : array, shape (f,) [kg/m^3]
-    left : array, shape (f,) [kg/s]
+    density (f,) [kg/m^3]
+    left (f,) [kg/s]
         What still flows into each of them.
     ends : array of int, shape (c, 2)
         Free volumes at the ends of columns; -1 for a known pressure.
-    friction : array, shape (c,) [J s/kg^2]
+    friction (c,) [J s/kg^2]
     known : array of bool, shape (f,)
         Volumes with a way for the fluid to a prescribed pressure; the others are enclosed.
     """
@@ -192,12 +192,11 @@ def begin_at_rest(
 
     Parameters
     ----------
-    network : CompiledNetwork
-    step : float [s]
+    step [s]
         Fine step of the run.
-    near : RestState, optional
+    near
         Equilibrium of a network of the same parts that hardly differs; it has warned already.
-    shift : array, shape (ports,), optional [m]
+    shift (ports,) [m]
         By which the ports are elsewhere than bodies that move along the axis have them.
 
     Raises
@@ -231,12 +230,12 @@ def begin_steady(
 
     Parameters
     ----------
-    network : CompiledNetwork
+    network
         No volume of it has a stated pressure: what it has at the start is where the search begins.
-    step : float [s]
-    first : mapping of str to float [m]
+    step [s]
+    first [m]
         Displacements of free bodies from which the search begins; 0 where it names none.
-    held : collection of str
+    held
         Bodies that stay at their ``first`` displacement: what is left on them holds them.
 
     Raises

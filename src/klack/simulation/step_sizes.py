@@ -29,13 +29,13 @@ class StepSizes:
 
     Parameters
     ----------
-    step : float [s]
+    step [s]
         Fine step of bodies, contacts and films, where films change fast.
-    coarse : int
+    coarse
         Fine steps of a macro step in flight, after which elements and fluid answer; 1 for none.
-    near : int
+    near
         Fine steps of a macro step about a touch; divides ``coarse``.
-    middle : int
+    middle
         Fine steps of a sub-step while films are smooth; divides ``near``.
     """
 
@@ -62,11 +62,10 @@ def step_sizes(
 
     Parameters
     ----------
-    rows : Rows
     accuracy : "normal" or "fine"
     step : float [s], optional
         Fine step, in place of that of the accuracy.
-    coarse : int, optional
+    coarse
         Fine steps of a macro step in flight, in place of that of the accuracy.
 
     Raises

@@ -25,13 +25,13 @@ class ContactPair:
 
     Parameters
     ----------
-    body_a, port_a, body_b, port_b : str
+    body_a, port_a, body_b, port_b
         Both ports point along +z (a contact port made of ``G_b^T lam`` must be turned round).
     law : LinearLaw, HertzLaw, TableLaw, HuntCrossley; RubbingLaw or YieldingLaw of a single contact
         Of the compliance that neither the modes nor ``series_compliance`` carry.
-    gap : float [m]
+    gap [m]
         At the start.
-    series_compliance : float [m/N]
+    series_compliance [m/N]
         Massless linear compliance in series with the law, with its own state.
     """
 
@@ -62,10 +62,9 @@ class AxialForce:
 
     Parameters
     ----------
-    body : str
-    force : float [N]
+    force [N]
         Negative presses a needle onto its seat.
-    port : str or None
+    port
         Where it acts; ``None`` spreads it over the mass, like weight.
     """
 
@@ -80,9 +79,8 @@ class ReturnSpring:
 
     Parameters
     ----------
-    body, port : str
-    stiffness : float [N/m]
-    preload : float [N]
+    stiffness [N/m]
+    preload [N]
         Force in -z at the start.
     """
 
@@ -101,12 +99,10 @@ class ReducedSystem:
 
     Parameters
     ----------
-    bodies : tuple of ReducedBody
+    bodies
         Distinct names.
-    contacts : tuple of ContactPair
+    contacts
         At least one.
-    forces : tuple of AxialForce
-    springs : tuple of ReturnSpring
     """
 
     bodies: tuple[ReducedBody, ...]

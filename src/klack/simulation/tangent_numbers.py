@@ -70,9 +70,9 @@ def steady_waves(base: Any, other: Any, flow: Vector) -> Vector:
 
     Parameters
     ----------
-    base, other : NetworkArrays
+    base, other
         With segments of equal numbers; the delays may differ.
-    flow : array [m^3/s]
+    flow [m^3/s]
         In each line of the other network, which is at rest.
     """
     lines = other.lines._replace(
@@ -146,10 +146,9 @@ class Direction:
 
     Parameters
     ----------
-    name : str
-    plus, minus : Rows
+    plus, minus
         A little further on, and as much before.
-    distance : float
+    distance
         Between both.
     """
 
@@ -165,7 +164,6 @@ class TangentNumbers:
 
     Parameters
     ----------
-    arrays : NetworkArrays
     by_step : list of (array, places, array)
         Of each array the numbers that stay but depend on the step, and their change with its
         logarithm.
@@ -188,11 +186,8 @@ def numbers_at_rest(
 
     Parameters
     ----------
-    network : CompiledNetwork
-    rest : RestState or None
+    rest
         Of it; None for one that starts undeformed.
-    directions : sequence of Direction
-    sizes : StepSizes
 
     Raises
     ------

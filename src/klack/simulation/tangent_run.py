@@ -92,11 +92,10 @@ class Touch:
 
     Parameters
     ----------
-    stop : str
-    time : float [s]
-    speed : float [m/s]
+    time [s]
+    speed [m/s]
         Of closing.
-    slopes : array, shape (directions,) [s per unit]
+    slopes (directions,) [s per unit]
         Of the time.
     """
 
@@ -112,13 +111,9 @@ class TangentRun:
 
     Parameters
     ----------
-    rows : Rows
-    directions : tuple of Direction
-    touches : tuple of Touch
-    sizes : StepSizes
-    cpu_time : float [s]
+    cpu_time [s]
         Of the processor; with compiling, if that was not done before.
-    looks : int
+    looks
         Records of the loop in one of the result.
     """
 
@@ -292,7 +287,7 @@ def run_tangents(
     ----------
     rows, duration, accuracy, step, coarse, record, start, progress
         As of :func:`klack.simulation.network_run.simulate_network`.
-    directions : sequence of Direction
+    directions
         At most :data:`DIRECTIONS`.
 
     Raises
@@ -322,7 +317,6 @@ def compile_tangents(rows: Rows, *, step: float | None = None) -> None:
 
     Parameters
     ----------
-    rows : Rows
     step : float [s], optional
     """
     for function in [row.step for row in rows.elements] + [row.step for row in rows.branches]:

@@ -134,7 +134,7 @@ def waves_commit(waves: Waves, H: float, c: Vector, Z: Vector, q: Vector, losses
 
     Parameters
     ----------
-    losses : array, shape (n, 4) [J]
+    losses (n, 4) [J]
         Of each row since the start; energy that passed its ends.
     """
     for k in range(waves.rows):

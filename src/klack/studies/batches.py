@@ -135,7 +135,7 @@ class Batches(ABC):
 
     Parameters
     ----------
-    objectives : int
+    objectives
         Columns of objectives that will be told.
     """
 

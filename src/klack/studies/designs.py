@@ -49,7 +49,7 @@ def even_levels(count: int, *, bounded: bool = True) -> Floats:
 
     Parameters
     ----------
-    bounded : bool
+    bounded
         Whether the parameter has a value at 0 and at 1.
 
     Returns
@@ -79,7 +79,7 @@ def latin_hypercube(count: int, parameters: int, seed: int) -> Floats:
 
     Parameters
     ----------
-    seed : int
+    seed
         The same seed gives the same points.
 
     Returns
@@ -110,9 +110,9 @@ def sobol_sequence(count: int, parameters: int, seed: int) -> Floats:
 
     Parameters
     ----------
-    count, parameters : int
+    count, parameters
         At most 2^30 points, 21201 parameters.
-    seed : int
+    seed
         The same seed gives the same points.
 
     Returns

@@ -26,7 +26,7 @@ class Front:
     ----------
     points : NDArray of int, shape (n,)
         Their rows, ascending; of equal points the first.
-    feasible : bool
+    feasible
         False if no point keeps all constraints; ``points`` are then those that violate them least.
     """
 
@@ -131,7 +131,7 @@ def spread_over(points: NDArray[np.integer], most: int) -> NDArray[np.integer]:
     ----------
     points : array of int, shape (n,)
         In the order of the front.
-    most : int
+    most
         Points at most; the first alone for one.
     """
     if points.size <= most:

@@ -46,17 +46,17 @@ def polish(
     Parameters
     ----------
     start : array_like, shape (parameters,)
-    values : callable
+    values
         Objectives to minimise, shape (objectives,), and constraints, zero or less where kept, shape
         (constraints,), at a point.  Called once for each point.
-    slopes : callable
+    slopes
         Their derivatives, shapes (objectives, parameters) and (constraints, parameters).  Called
         once for the point of each step.
     scales : array_like, shape (objectives,)
         Above zero.
-    steps : int
+    steps
         Most steps.
-    edge : float
+    edge
         Share that points keep from the ends of the cube.
 
     Notes

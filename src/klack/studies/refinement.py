@@ -40,7 +40,7 @@ def achievement(
         Wished-for value ``z`` of each objective, in its unit.
     scales : array_like, shape (objectives,)
         What counts as one in each objective ``w``, above zero, in its unit: its range on the front.
-    sum_weight : float
+    sum_weight
         ``rho``, zero or more: which loss in one objective is traded for gains in the others.
 
     Raises
@@ -151,15 +151,15 @@ class RefinementSettings:
 
     Parameters
     ----------
-    first_step : float
+    first_step
         In the unit cube: a part of the range of every parameter, above zero to 0.5.
-    last_step : float
+    last_step
         A point is done when its step falls below this, above zero.
-    evaluations : int
+    evaluations
         Most points to evaluate, all refined points together; no batch is begun that exceeds it.
-    seed : int
+    seed
         Of the rotated directions.
-    edge : float
+    edge
         As in the search.
 
     Raises

@@ -69,13 +69,13 @@ class Margin:
 
     Attributes
     ----------
-    mean, deviation : float
+    mean, deviation
         Of the runs with a value, in the unit of the measure; the standard deviation with ``n - 1``.
-    value : float
+    value
         ``mean + k deviation``.
-    mean_error, deviation_error, value_error : float
+    mean_error, deviation_error, value_error
         Standard errors: standard deviations of the three over repetitions of all runs.
-    runs, failed : int
+    runs, failed
         Runs with a value, and runs without one, which are not among ``runs``.
     """
 
@@ -108,7 +108,7 @@ def mean_and_margin(values: ArrayLike, multiple: float) -> Margin:
     ----------
     values : array_like, shape (runs,)
         In one unit; what is not finite is a failed run.
-    multiple : float
+    multiple
         ``k``, of either sign.
 
     Raises
@@ -167,20 +167,20 @@ class SampleQuantile:
 
     Attributes
     ----------
-    probability : float
+    probability
         That part.
-    estimate : float
+    estimate
         In the unit of the measure.
-    low, high : float
+    low, high
         Two values of the sample that enclose the quantile; infinite where the sample is too small
         to bound it.
-    confidence : float
+    confidence
         Asked for.
-    coverage : float
+    coverage
         Exact probability that the interval encloses the quantile, at least ``confidence``.
-    runs, failed : int
+    runs, failed
         Runs with a value, and runs without one, which are not among ``runs``.
-    low_if_low, high_if_high : float
+    low_if_low, high_if_high
         The ends if the values of all failed runs were below all others, or above all others.
     """
 
@@ -214,9 +214,9 @@ def sample_quantile(
     ----------
     values : array_like, shape (runs,)
         In one unit; what is not finite is a failed run.
-    probability : float
+    probability
         ``q``, between 0 and 1: 0.99 for the value that 1 % exceed.
-    confidence : float
+    confidence
         0.5 to below 1.
 
     Raises
@@ -317,18 +317,18 @@ class Exceedance:
 
     Attributes
     ----------
-    exceeded, runs, failed : int
+    exceeded, runs, failed
         Runs above the limit, runs with a value, and runs without one, which are not among ``runs``.
-    confidence : float
+    confidence
         Of the interval and of the bound.
-    estimate : float
+    estimate
         ``exceeded / runs``.
-    low, high : float
+    low, high
         Exact two-sided interval from the runs with a value.
-    at_most : float
+    at_most
         Exact one-sided upper bound.  It is the number to quote where no run exceeded; with
         ``runs`` of 100 and more it is then close to ``3 / runs`` at 95 %.
-    low_if_none, high_if_all : float
+    low_if_none, high_if_all
         The interval of all runs, the failed ones counted as not above the limit (its lower end) and
         as above it (its upper end).  Far from ``low`` and ``high``, failures leave the result in
         doubt: failed runs are seldom like the others.
@@ -353,9 +353,9 @@ def exceedance_of(values: ArrayLike, limit: float, *, confidence: float = 0.95) 
     ----------
     values : array_like, shape (runs,)
         In one unit; what is not finite is a failed run.
-    limit : float
+    limit
         In the unit of the values.  A value equal to it does not exceed it.
-    confidence : float
+    confidence
         0.5 to below 1.
 
     Raises
@@ -448,7 +448,7 @@ class RobustValue:
         Mean and a multiple of the standard deviation
         (:func:`~klack.studies.samples.mean_and_margin`), or a quantile
         (:func:`~klack.studies.samples.sample_quantile`).
-    number : float
+    number
         The multiple, or the probability, above one half.
 
     Examples

@@ -28,13 +28,13 @@ class SearchSettings:
 
     Parameters
     ----------
-    parameters : int
+    parameters
         Dimensions of the unit cube.
-    objectives : int
+    objectives
         1 to 4.
-    population : int
+    population
         Points per generation, which is one batch: 8 to 10 000, from 20 with 4 objectives.
-    edge : float
+    edge
         Distance that points keep from the faces of the cube, 0 to below 0.5; above zero for
         parameters whose distribution has no ends.
 

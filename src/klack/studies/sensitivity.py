@@ -49,18 +49,18 @@ class SobolIndices:
 
     Parameters
     ----------
-    first : Estimates
+    first
         Share that a parameter causes alone.  Estimates scatter, also below 0.
-    total : Estimates
+    total
         Share that vanishes when the parameter is known and all others are free: with interactions.
-    rows : int
+    rows
         Base rows that were used.
-    discarded : int
+    discarded
         Base rows with a failed point.  If this is not 0, the indices are those of the region where
         points succeed, and are biased where failures follow a parameter.
-    confidence : float
+    confidence
         Probability that an interval claims to hold the true index.
-    reason : str
+    reason
         Why estimates or intervals are not a number; empty if all are there.
     """
 
@@ -89,9 +89,9 @@ def saltelli_design(parameters: int, base: int, seed: int) -> Floats:
 
     Parameters
     ----------
-    parameters : int
+    parameters
         d
-    base : int
+    base
         Rows; :func:`~klack.studies.designs.balanced` says whether their number is a good one.
 
     Returns
@@ -148,11 +148,11 @@ def sobol_indices(
     values : array (base * (parameters + 2))
         One measure at the points of :func:`saltelli_design`, in their order; not finite where the
         point failed.  A base row with such a value is discarded as a whole.
-    confidence : float
+    confidence
         Above 0 and below 1.
-    resamples : int
+    resamples
         At least 100.
-    seed : int
+    seed
         For the drawing of rows.
 
     Raises
@@ -284,7 +284,7 @@ class Screening:
     discarded : array (parameters) of int
         Number of effects that a failed point took away.  If not 0, the numbers are those of
         the region where points succeed.
-    reasons : tuple of str
+    reasons
         For each parameter, why its numbers are not a number; empty if all are there.
     """
 
@@ -326,11 +326,11 @@ def morris_design(
 
     Parameters
     ----------
-    parameters : int
+    parameters
         d
-    levels : int
+    levels
         p, even.
-    candidates : int, optional
+    candidates
         More than ``trajectories``, so few that their distances can be computed; ten times as many
         are usual.
     bounded : bool or array (parameters) of bool

@@ -48,26 +48,26 @@ class Surrogate:
 
     Parameters
     ----------
-    points : int
+    points
         Different points with a value, that it was fitted to.
-    failed : int
+    failed
         Points without a value, left out.
-    repeated : int
+    repeated
         Points that are the same as another one, left out.
-    predictivity : float
+    predictivity
         Q2 = 1 - sum of squared residuals / sum of squared deviations from the mean; 1 is perfect,
         0 no better than the mean of all points.  Not a number if it was not fitted.
-    error : float
+    error
         Root of the mean square of the residuals, in the unit of the measure.
-    largest : float
+    largest
         The largest residual, without sign.
     residuals : array (points of the study)
         Value minus its prediction from the other points; not a number where there is none.
-    reason : str
+    reason
         Why nothing may be derived from it; empty if it may.
-    model : SurrogateModel or None
+    model
         None with a reason.
-    first, total : Estimates or None
+    first, total
         Shares of the variance; intervals by :attr:`error`, see
         :func:`~klack.studies.surrogate_model.share_estimates`.
     """

@@ -47,7 +47,7 @@ class ChaosModel:
         term is the constant.
     coefficients : array (terms)
         In the unit of the measure.
-    degree : int
+    degree
         Highest number of a function.
     """
 

@@ -36,7 +36,7 @@ class SurrogateAxis:
     ----------
     nodes, weights : array (nodes)
         Weights have the sum 1.
-    words : tuple of str
+    words
         Of a list of words; empty for numbers.
     """
 
@@ -167,7 +167,7 @@ class Shares:
 
     Parameters
     ----------
-    variance : float
+    variance
         Of the surrogate over the distributions of its parameters.
     first : array (parameters)
         Variance of the mean over all other parameters, V_i.
@@ -214,9 +214,9 @@ def share_estimates(parts: Floats, variance: float, error: float) -> Estimates:
     ----------
     parts : array (parameters)
         V_i or T_i of :class:`Shares`.
-    variance : float
+    variance
         Of the surrogate, above 0.
-    error : float
+    error
         Root of the mean square error, in the unit of the measure.
 
     Examples

@@ -41,7 +41,7 @@ class Covariance:
     ----------
     lengths : array (columns)
         Of all parameters, see :meth:`SurrogateAxis.columns`.
-    noise : float
+    noise
         What no smooth function explains, such as that of late bounces.
     """
 
@@ -59,7 +59,7 @@ class ProcessModel:
         Of the points that it was fitted to, for each parameter.
     lengths : tuple of array (columns)
         For each parameter.
-    noise : float
+    noise
         Variance of noise, of that of the process.
     """
 

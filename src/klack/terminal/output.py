@@ -33,10 +33,8 @@ class Written:
 
     Parameters
     ----------
-    folder : Path
-    files : tuple of str
+    files
         Names in it, sorted.
-    lines : tuple of str
     """
 
     folder: Path

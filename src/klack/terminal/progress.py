@@ -187,7 +187,7 @@ class _Compiling:
 
     Parameters
     ----------
-    tell : callable
+    tell
         Called with the words for what begins; with none when it is over.
     """
 

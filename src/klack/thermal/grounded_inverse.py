@@ -20,9 +20,9 @@ def grounded_inverse(links: Array, ground: Array) -> Array:
 
     Parameters
     ----------
-    links : array, shape (n, n) [W/K]
+    links (n, n) [W/K]
         Symmetric, not below 0, its diagonal 0.
-    ground : array, shape (n,) [W/K]
+    ground (n,) [W/K]
         Not below 0; above 0 somewhere in every island.
 
     Returns

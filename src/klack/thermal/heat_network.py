@@ -26,9 +26,9 @@ class Links:
 
     Parameters
     ----------
-    between : array, shape (n, n) [W/K]
+    between (n, n) [W/K]
         Of free nodes, symmetric, the diagonal 0.
-    to_fixed : array, shape (n, f) [W/K]
+    to_fixed (n, f) [W/K]
         To the nodes of known temperature.
     """
 
@@ -44,16 +44,16 @@ class HeatNetwork:
     ----------
     names : tuple of str, length n
         Of the free nodes: the first heat capacity there, or the ports that meet.
-    node_of : mapping of str to int
+    node_of
         Free node of every heat capacity.
-    capacity : array, shape (n,) [J/K]
-    start : array, shape (n,) [K]
+    capacity (n,) [J/K]
+    start (n,) [K]
     fixed_names : tuple of str, length f
         ``"ambient"`` first.
-    fixed : array, shape (f,) [K]
-    paths : tuple of HeatPath
+    fixed (f,) [K]
+    paths
         Nodes 0 to n - 1 are free, ``n + j`` is the fixed node ``j``.
-    supplies : tuple of HeatSupply
+    supplies
         Into free nodes.
     """
 

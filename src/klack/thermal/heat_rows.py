@@ -16,11 +16,10 @@ class HeatPath:
 
     Parameters
     ----------
-    component : str
-    a, b : int
+    a, b
         Nodes.
-    conductance : float [W/K]
-    radiation : float [W/K^4]
+    conductance [W/K]
+    radiation [W/K^4]
         Area, emissivity and the constant of Stefan and Boltzmann together.
     """
 

@@ -24,12 +24,12 @@ class HeatStep:
 
     Parameters
     ----------
-    temperature : array, shape (n,) [K]
-    supplied : array, shape (n,) [J]
+    temperature (n,) [K]
+    supplied (n,) [J]
         Heat into each free node.
-    stored : array, shape (n,) [J]
+    stored (n,) [J]
         Rise of what each of them stores.
-    given_off : array, shape (f,) [J]
+    given_off (f,) [J]
         Heat into each node of known temperature.
     """
 
@@ -56,12 +56,10 @@ def heat_step(
 
     Parameters
     ----------
-    network : HeatNetwork
-    links : Links
-    start : array, shape (n,) [K]
+    start (n,) [K]
     flow : two arrays, shape (n,) [W]
         Into each free node, at the start and at the end of the step.
-    length : float [s]
+    length [s]
     """
     zero = network.fixed[0]
     known = network.fixed - zero

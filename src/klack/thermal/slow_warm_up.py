@@ -48,11 +48,11 @@ class SlowSettings:
 
     Parameters
     ----------
-    tolerance : float [K]
+    tolerance [K]
         Of the error of one step, and of the distance to the steady state.
-    spacing : float [K]
+    spacing [K]
         Largest change of a temperature between two strokes.
-    duration : float or None [s]
+    duration [s]
         None: to the steady state.
     """
 
@@ -67,11 +67,11 @@ class WarmPoint:
 
     Parameters
     ----------
-    time : float [s]
+    time [s]
         Infinite for the steady state.
-    temperature, stroke_temperature : array, shape (n,) [K]
+    temperature, stroke_temperature (n,) [K]
         Of the nodes, and those at which the stroke was computed: the same within the tolerance.
-    heat : array, shape (n,) [W]
+    heat (n,) [W]
         Mean heat of that stroke into each node.
     """
 
@@ -87,20 +87,20 @@ class SlowWarmUp:
 
     Parameters
     ----------
-    points : tuple of WarmPoint
+    points
         The steady state last, where it was found.
-    supplied, stored : array, shape (n,) [J]
+    supplied, stored (n,) [J]
         Heat into each node until the last moment in time, and how much of it is stored.
-    given_off : array, shape (f,) [J]
+    given_off (f,) [J]
         To each node of known temperature.
-    residual : float [-]
+    residual [-]
         What does not balance, over all heat that was supplied, given off or moved.
-    gain : float [-]
+    gain [-]
         Rise of the steady temperature per rise of the temperature; from 1 on there is no steady
         state; nan if nothing moved.
-    end : str
+    end
         ``"steady"``, ``"duration"``, ``"runaway"``, or ``"hot"`` beyond 2000 K.
-    steps, repeats : int
+    steps, repeats
         Steps that were taken, and those that were done again.
     """
 
@@ -191,10 +191,8 @@ def warm_up(
 
     Parameters
     ----------
-    network : HeatNetwork
-    mean_heat : callable
+    mean_heat
         Mean heat [W] of a stroke into each free node, at temperatures [K] of shape (n,).
-    settings : SlowSettings
 
     Raises
     ------

@@ -134,14 +134,14 @@ def solve_active(
 
     Parameters
     ----------
-    A : array, shape (n, n) [m/N]
-    q : array, shape (n,) [m]
+    A (n, n) [m/N]
+    q (n,) [m]
         Gaps without contact forces.
-    carrying : ActiveSet
+    carrying
         In: first guess; out: the points that carry.
     lam, gap : array, shape (n,) [N], [m]
         Out.
-    tolerance : float [m]
+    tolerance [m]
         Gap that counts as zero; over ``scale`` [m/N] the force that does.
     """
     active, index, B, counts = carrying

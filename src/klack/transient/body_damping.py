@@ -43,12 +43,12 @@ class BodyDamping:
 
     Parameters
     ----------
-    shapes : array, shape (n_dof, m)
+    shapes (n_dof, m)
         Mass-normalised elastic modes, zero where fixed.
-    rate : array, shape (m,) [rad/s]
+    rate (m,) [rad/s]
         ``2 zeta omega`` of each.
-    alpha : float [1/s]
-    beta : float [s]
+    alpha [1/s]
+    beta [s]
     ends : sparse array, shape (n_dof, n_dof), optional [N s/m]
         Dashpots of non-reflecting ends.
     """
@@ -71,9 +71,9 @@ def body_damping(damping: Damping, modes: Modes) -> BodyDamping | None:
 
     Parameters
     ----------
-    damping : Damping
+    damping
         Rayleigh damping acts on the whole body; a ratio or a loss factor on the modes given.
-    modes : Modes
+    modes
         Elastic modes that the reduced levels keep.
     """
     if isinstance(damping, RayleighDamping):
@@ -99,9 +99,9 @@ class DampingMatrix:
     Parameters
     ----------
     sparse : sparse array, shape (n, n) [N s/m]
-    columns : array, shape (n, r) [kg^(1/2)]
+    columns (n, r) [kg^(1/2)]
         Z.
-    rate : array, shape (r,) [rad/s]
+    rate (r,) [rad/s]
         Below zero for what takes the drag of ``alpha M`` off the rigid motion.
     ends : sparse array, shape (n, n), or None [N s/m]
         What non-reflecting ends have in ``sparse``.
@@ -118,8 +118,6 @@ class DampingMatrix:
 
         Parameters
         ----------
-        damping : BodyDamping
-        body : ElasticBody
         M : sparse array, shape (n_dof, n_dof) [kg]
             Mass that the run moves, which may differ from the one of the body at its contact nodes.
         """
@@ -158,14 +156,14 @@ class LowRankSolve:
 
     Parameters
     ----------
-    plain : InterfaceSolve
+    plain
         Of S alone.
-    factorization : Factorization
+    factorization
         Of S.
     G : sparse array, shape (nc, n) [-]
-    columns : array, shape (n, r)
+    columns (n, r)
         Z.
-    weight : array, shape (r,)
+    weight (r,)
         None of them zero; S + Z diag(weight) Z^T is positive definite.
     """
 

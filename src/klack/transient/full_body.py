@@ -77,9 +77,8 @@ class InverseMass:
     Parameters
     ----------
     M : sparse array, shape (n_dof, n_dof) [kg]
-    free : int array, shape (n_free,)
+    free (n_free,)
         Free degrees of freedom, sorted.
-    dimension : int
     """
 
     def __init__(
@@ -147,8 +146,6 @@ def massless_nodes(M: csr_array, nodes: NDArray[np.int64], dimension: int) -> cs
     Parameters
     ----------
     M : sparse array, shape (n_dof, n_dof) [kg]
-    nodes : int array
-    dimension : int
     """
     m = scalar_mass(M, dimension)
     light = np.zeros(m.shape[0], dtype=bool)
@@ -424,9 +421,9 @@ class KnownBody:
 
     Parameters
     ----------
-    modes : Modes
+    modes
         Converged elastic modes, any of them: the more, the sooner a run can end.
-    compliance : array, shape (nc,) [m/N]
+    compliance (nc,) [m/N]
         Static compliance of the body at each contact point.
     """
 
@@ -449,12 +446,11 @@ def open_gaps(
     ----------
     bodies, known : sequence of FullBody, KnownBody
         One or two, in the same order; without damping and springs.
-    at_rest : array, shape (nc,) [m]
+    at_rest (nc,) [m]
         Gaps without displacement.
-    y : array, shape (nc,)
+    y (nc,)
         Contact-sized part of the velocity, as of :meth:`FullBody.velocity`.
-    steps : int
-    slack : float [m]
+    slack [m]
         What gaps have to stay wider than, besides the bound of the rest.
 
     Returns

@@ -145,54 +145,54 @@ def simulate_full_order(
 
     Parameters
     ----------
-    body_a : ElasticBody
+    body_a
         The needle, free along z.
-    body_b : ElasticBody or None
+    body_b
         The seat or stop, free or fixed; ``None`` for a rigid wall (``space.G_b`` is ignored).
-    space : ContactSpace
+    space
         Contact points and their gaps at the given placement.
-    speed : float [m/s]
+    speed [m/s]
         Speed of approach, above zero.
-    duration : float [s]
+    duration [s]
         Simulated time, counted from the start of the record.
-    step : float [s]
+    step [s]
         Time step; see :func:`recommended_step`.
     scheme : {"contact-stabilised-newmark", "massless"}
-    axial_force : float [N]
+    axial_force [N]
         Constant force on a along +z (negative presses a onto b), spread over it like its weight.
-    spring_stiffness : float [N/m]
+    spring_stiffness [N/m]
         Of a massless spring from the centre of mass of a to ground, without force at the given
         placement.
     damping : pair of BodyDamping or None
         Of body a and of body b; without any by default.  Non-reflecting ends are for body b.
-    friction : FaceFriction, optional
+    friction
         Between the faces, of these contact points.
-    layer : AsperityLayer, optional
+    layer
         Of the faces, elastic; not with friction nor the massless scheme.
-    sideways : tuple of float [m/s]
+    sideways [m/s]
         Velocity of a along x and y at the start, in addition to ``speed``; of solids only.
-    stop_after_separation : float, optional [s]
+    stop_after_separation [s]
         End the run early when no point has carried a force for this long after a contact.
-    known : sequence of KnownBody, optional
+    known
         Of body a and, unless it is a rigid wall, body b: with it the steps end where these bodies
         have parted for good (:mod:`klack.transient.full_body`), and the rest of the record is
         their free flight: no force, constant velocities of the centres of mass, gaps without what
         the known modes leave.  Not with damping, spring, axial force, friction, snapshots or the
         massless scheme: there every step is taken.
-    energy_interval : int
+    energy_interval
         Steps between entries of the energy record.
-    longest_period : float [s]
+    longest_period [s]
         Of the elastic modes of body a, handed on to the history.
     backend : {"auto", "pardiso", "ngsolve", "superlu"}
     precision : {"double", "single"}
         Of the factors (pardiso only; others are double).  ``"single"`` takes half the memory and
         two thirds of the time.  Every step solves for an increment only, and what its solve leaves
         of the equations is paid back in the next one: the force changes by some 1e-7.
-    threads : int
+    threads
         Threads of the factorisation; with two or more the two bodies also advance side by side.
-    progress : callable, optional
+    progress
         Called now and then with the fraction done, 0 to 1.
-    snapshots : Snapshots, optional
+    snapshots
         Who wants to see the fields on the way.
 
     Raises

@@ -59,23 +59,22 @@ def guide_of_shaft(
 
     Parameters
     ----------
-    model : InterfaceModel
-    body : ElasticBody
+    body
         The moving one, a solid.
-    shapes : array, shape (n_dof, m) [1/sqrt(kg)]
+    shapes (n_dof, m) [1/sqrt(kg)]
         Its kept modes, rigid ones first, as in the model.
-    flexibility : Flexibility
+    flexibility
         Of the moving body.
-    surface : str
+    surface
         Cylindrical surface of the shaft.
-    heights : sequence of float [m]
+    heights [m]
         z at the placement; each takes the ring of nodes of the surface that is there, or the two
         around it (on an unstructured mesh as many near it as surround the axis).
-    clearance : float [m]
+    clearance [m]
         Radial.
-    stiffness : float, optional [N/m]
+    stiffness [N/m]
         Of the bore at each height; rigid without.
-    consistent : bool
+    consistent
         Add the compliance of the shaft that the kept modes miss.
     friction, viscous : float [-], [N s/m]
         The drag is shared equally between the heights.
@@ -123,9 +122,9 @@ class ShaftSection(NamedTuple):
     ----------
     motion : array, shape (6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
         Displacement and rotation vector per unit coordinate of the modes of the shaft.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         The axis there.
-    radius : float [m]
+    radius [m]
     compliance : array, shape (2, 2), or None [m/N]
         Static one across the axis, of a free body with inertia relief; None: nothing is added to
         that of the modes.
@@ -151,10 +150,8 @@ def guide_at_sections(
 
     Parameters
     ----------
-    model : InterfaceModel
-    name : str
+    name
         Of the body, for messages.
-    sections : sequence of ShaftSection
     clearance, stiffness, friction, viscous
         As given to :func:`guide_of_shaft`.
     """
@@ -311,13 +308,13 @@ def turned_sections(body: str, mesh: Mesh, surface: str, heights: Sequence[float
 
     Parameters
     ----------
-    body : str
+    body
         Its name, for messages.
-    mesh : Mesh
+    mesh
         Half section.
-    surface : str
+    surface
         Cylindrical surface of the shaft.
-    heights : sequence of float [m]
+    heights [m]
 
     Raises
     ------

@@ -113,13 +113,13 @@ def stopping_force(
     ----------
     C : four floats [m/N]
         Slip per force, row by row; symmetric.
-    s0, s1 : float [m]
+    s0, s1 [m]
         Slip without the force.
     D : four floats [m/(N s)]
         Speed at the end per force.
-    u0, u1 : float [m/s]
+    u0, u1 [m/s]
         That speed without the force.
-    most : float [N]
+    most [N]
     """
     if most <= 0.0:
         return 0.0, 0.0
@@ -171,11 +171,9 @@ def rub_guide(modes: Modes, rub: GuideRub, before: Vector, step: Step) -> float:
 
     Parameters
     ----------
-    modes : Modes
-    rub : GuideRub
-    before : array, shape (M,)
+    before (M,)
         Coordinates at the start of the step.
-    step : Step
+    step
         In and out: modal forces of the step and the state at its end.
     """
     known, whole, q, v, share = step.known, step.whole, step.q, step.v, step.share

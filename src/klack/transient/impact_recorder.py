@@ -62,10 +62,10 @@ def sector_shares(points: Vector, area: Vector, sectors: int = SECTORS) -> csr_a
 
     Parameters
     ----------
-    points : array, shape (n, 3) [m]
+    points (n, 3) [m]
         About the axis x = y = 0.
-    area : array, shape (n,) [m^2]
-    sectors : int
+    area (n,) [m^2]
+    sectors
         Of equal angles, the first one from +x.
     """
     turn = 2.0 * np.pi
@@ -165,26 +165,25 @@ def follow(
 
     Parameters
     ----------
-    rows : ImpactRows
-    c, first : int
+    c, first
         Stop; step to begin with.
-    t, h : float [s]
+    t, h [s]
         Start of step 0, and length of the steps.
-    force : array, shape (n, S) [N]
+    force (n, S) [N]
         Mean force of each sector in each step.
     levers : array, shape (n, 3) [N m], [N m^2], [N m]
         Force times radius, its square, and height.
-    film : array, shape (n,) [N]
+    film (n,) [N]
         Axial force of the film; empty without.
-    lands : array, shape (n, 6)
+    lands (n, 6)
         Its lift and tilts at both ends of each step.
-    felt : float [N]
+    felt [N]
         Force from which on a film is felt.
-    places : array, shape (n, M)
+    places (n, M)
         Modal coordinates at the ends of the steps.
-    pause : float [s]
+    pause [s]
         Contacts closer together are one impact.
-    rest : float [s]
+    rest [s]
         An impact whose contact lasts this long is over.
     """
     words, times = rows.words[c], rows.times[c]
@@ -395,12 +394,11 @@ class ImpactRecorder:
 
     Parameters
     ----------
-    model : InterfaceModel
-    stops : sequence of str
+    stops
         Of ``model.contacts``.
     films : sequence of (str, FilmLand or None)
         Stop and land of each film, in the order of the record of steps.
-    shape_marks : array, shape (M,)
+    shape_marks (M,)
         By which the shapes of the modes are known again.
     felt, pause, rest : array, shape (stops,) [N], [s], [s]
         Force from which on a film is felt; contacts that are closer together are one impact; a
@@ -584,16 +582,13 @@ class StopRecord:
 
     Parameters
     ----------
-    network : CompiledNetwork
-    model : InterfaceModel
-    ports : array, shape (M, ports)
+    ports (M, ports)
         Shapes of the ports of the bodies.
-    rows : sequence of int
+    rows
         Interface of the network at each of ``model.contacts``.
-    films : mapping of int to int
+    films
         Place among the recorded films of an interface that has one.
-    arcs : ArcWatch or None
-    step : float [s]
+    step [s]
         Fine step.
 
     Attributes

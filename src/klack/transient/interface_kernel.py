@@ -139,7 +139,7 @@ def contact_compliance(
 
     Parameters
     ----------
-    local : array, shape (n, n) [m/N]
+    local (n, n) [m/N]
         Of what the modes do not carry.
     traces, B1, push, spring
         As in :func:`march`.
@@ -225,12 +225,12 @@ def safe_flight(
 
     Parameters
     ----------
-    gap : array, shape (n,) [m]
+    gap (n,) [m]
         At q = 0.
-    traces : array, shape (n, M)
-    omega, q, v, force : array, shape (M,)
+    traces (n, M)
+    omega, q, v, force (M,)
         Frequencies, state and constant modal forces.
-    horizon : float [s]
+    horizon [s]
     """
     n, modes = traces.shape
     swing = np.zeros(modes)
@@ -726,13 +726,12 @@ def march(
 
     Parameters
     ----------
-    steps : int
-    wait : int
+    wait
         Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
     modes, outside, points, bore, films, state
         ``bore`` and ``films`` are None without any, as are parts of ``points``: their code is not
         compiled then.  See :mod:`klack.transient.interface_arrays`.
-    record : Record
+    record
         Out, for at least ``steps`` steps.
 
     Returns

@@ -69,13 +69,11 @@ class InterfaceBody:
 
     Parameters
     ----------
-    body : ElasticBody
-    flexibility : Flexibility
-    modes : Modes
+    modes
         The kept elastic modes.
-    damping : array, shape (m,) [-]
+    damping (m,) [-]
         Damping ratio of each of them.
-    observers : array, shape (k, n_dof)
+    observers (k, n_dof)
         Rows on its displacements that are read.
     """
 
@@ -92,14 +90,11 @@ class InterfaceContact:
 
     Parameters
     ----------
-    name : str
-    upper, lower : str
+    upper, lower
         Names of the bodies a and b of ``space``.
-    space : ContactSpace
     compliance : array, shape (nc, nc) [m/N], optional
         Static compliance of both bodies at these points, if it is known already; with tangential
         directions of all rows.
-    faces : FaceFriction, optional
     """
 
     name: str
@@ -131,13 +126,13 @@ class StaticChecks:
 
     Parameters
     ----------
-    lowest_pivot : float [-]
+    lowest_pivot [-]
         Smallest Cholesky pivot of the residual compliance over its largest diagonal entry, above 0.
-    reciprocity : float [-]
+    reciprocity [-]
         Works of two loads on each other's displacements, their difference over their size (Betti).
-    static_limit : float [-]
+    static_limit [-]
         Deviation of modes + residual from the static answer of the whole bodies to one load.
-    modal_share : float [-]
+    modal_share [-]
         Share of the static compliance (trace) that the kept modes carry.
     """
 
@@ -153,52 +148,51 @@ class InterfaceModel:
 
     Parameters
     ----------
-    bodies : tuple of str
+    bodies
         The moving body first.
-    masses : tuple of float [kg]
+    masses [kg]
         ``inf`` for a supported body.
     omega, damping : array, shape (M,) [rad/s], [-]
         Of all modal coordinates: body by body, rigid modes first.
-    owner : int array, shape (M,)
+    owner (M,)
         Body of each coordinate.
-    traces : array, shape (nc, M) [1/sqrt(kg)]
+    traces (nc, M) [1/sqrt(kg)]
         Change of the gaps per unit modal coordinate.
-    compliance : array, shape (nc, nc) [m/N]
+    compliance (nc, nc) [m/N]
         Residual compliance; with friction (d nc, d nc), the normals of all points first, then each
         tangential direction.
-    gap : array, shape (nc,) [m]
+    gap (nc,) [m]
         At q = 0 without contact forces.
-    axial : array, shape (nc,) [-]
+    axial (nc,) [-]
         Change of the gaps per unit translation of the moving body along +z.
-    area : array, shape (nc,) [m^2]
-    points : array, shape (nc, dimension) [m]
+    area (nc,) [m^2]
+    points (nc, dimension) [m]
     contacts : tuple of (name, first, last)
         Rows ``first <= k < last`` belong to the contact.
     rim, beyond : array, shape (nc,) [-], [m]
         See :class:`klack.contact.mortar.ContactSpace`.
-    rigid : array, shape (6, M) [1/sqrt(kg)]
+    rigid (6, M) [1/sqrt(kg)]
         Translation of the centre of mass and rotation vector of the moving body per unit modal
         coordinate; rows other than z vanish for bodies of revolution.
-    drift : array, shape (bodies, M) [1/sqrt(kg)]
+    drift (bodies, M) [1/sqrt(kg)]
         Displacement of each centre of mass along z per unit modal coordinate.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         Centre of mass of the moving body.
-    longest_period : float [s]
+    longest_period [s]
         Of its elastic modes, 0 without any.
-    checks : StaticChecks
-    tangents : array, shape (ways nc, M) [1/sqrt(kg)]
+    tangents (ways nc, M) [1/sqrt(kg)]
         Change of the tangential offsets per unit modal coordinate; no rows without friction.
-    axial_across : array, shape (ways nc,) [-]
+    axial_across (ways nc,) [-]
         The same per unit translation of the moving body along +z.
-    friction : tuple of Friction
+    friction
         Of each contact; empty without.
-    observed : array, shape (k, M) [1/sqrt(kg)]
+    observed (k, M) [1/sqrt(kg)]
         What the observers of all bodies read per unit modal coordinate.
     observed_residual : array, shape (k, nc), with friction (k, d nc) [m/N]
         What they read besides, per unit contact force of each row of ``compliance``.
-    limit : PressureLimit or None
+    limit
         Of the points of the first contact, without friction; None: they stay elastic.
-    layer : AsperityLayer or None
+    layer
         On the points of the only contact, without friction or yield; None: they are smooth.
     """
 
@@ -287,21 +281,20 @@ class PointBody:
 
     Parameters
     ----------
-    name : str
-    mass : float [kg]
+    mass [kg]
         ``inf`` for a supported body.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         Centre of mass.
-    rigid : array, shape (6, r) [1/sqrt(kg)]
+    rigid (6, r) [1/sqrt(kg)]
         Translation of the centre of mass and rotation vector per unit rigid mode, the first modes.
     omega, damping : array, shape (m,) [rad/s], [-]
         Of all modes; 0 for rigid ones.
-    traces : array, shape (n, m) [1/sqrt(kg)]
+    traces (n, m) [1/sqrt(kg)]
         Change of the gaps of all contact points per unit modal coordinate, and after them of the
         offsets in each tangential direction.
-    observed : array, shape (k, m) [1/sqrt(kg)]
+    observed (k, m) [1/sqrt(kg)]
         What the observers read per unit modal coordinate.
-    observed_static : array, shape (k, n) [m/N]
+    observed_static (k, n) [m/N]
         What they read per unit contact force, of the whole body.
     """
 
@@ -322,15 +315,14 @@ class PointContact:
 
     Parameters
     ----------
-    name, upper : str
+    name, upper
         Of the contact, and of its upper body.
-    gap, axial, area, points, rim : array, shape (nc, ...)
+    gap, axial, area, points, rim (nc, ...)
         As of :class:`klack.contact.mortar.ContactSpace`; ``axial`` per motion of the upper body.
-    beyond : float [m]
+    beyond [m]
         No point that was left out has a smaller gap.
-    axial_across : array, shape (ways nc,) [-]
+    axial_across (ways nc,) [-]
         Change of the tangential offsets per translation of the moving body along +z.
-    law : Friction or None
     """
 
     name: str
@@ -352,9 +344,9 @@ def interface_model(
 
     Parameters
     ----------
-    bodies : sequence of InterfaceBody
+    bodies
         The moving one first; it must be free along z.
-    contacts : sequence of InterfaceContact
+    contacts
         One or more, for example seat and stop.
 
     Raises
@@ -407,11 +399,11 @@ def model_at_points(
 
     Parameters
     ----------
-    bodies : sequence of PointBody
+    bodies
         The moving one first.
-    contacts : sequence of PointContact
+    contacts
         In the order of the rows of ``traces``.
-    whole : array, shape (n, n) [m/N]
+    whole (n, n) [m/N]
         Static compliance of all bodies at these rows.
     loads, answers : array, shape (n, 2) [N], [m]
         :func:`uneven_loads`, and what they open, from static solutions of their own.

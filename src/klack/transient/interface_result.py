@@ -16,11 +16,11 @@ class ImpactSegment:
 
     Parameters
     ----------
-    contact : str
+    contact
         Name of the contact that carried first.
-    side : float [-]
+    side [-]
         1 when it pushes the moving body to +z, -1 when the stop is above.
-    history : ImpactHistory
+    history
         Axial contact force (magnitude), smallest gap, velocities of the centres of mass; seen with
         the other body below, so velocities and outside forces along +z are ``side`` times these.
     point_force : float32 array, shape (n, nc) [N]
@@ -52,8 +52,8 @@ class RigidMotion:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
-    position, velocity : array, shape (n, 6)
+    time (n,) [s]
+    position, velocity (n, 6)
         Translation of the centre of mass [m], [m/s] and rotation vector [rad], [rad/s].
     """
 
@@ -68,18 +68,18 @@ class InterfaceEnergy:
 
     Parameters
     ----------
-    initial, final : float [J]
+    initial, final [J]
         Kinetic and strain energy of all bodies, of the contacts, the guides and the spring.
-    damping, guide : float [J]
+    damping, guide [J]
         Lost in modal damping; in the guides (friction, drag, and their numerical part).
-    work : float [J]
+    work [J]
         Of constant forces.
-    debt : float [J]
+    debt [J]
         Energy that the contact steps have given too much and not yet taken back; the residual
         of the balance except for round-off.
-    friction : float [J]
+    friction [J]
         Lost in friction between the faces.
-    plastic : float [J]
+    plastic [J]
         Lost to faces that yield.
     """
 
@@ -119,19 +119,17 @@ class InterfaceResult:
 
     Parameters
     ----------
-    impacts : tuple of ImpactSegment
+    impacts
         In the order of time; without flight one segment holds the whole run.
-    motion : RigidMotion
-    energy : InterfaceEnergy
-    worn : array, shape (nc,) [m]
+    worn (nc,) [m]
         Set of the contact points at the end; no points where they stay elastic.
-    steps, steps_in_contact : int
+    steps, steps_in_contact
         Fine steps.
-    rounds_per_step : float
+    rounds_per_step
         Active sets tried per step in contact.
-    approach : float [m]
+    approach [m]
         Largest way of the centre of mass of the moving body to -z after the first touch below.
-    wall_time : float [s]
+    wall_time [s]
         Of the time loop.
     """
 

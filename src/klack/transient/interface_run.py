@@ -114,37 +114,35 @@ def simulate_interface(
 
     Parameters
     ----------
-    model : InterfaceModel
-    speed : float [m/s]
+    speed [m/s]
         Of approach.
-    duration : float [s]
-    step : float [s]
+    duration [s]
+    step [s]
         Around impacts; about one 500th of the contact time.
-    force : float [N]
+    force [N]
         Constant, presses the moving body towards -z (closing), spread over it like its weight.
-    spring_stiffness : float [N/m]
+    spring_stiffness [N/m]
         Of a spring that pulls the centre of mass back to where it started; its preload belongs to
         ``force``.
-    guide : Guide, optional
     offset : array, shape (6,), optional [m], [rad]
         Rigid placement of the moving body, from that of the meshes: translation of the centre of
         mass and rotation vector.
     velocity : array, shape (6,), optional [m/s], [rad/s]
         Besides ``speed``.
-    height : float, optional [m]
+    height [m]
         Start this far above first touch; without it, where the offset puts the body.
-    gaps : callable, optional
+    gaps
         Exact gaps at a rigid placement, asked before every impact; without it the gaps stay
         linear in the placement.
-    flight : bool
+    flight
         Jump over free flight; the result then has one segment per impact.
-    impacts : int, optional
+    impacts
         Stop after so many; with ``flight`` only.
-    points : bool
+    points
         Keep the force of every contact point.
-    worn : array, shape (nc,), optional [m]
+    worn (nc,) [m]
         Set of the contact points that earlier impacts have left, of a model whose points yield.
-    progress : callable, optional
+    progress
         Called with the fraction done.
 
     Raises
@@ -185,11 +183,10 @@ def contact_points(
 
     Parameters
     ----------
-    model : InterfaceModel
-    B1 : array, shape (M,)
+    B1 (M,)
         Of the propagator of this step.
-    step : float [s]
-    spring : float [N/m]
+    step [s]
+    spring [N/m]
         Of a spring that holds the moving body.
 
     Raises

@@ -61,7 +61,7 @@ def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolv
 
     Parameters
     ----------
-    factorization : Factorization
+    factorization
         Of S, shape (n, n) [N/m].
     G : sparse array, shape (nc, n) [-]
     """

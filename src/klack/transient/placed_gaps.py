@@ -32,7 +32,7 @@ class GapCourse:
 
     Parameters
     ----------
-    slopes : array, shape (n, 6)
+    slopes (n, 6)
         Per translation [-] and rotation vector [m].
     bends : array, shape (n, 6) [1/m], [m]
         Second derivatives along each of these motions, without a sign.
@@ -54,9 +54,9 @@ def gap_course(gaps: Callable[[Vector], Vector], reach: float) -> GapCourse:
 
     Parameters
     ----------
-    gaps : callable
+    gaps
         Exact gaps at a placement.
-    reach : float [m]
+    reach [m]
         Farthest contact point from the centre of the rotation.
     """
     middle = gaps(np.zeros(6))
@@ -85,14 +85,13 @@ class PlacedGaps:
 
     Parameters
     ----------
-    model : InterfaceModel
-    rigid_count : int
+    rigid_count
         Rigid modes of the needle, the first ones.
-    gaps : callable or None
+    gaps
         Exact gaps at a rigid placement of the needle.
-    course : GapCourse or None
+    course
         Of these gaps; made of them if not given.
-    reach : float [m]
+    reach [m]
         Farthest contact point from the centre of the rotation.
     """
 

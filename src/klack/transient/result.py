@@ -25,24 +25,24 @@ class EnergyRecord:
 
     Parameters
     ----------
-    time : array, shape (k,) [s]
-    kinetic, strain : array, shape (k, n_bodies) [J]
+    time (k,) [s]
+    kinetic, strain (k, n_bodies) [J]
         Of body a, then body b.
-    contact : array, shape (k,) [J]
+    contact (k,) [J]
         Work that the contact forces took out of the bodies when points closed or opened within
         a step; the first of the two numerical losses.  Never below zero in the stabilised scheme;
         the massless one may gain (3e-4 of the energy in 60 steps through an impact of 25 us).
-    overshoot : array, shape (k,) [J]
+    overshoot (k,) [J]
         Taken out by removing the inertial overshoot, >= 0; the second one.
-    work : array, shape (k,) [J]
+    work (k,) [J]
         Done by the constant force.
-    damping : array, shape (k,) [J]
+    damping (k,) [J]
         Lost in the damping of the bodies, >= 0.
-    spring : array, shape (k,) [J]
+    spring (k,) [J]
         Taken up by the spring since the start.
-    friction : array, shape (k,) [J]
+    friction (k,) [J]
         Lost in friction of the faces, >= 0; grows only.
-    radiated : array, shape (k,) [J]
+    radiated (k,) [J]
         Carried away through non-reflecting ends, >= 0; grows only.
     """
 
@@ -75,11 +75,10 @@ class FieldsOfBody:
 
     Parameters
     ----------
-    name : str
-    peak_displacement : array, shape (n_dof,) [m]
+    peak_displacement (n_dof,) [m]
         At the end of the step with the largest contact force, counted from the start of the run.
-    end_displacement : array, shape (n_dof,) [m]
-    end_velocity : array, shape (n_dof,) [m/s]
+    end_displacement (n_dof,) [m]
+    end_velocity (n_dof,) [m/s]
         At the end; its mass-weighted projection on the modes says where the energy went.  Modes
         that the step does not resolve alternate from step to step, which single contact nodes show.
     """
@@ -96,10 +95,9 @@ class MotionOfBody:
 
     Parameters
     ----------
-    name : str
-    displacement : array, shape (n_dof,) [m]
+    displacement (n_dof,) [m]
         Counted from the given placement, with the flight to the first touch.
-    velocity : array, shape (n_dof,) [m/s]
+    velocity (n_dof,) [m/s]
         Mean over the step before, in which modes cancel that the step does not resolve.
     """
 
@@ -114,9 +112,9 @@ class Snapshots:
 
     Parameters
     ----------
-    steps : collection of int
+    steps
         Numbers of the steps after which to look; 0 is the start.
-    receive : callable
+    receive
         Called with the time [s] and a tuple of :class:`MotionOfBody`, body a first.
     """
 
@@ -130,22 +128,19 @@ class SolverStatistics:
 
     Parameters
     ----------
-    scheme, backend : str
-    degrees_of_freedom : int
+    degrees_of_freedom
         Free ones, of both bodies.
-    contact_points : int
-    steps, steps_in_contact : int
-    rounds_per_step : float
+    rounds_per_step
         Active sets tried per step in contact.
-    watched : float
+    watched
         Mean number of contact points that were near enough to be looked at.
-    repeats : int
+    repeats
         Steps done twice because a point outside of these closed.
-    factor_entries : int
+    factor_entries
         Stored entries of all factors (0 where the solver does not tell).
-    turns : int
+    turns
         Steps whose forces with friction were found by taking turns, point by point.
-    set_up_time, loop_time : float [s]
+    set_up_time, loop_time [s]
         Wall-clock.
     """
 
@@ -186,22 +181,20 @@ class FullOrderResult:
 
     Parameters
     ----------
-    history : ImpactHistory
+    history
         Contact force, gap and centre-of-mass velocities; its contact dissipation is the
         numerical loss of the scheme.
     point_force : float32 array, shape (n, nc) [N]
         Force of every contact point, mean over each step.
-    area : array, shape (nc,) [m^2]
+    area (nc,) [m^2]
         Of the contact points.
-    energy : EnergyRecord
-    fields : tuple of FieldsOfBody
+    fields
         Of body a and, unless it is a rigid wall, body b.
-    approach : float [m]
+    approach [m]
         Largest approach of the centre of mass of a after the first touch.
-    retraction : float [m]
+    retraction [m]
         Distance that a was moved back along +z at the start because the bodies overlapped.
-    statistics : SolverStatistics
-    rubbing : RubbingRecord, optional
+    rubbing
         With friction.
     """
 

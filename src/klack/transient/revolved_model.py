@@ -65,17 +65,17 @@ class RevolvedPoints:
 
     Parameters
     ----------
-    body : PointBody
+    body
         Modes: rigid ones, those of order 0, then pairs of the orders above, lowest frequency first.
-    order : int array, shape (m,)
+    order (m,)
         Of each mode.
-    compliance : array, shape (p, p) [m/N]
+    compliance (p, p) [m/N]
         Static compliance of the whole body, of a free one with inertia relief.
-    answers : array, shape (p, k) [m]
+    answers (p, k) [m]
         What the loads move the points by, solved apart from ``compliance``.
     sections : array, shape (s, 6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
         Displacement and rotation vector of sections of the body per unit modal coordinate.
-    section_compliance : array, shape (s,) [m/N]
+    section_compliance (s,) [m/N]
         Static one of each section across the axis, of a free body with inertia relief.
     """
 
@@ -121,26 +121,26 @@ def reduce_revolved(
 
     Parameters
     ----------
-    in_order : callable
+    in_order
         Body in an order.
-    rows : RingRows
+    rows
         Of all its contacts.
-    points : RingPoints
+    points
         Points of all its contacts, and the rows that read them.
-    axial : Modes
+    axial
         Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others : int or None
+    others
         Modes of the orders above that are kept, both motions of an order counted: those with the
         lowest frequencies; None: all with ``below``.
-    damping : callable
+    damping
         Ratios of modes with these angular frequencies.
-    loads : array, shape (p, k) [N]
+    loads (p, k) [N]
         For ``answers``.
-    below : float [rad/s]
+    below [rad/s]
         Highest angular frequency of these others.
-    sections : RingSections, optional
+    sections
         That are read as well.
-    cache : ResultCache, optional
+    cache
         As of :class:`klack.bodies.elasticity.statics.Flexibility`.
     """
     sums = _Orders(rows, points, loads, sections)
@@ -315,18 +315,17 @@ class RevolvedBody:
 
     Parameters
     ----------
-    name : str
-    in_order : callable
+    in_order
         Body in a Fourier order, of the half section at its centred place.
-    axial : Modes
+    axial
         Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others : int or None
+    others
         Modes of the orders above that are kept, the lowest ones; None: all with ``below``.
-    damping : callable
+    damping
         Ratios of modes with these angular frequencies [rad/s].
-    below : float [rad/s]
+    below [rad/s]
         Highest angular frequency of the others.
-    sections : RingSections, optional
+    sections
         Of its shaft, in a guide.
     """
 
@@ -345,11 +344,9 @@ class RingContact:
 
     Parameters
     ----------
-    name : str
-    upper, lower : str
+    upper, lower
         Names of the bodies.
-    space : RingSpace
-    faces : RingFriction or None
+    faces
         Their friction; None without tangential directions.
     """
 
@@ -375,10 +372,9 @@ def reduced_bodies(
 
     Parameters
     ----------
-    bodies : sequence of RevolvedBody
-    contacts : sequence of RingContact
+    contacts
         All with the same number of angles.
-    cache : ResultCache, optional
+    cache
         As of :class:`klack.bodies.elasticity.statics.Flexibility`.
     """
     ways = {contact.ways for contact in contacts}
@@ -435,9 +431,8 @@ def revolved_model(
 
     Parameters
     ----------
-    bodies : sequence of RevolvedBody
+    bodies
         The moving one first; it must be free.
-    contacts : sequence of RingContact
 
     Raises
     ------

@@ -21,12 +21,11 @@ class RingArcs:
 
     Parameters
     ----------
-    count : int
+    count
         Angles of every ring.
-    stops : tuple of str
     turn : tuple of int array
         Number of the angle of each point, stop by stop.
-    weakest : tuple of float [N]
+    weakest [N]
         Impacts on each stop with a lower peak are not judged.
     """
 
@@ -50,11 +49,11 @@ class ArcWatch:
 
         Parameters
         ----------
-        stop : int
+        stop
             Its number.
-        force : float [N]
+        force [N]
             Along the axis.
-        carried : array, shape (n,) [N]
+        carried (n,) [N]
             At its points.
 
         Warns

@@ -191,11 +191,10 @@ def solve_rough(
 
     Parameters
     ----------
-    A : array, shape (n, n) [m/N]
-    q : array, shape (n,) [m]
+    A (n, n) [m/N]
+    q (n,) [m]
         Gaps without contact forces.
-    layer : Layer
-    pressed : Pressed
+    pressed
         In: first guess and an inverse; out: those for the next step.
     lam, gap : array, shape (n,) [N], [m]
         Out; the gap of a pressed point is negative by its closure.

@@ -557,21 +557,21 @@ def solve_rubbing(
 
     Parameters
     ----------
-    A : array, shape (d n, d n) [m/N]
+    A (d n, d n) [m/N]
         Symmetric, positive definite; normal directions of all points first, then each tangential
         one; d is 2 (one tangential direction) or 3.
-    q : array, shape (d n,) [m]
+    q (d n,) [m]
         Gaps and slips without these forces.
-    mu : array, shape (n,) [-]
-    closed : Closed
+    mu (n,) [-]
+    closed
         Of the step before, for the same A; changed in place.
-    lam : array, shape (d n,) [N]
+    lam (d n,) [N]
         In: first guess, out: the solution.
-    w : array, shape (d n,) [m]
+    w (d n,) [m]
         Out: gaps and slips.
-    doing : int array, shape (n,)
+    doing (n,)
         Out: :data:`OPEN`, :data:`STICK` or :data:`SLIP`.
-    tolerance : float [N]
+    tolerance [N]
         Of the residual of the law.
 
     Returns
@@ -623,13 +623,12 @@ class RubbingPoints:
 
     Parameters
     ----------
-    law : Friction
-    step : float [s]
-    count : int
+    step [s]
+    count
         Number of all contact points, nc.
-    ways : int
+    ways
         Tangential directions, 1 or 2.
-    still : bool array, shape (nc,)
+    still (nc,)
         Points that cannot slip: hats at the axis of bodies of revolution.
     """
 
@@ -651,7 +650,7 @@ class RubbingPoints:
 
         Parameters
         ----------
-        points : int array, shape (n,)
+        points (n,)
         A : array, shape ((ways + 1) n, (ways + 1) n) [m/N]
             Compliance of their gaps, then of their slips in every direction.
 

@@ -53,12 +53,11 @@ class RubbingContact:
 
     Parameters
     ----------
-    closing : StaticContact
+    closing
         While it closes from first touch; ``force`` is that of pressure and friction together.
-    shear : array, shape (n, ways nc) [N]
+    shear (n, ways nc) [N]
         Forces across the normals at these states.
-    faces : FaceFriction
-    loops : tuple of Loop
+    loops
         It opens again from several states, the last one from the highest.
     """
 
@@ -102,17 +101,17 @@ def rubbing_contact(
 
     Parameters
     ----------
-    static : StaticContact
+    static
         Without friction.
-    faces : FaceFriction
+    faces
         Of one coefficient: where the law has two, the kinetic one counts.
-    C : array, shape (d nc, d nc) [m/N]
+    C (d nc, d nc) [m/N]
         Of :func:`klack.contact.statics.contact_compliance`.
-    turns : sequence of float
+    turns
         Approaches from which it opens again, over the highest one; the last is 1.
-    count : int
+    count
         Steps of each opening.
-    key : str
+    key
         Of the friction in the case, for an error.
 
     Raises

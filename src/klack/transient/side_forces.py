@@ -31,10 +31,9 @@ class SideForces:
 
     Parameters
     ----------
-    network : CompiledNetwork
-    model : InterfaceModel
+    model
         The needle first.
-    ports : array, shape (M, k)
+    ports (M, k)
         Shapes of the ports of the network.
     """
 

@@ -53,14 +53,13 @@ def settle_at_rest(
 
     Parameters
     ----------
-    model : InterfaceModel
+    model
         Without friction between the faces.
-    state : State
+    state
         In: where they are; out: at rest, but for the set of points that carry.
-    gaps : callable
+    gaps
         Gaps at q = 0, shape (nc,) [m], where ``state.q`` is now.
-    bore : Guide
-    force : array, shape (M,)
+    force (M,)
 
     Raises
     ------

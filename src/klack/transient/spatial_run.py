@@ -128,33 +128,32 @@ class SpatialValve:
 
     Parameters
     ----------
-    model : InterfaceModel
+    model
         Of all bodies of the network, the needle first, at the placement of the meshes (q = 0 is
         where the network has its displacements 0).  Faces stay elastic and have no layer of
         asperities.
-    components : tuple of str
+    components
         Component of each of ``model.bodies`` in the network.
-    stops : tuple of str
+    stops
         Component of the network at each of ``model.contacts``; one below and one above at most.
-    arms : array, shape (contacts, 3), optional [m]
+    arms (contacts, 3) [m]
         Middle of each contact from the centre of mass of the needle; with ``gaps``.
-    guide : Guide, optional
-    gaps : callable, optional
+    gaps
         Exact gaps at a rigid placement of the needle; without it they stay linear.
-    course : GapCourse, optional
+    course
         Of these gaps; made of them if not given.
     placement : array, shape (6,) [m], [rad]
         Of the needle at the start: translation of its centre of mass and rotation vector, beside
         the displacement along the axis that the network has.
     velocity : array, shape (6,) [m/s], [rad/s]
         At the start, beside what the network has.
-    films : tuple of TiltingFilm
+    films
         Lands of squeeze films, for the stops that have one in the network.
-    bearing : BearingFilm, optional
+    bearing
         Film in the guide, where the network has a fluid.
-    shape_marks : array, shape (M,), optional
+    shape_marks (M,)
         By which the shapes of the modes are known again: recorded with their coordinates.
-    arcs : RingArcs, optional
+    arcs
         Angles of contact points on rings, for a doubt about short contacts.
     """
 

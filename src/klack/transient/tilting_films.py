@@ -50,17 +50,17 @@ class TiltingFilm:
 
     Parameters
     ----------
-    stop : str
+    stop
         Name of the contact in the model.
-    land : SectorFilm or None
+    land
         None for a film that no tilt changes: a sphere.
-    cubic : float [m^4]
+    cubic [m^4]
         Force of the land over viscosity and closing speed, times the height cubed.
-    slope : float [-]
+    slope [-]
         Sine of the angle between the axis and the land: 1 for a flat one.
-    fit : array, shape (3, n)
+    fit (3, n)
         Lift [-] and tilts [1/m] that fit gaps of the contact points best.
-    base : array, shape (3,)
+    base (3,)
         The same of the gaps of the centred faces in touch.
     """
 
@@ -78,9 +78,9 @@ class BearingFilm:
 
     Parameters
     ----------
-    length : float [m]
+    length [m]
         Along the axis.
-    cut_off : float [m]
+    cut_off [m]
         Height that the roughness leaves.
     """
 
@@ -105,11 +105,9 @@ def film_arrays(
 
     Parameters
     ----------
-    model : InterfaceModel
-    films : sequence of TiltingFilm
-    rows : mapping of str to FilmRow
+    rows
         Of each of their stops, between parallel faces along the axis.
-    series : mapping of str to float [m/N]
+    series [m/N]
         Compliance along the axis of the bulk of the bodies at these stops.
     bearing, room : array, shape (g,) [N s], [m]
         Of the films at the heights of the guide; empty without.

@@ -136,12 +136,11 @@ def solve_yielding(
 
     Parameters
     ----------
-    A : array, shape (n, n) [m/N]
+    A (n, n) [m/N]
         Of the elastic points, and on its diagonal ``worn.softness``; changed in place.
-    q : array, shape (n,) [m]
+    q (n,) [m]
         Gaps without contact forces, over the faces as they are.
-    limit : Limit
-    worn : Worn
+    worn
         The set stays as it is: :func:`let_yield` takes it along.
     carrying, lam, gap, tolerance, scale
         As in :func:`klack.transient.active_set.solve_active`.

@@ -50,13 +50,12 @@ class ComparedCurve:
 
     Parameters
     ----------
-    x_label, y_label : str
+    x_label, y_label
         With the unit: ``"time [us]"``.
     expected : tuple of two arrays, shapes (n,)
         Abscissae and values of the known curve (few points where a table is quoted).
     computed : tuple of two arrays, shapes (m,)
         The same of klack, on its own abscissae.
-    x_log, y_log : bool
     """
 
     x_label: str
@@ -73,21 +72,20 @@ class Check:
 
     Parameters
     ----------
-    group, name : str
+    group, name
         Domain (``"elasticity"``) and what is compared (one line, with the unit).
-    expected, computed : float
-    deviation : float
+    deviation
         Relative to ``expected``, or absolute where ``expected`` is zero or ``absolute`` was asked.
-    tolerance : float
+    tolerance
         Largest accepted magnitude of ``deviation``.
-    source : str
+    source
         Author, year, equation or table; or the closed formula.
-    reason : str
+    reason
         Why the tolerance is as wide as it is, where :attr:`headroom` is above
         :data:`LARGEST_HEADROOM`: the digits of a printed table, the scatter of a standard.
-    curve : ComparedCurve, optional
+    curve
         Where the number belongs to a curve; several checks may share one object.
-    is_absolute : bool
+    is_absolute
         Whether ``deviation`` has the unit of the numbers.
     """
 

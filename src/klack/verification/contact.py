@@ -86,17 +86,17 @@ def half_spaces(
     Parameters
     ----------
     profile : function of distances [m] to gaps [m]
-    contact : float [m]
+    contact [m]
         Expected half width of the contact.
     cells : pair of int
         Cells of a and of b per ``contact``.
-    ring : float [m]
+    ring [m]
         Radius of the contact ring, 0 for a contact on the axis.
-    family : str
+    family
         Axisymmetric element family.
-    far : float
+    far
         Size of the bodies over ``contact`` (at least; on a ring twenty times ``ring``).
-    reach : float [m]
+    reach [m]
     """
     size = max(far * contact, 20.0 * ring)
     bodies = []
@@ -148,11 +148,11 @@ def uniform_compression(
 
     Parameters
     ----------
-    family_a, family_b : str
+    family_a, family_b
         Solid element families.
     cells : pair of int
         Cells per edge of a and of b; unequal ones do not match.
-    skew : float [m]
+    skew [m]
         Amplitude by which inner nodes of a are displaced sideways.
     """
 
@@ -184,13 +184,13 @@ def sphere_on_cone(
 
     Parameters
     ----------
-    family : str
+    family
         Solid element family.
     layers : pair of int
         Element borders around the third of the circle, for the sphere and the cone.
-    h : float [m]
+    h [m]
         Element size along the meridian.
-    radius : float [m]
+    radius [m]
 
     Returns
     -------

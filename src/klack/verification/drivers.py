@@ -36,18 +36,18 @@ class CoilRun:
 
     Parameters
     ----------
-    time : array, shape (n + 1,) [s]
+    time (n + 1,) [s]
         Ends of the steps, from 0.
     current, flux : array, shape (n + 1,) [A], [Wb]
         At those ends; flux of the main branch (linkage of a map).
     voltage, force : array, shape (n,) [V], [N]
         Means over the steps; the force on the armature along +z.
-    state : array, shape (n + 1,)
+    state (n + 1,)
         Number of the driver's state.
-    fluxes : array, shape (n + 1, loops) [Wb]
-    electric, ohmic, eddy, hysteresis, work : float [J]
+    fluxes (n + 1, loops) [Wb]
+    electric, ohmic, eddy, hysteresis, work [J]
         Supply, losses, and work done on the armature.
-    residual : float [-]
+    residual [-]
         Energy that does not balance, over the largest amount, that at the end of any step included.
     """
 
@@ -121,14 +121,13 @@ def run_coil(
     Parameters
     ----------
     plant : MagneticCircuit or FluxMap
-    driver : DriveProgram
-    resistance : float [ohm]
-    gap : float [m]
+    resistance [ohm]
+    gap [m]
         At lift zero; the lift closes it.
-    step : float [s]
-    lift : array, shape (n + 1,) [m]
+    step [s]
+    lift (n + 1,) [m]
         At the ends of the steps; straight between.
-    fluxes : array [Wb]
+    fluxes [Wb]
         Loop fluxes at the start.
 
     Raises

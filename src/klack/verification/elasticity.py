@@ -373,8 +373,7 @@ def free_bar_frequencies(
 
     Parameters
     ----------
-    material : Material
-    radius, length : float [m]
+    radius, length [m]
         At least 15 radii long: the search for the roots is not made for shorter bars.
 
     Returns

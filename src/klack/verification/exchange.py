@@ -322,11 +322,9 @@ def calculix_frequencies(mesh: Mesh, material: Material, count: int, folder: Pat
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         Of ``tet10`` or ``hex20``.
-    material : Material
-    count : int
-    folder : Path
+    folder
         Made for its files.
     """
     folder.mkdir()
@@ -380,12 +378,11 @@ def fmu_peak_and_lift(
 
     Parameters
     ----------
-    model : ModalModel
+    model
         A pair with one contact.
-    folder : Path
     fmi : 2 or 3
     kind : "CoSimulation" or "ModelExchange"
-    step : float [s]
+    step [s]
         Communication and output step of co-simulation.
     """
     import fmpy

@@ -26,8 +26,7 @@ class MatrixFiles:
 
     Parameters
     ----------
-    stiffness, mass : Path
-    dofs : Path or None
+    dofs
         Table of node and direction, where the files do not say them.
     """
 
@@ -76,9 +75,8 @@ def write_matrices(
 
     Parameters
     ----------
-    form : str
+    form
         Key of :data:`MATRIX_WRITERS`.
-    folder : Path
     K, M : csr_array, shape (n, n)
         Both triangles.
     node, direction : int arrays, shape (n,)
@@ -361,10 +359,8 @@ def write_mesh(form: str, folder: Path, mesh: Mesh) -> Path:
 
     Parameters
     ----------
-    form : str
+    form
         Key of :data:`MESH_WRITERS`.
-    folder : Path
-    mesh : Mesh
 
     Returns
     -------

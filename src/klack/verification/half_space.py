@@ -47,11 +47,10 @@ def half_space_compliance(
 
     Parameters
     ----------
-    points : array, shape (n, 2) [m]
+    points (n, 2) [m]
         Centres of the cells.
-    size : float [m]
+    size [m]
         Side of the cells.
-    lower, upper : Material
     """
     n = len(points)
     x, y = (points[:, None, :] - points[None, :, :]).transpose(2, 0, 1)  # from cell j to point i
@@ -87,17 +86,17 @@ class ObliqueImpact:
 
     Parameters
     ----------
-    centre : float [m/s]
+    centre [m/s]
         Tangential speed of the centre.
-    spin : float [rad/s]
+    spin [rad/s]
         About the axis across the plane of motion; positive where it rolls on.
-    surface : float [m/s]
+    surface [m/s]
         Tangential speed of the point of contact.
-    normal : float [m/s]
+    normal [m/s]
         Speed of rebound.
-    lost : float [J]
+    lost [J]
         In friction.
-    peak : float [-]
+    peak [-]
         Largest tangential force over friction times the largest normal force.
     """
 
@@ -115,13 +114,12 @@ class SphereImpact:
 
     Parameters
     ----------
-    radius : float [m]
-    sphere, ground : Material
-    speed : float [m/s]
+    radius [m]
+    speed [m/s]
         Along the normal.
-    cells : float [-]
+    cells [-]
         Contact points over the radius of the largest contact.
-    inertia : float [-]
+    inertia [-]
         m R^2 / I; 2.5 for a solid sphere, 0 for a body that does not turn.
     """
 

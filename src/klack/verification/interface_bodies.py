@@ -75,13 +75,13 @@ def modal_model(
 
     Parameters
     ----------
-    masses : sequence of float [kg]
+    masses [kg]
         Moving body first, ``inf`` for a supported one.
-    omega : array, shape (M,) [rad/s]
-    traces : array, shape (nc, M) [1/sqrt(kg)]
-    compliance : array, shape (nc, nc) [m/N]
-    gap : array, shape (nc,) [m]
-    rigid : array, shape (6, M), optional [1/sqrt(kg)]
+    omega (M,) [rad/s]
+    traces (nc, M) [1/sqrt(kg)]
+    compliance (nc, nc) [m/N]
+    gap (nc,) [m]
+    rigid (6, M) [1/sqrt(kg)]
     more
         Other fields of the model.  Without them all coordinates belong to the moving body and are
         undamped, and one contact on 1 m^2 for each point lies below that body, on its axis.
@@ -131,10 +131,10 @@ def rigid_body(
 
     Parameters
     ----------
-    mass : float [kg]
+    mass [kg]
     inertia : three floats [kg m^2]
         About x, y, z through the centre of mass.
-    points : array, shape (nc, 3) [m]
+    points (nc, 3) [m]
         From the centre of mass.
     stiffness, gap : float [N/m], [m]
     """
@@ -177,9 +177,9 @@ def rod_between_stops(modes: int, *, stiffness: float, gaps: tuple[float, float]
 
     Parameters
     ----------
-    modes : int
+    modes
         Elastic ones.
-    stiffness : float [N/m]
+    stiffness [N/m]
         Of the contact spring at either end.
     gaps : pair of float [m]
         Below and above.
@@ -220,12 +220,11 @@ def lateral_guide(
 
     Parameters
     ----------
-    model : InterfaceModel
     clearance, stiffness : float [m], [N/m]
     heights, offset : sequence of float, of (x, y) [m]
     friction, viscous : float [-], [N s/m]
         At each height.
-    radius : float [m]
+    radius [m]
         Of the shaft, which friction turns.
     """
     translation, rotation = model.rigid[:3], model.rigid[3:]
@@ -350,12 +349,12 @@ class BeamImpact:
 
     Parameters
     ----------
-    mass : float [kg]
+    mass [kg]
         Of the sphere.
     omega, shapes : array, shape (m,) [rad/s], [1/sqrt(kg)]
         Frequencies of the beam and its modes at the middle.
     gaps, stiffness : array, shape (n,) [m], [N/m]
-    hertz : float [N/m^1.5]
+    hertz [N/m^1.5]
         K of the law that the springs follow.
     """
 
@@ -390,9 +389,9 @@ class BeamImpact:
         Parameters
         ----------
         speed, duration : float [m/s], [s]
-        smooth : bool
+        smooth
             Take Hertz' law itself instead of the springs.
-        samples : int
+        samples
             Instants at which the force is looked at.
         """
         m = len(self.omega)
@@ -444,9 +443,9 @@ def sphere_on_beam(*, modes: int = 20, springs: int = 30) -> BeamImpact:
 
     Parameters
     ----------
-    modes : int
+    modes
         Symmetric ones of the beam.
-    springs : int
+    springs
         Pieces of Hertz' law, up to a depth of 80 um.
     """
     radius, length, width, height = 70e-3, 780e-3, 60e-3, 27.8e-3
@@ -481,10 +480,9 @@ class MassOnLayer:
 
     Parameters
     ----------
-    layer : AsperityLayer
-    mass : float [kg]
-    area : float [m^2]
-    stiffness : float [N/m]
+    mass [kg]
+    area [m^2]
+    stiffness [N/m]
         Of the bodies behind the layer, in series.
     """
 
@@ -627,10 +625,10 @@ class PointImpact:
 
     Parameters
     ----------
-    along, coupling, normal : float [1/kg]
+    along, coupling, normal [1/kg]
         Inverse mass at the point: tangential, tangential per normal force, normal.
-    friction : float [-]
-    tangential, approach : float [m/s]
+    friction [-]
+    tangential, approach [m/s]
         Velocity of the point before, along the face and into it.
     spring, stiffer : float [N/m], [-]
         Normal spring, and the tangential one over it.

@@ -27,19 +27,19 @@ class InterfaceMotion:
 
     Parameters
     ----------
-    step : float [s]
+    step [s]
     gap, law_gap : array (n + 1,) [m]
         Of the bodies, and what contact and film feel behind the series compliance, at the ends
         of the steps.
     contact_force, film_force : array (n,) [N]
         Means over the steps.
     contact_loss, film_loss : array (n,) [J]
-    kinetic : float [J]
+    kinetic [J]
         Modal energy of both bodies at the start.
-    residual : float [-]
+    residual [-]
         Residual of the energy balance, over ``kinetic`` or the work of the force, whichever is
         larger.
-    upper_speed : float [m/s]
+    upper_speed [m/s]
         Of the centre of mass of the upper body at the end.
     state : array (2 m,)
         Modal displacements and velocities at the end.
@@ -80,18 +80,15 @@ def interface_motion(
 
     Parameters
     ----------
-    upper, lower : ReducedBody
+    upper, lower
         Undamped, so that the energy balance close without the modes.
-    law : ContactLaw or None
-    film : FilmRow or None
-    series : float [m/N]
-    gap : float [m]
-    speed : float [m/s]
+    series [m/N]
+    gap [m]
+    speed [m/s]
         Of ``upper``, down.
-    press : float [N]
+    press [N]
         Pushes ``upper`` down, as a body force on its rigid mode.
-    step : float [s]
-    steps : int
+    step [s]
     """
     flat = law.flat() if law else FlatLaw(kind=NO_LAW, parameters=np.zeros(1))
     alpha = law.dissipation if isinstance(law, HuntCrossley) else 0.0
@@ -216,9 +213,8 @@ def squeeze_by_volumes(inner: float, outer: float, cells: int) -> float:
 
     Parameters
     ----------
-    inner, outer : float [m]
+    inner, outer [m]
         Radii; an inner one of 0 makes a disc.
-    cells : int
     """
     edges = np.linspace(inner, outer, cells + 1)
     r, dr = 0.5 * (edges[1:] + edges[:-1]), edges[1] - edges[0]
@@ -250,11 +246,10 @@ def film_by_ode(
 
     Parameters
     ----------
-    upper, lower : ReducedBody
+    upper, lower
         Ports ``bottom`` and ``top`` meet.
-    film : FilmRow
     series, gap, speed, duration : float [m/N], [m], [m/s], [s]
-    relative : float [-]
+    relative [-]
         Tolerance.
     """
     omega = np.concatenate([upper.omega, lower.omega])

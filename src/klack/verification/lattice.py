@@ -63,13 +63,12 @@ def lattice_mesh(
 
     Parameters
     ----------
-    family : str
+    family
         Element family; triangles, wedges and tetrahedra split the cells.
     lines : arrays, one per direction [m]
         Ascending coordinates of the cell borders.
     shape : function of points (n, d) to points (n, d), optional
         Map that keeps the orientation; it is applied to mid nodes as well.
-    solid : str
 
     Returns
     -------

@@ -113,8 +113,7 @@ def struck_bar(shot: Shot, *, flat: bool = False) -> MeasuredImpactStudy:
 
     Parameters
     ----------
-    shot : Shot
-    flat : bool
+    flat
         With a flat end of the striker.
     """
     # a flat impact is linear: its speed is the factor

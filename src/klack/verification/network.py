@@ -78,13 +78,13 @@ def whole_valve(
 
     Parameters
     ----------
-    modes : tuple of int
+    modes
         Of needle (one of them rigid), housing and pole.
-    damping : float [-]
+    damping [-]
         Of every elastic mode.
-    driver : Driver, optional
+    driver
         :func:`peak_and_hold` by default.
-    gas_fraction : float [-]
+    gas_fraction [-]
     """
     parts: dict[str, Component] = {
         "needle": _rod("needle", 0.04, 3e-3 / (0.04 * 7850.0), modes[0] - 1, damping, free=True),

@@ -48,8 +48,6 @@ def one_contact(
 
     Parameters
     ----------
-    a, b : ReducedBody
-    law : ContactLaw
     gap, series, press : float [m], [m/N], [N]
     """
     pair = ContactPair(
@@ -155,13 +153,13 @@ class BouncingDrop:
 
     Parameters
     ----------
-    speed : float [m/s]
+    speed [m/s]
         At first touch.
-    acceleration : float [m/s^2]
-    restitution : tuple of float
+    acceleration [m/s^2]
+    restitution
         Per impact; the needle rests after the flight that follows the last.
-    contact : float [s]
-    before, after : float [s]
+    contact [s]
+    before, after [s]
         Rest at the top, and on the seat.
     """
 

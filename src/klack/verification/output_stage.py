@@ -50,11 +50,11 @@ class StageRun:
 
     Parameters
     ----------
-    time : array, shape (n + 1,) [s]
+    time (n + 1,) [s]
     current, capacitor : array, shape (n + 1,) [A], [V]
-    state, entered : array, shape (n + 1,)
+    state, entered (n + 1,)
         State of the driver, and when it was entered [s].
-    energies : dict of str to float [J]
+    energies [J]
         Supplies, losses and changes of stores over the run, by their entries; and ``work``.
     """
 

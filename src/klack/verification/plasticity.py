@@ -59,11 +59,11 @@ class FirstYield:
 
     Parameters
     ----------
-    modulus : float [Pa]
+    modulus [Pa]
         E* of the contact.
-    radius : float [m]
-    yield_stress : float [Pa]
-    poisson : float [-]
+    radius [m]
+    yield_stress [Pa]
+    poisson [-]
     """
 
     modulus: float
@@ -109,9 +109,9 @@ def sphere_on_sphere(*, size: float, extent: float, energy: float) -> YieldingLo
 
     Parameters
     ----------
-    size, extent : float [m]
+    size, extent [m]
         Of the elements at the contact, and how far these reach.
-    energy : float [J]
+    energy [J]
         Up to which.
     """
     return _loops(*_spheres(size, extent), energy).loops

@@ -34,9 +34,9 @@ def rod(*, elements: int, clamped: bool) -> tuple[ElasticBody, Port, Port]:
 
     Parameters
     ----------
-    elements : int
+    elements
         Along the length, eight nodes each.
-    clamped : bool
+    clamped
         Hold the upper end.
 
     Returns

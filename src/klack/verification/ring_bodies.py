@@ -61,9 +61,9 @@ class NeedleOnRing:
 
     Parameters
     ----------
-    size, bulk : float [m]
+    size, bulk [m]
         Elements at the ring and far away.
-    reach : float [m]
+    reach [m]
         Largest gap of a contact point of the centred bodies.
     slave : "a" or "b", optional
         Side of the hats, needle or seat.
@@ -186,11 +186,9 @@ def solid_over_ring_compliance(
 
     Parameters
     ----------
-    pair : NeedleOnRing
-    number : int
+    number
         Needle (0) or seat (1).
-    order : int
-    layers : int
+    layers
         Of the solid.
     """
     space, _ = pair.placed(2 * layers, np.zeros(6))
@@ -232,14 +230,13 @@ class RingStroke:
 
     Parameters
     ----------
-    pair : NeedleOnRing
     placement : array, shape (6,) [m], [rad]
         Of the needle; it is moved along z to ``gap``.
-    count : int
+    count
         Angles of every ring.
-    axial, others : int
+    axial, others
         Modes of each body of order 0, and of the orders above.
-    gap : float [m]
+    gap [m]
         Along z, to the first touch.
     """
 
@@ -313,12 +310,11 @@ class RingStroke:
 
         Parameters
         ----------
-        speed : float [m/s]
+        speed [m/s]
             Downwards.
-        duration, step : float [s]
+        duration, step [s]
         velocity : array, shape (6,), optional [m/s], [rad/s]
             Beside it.
-        guide : Guide, optional
         """
         needle, seat = self.bodies
         network = Network(

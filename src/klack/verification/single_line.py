@@ -71,15 +71,15 @@ class LineRun:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Start of each step.
     pressure, flow : array, shape (n, 2) [Pa], [m^3/s]
         At both ends, means over each step; flow into the line.
-    cavity : array, shape (n,) [m^3]
+    cavity (n,) [m^3]
         Vapour in the line after each step.
-    losses : array, shape (3,) [J]
+    losses (3,) [J]
         See ``LINE_LOSSES``.
-    energy_residual, volume_residual : float [-]
+    energy_residual, volume_residual [-]
         What does not balance, over what passed the ends; none where nothing did.
     """
 
@@ -133,9 +133,9 @@ def run_line(
     ----------
     lengths : array of int, shape (n,)
         Fine steps of each step: 1, or one greater number.
-    pressure : array, shape (2,) [Pa]
+    pressure (2,) [Pa]
         At both ends at the start.
-    flow : float [m^3/s]
+    flow [m^3/s]
         From a to b at the start.
     """
     m = np.asarray(lengths, dtype=np.int64)
@@ -229,11 +229,11 @@ def ringing(time: np.ndarray, values: np.ndarray, frequency: float, *, apart: fl
 
     Parameters
     ----------
-    time, values : array, shape (n,)
+    time, values (n,)
         Evenly spaced.
-    frequency : float [Hz]
+    frequency [Hz]
         About that of the tone; others are suppressed by the window.
-    apart : float [s]
+    apart [s]
         Distance of the windows; the later one ends with the record.
     """
     step = time[1] - time[0]
@@ -251,15 +251,15 @@ class CellRun:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Middle of each step.
     total, flow : array, shape (n, 2) [J/kg], [kg/s]
         At both ends, means over each step; flow into the line.
-    losses : array, shape (n, 3) [J]
+    losses (n, 3) [J]
         Of each step: friction, waves, outflow.
     pressure, velocity : array, shape (cells,) [Pa], [m/s]
         At the end.
-    energy_residual, mass_residual : float [-]
+    energy_residual, mass_residual [-]
         What does not balance, over what passed the ends and over what is held.
     """
 

@@ -50,9 +50,8 @@ class Sphere:
 
     Parameters
     ----------
-    name : str
-    density : float [kg/m^3]
-    modulus : float [Pa]
+    density [kg/m^3]
+    modulus [Pa]
         ``E*`` of sphere and wall.
     """
 
@@ -143,12 +142,11 @@ def restitution(
 
     Parameters
     ----------
-    sphere : Sphere
-    stokes : float [-]
-    cut_off : float [m]
-    pull : bool
+    stokes [-]
+    cut_off [m]
+    pull
         The film may pull up to the tension of the ambient pressure; else it cavitates at once.
-    drag : bool
+    drag
         With steady drag.
     """
     return _bounce(

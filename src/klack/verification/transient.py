@@ -63,13 +63,11 @@ def rod_body(
 
     Parameters
     ----------
-    name : str
-    material : Material
+    material
         Poisson's ratio plays no part.
-    area : float [m^2]
-    length : float [m]
-    elements : int
-    bottom : float [m]
+    area [m^2]
+    length [m]
+    bottom [m]
         Height of node 0.
     """
     size = length / elements
@@ -440,12 +438,10 @@ def blocked_bar_model(
 
     Parameters
     ----------
-    length : float [m]
-    modes : int
+    length [m]
+    modes
         Plane ones of the bar, the lowest; picked by the compliance they give a uniform pressure.
-    radius : float [m]
-    material : Material
-    elements : int
+    radius [m]
     """
     bar, _ = blocked_bar(length, radius, elements, material)
     wall_mesh = lattice_mesh("quad8", [np.array([0.0, 2.0 * radius]), np.array([-length, 0.0])])
@@ -485,9 +481,9 @@ def block_on_pad(
 
     Parameters
     ----------
-    arm : float [m]
+    arm [m]
         From the axis of the block to the middle of the pad, along x.
-    width : float [m]
+    width [m]
         Of the square pad, half as high; its stiffness is about E width * 2.
     """
     half = 5e-3

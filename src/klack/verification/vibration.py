@@ -41,8 +41,7 @@ def rod_structure(*, modes: int = 12, damping: float = 0.0) -> Structure:
 
     Parameters
     ----------
-    modes : int
-    damping : float [-]
+    damping [-]
         Ratio of every mode.
     """
     body, lower, _ = rod(elements=80, clamped=True)
@@ -70,11 +69,11 @@ def oscillator(*, mass: float, stiffness: float, base: float, damping: float = 0
 
     Parameters
     ----------
-    mass : float [kg]
-    stiffness : float [N/m]
-    base : float [kg]
+    mass [kg]
+    stiffness [N/m]
+    base [kg]
         Mass of the held part.
-    damping : float [-]
+    damping [-]
     """
     shape, area = 1.0 / sqrt(mass), 1e-4
     columns = np.array([shape, 0.0, 1.0])

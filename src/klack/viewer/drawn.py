@@ -44,7 +44,6 @@ def view_of_case(case: Case | ValveCase, progress: Progress = silent) -> View:
     Parameters
     ----------
     case : Case or ValveCase
-    progress : callable
     """
     view = View(
         name=case.name,
@@ -134,11 +133,8 @@ def body_view(name: str, mesh: Mesh, held: NDArray[np.int64], about: str) -> Bod
 
     Parameters
     ----------
-    name : str
-    mesh : Mesh
-    held : int array
+    held
         Nodes.
-    about : str
     """
     skin = skin_of_mesh(mesh)
     is_held = np.zeros(mesh.node_count, dtype=bool)
@@ -202,11 +198,10 @@ def view_of_result(
     Parameters
     ----------
     study : ImpactStudy or StrokeStudy
-    folder : Path
+    folder
         Of the result; files that its case names are looked for beside it.
     components : iterable of type
         Component classes of the user.
-    progress : callable
 
     Raises
     ------

@@ -34,13 +34,12 @@ def view_of_source(
 
     Parameters
     ----------
-    source : Path
+    source
         Case file or name of a shipped case, mesh or STEP file, folder of a result.
     components : iterable of type
         Component classes of the user that a case may name.
     unit_length : float [m] or None
         Of a mesh file that does not name it.
-    progress : callable
 
     Raises
     ------

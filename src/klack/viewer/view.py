@@ -28,16 +28,16 @@ class ContactView:
 
     Parameters
     ----------
-    name : str
+    name
         Of the stop; ``"contact"`` for that of an impact.
-    upper, lower : str
+    upper, lower
         Surfaces, written ``needle.tip``.
-    ring : array, shape (n, 3) [m]
+    ring (n, 3) [m]
         Points of first touch in their order round their centre; one for a point, none where flat
         faces touch all at once.
-    closed : bool
+    closed
         The points are a ring; others are drawn one by one.
-    gap : float [m]
+    gap [m]
         Between both as shown; nan where it is not known.
     """
 
@@ -58,15 +58,15 @@ class MotionView:
     shapes : int16 array, shape (m, n, dimension)
         Of full range each: mode shapes of the nodes of the surface, rigid ones first, then the
         static rests.
-    scale : array, shape (m,)
+    scale (m,)
         Displacement of each shape at 32767, per unit of its amplitude.
-    frequency : array, shape (m,) [Hz]
+    frequency (m,) [Hz]
         0 for a rigid motion; nan for a static rest.
-    amplitude : array, shape (frames, m)
+    amplitude (frames, m)
         Over ``time`` of the page; empty where no impact was computed with these shapes.
-    stress : array, shape (n,) [Pa]
+    stress (n,) [Pa]
         Von Mises at the highest force; empty where it is not known.
-    node : int array, shape (n,)
+    node (n,)
         Nodes of the mesh, rising.
     """
 
@@ -84,18 +84,16 @@ class BodyView:
 
     Parameters
     ----------
-    name, about : str
+    name, about
         ``about`` in words: where it comes from, its mesh.
-    skin : Skin
-    held : bool array, shape (v,)
+    held (v,)
         Vertices of the skin that are held.
-    section : array, shape (s, 2, 3) [m]
+    section (s, 2, 3) [m]
         Sides of elements in the plane y = 0.
-    finest : float [m]
+    finest [m]
         Shortest side of an element.
-    travel : array, shape (frames,) [m]
+    travel (frames,) [m]
         Displacement along z of the body as a whole over ``time`` of the page; empty without.
-    motion : MotionView or None
     """
 
     name: str
@@ -114,9 +112,8 @@ class Curve:
 
     Parameters
     ----------
-    name, x_unit, y_unit : str
-    x, y : array, shape (n,)
-    body : str
+    x, y (n,)
+    body
         Whose modes its peaks are; empty for a history.
     """
 
@@ -134,18 +131,15 @@ class View:
 
     Parameters
     ----------
-    name, title, source, description : str
+    name, title, source, description
         ``name`` is a short one, for a file; ``source`` says which case, mesh or result this is.
-    version : str
+    version
         Of klack.
-    bodies : tuple of BodyView
-    contacts : tuple of ContactView
-    time : array, shape (frames,) [s]
+    time (frames,) [s]
         Instants of the motion; empty without one.
-    transfer, histories : tuple of Curve
-    schematic : str
+    schematic
         SVG of the network; empty without one.
-    notes : tuple of str
+    notes
         What is not shown, and why.
     """
 

@@ -17,9 +17,9 @@ class Group:
 
     Parameters
     ----------
-    words : str
+    words
         What they do, for the table of ``klack warm``.
-    compute : callable
+    compute
         Small calculation that calls each of them with the types of a real one.
     """
 

@@ -23,7 +23,7 @@ class Compiled:
 
     Parameters
     ----------
-    seconds : float [s]
+    seconds [s]
     """
 
     functions: int = 0
@@ -64,9 +64,9 @@ class Warmed:
 
     Parameters
     ----------
-    functions : int
+    functions
         Functions of klack that had to be compiled for it; 0 if all were there.
-    seconds : float [s]
+    seconds [s]
         Spent on compiling, waiting for other processes included.
     """
 

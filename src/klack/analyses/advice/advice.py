@@ -33,9 +33,9 @@ class Measured:
 
     Parameters
     ----------
-    runs : str
+    runs
         For the table: level, bodies, what was run.
-    at_least : float
+    at_least
         Coarsest factor that the target band allows, whatever the errors; inf without such a limit.
     """
 
@@ -60,8 +60,8 @@ class Fixed:
 
     Parameters
     ----------
-    errors : array, shape (m,)
-    remedy : str
+    errors (m,)
+    remedy
         What to do instead.
     """
 
@@ -78,9 +78,9 @@ class Counsel:
     ----------
     values : mapping of key to float
         Advised [SI].
-    factor : float
+    factor
         At which they stand; 1 keeps the case.
-    reached : bool
+    reached
         Whether the share of the target is met within what may be extrapolated.
     """
 
@@ -121,13 +121,13 @@ class Advice:
 
     Parameters
     ----------
-    level : str
+    level
         ``reduced``, ``interface`` or ``stroke``.
-    up_to : float [Hz]
+    up_to [Hz]
         Middle frequency of the highest third octave that is judged; nan for strokes.
-    band_from_case : bool
+    band_from_case
         Whether the target band was taken from the force of the case.
-    unmeshed : tuple of str
+    unmeshed
         Bodies whose meshes were given: their errors are in no sum.
     dofs : pair of int or None
         Of all bodies now, and with the advice.
@@ -135,10 +135,10 @@ class Advice:
         Of one run with everything before it: measured, and estimated for the advice.
     checked : pair of array or None
         Deviations of the case as it is and of the advised one from the finest run, shape (m,) each.
-    check_words : str
+    check_words
         What that was, or why there is none.
-    wall_time : float [s]
-    runs : int
+    wall_time [s]
+    runs
         Cases that were run in all.
     """
 
@@ -220,7 +220,7 @@ def counsel(item: Measured, share: float, measures: Sequence[Measure]) -> Counse
 
     Parameters
     ----------
-    share : float [-]
+    share [-]
     """
     factor = coarsest_within(item.ladder, share, measures, coarsest=item.coarsest)
     values = item.setting.advised(factor)

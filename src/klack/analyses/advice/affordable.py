@@ -37,7 +37,7 @@ def added(present: int, run: tuple[float, int], factor: float, dimension: int) -
 
     Parameters
     ----------
-    present : int
+    present
         Of the case.
     run : pair of float and int
         Factor of the run, and its degrees of freedom.
@@ -95,9 +95,9 @@ def affordable(
     ----------
     measured, fixed, measures
         As for :func:`klack.analyses.advice.advice.settle`.
-    size_with : callable
+    size_with
         Degrees of freedom of all bodies with these values.
-    present : int
+    present
         Those of the case.
 
     Returns

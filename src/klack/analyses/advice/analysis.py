@@ -36,9 +36,9 @@ class AdvisedCase:
 
     Parameters
     ----------
-    yaml : str
+    yaml
         Sections of the case with the advice in them; empty if nothing changes.
-    written : Path or None
+    written
         Where the whole case with the advice stands.
     """
 

@@ -134,16 +134,16 @@ def advise_impact(
 
     Parameters
     ----------
-    error : float [-]
+    error [-]
         Accepted for peak force, contact time and force history.
-    level_error : float [dB]
+    level_error [dB]
         Accepted for every third octave of the target band.
-    up_to : float, optional [Hz]
+    up_to [Hz]
         Target band; by default the highest third octave within 40 dB of the strongest.
-    level : str, optional
+    level
         ``reduced`` or ``interface``, whose results shall be so good; by default reduced, and
         interface for a case off its axis.
-    confirm : bool
+    confirm
         Run the advised case and compare it with the finest run.
 
     Raises

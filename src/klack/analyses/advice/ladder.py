@@ -31,9 +31,9 @@ class Measure:
 
     Parameters
     ----------
-    limit : float
+    limit
         Greatest error that the user accepts; inf for a number that is only reported.
-    decibel : bool
+    decibel
         Errors are in dB, otherwise relative (-).
     """
 
@@ -47,7 +47,7 @@ def score(errors: NDArray[np.float64], measures: Sequence[Measure]) -> float:
 
     Parameters
     ----------
-    errors : array, shape (m,)
+    errors (m,)
     """
     limits = np.array([measure.limit for measure in measures])
     return float(np.max(np.abs(errors) / limits))
@@ -59,13 +59,13 @@ class Ladder:
 
     Parameters
     ----------
-    factors : tuple of float
+    factors
         Falling, in one constant ratio; 1 is the case.
-    differences : array, shape (k - 1, m)
+    differences (k - 1, m)
         Absolute deviation of each run but the finest from the finest.
-    steps : array, shape (k - 1,)
+    steps (k - 1,)
         Norm of the difference between neighbours: what the order is measured on.
-    assumed_order : float
+    assumed_order
         Taken where two runs tell no order.
     """
 
@@ -140,7 +140,7 @@ def coarsest_within(
 
     Parameters
     ----------
-    allowed : float [-]
+    allowed [-]
         Share of the target.
     """
     finest = min(ladder.finest, coarsest)
@@ -166,7 +166,7 @@ def allotment(caps: Sequence[float], budget: float) -> float:
 
     Parameters
     ----------
-    caps : sequence of float
+    caps
         Score of each setting at its coarsest.
     """
     left = sorted(caps)

@@ -55,9 +55,9 @@ def impact_measures(error: float, level: float) -> tuple[Measure, ...]:
 
     Parameters
     ----------
-    error : float [-]
+    error [-]
         Accepted for peak force, contact time and force history (rms, over the peak force).
-    level : float [dB]
+    level [dB]
         Accepted in every third octave of the target band.
     """
     return (
@@ -107,7 +107,7 @@ def impact_errors(
 
     Parameters
     ----------
-    up_to : float [Hz]
+    up_to [Hz]
         Third octaves that begin below it are compared, as far as those of the reference lie
         within 40 dB of its strongest.
     """
@@ -204,9 +204,9 @@ def mode_setting(
 
     Parameters
     ----------
-    count : int
+    count
         That it keeps.
-    frequencies : array, shape (k,) [Hz]
+    frequencies (k,) [Hz]
         Of the elastic modes known, ascending; the case keeps some of them.
     """
     key = ("reduction", "modes", body)
@@ -241,14 +241,14 @@ def mode_ladder(
 
     Parameters
     ----------
-    pools : mapping of str to Modes
+    pools
         Twice as many as kept.
-    counts : mapping of str to int
+    counts
         Kept.
-    reference : ImpactHistory
+    reference
         With twice the modes of every body.
-    step : float [s]
-    up_to : float [Hz]
+    step [s]
+    up_to [Hz]
     """
     most = {name: 2 * count for name, count in counts.items()}
     if len(pools[body].omega) < most[body]:

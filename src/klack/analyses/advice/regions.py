@@ -29,7 +29,7 @@ def mesh_settings(
 
     Parameters
     ----------
-    surfaces : tuple of SurfaceName
+    surfaces
         That touch.
     """
     contact: list[SettingValue] = []
@@ -91,7 +91,7 @@ def axisymmetric_twin(case: Case, highest: Mapping[str, float]) -> Case | None:
 
     Parameters
     ----------
-    highest : mapping of str to float [Hz]
+    highest [Hz]
         Highest kept mode of each body.
     """
     names = (case.contact.moving.body, case.contact.stop.body)
@@ -127,7 +127,7 @@ def unmeshed_notes(bodies: Mapping[str, CaseBody], size_ratio: float = nan) -> l
 
     Parameters
     ----------
-    size_ratio : float [-]
+    size_ratio [-]
         Element size across the contact over its half width; nan if unknown.
     """
     names = unmeshed(bodies)
@@ -168,7 +168,7 @@ def coarse_contact_notes(size_ratio: float) -> list[str]:
 
     Parameters
     ----------
-    size_ratio : float [-]
+    size_ratio [-]
         Element size across the contact over its half width.
     """
     if not size_ratio > COARSE:

@@ -20,18 +20,18 @@ class SettingValue:
 
     Parameters
     ----------
-    key : tuple of str
+    key
         Its place in the case.
-    value : float
+    value
         In SI, as the case has it.
-    unit : str
+    unit
         ``m``, ``s``, ``Hz``; empty for a plain number.
-    kind : str
+    kind
         How it follows the factor: ``size`` in proportion, ``count`` inversely, ``frequency`` so
         that the number of modes below it does.
-    least, most : float
+    least, most
         What the case accepts.
-    table : tuple of float [Hz]
+    table [Hz]
         Frequencies of modes, ascending, of a ``frequency``.
     """
 
@@ -94,9 +94,9 @@ class Setting:
 
     Parameters
     ----------
-    name : str
+    name
         For example ``"needle, away from the contact"``.
-    group : str
+    group
         ``mesh``, ``layers``, ``modes`` or ``step``.
     """
 

@@ -44,7 +44,7 @@ def stroke_measures(error: float) -> tuple[Measure, ...]:
 
     Parameters
     ----------
-    error : float [-]
+    error [-]
         Accepted for the time of the impact (of its time since the start), peak force, and
         absolutely for the restitution.  The contact time comes in whole steps and is only reported.
     """
@@ -58,7 +58,7 @@ def first_impacts(valve: Valve, *, step: float | None = None) -> dict[str, NDArr
 
     Parameters
     ----------
-    step : float, optional [s]
+    step [s]
         Of the network; that of the case without.  Macro steps change in proportion.
     """
     case = valve.case
@@ -110,9 +110,9 @@ def advise_stroke(
 
     Parameters
     ----------
-    error : float [-]
+    error [-]
         Accepted for time and peak force of first impacts, and for their restitution.
-    confirm : bool
+    confirm
         Run the advised valve and lay it over the one with everything finest.
 
     Raises
@@ -237,7 +237,7 @@ def step_ladder(
 
     Parameters
     ----------
-    now : mapping of str to array
+    now
         First impacts with the step of the case.
     """
     step, doubles = valve.case.run.fine_step, _may_double(valve)

@@ -48,7 +48,7 @@ def correlation_figure(
 
     Parameters
     ----------
-    names : sequence of str
+    names
         Of the parameters.
     matrices : sequence of (title, array of shape (p, p))
     """

@@ -55,7 +55,7 @@ class Motion:
 
     Parameters
     ----------
-    step : float [s]
+    step [s]
         Of the channels, which begin at time zero.
     channels : mapping of str to float32 array, shape (n,)
         By role, SI.
@@ -79,12 +79,12 @@ class MotionModel:
 
     Parameters
     ----------
-    parameters : tuple of FreeParameter
+    parameters
         Those that the motion depends on.
     variant : "wet" or "dry"
-    channels : mapping of str to str
+    channels
         Recorded channel of each role.
-    record : float [s]
+    record [s]
         Spacing of the records.
     """
 
@@ -280,21 +280,21 @@ class StrokeModel:
 
     Parameters
     ----------
-    parameters : tuple of FreeParameter
+    parameters
         All of them, in the order of the fit.
-    pool : TrialPool
+    pool
         Computes motions from those parameters that are not of the sensor.
-    sensor : LiftSensor
+    sensor
         Of the case.
-    zeroed : bool
+    zeroed
         True if the lift before the trigger is set to zero.
-    time : array, shape (k,) [s]
+    time (k,) [s]
         Of the measured strokes.
-    channels : tuple of str
+    channels
         Roles that are fitted.
-    counted : bool array, shape (k,)
+    counted (k,)
         Samples that are fitted.
-    duration : float [s]
+    duration [s]
         To compute: up to the last of them.
     """
 

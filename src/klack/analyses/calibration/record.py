@@ -42,17 +42,17 @@ class CalibratedParameter:
 
     Parameters
     ----------
-    keys : tuple of str
+    keys
         Paths in the case.
-    unit : str
+    unit
         Empty for a plain number.
-    value, standard_error : float
+    value, standard_error
         The error is infinite if the data do not see the parameter.
-    lower_95, upper_95 : float
+    lower_95, upper_95
         Ends of the 95 % interval, by Student's t.
-    start, lower, upper : float
+    start, lower, upper
         Value before, and the bounds.
-    strokes : array, shape (n,)
+    strokes (n,)
         Value that each stroke alone asks for; nan if the data do not see the parameter.
     """
 
@@ -88,11 +88,11 @@ class FittedChannel:
 
     Parameters
     ----------
-    mean, low, high : array, shape (k,)
+    mean, low, high (k,)
         Mean of the measured strokes, and the band of 90 % of them.
-    before, after : array, shape (k,)
+    before, after (k,)
         Computed with the values of the case, and with the calibrated ones.
-    weight : array, shape (k,)
+    weight (k,)
         Of each sample in the fit, inverse variance; 0 outside the windows.
     """
 
@@ -112,9 +112,9 @@ class FittedImpact:
 
     Parameters
     ----------
-    measured, scatter : float
+    measured, scatter
         Median and standard deviation of the strokes.
-    before, after : float
+    before, after
         Computed, with the values of the case and with the calibrated ones.
     """
 
@@ -131,12 +131,12 @@ class ProfileCurve:
 
     Parameters
     ----------
-    values : array, shape (k,)
-    excess : array, shape (k,) [-]
+    values (k,)
+    excess (k,) [-]
         ``Lambda``: squared distance from the best value in standard errors, for a linear model.
-    threshold : float [-]
+    threshold [-]
         Of the 95 % interval.
-    lower, upper : float
+    lower, upper
         Ends of that interval; infinite where it is not left within the bounds.
     """
 
@@ -154,28 +154,28 @@ class CalibrationStudy(CaseRecord):
 
     Parameters
     ----------
-    profile_time : float [s]
+    profile_time [s]
         Wall time of the profiles alone.
-    source : str
+    source
         Measured files, in words.
-    strokes : tuple of str
+    strokes
         Names of the strokes that were fitted.
-    rejected : tuple of str
+    rejected
         Strokes that were discarded, with the reason.
-    correlation, design_correlation : array, shape (p, p)
+    correlation, design_correlation (p, p)
         Of the estimates, from the scatter of the strokes; and from the sensitivities alone.
-    singular_values : array, shape (p,)
+    singular_values (p,)
         Of the weighted sensitivities by parameters scaled to their bounds.
-    time : array, shape (k,) [s]
+    time (k,) [s]
         From the trigger.
-    residual_rms, residual_rms_before : float [m]
+    residual_rms, residual_rms_before [m]
         Of the lift, mean stroke less computed, inside the windows.
-    misfit : float [-]
+    misfit [-]
         Weighted root mean square residual of the mean stroke, in standard errors of the mean: about
         1 or less if nothing but scatter is left.
-    degrees : int
+    degrees
         Degrees of freedom of Student's t.
-    iterations, evaluations, resumed, workers : int
+    iterations, evaluations, resumed, workers
         Evaluations are computed strokes; those resumed come from an earlier, interrupted run.
     """
 

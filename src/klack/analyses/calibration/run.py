@@ -112,15 +112,15 @@ def run_calibration(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         Case of the whole valve, as it was written.
-    folder : Path, optional
+    folder
         Keeps computed trials there until it is finished; the same call resumes from them.
-    workers : int, optional
+    workers
         Processes; all cores by default.
-    progress : callable
+    progress
         Called with stage and fraction.
-    threads : int, optional
+    threads
         Of the factorisations.
 
     Raises

@@ -42,13 +42,13 @@ class OtherRun:
 
     Parameters
     ----------
-    program : str
+    program
         Its name, as a table says it.
-    energy_swing : float or None [-]
+    energy_swing [-]
         Largest distance of the total energy from that at the start, over that at the start.
-    iterations : int or None
+    iterations
         Of all steps together.
-    wall_time : float or None [s]
+    wall_time [s]
     """
 
     program: str
@@ -65,9 +65,9 @@ class Comparison:
 
     Parameters
     ----------
-    measures : ImpactMeasures
+    measures
         Of the other program.
-    deviation : Deviation
+    deviation
         Of klack from the other program.
     """
 

@@ -66,15 +66,15 @@ def compare_impact(
 
     Parameters
     ----------
-    paths : sequence of Path
+    paths
         Recordings of repeated shots.
-    output : str, optional
+    output
         Name of the output; needed where the case has several.
-    channel : str, optional
+    channel
         Name in the recordings; needed where they have several.
-    low_pass : LowPass, optional
+    low_pass
         Instead of that of the output.
-    known_speed : bool
+    known_speed
         The speed is known and the recordings are absolute: no factor is fitted.
 
     Raises

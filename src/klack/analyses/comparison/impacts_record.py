@@ -21,21 +21,21 @@ class ComparedPulse:
 
     Parameters
     ----------
-    name : str
+    name
         Of the recording.
-    channel : str
+    channel
         Read from it, with its unit.
-    measured, computed : Pulse
+    measured, computed
         In the unit of the output, each on its own clock.
-    factor : float [-]
+    factor [-]
         Measured over computed.
-    fitted : bool
+    fitted
         Whether the factor is fitted; otherwise it is 1.
-    shift : float [s]
+    shift [s]
         Computed time minus measured time.
-    rms : float [-]
+    rms [-]
         Of the difference, over the measured plateau.
-    absolute : bool
+    absolute
         False if the recording cannot be in the unit of the output: it names none, or a scale that
         klack does not know.
     """
@@ -62,21 +62,21 @@ class MeasuredImpactStudy(CaseRecord):
 
     Parameters
     ----------
-    level : str
+    level
         Of the impact.
-    output, label, unit : str
+    output, label, unit
         Name of the channel, what it is, and its unit.
-    speed : float [m/s]
+    speed [m/s]
         That was computed.
-    pulses : tuple of ComparedPulse
+    pulses
         One for each recording.
-    time : array, shape (n,) [s]
+    time (n,) [s]
         From half of the plateau in the front of the computed pulse.
     measured : float32 array, shape (recordings, n)
         Over the factor of each, so that all belong to the computed speed, upwards.
-    middle, low, high : array, shape (n,)
+    middle, low, high (n,)
         Median, 5 % and 95 % of the recordings.
-    computed : array, shape (n,)
+    computed (n,)
     """
 
     level: str

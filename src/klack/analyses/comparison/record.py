@@ -36,15 +36,15 @@ class Compared:
 
     Parameters
     ----------
-    computed : float
+    computed
         Read off the computed lift in the same way as off the measured one; nan if it has none.
-    measured : float
+    measured
         Median of the strokes; nan if they have none.
-    scatter : float
+    scatter
         Standard deviation from stroke to stroke; nan for a single stroke, which has none.
-    error : float
+    error
         Standard error of reading it off one stroke, median of the strokes.
-    count : int
+    count
         Strokes that have it.
     """
 
@@ -81,15 +81,15 @@ class ComparedImpact:
 
     Parameters
     ----------
-    stop : str
+    stop
         ``"opening"`` or ``"seat"``.
-    number : int
+    number
         1 for the first on this stop.
-    time : Compared [s]
+    time [s]
         Of first touch, from the trigger.
-    approach_speed : Compared [m/s]
-    restitution : Compared [-]
-    rebound_height : Compared [m]
+    approach_speed [m/s]
+    restitution [-]
+    rebound_height [m]
     """
 
     stop: str
@@ -106,19 +106,19 @@ class HighestShot:
 
     Parameters
     ----------
-    stop : str
+    stop
         ``"opening"`` or ``"seat"``.
-    count : int
+    count
         Strokes of which it is the highest.
-    rebound_height, rebound_height_error : float [m]
+    rebound_height, rebound_height_error [m]
         With standard error.
-    restitution, restitution_error : float [-]
+    restitution, restitution_error [-]
         Of the same stroke.
-    by_reading : float [m]
+    by_reading [m]
         How much too high the highest of so many readings is by their errors alone.
-    above_median : float [m]
+    above_median [m]
         How far the highest of so many strokes lies above the median, without reading errors.
-    bounces : float
+    bounces
         Bounces from this stop, median of the strokes.
     """
 
@@ -140,35 +140,35 @@ class ComparedVariant:
 
     Parameters
     ----------
-    variant, label : str
+    variant, label
         Of the model, as in the stroke study.
-    source : str
+    source
         Files of the measurement.
-    count : int
+    count
         Strokes that are used.
-    notes : tuple of str
+    notes
         Of the reader.
-    time : array, shape (n,) [s]
+    time (n,) [s]
         From the trigger, that of the model too.
     lift, velocity : float32 array, shape (strokes, n) [m], [m/s]
         Measured.
-    lift_median, lift_low, lift_high : array, shape (n,) [m]
+    lift_median, lift_low, lift_high (n,) [m]
         Median, 5 % and 95 % of the strokes.
-    velocity_median, velocity_low, velocity_high : array, shape (n,) [m/s]
-    computed_lift : array, shape (n,) [m]
+    velocity_median, velocity_low, velocity_high (n,) [m/s]
+    computed_lift (n,) [m]
         As the sensor would show it.
-    computed_velocity : array, shape (n,) [m/s]
+    computed_velocity (n,) [m/s]
         From it, by the same differentiator as the measured one.
-    velocity_bandwidth : float [Hz]
+    velocity_bandwidth [Hz]
         3 dB of that differentiator; ``velocity_noise`` [m/s] is what it leaves of the noise.
-    velocity_noise : float [m/s]
+    velocity_noise [m/s]
     lift_rms, velocity_rms : float [m], [m/s]
         Root mean square of computed minus median, over the whole record.
     lift_scatter, velocity_scatter : float [m], [m/s]
         Root mean square of the single strokes about the median, noise included; nan for one stroke.
-    way : Compared [m]
+    way [m]
         Lift between both stops.
-    highest : tuple of HighestShot
+    highest
         Of the measured strokes, per stop.
     """
 
@@ -234,11 +234,11 @@ class MeasuredStrokeStudy(CaseRecord):
     ----------
     case_text : str
         With the section ``measurement`` that was used.
-    trigger, sensor, zero : str
+    trigger, sensor, zero
         In words.
-    point : str
+    point
         Channel of the model that is the lift.
-    excellent, fair : float [-]
+    excellent, fair [-]
         Limits of the verdict: differences over the scatter.
     """
 
@@ -257,21 +257,21 @@ class MeasuredDistribution:
 
     Parameters
     ----------
-    name : str
+    name
         In words.
-    unit : str
+    unit
         SI; ``""`` for a plain number.
     computed, measured : array, shape (n,), (m,)
         One value per shot; nan for a shot without.
-    error : float
+    error
         Standard error of reading it off one drop, median of the drops.
-    computed_highest, measured_highest : float
+    computed_highest, measured_highest
         Of the shot with the highest rebound.
-    centred : float
+    centred
         Of the computed shot that is centred.
-    expected_highest : float
+    expected_highest
         Mean over the highest of any m computed shots, m as many as were measured.
-    statistic, significance : float [-]
+    statistic, significance [-]
         Largest distance of the two cumulative distributions (Kolmogorov and Smirnov), and the
         probability of a larger one if both were the same.
     """
@@ -300,24 +300,24 @@ class MeasuredShotsStudy(CaseRecord):
 
     Parameters
     ----------
-    source : str
+    source
         Files of the measurement.
-    names : tuple of str
+    names
         Of the measured drops, in the order of the distributions.
-    sensor : str
+    sensor
         In words.
-    approach_speed : Compared [m/s]
+    approach_speed [m/s]
         Mean of the computed shots as ``computed``.
-    distributions : tuple of MeasuredDistribution
+    distributions
         Restitution, rebound height.
-    time : array, shape (k,) [s]
+    time (k,) [s]
         From the first touch.
     lift : float32 array, shape (drops, k) [m]
         Measured, above the seat.
-    computed_time : array, shape (j,) [s]
+    computed_time (j,) [s]
     computed_height : float32 array, shape (shots, j) [m]
         Of the centre of mass.
-    likely : float [-]
+    likely [-]
         Limit of the verdict: significance from which two distributions are called alike.
     """
 

@@ -57,12 +57,12 @@ def compare_shots(
 
     Parameters
     ----------
-    paths : sequence of Path
+    paths
         Recordings of the drops.
-    section : CaseMeasurement or None
+    section
         With ``zero: none`` the lift is the height above first touch; else the needle has to rest
         on its seat somewhere in the record.
-    case_text : str, optional
+    case_text
         The case that ``section`` stands in, if it is not that of the study.
 
     Raises
@@ -111,7 +111,7 @@ def mean_of_highest(values: Floats, heights: Floats, count: int) -> float:
 
     Parameters
     ----------
-    values, heights : array, shape (n,)
+    values, heights (n,)
         Shots without a value or a height are left out.
 
     Examples

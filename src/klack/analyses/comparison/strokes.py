@@ -72,10 +72,10 @@ def compare_strokes(
     ----------
     measurements : mapping of variant to files
         Of one set each.
-    section : CaseMeasurement or None
+    section
         Channels, trigger and sensor; with None, channels are found by their names, each recording
         is one stroke, and the sensor is perfect.
-    case_text : str, optional
+    case_text
         The case that ``section`` stands in, if it is not that of the study.
 
     Raises

@@ -89,7 +89,7 @@ def warm_valve(valve: Valve, at: Mapping[Aspect, Temperatures]) -> WarmValve:
 
     Parameters
     ----------
-    valve : Valve
+    valve
         Built once; bodies and laws stay.
     at : mapping of Aspect to mapping of str to float [K]
         Temperature of every thermal node, for each aspect.
@@ -247,9 +247,9 @@ class HeatedStroke:
 
     Parameters
     ----------
-    losses : mapping of str to float [J]
+    losses [J]
         As the energy balance calls them.
-    numbers : mapping of str to float
+    numbers
         By the names of :data:`NUMBERS`; nan where the stroke does not have it.
     values : mapping of str to (float, str)
         Resistances and gaps at its temperatures, with their units.

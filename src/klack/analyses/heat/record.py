@@ -19,9 +19,9 @@ class WarmColumn:
 
     Parameters
     ----------
-    name, unit : str
+    name, unit
         SI.
-    values : array, shape (points,)
+    values (points,)
         nan where a stroke does not have it.
     """
 
@@ -36,9 +36,9 @@ class CauseRow:
 
     Parameters
     ----------
-    state : str
+    state
         At which temperatures, in words.
-    cause : str
+    cause
         ``"base"``, an aspect, or ``"all"``.
     """
 
@@ -53,28 +53,28 @@ class HeatStudy(CaseRecord):
 
     Parameters
     ----------
-    period : float [s]
+    period [s]
         From one stroke to the next.
-    time : array, shape (points,) [s]
+    time (points,) [s]
         Of a warm-up: infinite for the steady state; of soaked strokes all 0.
-    temperature : tuple of WarmColumn [K]
+    temperature [K]
         Of the nodes.
-    heat : tuple of WarmColumn [W]
+    heat [W]
         Mean heat of the strokes into each node.
-    numbers, values : tuple of WarmColumn
+    numbers, values
         Of the strokes: delays and peaks; resistances and gaps.
-    end : str
+    end
         ``"steady"``, ``"duration"``, ``"runaway"``, ``"hot"``, or ``"soaked"``.
-    gain : float [-]
+    gain [-]
         See :class:`~klack.thermal.slow_warm_up.SlowWarmUp`.
-    supplied, stored, given_off : mapping of str to float [J]
+    supplied, stored, given_off [J]
         By node, over the time of the warm-up.
-    energy_residual : float [-]
-    unsent : mapping of str to float [W]
+    energy_residual [-]
+    unsent [W]
         Mean power of losses of the last stroke that warm no node.
-    strokes, repeats : int
+    strokes, repeats
         Strokes computed, and steps that were done again.
-    cpu_time : float [s]
+    cpu_time [s]
         Processor time of the strokes.
     """
 

@@ -137,13 +137,13 @@ def run_heat(
 
     Parameters
     ----------
-    case : ValveCase
+    case
         With a section ``thermal``.
-    variant : str, optional
+    variant
         The first one of the case by default.
-    soak : sequence of float [K]
+    soak [K]
         Temperatures of the whole valve, instead of a warm-up.
-    folder : Path, optional
+    folder
         Where finished strokes are kept until the result stands; in memory without one.
 
     Raises

@@ -48,11 +48,11 @@ def body_pictures(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         With its factorisations.
-    pair : ReducedPair
+    pair
         As the case asks.
-    ran : LevelResult or None
+    ran
         The level reduced; without it the modes are there, but no motion and no stress.
     """
     bodies = (problem.pair.upper, problem.pair.lower)
@@ -103,7 +103,7 @@ def with_peak_stress(
 
     Parameters
     ----------
-    displacement : array, shape (n_dof,) [m]
+    displacement (n_dof,) [m]
     """
     if case.bodies[body.name].material is None:
         return picture

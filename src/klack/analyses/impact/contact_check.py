@@ -65,9 +65,9 @@ class YieldCheck:
 
     Parameters
     ----------
-    pressure : float [Pa]
+    pressure [Pa]
         Highest pressure at the force that was asked for; nan where it is not known.
-    needed : float [Pa]
+    needed [Pa]
         Yield stress from which on both bodies stay elastic up to there.
     """
 
@@ -88,15 +88,15 @@ def check_yield(
 
     Parameters
     ----------
-    case : CaseFile
+    case
         For the materials.
-    static : StaticContact
+    static
         Of elastic bodies.
-    force : float [N]
+    force [N]
         Peak force of the impact.
-    surfaces : str
+    surfaces
         The two surfaces, for the message.
-    computed : bool
+    computed
         Whether the law of the contact has the yield.
 
     Warns
@@ -209,17 +209,17 @@ class ContactCheck:
 
     Parameters
     ----------
-    half_width : float [m]
+    half_width [m]
         On this mesh.
-    size_ratio : float [-]
+    size_ratio [-]
         Element size across the contact over the half width.
-    points_across : int
+    points_across
         Contact points across the whole width.
-    expected : float [m]
+    expected [m]
         Half width of smooth bodies of this shape (Hertz); nan where no law fits.
-    needed_yield : float [Pa]
+    needed_yield [Pa]
         Yield stress from which on both bodies stay elastic; nan where it is not known.
-    doubts : tuple of str
+    doubts
         Why no error of this contact can be judged on this mesh, each in a few words.
     """
 
@@ -245,15 +245,15 @@ def check_contact(
 
     Parameters
     ----------
-    case : CaseFile
+    case
         For the materials.
-    pair : BodyPair
+    pair
         Placed as they touch.
-    force : float [N]
+    force [N]
         Peak force of the impact.
-    surfaces : str
+    surfaces
         The two surfaces, for the messages.
-    has_yield : bool
+    has_yield
         Whether the law of the contact has the yield of its faces.
 
     Warns
@@ -313,7 +313,7 @@ def ends_reached(
 
     Parameters
     ----------
-    check : ContactCheck
+    check
         Of the static contact.
     worn_by : float [N]
         Highest force of the impacts that have worn the faces, 0 for faces as made.
@@ -355,9 +355,9 @@ def force_all_round(record: PressureRecord, peak: float) -> float:
 
     Parameters
     ----------
-    record : PressureRecord
+    record
         Of points at equal angles of a ring.
-    peak : float [N]
+    peak [N]
         Peak axial force of that impact.
     """
     turn = np.round(np.arctan2(record.points[:, 1], record.points[:, 0]), 9) + 0.0
@@ -381,7 +381,7 @@ def expected_half_width(
 
     Parameters
     ----------
-    force : float [N]
+    force [N]
     """
     space, lam = static.space, static.pattern_at(force) * force
     modulus = _modulus(case, pair)

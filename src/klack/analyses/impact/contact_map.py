@@ -51,15 +51,15 @@ class ContactMap:
 
     Parameters
     ----------
-    shape : str
+    shape
         ``ring``, ``spot``; of axisymmetric bodies ``meridian`` (a ring) or ``disc`` (around the
         axis).
-    along : array, shape (nc,)
+    along (nc,)
         Ring: angle round its axis from +x towards +y, 0 to 360 [deg]; spot: x [m]; else 0.
-    across : array, shape (nc,) [m]
+    across (nc,) [m]
         Ring: distance along the surface, outwards, from where the bodies touch first.  Spot: y.
         Disc: distance from the axis.  A spot is counted from the centre of its force.
-    radius : float [m]
+    radius [m]
         Mean radius of the ring; nan without one.
     """
 
@@ -77,9 +77,9 @@ class Cells:
     ----------
     along, across : array, shape (nx + 1,), (ny + 1,)
         Edges of the rectangles, in the units of the map.
-    owner : int array, shape (ny, nx)
+    owner (ny, nx)
         Contact point of each rectangle; -1 beyond the surface.
-    closed : bool
+    closed
         The last column borders on the first one.
     """
 
@@ -165,7 +165,7 @@ def map_cells(
 
     Parameters
     ----------
-    found : ContactMap
+    found
         Of shape ``ring`` or ``spot``.
     along, across : pair of float
         Window, in the units of the map; a ring is closed.

@@ -47,10 +47,10 @@ def simulate_in_full(
     kept : mapping of body name to Modes
         Elastic modes that the reduced levels keep: a damping ratio acts on these, as it does
         there, and they tell when the bodies have parted for good.
-    space : ContactSpace, optional
+    space
         Other contact points of the same surfaces than those of the static contact.
-    longest_period : float [s]
-    snapshots : Snapshots, optional
+    longest_period [s]
+    snapshots
         Both as in :func:`klack.transient.full_order.simulate_full_order`.
 
     Raises

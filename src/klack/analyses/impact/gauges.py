@@ -105,11 +105,11 @@ def modal_motion(
     Parameters
     ----------
     omega, damping : array, shape (m,) [rad/s], [-]
-    loads : array, shape (n, m)
+    loads (n, m)
         Modal force of each interval.
-    velocity : array, shape (m,)
+    velocity (m,)
         At the start.
-    step : float [s]
+    step [s]
     """
     n, m = loads.shape
     q, v = np.zeros((n + 1, m)), np.zeros((n + 1, m))
@@ -174,9 +174,9 @@ def with_reduced_gauges(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         With its static solutions still there.
-    pair : ReducedPair
+    pair
         Of that level.
     """
     history, found = result.history, []

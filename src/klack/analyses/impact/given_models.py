@@ -46,9 +46,9 @@ def run_given_impact(
 
     Parameters
     ----------
-    case : Case
+    case
         With at least one body without surfaces.
-    threads : int, optional
+    threads
         Of the factorisation of a body that klack reduces.
 
     Raises

@@ -103,17 +103,17 @@ def build_interface(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         With its factorisations still there.
     ports : pair of Port, optional
         Contact ports of both bodies: needed when modes are chosen by participation.
-    count : int, optional
+    count
         Take so many modes of each body, as far as the pool goes, instead of those of the case.
-    space : ContactSpace, optional
+    space
         Other contact points of the same surfaces than those of the static contact.
-    compliance : array, shape (nc, nc), optional [m/N]
+    compliance (nc, nc) [m/N]
         Static compliance of both bodies at these.
-    limit : PressureLimit, optional
+    limit
         Of the points of the contact, from :func:`klack.assembling.pressure_limit.pressure_limit`;
         those of an upper stop stay elastic.
     """
@@ -190,7 +190,7 @@ def within_reach(
     ----------
     problem, pools, ports, count, limit
         As given to :func:`build_interface`.
-    run : callable
+    run
         Given the model; called again, with twice the reach, after a :class:`ReachError`.
 
     Raises
@@ -233,7 +233,7 @@ def off_axis_within_reach(
     ----------
     problem, pools, ports, limit
         As given to :func:`build_interface`; the bodies are centred.
-    run : callable
+    run
         Given the model; called again, with twice the reach, after a :class:`ReachError`.
 
     Raises
@@ -356,7 +356,7 @@ def build_guide(
     ----------
     problem, pools, ports, count
         As given to :func:`build_interface`.
-    model : InterfaceModel
+    model
         What that returned.
 
     Raises

@@ -48,10 +48,10 @@ class PressureView:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Since first touch.
-    force : array, shape (n, nc) [N]
-    area : array, shape (nc,) [m^2]
+    force (n, nc) [N]
+    area (nc,) [m^2]
     """
 
     title: str

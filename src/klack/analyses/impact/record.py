@@ -45,21 +45,21 @@ class ContactSummary:
 
     Parameters
     ----------
-    surfaces : str
+    surfaces
         For example ``"needle.tip on housing.seat"``.
-    points : int
+    points
         Number of contact points (mortar multipliers).
-    half_width : float [m]
+    half_width [m]
         Half width of the contact at the highest force of the impact.
-    size_ratio : float [-]
+    size_ratio [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
-    points_across : int
+    points_across
         Loaded contact points across the whole width then; 0 if unknown.
-    doubts : tuple of str
+    doubts
         Why no error can be judged on these meshes, each in a few words.
-    needed_yield : float [Pa]
+    needed_yield [Pa]
         Yield stress from which on both bodies stay elastic; nan where it is not known.
-    layer : str
+    layer
         Asperities of rough faces in words; empty for smooth ones.
     approach, force, area : array, shape (n,) [m], [N], [m^2]
         Ladder from first touch.
@@ -84,17 +84,17 @@ class LawSummary:
 
     Parameters
     ----------
-    kind : str
+    kind
         ``"consistent"``, ``"linear"``, ``"hertz"``.
     indentation, force : array [m], [N]
-    share : array [-]
+    share [-]
         Share of the static compliance that the law carries, at each ``force``.
-    linear_stiffness : float [N/m]
+    linear_stiffness [N/m]
         Straight line through the law over ``fit_range``.
-    fit_range : tuple of float [N]
-    classical_stiffness : float [N/m]
+    fit_range [N]
+    classical_stiffness [N/m]
         Linear fit of a static submodel of the contact region alone.
-    classical_size : float [m]
+    classical_size [m]
         Radius of that submodel.
     """
 
@@ -128,7 +128,7 @@ class FrictionRecord:
         axis too.
     doing : int8 array, shape (n, nc)
         0 open, 1 sticking, 2 slipping (:mod:`klack.transient.rubbing`).
-    coefficient : float [-]
+    coefficient [-]
         While a point slips.
     """
 
@@ -143,14 +143,14 @@ class PressureRecord:
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
+    time (n,) [s]
         Middle of each recorded step.
-    points : array, shape (nc, dimension) [m]
+    points (nc, dimension) [m]
         Where the contact points are.
-    area : array, shape (nc,) [m^2]
+    area (nc,) [m^2]
         The pressure of a point is its force over its area.
     point_force : float32 array, shape (n, nc) [N]
-    friction : FrictionRecord or None
+    friction
         Where the faces rub.
     """
 
@@ -167,28 +167,28 @@ class LevelResult:
 
     Parameters
     ----------
-    level : str
+    level
         ``lumped``, ``reduced``, ``reduced-attachment``, ``reduced-none``,
         ``reduced-participation``, ``interface`` or ``full``.
-    label : str
+    label
         What a legend says, for example ``"reduced, 20 + 40 modes, consistent law"``.
-    step : float [s]
-    wall_time : float [s]
+    step [s]
+    wall_time [s]
         Of the time integration alone.
-    setup_time : float [s]
+    setup_time [s]
         Of everything that this level needs before it can run (shared steps counted once each).
-    energies : mapping of str to float [J]
+    energies [J]
         After separation, e.g. ``"needle kinetic (rigid)"``, ``"needle vibration"``, ...; the first
         entry is ``"initial kinetic"``.
-    energy_residual : float [-]
+    energy_residual [-]
         Residual of the energy balance over the initial kinetic energy.
-    pressure : PressureRecord or None
+    pressure
         Of levels that resolve the contact point by point.
-    frictionless : ImpactMeasures or None
+    frictionless
         What the level computes without the friction of the faces, where they rub.
-    doubts : tuple of str
+    doubts
         Why this level can be no reference for others (:mod:`klack.analyses.impact.trust`).
-    gauges : tuple of GaugeRecord
+    gauges
         Output channels of the case; none at the level lumped.
     """
 
@@ -220,17 +220,17 @@ class SectionPicture:
 
     Parameters
     ----------
-    points : array, shape (n, 2) [m]
+    points (n, 2) [m]
         Undeformed coordinates, distance from the axis and height.
-    displacement : array, shape (n, 2) [m]
+    displacement (n, 2) [m]
         In the same two directions, elastic and rigid.
-    magnitude : array, shape (n,) [m]
+    magnitude (n,) [m]
         Length of the displacement vector (three components) that colours the picture.
-    triangles : int array, shape (t, 3)
-    edges : int array, shape (e, 2)
+    triangles (t, 3)
+    edges (e, 2)
         Element edges to draw as thin lines.
-    time : float [s]
-    closing : float [m]
+    time [s]
+    closing [m]
         Mean axial displacement of a body that is held nowhere; 0 for a held one.
     """
 
@@ -250,30 +250,30 @@ class BodyPicture:
 
     Parameters
     ----------
-    skin : Skin
+    skin
         In its place at the start.
-    held : bool array, shape (v,)
+    held (v,)
         Vertices of the skin that are held.
-    section : array, shape (s, 2, 3) [m]
+    section (s, 2, 3) [m]
         Sides of elements in the plane y = 0.
-    finest : float [m]
+    finest [m]
         Shortest side of an element.
-    node : int array, shape (n,)
+    node (n,)
         Nodes of the mesh on the skin, rising.
     shapes : int16 array, shape (m, n, dimension)
         Displacements of these nodes, each in 32767ths of the largest component of its shape: rigid
         modes, elastic modes, and last the static rest of the contact force if there is one.
-    scale : array, shape (m,)
+    scale (m,)
         Displacement of 32767 [m] per unit of its amplitude.
-    frequency : array, shape (m,) [Hz]
+    frequency (m,) [Hz]
         0 of rigid modes; nan of attachment modes and of the static rest.
-    instants : array, shape (frames,) [s]
+    instants (frames,) [s]
         Of the reduced level; empty where it was not computed.
     amplitude : float32 array, shape (frames, m)
         Of the modes in sqrt(kg) m, of the static rest in N.
     stress : float32 array, shape (n,) [Pa]
         Von Mises at the highest force, of the full level if it was computed; empty without.
-    touch : array, shape (k, 3) [m]
+    touch (k, 3) [m]
         Points of first touch of both bodies when centred, in their order round the axis: of the
         lower body; else, and for faces that touch all at once, none.
     """
@@ -299,26 +299,26 @@ class RunningIn:
 
     Parameters
     ----------
-    asked : int
+    asked
         Impacts that were asked for; those of running-in follow them.
-    peak_force : array, shape (n,) [N]
-    contact_time : array, shape (n,) [s]
-    restitution : array, shape (n,) [-]
-    lost : array, shape (n,) [J]
+    peak_force (n,) [N]
+    contact_time (n,) [s]
+    restitution (n,) [-]
+    lost (n,) [J]
         In yield, of each impact.
-    set : array, shape (n,) [m]
+    set (n,) [m]
         After each impact: how much lower the bodies touch than new ones.
-    land : array, shape (n,) [m]
+    land (n,) [m]
         Width of the strip that has been in contact at the highest force so far; nan at the
         interface level.
-    run_in : bool
+    run_in
         The last impact does not yield any more.
-    radius : array, shape (nc,) [m]
+    radius (nc,) [m]
         Of the contact points, from the axis, rising; none at the interface level, where the set
         differs round the ring.
-    opening : array, shape (nc,) [m]
+    opening (nc,) [m]
         Gap between both faces that has stayed at them after the last impact.
-    worn_by : float [N]
+    worn_by [N]
         Force up to which the faces are elastic now; nan at the interface level.
     """
 
@@ -343,30 +343,30 @@ class ImpactStudy(CaseRecord):
     Parameters
     ----------
     speed, gap : float [m/s], [m]
-    reference : str
+    reference
         Level whose numbers are the answer: the finest one that nothing speaks against.
     deviations : mapping of level to Deviation
         From the reference; none where that has doubts itself.
     estimates : mapping of level to Deviation
         Estimated error of reduced levels: their deviation from one interface-level run.  With the
         full order also that of its steps: of the same run with its periods and steps.
-    estimate_basis : str
+    estimate_basis
         What that run was, in words; empty without one.
     estimate_margins : mapping of level to Deviation
         So far may each estimate be off, no signs: what half the modes in longer steps do to
         that run, and what its steps leave open.  None in results of earlier versions.
-    estimate_spread : float [-]
+    estimate_spread [-]
         That of the force history.  Above :data:`SETTLED` the run is no reference, and the
         estimates say little.
-    estimate_doubt : str
+    estimate_doubt
         Why there is no estimate, although one was asked for.
-    structures : tuple of Structure
+    structures
         Held bodies as sources of sound; their stop is called ``"contact"``.
-    failures : mapping of str to str
+    failures
         Why a level that was asked for has no result, by its name.
-    running_in : RunningIn or None
+    running_in
         Where faces yield and more than one impact was asked for.
-    pictures : tuple of BodyPicture
+    pictures
         Of both bodies; none in results of earlier versions.
     """
 

@@ -113,9 +113,9 @@ def recovered_motion(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem
         With its factorisations; they are needed until the last instant.
-    instants : sequence of int
+    instants
         In steps of ``run.reduced_step``, rising; 0 is the start.
 
     Yields

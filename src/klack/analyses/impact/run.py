@@ -142,14 +142,14 @@ def run_impact(
 
     Parameters
     ----------
-    levels : sequence of str
+    levels
         Among :data:`klack.case.levels.LEVELS`.
-    certify : bool
+    certify
         Estimate the error of reduced levels, and of the steps of the full order, by one
         interface-level run with twice as many modes; bodies without surfaces have no such level.
-    progress : callable
+    progress
         Called with stage and fraction.
-    threads : int, optional
+    threads
         Of the factorisations; the full order moves two bodies side by side on two cores.
 
     Returns
@@ -182,7 +182,7 @@ class ImpactBodies(Closing):
     ----------
     pools : mapping of body name to Modes
         As many as the levels of the impact need.
-    notes : tuple of str
+    notes
         Doubts about them.
     """
 
@@ -244,11 +244,11 @@ def impact_of_bodies(
 
     Parameters
     ----------
-    case : Case
+    case
         Of these bodies; with an upper stop also of this speed and these forces.
-    bodies : ImpactBodies
+    bodies
         Made for the same levels; they stay open.
-    levels : sequence of str
+    levels
         Without ``full``, which frees the factorisations first.
     near : mapping of body name to NearLoads, optional
         Of earlier impacts: the structures then depend on these to about 1e-6, the impact does not.

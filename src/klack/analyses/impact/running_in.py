@@ -55,11 +55,11 @@ def running_in(case: Case, pair: ReducedPair, loops: YieldingLoops) -> RunningIn
 
     Parameters
     ----------
-    case : Case
+    case
         ``run.impacts``, and with ``run.run_in`` as many more as it takes.
-    pair : ReducedPair
+    pair
         With a law of faces that yield.
-    loops : YieldingLoops
+    loops
         Behind that law.
 
     Warns
@@ -123,7 +123,7 @@ def points_running_in(case: Case, model: InterfaceModel, guide: Guide | None) ->
 
     Parameters
     ----------
-    model : InterfaceModel
+    model
         With a pressure limit.
     """
     if model.limit is None or not asks_for_more(case):
@@ -249,11 +249,11 @@ def worn_text(text: str, source: Path, found: RunningIn, folder: Path, version: 
 
     Parameters
     ----------
-    text : str
+    text
         Of the case whose impacts have worn the faces.
-    source : Path
+    source
         Its file.
-    version : str
+    version
         Of klack.
 
     Raises

@@ -57,13 +57,13 @@ def section_picture(mesh: Mesh, displacement: Floats, time: float, body: str) ->
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         Axisymmetric (columns r, z) or solid (columns x, y, z; axis of motion z).
-    displacement : array, shape (n_dof,) [m]
+    displacement (n_dof,) [m]
         Nodal displacements, ``dimension * node + component``, counted from ``mesh.points``.
-    time : float [s]
+    time [s]
         Instant of the picture.
-    body : str
+    body
         Name of the body.
 
     Returns

@@ -65,7 +65,7 @@ def best_level(results: Mapping[str, LevelResult]) -> str:
 
     Parameters
     ----------
-    results : mapping of str to LevelResult
+    results
         Not empty.  The lumped model and variants of the reduced one are never better than another.
     """
     variants = [name for name in results if name.startswith("reduced")]
@@ -92,9 +92,9 @@ def trust_notes(
 
     Parameters
     ----------
-    answer : str
+    answer
         Name of the best level.
-    deviations : mapping of str to Deviation
+    deviations
         From the best level.
     """
     doubted: dict[str, list[str]] = {}
@@ -162,13 +162,13 @@ def doubts_of_history(
 
     Parameters
     ----------
-    measures : ImpactMeasures
+    measures
         Of this history.
-    step : float [s]
+    step [s]
         Of the integration.
-    key : str
+    key
         Where a case gives the step.
-    periods : array [s]
+    periods [s]
         Of the modes that ring and that the time integration does not take exactly.
     """
     if measures.cut_off:

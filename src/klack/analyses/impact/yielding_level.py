@@ -47,9 +47,9 @@ class YieldingFaces:
 
     Parameters
     ----------
-    loops : YieldingLoops or None
+    loops
         For the law of reduced levels; None where they are elastic.
-    limit : PressureLimit or None
+    limit
         For the contact points of the interface level; None where they are elastic.
     """
 
@@ -64,7 +64,7 @@ class YieldingFaces:
 
         Parameters
         ----------
-        problem : ContactProblem
+        problem
             With its factorisations.
 
         Warns
@@ -85,7 +85,7 @@ def elastic_twin(problem: ContactProblem, pair: ReducedPair) -> ImpactHistory:
 
     Parameters
     ----------
-    pair : ReducedPair
+    pair
         With the consistent law.
     """
     assert pair.local is not None
@@ -97,9 +97,9 @@ def tell_yield(result: LevelResult, elastic: ImpactHistory, surfaces: str) -> No
 
     Parameters
     ----------
-    result : LevelResult
+    result
         With the law of faces that yield.
-    elastic : ImpactHistory
+    elastic
         Of the same bodies, elastic.
 
     Warns
@@ -127,9 +127,9 @@ def doubt_large_strain(result: LevelResult, loops: YieldingLoops) -> LevelResult
 
     Parameters
     ----------
-    result : LevelResult
+    result
         With the law of faces that yield.
-    loops : YieldingLoops
+    loops
         Behind that law.
     """
     strains = [state.plastic_strain for state in loops.states]
@@ -150,7 +150,7 @@ def doubt_elastic_levels(
 
     Parameters
     ----------
-    yielding : collection of str
+    yielding
         Names of the levels that have yield.
     """
     lost = max((yield_share(results[name]) for name in yielding if name in results), default=0.0)

@@ -54,11 +54,11 @@ def pid_loop(
 
     Parameters
     ----------
-    name : str
+    name
         Of the component.
-    network : Network
+    network
         As the case has it, with its drivers.
-    rows : Rows
+    rows
         Of the operating point.
 
     Raises
@@ -164,9 +164,9 @@ def loop_margins(name: str, opened: Callable[[float], complex], axis: Vector) ->
 
     Parameters
     ----------
-    opened : callable
+    opened
         Over the frequency [Hz].
-    axis : array [Hz]
+    axis [Hz]
         Between whose points the crossings are searched.
     """
     L = np.array([opened(float(f)) for f in axis])

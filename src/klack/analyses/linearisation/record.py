@@ -36,11 +36,11 @@ class Eigenvalue:
 
     Parameters
     ----------
-    real, imaginary : float [1/s]
+    real, imaginary [1/s]
         The imaginary part is zero or above.
-    uncertainty : float [1/s]
+    uncertainty [1/s]
         By which round-off may move it.
-    verdict : str
+    verdict
         ``decays``, ``grows`` or ``neutral``.
     """
 
@@ -72,8 +72,8 @@ class Response:
 
     Parameters
     ----------
-    frequency : array [Hz]
-    real, imaginary : array
+    frequency [Hz]
+    real, imaginary
         In the unit of the output per unit of the input.
     """
 
@@ -96,20 +96,20 @@ class LoopMargins:
 
     Parameters
     ----------
-    name : str
+    name
         Output at which the loop is opened.
-    frequency : array [Hz]
-    real, imaginary : array [-]
+    frequency [Hz]
+    real, imaginary [-]
         Of the open loop ``L``, closed by ``-1``.
-    gain_margin : float [-]
+    gain_margin [-]
         Factor on the loop at which it would reach the limit of stability, the nearest to one.
-    gain_frequency : float [Hz]
-    phase_margin : float [degrees]
+    gain_frequency [Hz]
+    phase_margin [degrees]
         Lag, or lead below zero, that would bring it there.
-    phase_frequency : float [Hz]
-    distance : float [-]
+    phase_frequency [Hz]
+    distance [-]
         Least distance of ``L`` from -1.
-    distance_frequency : float [Hz]
+    distance_frequency [Hz]
     """
 
     name: str
@@ -140,17 +140,17 @@ class StabilitySweep:
 
     Parameters
     ----------
-    name, unit : str
+    name, unit
         Key of the case, or lift, current, voltage; SI.
-    values : array, shape (points,)
-    growth : array [1/s]
+    values (points,)
+    growth [1/s]
         Real part of its eigenvalue.
-    frequency : array [Hz]
-    damping : array [-]
+    frequency [Hz]
+    damping [-]
     unstable : array of int
         Number of eigenvalues that grow, those without oscillation among them; -1 where there is no
         point.
-    failures : tuple of str
+    failures
         Why there is no point; empty where there is one.
     """
 
@@ -175,26 +175,26 @@ class LinearModel(CaseRecord):
 
     Parameters
     ----------
-    drive : mapping of str to float [A]
+    drive [A]
         Current of each coil.
-    band : float [Hz]
+    band [Hz]
         Up to which the matrices and the eigenvalues hold where there are lines.
-    delays : array [s]
+    delays [s]
         Of the segments of lines, both directions; empty without lines.
-    A, B, C, D : array
+    A, B, C, D
         Without delays: those of lines are all-passes.
-    eigenvalues : tuple of Eigenvalue
+    eigenvalues
         Those that grow first, then by their distance from zero.
-    owners : tuple of str
+    owners
         Components that have states.
-    shares : array, shape (eigenvalues, owners) [-]
+    shares (eigenvalues, owners) [-]
         Participation; every row adds up to one.
-    unconfirmed : int
+    unconfirmed
         Eigenvalues of the matrices within the band that lead to no root of the equation with
         delays.
-    sweeps : tuple of StabilitySweep
+    sweeps
         None or one.
-    cpu_time : float [s]
+    cpu_time [s]
         Processor time without bodies and contact laws.
     """
 

@@ -127,20 +127,20 @@ def run_linearisation(
 
     Parameters
     ----------
-    base : Conditions, optional
+    base
         Drive and lift of the operating point.
     origin : "start" or "far"
         Where the search for the point begins.
-    band : float, optional [Hz]
+    band [Hz]
         Up to which matrices and eigenvalues hold where there are lines.
-    sources, targets : sequence of str
+    sources, targets
         Inputs and outputs between which the frequency response is wanted.
     frequencies : (float, float), optional [Hz]
-    loops : sequence of str
+    loops
         Outputs at which a loop is opened for its margins.
-    tree : CaseTree, optional
+    tree
         The case as it was written; for a sweep.
-    sweep : Sweep, optional
+    sweep
         What changes from point to point, beside the point itself.
 
     Raises

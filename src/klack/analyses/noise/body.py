@@ -57,9 +57,9 @@ def net_share(net: TimeSeries | None, bands: Sequence[ThirdOctaves]) -> Floats:
 
     Parameters
     ----------
-    net : TimeSeries or None [N]
+    net [N]
         Mass times acceleration of the needle, means over intervals; None for all of it.
-    bands : sequence of ThirdOctaves
+    bands
         Of each stop; those above a tenth of the sampling rate of ``net`` count in full.
     """
     total = np.sum([octaves.energy for octaves in bands], axis=0)
@@ -105,11 +105,11 @@ class Surroundings:
     Parameters
     ----------
     efficiency : "piston" or "unity"
-    period : float [s]
+    period [s]
         From click to click.
-    share : array, shape (b,) [-]
+    share (b,) [-]
         Of the energy of the forces per band that is not balanced within the valve.
-    octaves : ThirdOctaves
+    octaves
         The bands.
     """
 
@@ -131,10 +131,10 @@ def body_noise(
 
     Parameters
     ----------
-    structure : Structure
+    structure
         Rigidly held, as the forces were computed.
     stop_forces : mapping of stop to TimeSeries [N]
-    around : Surroundings
+    around
         Of the radiation.
     """
     forces = port_forces(structure, stop_forces)

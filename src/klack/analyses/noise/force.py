@@ -142,9 +142,9 @@ def interrupted_impact(events: Sequence[ImpactEvent], net: TimeSeries | None) ->
 
     Parameters
     ----------
-    events : sequence of ImpactEvent
+    events
         In order of time.
-    net : TimeSeries or None [N]
+    net [N]
         Mass times acceleration of the needle.
     """
     if net is None or not events or np.isfinite(events[-1].separation_time):
@@ -179,7 +179,7 @@ def stop_force(result: NetworkResult, stop: str) -> TimeSeries:
 
     Parameters
     ----------
-    stop : str
+    stop
         Component.
     """
     step = result.step

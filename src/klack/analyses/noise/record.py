@@ -35,19 +35,19 @@ class StopForce:
 
     Parameters
     ----------
-    stop : str
+    stop
         Component; ``"contact"`` for an impact.
-    peak_force : float [N]
+    peak_force [N]
         Largest mean over a step.
-    impulse : float [N s]
+    impulse [N s]
         Of the whole record, with what presses at rest.
-    force : TimeSeries [N]
+    force [N]
         Means over steps, above zero when it presses.
-    first : TimeSeries [N]
+    first [N]
         The strongest impact alone.
     frequency, level : array, shape (k,) [Hz], [dB re 1 uN s]
         Magnitude of the Fourier integral of the strongest impact.
-    bands : ThirdOctaves
+    bands
         Energies of the whole record, from 20 Hz to 200 kHz [N^2 s].
     """
 
@@ -68,10 +68,10 @@ class Surface:
 
     Parameters
     ----------
-    points : array, shape (n, dimension) [m]
+    points (n, dimension) [m]
         (r, z) or (x, y, z).
     faces : int array, shape (f, 2) or (f, 3 or 4)
-    face_group : int array, shape (f,)
+    face_group (f,)
     velocity : float32 array, shape (b, f) [m/s]
         Normal velocity in each band, rms over one period of the drive pattern.
     """
@@ -91,37 +91,37 @@ class BodyNoise:
 
     Parameters
     ----------
-    mass : float [kg]
-    highest_frequency : float [Hz]
+    mass [kg]
+    highest_frequency [Hz]
         Highest kept mode.
-    injected : array, shape (p,) [J]
+    injected (p,) [J]
         ``int F v dt``: structure-borne energy through each port.
-    vibration_energy : float [J]
+    vibration_energy [J]
         Lost in the modes, or still ringing when the record ends: by the motion over time.
-    vibration_spectral : float [J]
+    vibration_spectral [J]
         The same by ``int 2 Re(Y) |F|^2 df``; nan for a body without damping.
-    dissipated, ringing : float [J]
+    dissipated, ringing [J]
         Parts of the vibration energy.
-    static_energy : float [J]
+    static_energy [J]
         What the modes store statically at the end, less at the start: the rest of what was
         injected.
-    residual : float [-]
+    residual [-]
         Of the balance of energy, over the energy turned over.
-    assumed : bool
+    assumed
         Whether the damping that radiation takes is assumed, because the case gives none.
-    frequency : array, shape (k,) [Hz]
-    mobility : complex array, shape (p, p, k) [m/s/N]
+    frequency (k,) [Hz]
+    mobility (p, p, k) [m/s/N]
         Drive-point on the diagonal, transfer beside it.
-    blocked : TimeSeries [N]
+    blocked [N]
         Force on the rigid support.
-    blocked_bands : ThirdOctaves [N^2 s]
-    area : array, shape (g,) [m^2]
+    blocked_bands [N^2 s]
+    area (g,) [m^2]
         Nan for the plate.
-    radiated : array, shape (g, b) [J]
+    radiated (g, b) [J]
         Estimate of the radiated sound energy, on the mount and with the plate of the case.
-    upper_bound : array, shape (g, b) [J]
+    upper_bound (g, b) [J]
         Equivalent radiated energy ``rho c int v_n^2 dA dt``: radiation efficiency 1.
-    support_energy : float [J]
+    support_energy [J]
         That flows through the held surfaces into mount and plate; nan in results of former
         versions.
     """
@@ -158,15 +158,15 @@ class ClickSound:
 
     Parameters
     ----------
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
         Of one click, free field, at :attr:`NoiseSettings.distance`.
-    statistics : SoundStatistics
+    statistics
         Of one click.
-    bands : ThirdOctaves [Pa^2 s]
+    bands [Pa^2 s]
         Sound exposures of one click.
-    pattern : SoundStatistics
+    pattern
         Of the drive pattern, over whole periods.
-    loudness : Loudness
+    loudness
         Of one click.
     """
 
@@ -183,18 +183,18 @@ class NoiseSettings:
 
     Parameters
     ----------
-    mount, plate : str
+    mount, plate
         In words; empty without.
-    radiation : str
+    radiation
         ``"piston"`` or ``"unity"``.
-    distance : float [m]
-    air_density : float [kg/m^3]
-    sound_speed : float [m/s]
-    rate : float [Hz]
+    distance [m]
+    air_density [kg/m^3]
+    sound_speed [m/s]
+    rate [Hz]
         Strokes per second of the drive pattern.
-    duration : float [s]
+    duration [s]
         Of the drive pattern.
-    given : bool
+    given
         Whether the case has such a section.
     """
 
@@ -215,26 +215,26 @@ class NoiseDesign:
 
     Parameters
     ----------
-    name : str
+    name
         Short, unique in the study.
-    label, detail : str
+    label, detail
         What a legend says; what was run, in words.
-    kind : str
+    kind
         ``"impact"`` or ``"stroke"``.
-    case, case_text, run : str
+    case, case_text, run
         ``run`` names the variant or level.
-    valid_from, valid_up_to : float [Hz]
+    valid_from, valid_up_to [Hz]
         One over the record, 0 if every force ends as it began; lowest of the highest kept modes of
         the bodies, nan without any.
-    net_share : array, shape (b,) [-]
+    net_share (b,) [-]
         Share of the energy of the forces per band that springs, magnets and fluid do not balance
         within the valve: (mass times acceleration of the needle)^2 over the forces squared.
         Radiated energy, surface velocity and sound have it.
-    bodies : tuple of BodyNoise
+    bodies
         Empty if there is no elastic held body.
-    sound : ClickSound or None
+    sound
         None without bodies.
-    own_components : mapping of str to str
+    own_components
         See :class:`klack.analyses.stroke.record.StrokeStudy`.
     """
 

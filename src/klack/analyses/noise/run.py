@@ -61,12 +61,12 @@ def run_noise(
 
     Parameters
     ----------
-    sources : sequence of NoiseSource
+    sources
         One per design; the first one is the one to compare with.
-    names : sequence of str
+    names
         Of the designs, each different; by default case and run of each source, and a number
         where they repeat.
-    progress : callable
+    progress
         Called with stage and fraction.
 
     Returns
@@ -105,9 +105,9 @@ def click_sound(
 
     Parameters
     ----------
-    transfers : Transfers
+    transfers
         Of its structures, as far as they are known.
-    bands : sequence of ThirdOctaves, optional
+    bands
         Of the forces of its stops, where they are known.
     """
     if bands is None:

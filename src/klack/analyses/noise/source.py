@@ -67,19 +67,19 @@ class NoiseSource:
 
     Parameters
     ----------
-    kind : str
+    kind
         ``"impact"`` or ``"stroke"``.
-    run, label : str
+    run, label
         Name of the variant or level, and in words.
-    net : TimeSeries or None [N]
+    net [N]
         Mass times acceleration of the needle, means over records: the force that all of the valve
         together exerts on it.  None where it is the contact force (a needle that only falls), or
         where it is not known.
-    kept_up_to : float [Hz]
+    kept_up_to [Hz]
         Lowest of the highest kept modes of all bodies; nan for rigid ones.
-    given : bool
+    given
         Whether the case has a section ``noise``.
-    own_components : mapping of str to str
+    own_components
         See :class:`klack.analyses.stroke.record.StrokeStudy`.
     """
 
@@ -108,7 +108,7 @@ def load_sources(folder: Path, names: Sequence[str] = ()) -> tuple[NoiseSource, 
 
     Parameters
     ----------
-    names : sequence of str
+    names
         Variants or levels; the best one of an impact and the first one of a stroke without.
 
     Raises
@@ -157,7 +157,7 @@ def run_sources(
 
     Parameters
     ----------
-    names : sequence of str
+    names
         Levels of an impact, ``reduced`` without; variants of a stroke, the first one without.
     """
     if isinstance(case, ValveCase):

@@ -35,7 +35,7 @@ class Conditions:
     ----------
     current, voltage : mapping of str to float [A], [V]
         By coil; an empty name stands for every coil.
-    lift : float or None [m]
+    lift [m]
         At which the needle is held; None lets it find its place.
     changes : mapping of Key to str or float
         What stands in the case instead.
@@ -89,9 +89,9 @@ class Sweep:
 
     Parameters
     ----------
-    name : str
+    name
         Key of the case, or one of ``lift``, ``current``, ``voltage``.
-    place : Quantity or None
+    place
         Of a key.
     """
 

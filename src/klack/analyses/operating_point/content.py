@@ -68,9 +68,9 @@ def sweep_charts(
 
     Parameters
     ----------
-    over : str
+    over
         Quantity on the x axis, ``"component quantity"``; the first swept one by default.
-    shown : sequence of str
+    shown
         Quantities to draw; the main ones by default.
 
     Raises

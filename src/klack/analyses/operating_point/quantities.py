@@ -26,9 +26,9 @@ class Measured:
     Parameters
     ----------
     values : mapping of (component, quantity, unit) to float
-    force_left : float [N]
-    flow_left : float [m^3/s]
-    voltage_left : float [V]
+    force_left [N]
+    flow_left [m^3/s]
+    voltage_left [V]
     """
 
     values: Mapping[Key, float]

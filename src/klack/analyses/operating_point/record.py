@@ -19,11 +19,11 @@ class SweptQuantity:
 
     Parameters
     ----------
-    name : str
+    name
         Key of the case, or ``lift``, ``current``, ``voltage``.
-    unit : str
+    unit
         SI; ``"1"`` for a pure number.
-    values : array, shape (points,)
+    values (points,)
     """
 
     name: str
@@ -42,9 +42,9 @@ class PointQuantity:
 
     Parameters
     ----------
-    unit : str
+    unit
         SI.
-    values : array, shape (points,)
+    values (points,)
         nan at a point that was not found, or that does not have it.
     """
 
@@ -70,25 +70,25 @@ class OperatingPoints(CaseRecord):
 
     Parameters
     ----------
-    needle : str
+    needle
         ``component.point`` whose displacement is the lift.
-    origin : str
+    origin
         Where the search begins: ``"start"``, or ``"far"`` stops.
-    drive : mapping of str to float [A]
+    drive [A]
         Current of each coil, of the first point.
-    swept : tuple of SweptQuantity
+    swept
         None, one or two of them.
-    force_left : array, shape (points,) [N]
+    force_left (points,) [N]
         Largest force that is left on a free body.
-    flow_left : array, shape (points,) [m^3/s]
+    flow_left (points,) [m^3/s]
         Largest flow that is left of a volume.
-    voltage_left : array, shape (points,) [V]
+    voltage_left (points,) [V]
         Largest voltage that the steady fluxes of a coil leave.
-    failures : tuple of str
+    failures
         Why there is no point; empty where there is one.
-    doubts : tuple of str
+    doubts
         What has to be known of each point, one line each.
-    cpu_time : float [s]
+    cpu_time [s]
         Processor time of all points, without bodies and contact laws.
     """
 

@@ -74,9 +74,9 @@ class PointFound:
 
     Parameters
     ----------
-    network : Network
+    network
         With everything that drives it constant.
-    currents : mapping of str to float [A]
+    currents [A]
     """
 
     point: OperatingPoint
@@ -102,13 +102,13 @@ def run_operating_points(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
-    variant : str, optional
+    variant
         The first one of the case by default.
-    base : Conditions, optional
+    base
         Drive and lift; those of the start of a run by default.
-    sweeps : sequence of Sweep
+    sweeps
         None, one or two.
     origin : "start" or "far"
         Where the search begins: bodies where they are drawn, or at the stops farthest from there.

@@ -63,18 +63,18 @@ class OneNode:
 
     Parameters
     ----------
-    node : int
+    node
         In the mesh of the body, from 0.
     place : array, shape (2,) or (3,) [m]
         Of the node in the drawing of the body.
-    distance : float [m]
+    distance [m]
         Between the node and the place that the case asks for.
-    correction : str
+    correction
         Attachment modes of the recipe: ``"residual"``, or where they are shifted to.
-    compliance : float [-]
+    compliance [-]
         Static displacement of the node over that of the port, both of the whole body; of a free
         body the elastic part.
-    transfer : TransferComparison
+    transfer
         From the contact force to the node: the full order first, 20 modes alone, 20 and 50 with
         the correction; last, the full order at the port.
     """
@@ -94,7 +94,7 @@ class OneNodeImpact:
 
     Parameters
     ----------
-    modes : int
+    modes
         Kept elastic modes of each body; attachment modes come in addition.
     """
 

@@ -39,11 +39,11 @@ class BendingModes:
 
     Parameters
     ----------
-    axial : array, shape (m,) [Hz]
+    axial (m,) [Hz]
         Of Fourier order 0 without torsion: those of the impact.
-    bending : array, shape (m,) [Hz]
+    bending (m,) [Hz]
         Of order 1; each is two modes, in directions at right angles.
-    rigid : int
+    rigid
         Rigid modes of order 1: 2 (shift and rotation) of a free body, 0 of a held one.
     """
 
@@ -89,13 +89,13 @@ class ReductionStudy:
 
     Parameters
     ----------
-    transfer : tuple of TransferComparison
+    transfer
         Of each body: full order first, then 20 and 50 modes with and without correction.
-    nodes : tuple of OneNode
+    nodes
         Of the bodies of which the case names a node.
-    impacts : tuple of OneNodeImpact
+    impacts
         With 20 and with 50 modes a body, where there is such a node.
-    bending : tuple of BendingModes
+    bending
         Of the axisymmetric bodies.
     """
 

@@ -63,7 +63,7 @@ def run_differences(
     case, tree, source, parameters, measures, check, threads, progress
         See :func:`~klack.analyses.sensitivities.run.run_sensitivities`; parameters may be any
         numbers of the case, also of its bodies.
-    level : str, optional
+    level
         ``reduced``, or that of the study, by default.
 
     Raises
@@ -173,9 +173,9 @@ def sensitivities_of(
     Parameters
     ----------
     case : Case or ValveCase
-    variant : str, optional
+    variant
         Of a stroke.
-    level : str, optional
+    level
         Of an impact.
 
     Returns

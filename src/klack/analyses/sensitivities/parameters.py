@@ -41,8 +41,8 @@ class VariedKey:
 
     Parameters
     ----------
-    value : float [SI]
-    size : float [SI]
+    value [SI]
+    size [SI]
         Of the value; of its range where that is zero.
     """
 
@@ -65,11 +65,11 @@ class SlopeSpace:
     ----------
     others : mapping of str to value [SI]
         Parameters of the study that stay as they are.
-    kinds : mapping of str to Kind or None
+    kinds
         Of all keys of the case that are set.
-    space : Space
+    space
         Of the study: what follows from its parameters.
-    skipped : tuple of str
+    skipped
         Parameters of the study that have no derivative here.
     """
 
@@ -100,7 +100,7 @@ class SlopeSpace:
 
         Parameters
         ----------
-        slopes : sequence of float or None
+        slopes
             With each parameter, per its unit.
 
         Returns
@@ -128,7 +128,7 @@ class SlopeSpace:
 
         Parameters
         ----------
-        shifts : mapping of str to float
+        shifts
             By name; 0 for those not named.
         """
         values = dict(self.others)
@@ -142,9 +142,9 @@ def slope_space(case: AnyCase, source: StudySource | None, names: Sequence[str] 
 
     Parameters
     ----------
-    source : StudySource or None
+    source
         Whose parameters are meant, with what is linked to them.
-    names : sequence of str
+    names
         Keys of the case, or parameters of the study; all numbers that vary in it by default.
 
     Raises

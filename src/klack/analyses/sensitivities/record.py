@@ -22,9 +22,9 @@ class SlopeParameter:
 
     Parameters
     ----------
-    name : str
+    name
         Path of its key, or a word of the study.
-    unit : str
+    unit
         SI; ``"1"`` for a pure number.
     """
 
@@ -39,22 +39,22 @@ class MeasureSlopes:
 
     Parameters
     ----------
-    title : str
+    title
         What it is.
-    unit : str
+    unit
         SI.
-    value : float or None
+    value
         None where the run does not have it.
-    slopes : tuple of float or None
+    slopes
         With each parameter, per its unit; None where it has no value a little further on.
-    predicted, secant : float or None
+    predicted, secant
         Change of the measure if all parameters change together by the share of the check, each in
         the sense of its sign there: from the derivatives, and from two runs.
-    scale : float
+    scale
         Root of the sum of the squares of what each parameter adds to ``predicted``.
-    resolution : float
+    resolution
         What the steps of a run resolve of the measure: a smaller difference is no doubt.
-    strayed : float
+    strayed
         Difference of the value in the run with derivatives from that without, which differ by
         round-off; 0 without a check.
     """
@@ -127,15 +127,15 @@ class ImpactSlope:
 
     Parameters
     ----------
-    number : int
+    number
         On that stop, from 1.
-    time : float [s]
-    growth : float [s]
+    time [s]
+    growth [s]
         Change of the time for all parameters changed by their whole size, root of the sum of the
         squares: how strongly the motion up to here answers.
-    deviation : float or None
+    deviation
         As of :attr:`MeasureSlopes.deviation`.
-    is_doubtful : bool
+    is_doubtful
         Whether two runs tell something else.
     """
 
@@ -153,15 +153,15 @@ class SensitivityRecord(CaseRecord):
 
     Parameters
     ----------
-    variant : str
+    variant
         Of an impact its level.
-    impacts : tuple of ImpactSlope
+    impacts
         In order of time.
-    share : float
+    share
         By which the check changed each parameter; 0 without a check.
-    runs_time, run_time : float [s]
+    runs_time, run_time [s]
         Processor time of the derivatives, and of one run without them.
-    by_differences : bool
+    by_differences
         Whether they are those of runs with changed parameters, not exact tangents.
     """
 

@@ -57,22 +57,22 @@ def run_sensitivities(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
-    source : StudySource, optional
+    source
         A study with parameters and measures; that of the case by default, if it has one and no
         parameters are given.
-    parameters : sequence of str
+    parameters
         Keys of the case, or parameters of the study.
-    measures : sequence of str
+    measures
         See :func:`~klack.analyses.study.measures.stroke_measures`; those of the study by
         default.
-    variant : str, optional
+    variant
         The first one of the case, or that of the study, by default.
-    check : bool
+    check
         Whether three more strokes are computed: the derivatives have to predict two of them, and
         the values have to be those of the third.
-    threads : int, optional
+    threads
         Of the factorisations of bodies.
 
     Raises
@@ -174,7 +174,7 @@ class _Others:
 
     Parameters
     ----------
-    time : float [s]
+    time [s]
         Processor time of one of them.
     """
 

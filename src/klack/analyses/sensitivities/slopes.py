@@ -68,11 +68,11 @@ class MovedForces:
 
     Parameters
     ----------
-    source : NoiseSource
+    source
         Of the run.
-    stops : mapping of str to array [N per unit]
+    stops [N per unit]
         Derivative of the force of each stop at the times of ``source``.
-    net : array or None [N per unit]
+    net [N per unit]
         Of the net force.
     """
 
@@ -103,9 +103,9 @@ def moved_forces(
 
     Parameters
     ----------
-    study : StrokeStudy
+    study
         Of this run alone.
-    case : ValveCase
+    case
         Whose section ``noise`` counts.
     """
     source = stroke_sources(study, case=case)[0]
@@ -134,11 +134,11 @@ def transported(values: Floats, late: Floats, step: float) -> Floats:
 
     Parameters
     ----------
-    values : array, shape (n,)
+    values (n,)
         Means over the intervals.
-    late : array, shape (n + 1,) [s per unit]
+    late (n + 1,) [s per unit]
         Derivatives of the times of their ends.
-    step : float [s]
+    step [s]
         Length of an interval.
     """
     at_ends = np.concatenate([values[:1], 0.5 * (values[:-1] + values[1:]), values[-1:]])

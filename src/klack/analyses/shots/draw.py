@@ -58,23 +58,23 @@ class ShotDraw:
 
     Parameters
     ----------
-    index : int
+    index
         Number of the shot, from 0; -1 for the centred one.
-    aside : array, shape (2,) [m]
+    aside (2,) [m]
         Position of the axis of the moving body at the height of first touch.
-    lean : array, shape (2,) [rad]
+    lean (2,) [rad]
         Slope of that axis over the height: towards x and y.
-    force : float [N]
+    force [N]
         Closing force at first touch.
-    friction : float [-]
+    friction [-]
         Coulomb's coefficient in the guide.
-    contact_friction : float [-]
+    contact_friction [-]
         That between the faces, while they slip.
-    waviness : float [m]
+    waviness [m]
         Root mean square.
-    waves : array, shape (h, 2) [m]
+    waves (h, 2) [m]
         Amplitudes of cosine and sine of each harmonic of the ring.
-    harmonics : int array, shape (h,)
+    harmonics (h,)
     """
 
     index: int
@@ -110,9 +110,9 @@ def draw_shot(case: Case, seed: int, index: int, height: float) -> ShotDraw:
 
     Parameters
     ----------
-    case : Case
+    case
         With a section ``shots``.
-    height : float [m]
+    height [m]
         z of first touch in the drawing of the moving body.
 
     Raises

@@ -40,11 +40,11 @@ class ShotModel:
 
     Parameters
     ----------
-    touch_height : float [m]
+    touch_height [m]
         z of first touch in the drawing of the moving body.
-    modes : tuple of int
+    modes
         Kept elastic modes of both bodies.
-    notes : tuple of str
+    notes
         Doubts about bodies and contact.
     """
 
@@ -99,9 +99,9 @@ def shot_model(case: Case, bodies: ImpactBodies, progress: Progress) -> ShotMode
 
     Parameters
     ----------
-    case : Case
+    case
         With a section ``shots``.
-    bodies : ImpactBodies
+    bodies
         From :func:`shot_bodies` of this case, or of one with the same bodies; they stay open.
     """
     with collected_warnings() as notes:

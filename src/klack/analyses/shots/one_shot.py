@@ -45,26 +45,26 @@ class ShotSetup:
 
     Parameters
     ----------
-    model : InterfaceModel
+    model
         Centred, in first touch, with the mean friction between the faces.
-    about : array, shape (3,) [m]
+    about (3,) [m]
         Point of the axis at the height of first touch, about which the moving body is tilted.
-    inertia : array, shape (3, 3) [kg m^2]
+    inertia (3, 3) [kg m^2]
         Of the moving body about its centre of mass.
-    opposite_gap : array, shape (m,) [m]
+    opposite_gap (m,) [m]
         Gaps of the contact points of an upper stop, at the placement of the model.
-    opposite_slope : array, shape (m, 6)
+    opposite_slope (m, 6)
         Their change per unit of a rigid placement; there the gaps stay linear.
-    radial : array, shape (nc - m,) [-]
+    radial (nc - m,) [-]
         Change of each gap at the seat per unit growth of the radius of the moving body.
-    angle : array, shape (nc - m,) [rad]
+    angle (nc - m,) [rad]
         Of each contact point round the axis.
-    speed : float [m/s]
-    start_height : float [m]
+    speed [m/s]
+    start_height [m]
         Above first touch.
-    spring_stiffness : float [N/m]
-    duration, step : float [s]
-    force_span : float [s]
+    spring_stiffness [N/m]
+    duration, step [s]
+    force_span [s]
         Length of the record of the first impact.
     """
 
@@ -136,15 +136,15 @@ class ShotOutcome:
 
     Parameters
     ----------
-    numbers : mapping of str to float
+    numbers
         One for each field of :class:`klack.analyses.shots.record.ShotColumns`.
     height, force : float32 array
         On the grids of the setup.
-    approach : float [m]
+    approach [m]
         Largest way of the moving body after first touch.
-    doubts : tuple of str
+    doubts
         Accuracy warnings of its run, in whichever process.
-    worn : array, shape (nc,) [m]
+    worn (nc,) [m]
         Set of the contact points after it; no points where they stay elastic.
     """
 
@@ -169,11 +169,11 @@ def simulate_shot(
 
     Parameters
     ----------
-    impacts : int, optional
+    impacts
         Stop earlier than the setup says.
-    points : bool
+    points
         Keep the force of every contact point.
-    worn : array, shape (nc,), optional [m]
+    worn (nc,) [m]
         Set of the faces that the shot meets; new ones without.
     """
     guide = setup.guide.with_friction(draw.friction) if setup.guide is not None else None

@@ -41,17 +41,17 @@ class RuleVerdict:
 
     Parameters
     ----------
-    restitution_bias : float [-]
+    restitution_bias [-]
         Restitution of the shot with the highest rebound, minus the centred one.
-    rebound_height_bias : float [m]
+    rebound_height_bias [m]
         The same of the rebound height.
-    relative_restitution_bias, relative_rebound_height_bias : float [-]
+    relative_restitution_bias, relative_rebound_height_bias [-]
         Over the centred values.
-    rank : int
+    rank
         How many shots rebound at least as high as the centred one.
-    holds : bool
+    holds
         True if the relative bias of the restitution is below 1 %.
-    sentence : str
+    sentence
         The answer in words.
     """
 
@@ -305,11 +305,11 @@ class ShotTraces:
 
     Parameters
     ----------
-    time : array, shape (k,) [s]
+    time (k,) [s]
         From the first touch.
     height : float32 array, shape (n, k) [m]
         Of the centre of mass, above that at first touch; nan after the end of the shot.
-    force_time : array, shape (m,) [s]
+    force_time (m,) [s]
         From the first touch.
     force : float32 array, shape (n, m) [N]
         Axial contact force of the first impact.
@@ -327,38 +327,38 @@ class ShotsStudy(CaseRecord):
 
     Parameters
     ----------
-    shot_time : float [s]
+    shot_time [s]
         Wall time of the shots alone, on ``workers`` processes.
-    resumed : int
+    resumed
         Shots that an earlier, interrupted run had finished.
-    speed : float [m/s]
+    speed [m/s]
         At the start, ``start_height`` [m] above first touch.
-    step : float [s]
+    step [s]
         Of the time loop.
-    distributions : mapping of str to str
+    distributions
         Distributions, in words.
-    surfaces : str
+    surfaces
         For example ``"needle.tip on housing.seat"``.
-    guide : str
+    guide
         The guide in words; empty without one.
-    faces : str
+    faces
         Friction between the faces in words; empty without.
-    layer : str
+    layer
         Asperities of rough faces in words; empty for smooth ones.
-    mass : float [kg]
+    mass [kg]
         Of the moving body.
-    modes : tuple of int
+    modes
         Kept elastic modes of the moving body and of the one it hits.
-    points : int
+    points
         Contact points.
-    approach : float [m]
+    approach [m]
         Largest approach of any shot.
-    centric : ShotColumns
+    centric
         One row: no eccentricity, tilt, waviness or Coulomb friction in the guide, the mean force,
         and the mean coefficient of friction between the faces.
-    highest : int
+    highest
         Row of the shot with the highest rebound.
-    pressures : mapping of str to PressureRecord
+    pressures
         Contact forces point by point of the first impact: ``"centric"`` and ``"highest"``, and
         ``"lowest"`` for the shot with the lowest restitution.
     """

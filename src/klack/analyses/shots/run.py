@@ -78,18 +78,18 @@ def run_shots(
 
     Parameters
     ----------
-    case : Case
+    case
         With a section ``shots``.
-    count, seed : int, optional
+    count, seed
         Instead of those of the case.
-    workers : int, optional
+    workers
         Processes; as many as there are cores without.
-    folder : Path, optional
+    folder
         Where finished shots are kept until all are there: an interrupted run resumes from them.
         See :class:`klack.analyses.unfinished.UnfinishedLog`.
-    progress : callable
+    progress
         Called with stage and fraction.
-    threads : int, optional
+    threads
         Of the factorisations.
 
     Raises
@@ -166,9 +166,9 @@ class DroppedShots:
 
     Parameters
     ----------
-    outcomes : tuple of ShotOutcome
+    outcomes
         Of the draws, in their order.
-    alone : ShotOutcome
+    alone
         The centred shot; faces that yield are for it as the last of the others has left them.
     """
 

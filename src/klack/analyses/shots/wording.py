@@ -98,9 +98,9 @@ def drawn_section(
     ----------
     facts : iterable of (str, str)
         What they share.
-    runs : str
+    runs
         What they are called, ``"shots"``.
-    spent : float [s]
+    spent [s]
         Wall time of the runs alone.
     """
     processes = f"{study.workers} process{'es' if study.workers != 1 else ''}"

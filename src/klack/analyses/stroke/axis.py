@@ -32,8 +32,8 @@ class AxisPlace:
 
     Parameters
     ----------
-    x, y : float [m]
-    tilt_x, tilt_y : float [rad]
+    x, y [m]
+    tilt_x, tilt_y [rad]
         Of the axis along x and along y, upwards.
     """
 

@@ -18,9 +18,9 @@ def missing_notes(
 
     Parameters
     ----------
-    not_run : sequence of str
+    not_run
         Variants that were asked for and have no record.
-    failure : Exception or None
+    failure
         That ended the study.
     """
     notes = []
@@ -63,7 +63,7 @@ def rest_note(variant: str, result: NetworkResult, seat: str) -> str:
 
     Parameters
     ----------
-    seat : str
+    seat
         Component.
     """
     pressing = result.channels.get(f"{seat} contact force")

@@ -36,16 +36,16 @@ class FluidSummary:
 
     Parameters
     ----------
-    temperature : float [K]
-    pressure : float [Pa]
+    temperature [K]
+    pressure [Pa]
         Absolute, at which the numbers below hold: the highest start pressure of the valve.
-    density : float [kg/m^3]
-    bulk_modulus : float [Pa]
+    density [kg/m^3]
+    bulk_modulus [Pa]
         With its entrained gas.
-    sound_speed : float [m/s]
-    viscosity : float [Pa s]
+    sound_speed [m/s]
+    viscosity [Pa s]
         Dynamic.
-    vapour_pressure : float [Pa]
+    vapour_pressure [Pa]
         Absolute.
     """
 
@@ -65,12 +65,12 @@ class LineSummary:
 
     Parameters
     ----------
-    name : str
+    name
         Component.
-    length : float [m]
-    sound_speed : float [m/s]
+    length [m]
+    sound_speed [m/s]
         Of its waves, with the elasticity of the wall.
-    echo_time : float [s]
+    echo_time [s]
         ``2 L / a``: spacing of the stairs in pressure and rebound velocity.
     """
 
@@ -86,37 +86,37 @@ class StopSummary:
 
     Parameters
     ----------
-    name : str
+    name
         Component of the network, for example ``"seat"``.
-    surfaces : str
+    surfaces
         For example ``"needle.tip on housing.seat"``; empty for a stop without surfaces.
-    kind : str
+    kind
         ``"consistent"`` if the law was computed, else the kind that the case gives.
-    gap : float [m]
+    gap [m]
         At the start; of the opening stop, the lift.
-    film : bool
+    film
         Whether a squeeze film acts beside the contact.
     indentation, force : array, shape (k,) [m], [N]
         Local law; empty for a law that is given.
-    share : array, shape (k,) [-]
+    share (k,) [-]
         Share of the static compliance that the law carries, at each force.
     approach, static_force, area : array, shape (n,) [m], [N], [m^2]
         Static contact of the two full bodies, from first touch.
-    pattern_force : float [N]
+    pattern_force [N]
         Force whose pressure pattern the ports carry; nan for a law that is given.
-    half_width : float [m]
+    half_width [m]
         Of the contact at that force.
-    size_ratio : float [-]
+    size_ratio [-]
         Element size across the contact over the half width; good up to 1, doubtful above 1.5.
-    points_across : int
+    points_across
         Loaded contact points across the whole width then; 0 if unknown.
-    doubts : tuple of str
+    doubts
         Why no error of impacts on this stop can be judged, each in a few words.
-    needed_yield : float [Pa]
+    needed_yield [Pa]
         Yield stress from which on both bodies stay elastic; nan where it is not known.
-    friction : float [-]
+    friction [-]
         Coulomb's coefficient between the faces.
-    returning : array, shape (k,) [N]
+    returning (k,) [N]
         Force at ``indentation`` while faces with friction slip back; empty for a law without loss.
     """
 
@@ -147,14 +147,14 @@ class StrokeChannels:
 
     Parameters
     ----------
-    lift : str
+    lift
         Displacement of the port at which the lift is measured, for example
         ``"needle.tip displacement"``; ``lift_velocity`` is its rate.
-    velocity : str
+    velocity
         Of the centre of mass of the needle.
-    voltage, current, magnetic_force : tuple of str
+    voltage, current, magnetic_force
         One per solenoid.
-    opening_stop, seat : str
+    opening_stop, seat
         Components of the two stops; empty if the valve has none.
     """
 
@@ -176,26 +176,26 @@ class StrokeVariant:
 
     Parameters
     ----------
-    name : str
+    name
         ``"wet"``, ``"dry"``, ``"wet-lumped"`` or ``"dry-lumped"``.
-    label : str
+    label
         What a legend says, for example ``"n-heptane at 5 bar, 20 + 40 modes"``.
-    modes : int
+    modes
         Degrees of freedom of all bodies.
-    opening_time : float or None [s]
+    opening_time [s]
         From time zero to the first touch of the opening stop in the stroke of ``times``; None if
         it is not touched.
-    closing_time : float or None [s]
+    closing_time [s]
         The same for the seat, after the largest lift of that stroke.  A valve that starts open
         closes before it opens.  Neither is ever negative.
-    times : tuple of LiftTimes
+    times
         Of the needle first, then of every other body between stops: passing 10, 50 and 90 % of the
         lift, and the touches.
-    setup_time : float [s]
+    setup_time [s]
         Wall time of everything before the time loop that is this variant's own.
-    changes : tuple of ImpactChange
+    changes
         Of each impact when all steps are doubled; empty where that was not asked for.
-    halvings : int
+    halvings
         How often the check of the steps halved all of them.
     """
 
@@ -250,23 +250,23 @@ class StrokeStudy(CaseRecord):
 
     Parameters
     ----------
-    needle : str
+    needle
         Component of the body that moves.
-    lift : float or None [m]
+    lift [m]
         Travel from the seat to the opening stop, both unloaded; None if no stop ends it.
-    switch_off : float or None [s]
+    switch_off [s]
         When the drivers' command ends; None if no driver says.
-    duration, step : float [s]
+    duration, step [s]
     variants : mapping of name to StrokeVariant
         The first one is the one to compare with; the last one may be incomplete, see
         :attr:`~klack.simulation.network_result.NetworkResult.failure`.
-    bodies : tuple of BodySummary
+    bodies
         Their ``compliance_share`` is the smallest of all contact ports.
-    fluid : FluidSummary or None
+    fluid
         None for a case without fluid.
-    structures : tuple of Structure
+    structures
         Held bodies as sources of sound, their stops by the names of the end stops.
-    schematic : str
+    schematic
         Picture of the network (SVG); empty in older results.
     """
 
@@ -305,7 +305,7 @@ class IncompleteStrokeError(ConvergenceError):
 
     Parameters
     ----------
-    study : StrokeStudy
+    study
         Says in its warnings what is missing.
     """
 

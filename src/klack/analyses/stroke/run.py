@@ -85,13 +85,13 @@ def run_stroke(
 
     Parameters
     ----------
-    variants : sequence of str
+    variants
         Among :data:`klack.case.levels.VARIANTS`; those of the case by default.
-    after : StrokeStudy, optional
+    after
         Continue from the end of this study of the same case, for another duration.
-    progress : callable
+    progress
         Called with stage and fraction.
-    threads : int, optional
+    threads
         Of the factorisations.
 
     Returns
@@ -187,9 +187,9 @@ class VariantRun:
 
     Parameters
     ----------
-    failure : ConvergenceError or None
+    failure
         With ``variant`` up to there.
-    steps : CheckedSteps or None
+    steps
         None where they were not checked.
     """
 
@@ -220,11 +220,11 @@ def stroke_study(
 
     Parameters
     ----------
-    valve : Valve
+    valve
         Its meshes and contacts are not needed.
-    made : mapping
+    made
         See :func:`~klack.analyses.record.run_fields`: by which version, when, in which time.
-    schematic : str
+    schematic
         Picture of the network (SVG).
     """
     case = valve.case
@@ -334,11 +334,11 @@ def one_variant(
 
     Parameters
     ----------
-    sizes : StepSizes, optional
+    sizes
         Of steps that are not checked.
-    check : bool
+    check
         Whether steps are checked, and halved where impacts depend on them, unless the case says.
-    until : callable
+    until
         Time [s] of a run until which impacts have to be right.
 
     Raises

@@ -49,14 +49,14 @@ class ImpactChange:
 
     Parameters
     ----------
-    number : int
+    number
         On its stop, from 1; 0 for a touch too slow to be counted, or later than what is asked for.
-    time : float [s]
+    time [s]
         Of the first touch, above zero where it comes later; nan, as those below, where there is
         none.
-    approach_speed, peak_force, impulse : float [-]
+    approach_speed, peak_force, impulse [-]
         Relative.
-    reason : str
+    reason
         Why a number is missing; empty where all are there.
     """
 
@@ -153,11 +153,11 @@ class CheckedSteps(NamedTuple):
 
     Parameters
     ----------
-    changes : tuple of ImpactChange
+    changes
         Of each impact; empty where nothing was checked.
-    doubt : str
+    doubt
         Sentence on what still depends on the steps, or on why they were not checked.
-    halvings : int
+    halvings
         How often all steps were halved.
     """
 

@@ -26,12 +26,12 @@ class Passage:
 
     Parameters
     ----------
-    at_10, at_50, at_90 : float or None [s]
+    at_10, at_50, at_90 [s]
         From time zero, which is that of the first run where one continues it, at these shares of
         the lift: 0 closed, 1 open.
-    stop : str
+    stop
         End stop at which the way ends; empty if there is none.
-    touch : float or None [s]
+    touch [s]
         First contact there.  None as well where a film cushions it to the end.
     """
 
@@ -53,14 +53,14 @@ class LiftTimes:
 
     Parameters
     ----------
-    body : str
+    body
         Component.
-    starts : str
+    starts
         ``"closed"`` or ``"open"``: the nearer end of the lift at the start.  A valve that starts
         open closes first, and its opening is the one after that.
-    lift : float or None [m]
+    lift [m]
         Between both ends; None if nothing moved.
-    between_stops : bool
+    between_stops
         Whether stops end the lift; else it counts to the furthest place of the run, because no stop
         is there or because less than 10 % of the way to it are used.
     """
@@ -86,9 +86,9 @@ def all_lift_times(
 
     Parameters
     ----------
-    rows : Rows
+    rows
         Of the same run.
-    needle, point : str
+    needle, point
         Component, and its port whose displacement is the lift.
     """
     travel = Travel.of(rows)
@@ -131,8 +131,8 @@ def lift_times(
 
     Parameters
     ----------
-    time : array, shape (n,) [s]
-    displacement : array, shape (n,) [m]
+    time (n,) [s]
+    displacement (n,) [m]
         Along +z, the direction of opening.
     ends : (float, float) [m]
         Displacements closed and open; infinite where no stop ends the lift.

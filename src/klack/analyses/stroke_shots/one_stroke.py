@@ -65,16 +65,16 @@ class StrokeStart:
 
     Parameters
     ----------
-    aside : array, shape (2,) [m]
+    aside (2,) [m]
         Position of the axis of the needle at the height of its seat.
-    lean : array, shape (2,) [rad]
+    lean (2,) [rad]
         Slope of that axis over the height: towards x and y.
     placement : array, shape (6,) [m], [rad]
         The same as a translation of the centre of mass and a rotation vector; with a turn about
         the axis, which guides with friction leave behind.
-    friction : float [-]
+    friction [-]
         Coulomb's coefficient in the guide.
-    contact_friction : float [-]
+    contact_friction [-]
         That between the faces of all stops; nan: each has that of the case.
     """
 
@@ -92,11 +92,11 @@ class Starts:
 
     Parameters
     ----------
-    case : ValveCase
+    case
         With a section ``shots`` and a guide.
-    height : float [m]
+    height [m]
         Of the seat in the drawing of the needle.
-    centre : array, shape (3,) [m]
+    centre (3,) [m]
         Centre of mass of the needle there.
     """
 
@@ -220,9 +220,9 @@ class StrokeSetup:
 
     Parameters
     ----------
-    valve : Valve
+    valve
         Without meshes and contacts.
-    spatial : SpatialValve
+    spatial
         Of the valve.
     """
 
@@ -252,18 +252,18 @@ class StrokeOutcome:
 
     Parameters
     ----------
-    label : str
+    label
         Of the variant in words.
-    stroke : mapping of str to float
+    stroke
         One for each field of :class:`klack.analyses.stroke_shots.record.StrokeColumns`.
     stops : mapping of str to mapping of str to float
         By end stop, likewise of :class:`~klack.analyses.stroke_shots.record.StopColumns`.
     lift : float32 array, shape (k,) [m]
     end : array, shape (6,) [m], [rad]
         Where it leaves the needle: translation of the centre of mass and rotation vector.
-    failure : str
+    failure
         Why it ended early; empty if it did not.
-    doubts : tuple of str
+    doubts
         Of its run, in whichever process.
     """
 
@@ -458,9 +458,9 @@ def rebound_height(
 
     Parameters
     ----------
-    events : sequence of ImpactEvent
+    events
         Of the whole stroke.
-    side : float
+    side
         1 for a stop below the needle, -1 for one above.
 
     Returns

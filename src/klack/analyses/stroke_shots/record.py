@@ -41,22 +41,22 @@ class HighestRebound:
 
     Parameters
     ----------
-    stroke : int
+    stroke
         Its number.
-    rebound_height, eccentricity : float [m]
+    rebound_height, eccentricity [m]
         Its own; the eccentricity is that at first touch.
-    place : int
+    place
         In the order of that eccentricity; 1 is the most centred.
-    count : int
+    count
         Strokes with a rebound.
-    most_centred : int
+    most_centred
         Number of the most centred stroke among them.
-    most_centred_height, most_centred_eccentricity : float [m]
-    centred_height : float [m]
+    most_centred_height, most_centred_eccentricity [m]
+    centred_height [m]
         Of the stroke that starts centred.
-    relative_height_bias : float [-]
+    relative_height_bias [-]
         Highest rebound over that, minus 1.
-    restitution_bias : float [-]
+    restitution_bias [-]
         Restitution minus that of the stroke that starts centred.
     """
 
@@ -372,19 +372,19 @@ class VariantShots:
 
     Parameters
     ----------
-    name, label : str
+    name, label
         ``"wet"`` or ``"dry"``; what a legend says.
-    stops : mapping of str to StopColumns
+    stops
         By end stop, the seat first.
-    centric : StrokeColumns
+    centric
         One row: started centred and upright, without Coulomb friction in the guide.
-    centric_stops : mapping of str to StopColumns
+    centric_stops
         One row each.
-    time : array, shape (k,) [s]
+    time (k,) [s]
     lift : float32 array, shape (n, k) [m]
         Displacement of the point of the lift; nan after the end of a stroke that failed.
     centric_lift : float32 array, shape (k,) [m]
-    failures : mapping of str to str
+    failures
         By the number of the stroke, why it ended early; its row holds what was known by then.
     """
 
@@ -406,27 +406,27 @@ class StrokeShotsStudy(CaseRecord):
 
     Parameters
     ----------
-    carry : bool
+    carry
         Whether every stroke starts from where the one before has left the needle.
-    resumed : int
+    resumed
         Strokes that an earlier, interrupted run had finished.
-    stroke_time : float [s]
+    stroke_time [s]
         Wall time of the strokes alone.
-    duration : float [s]
+    duration [s]
         Of each stroke.
-    needle, seat, opening_stop : str
+    needle, seat, opening_stop
         Components; empty where the valve has no such stop.
-    guide : str
+    guide
         In words.
-    distributions : mapping of str to str
+    distributions
         In words.
-    largest_eccentricity : mapping of str to float [m]
+    largest_eccentricity [m]
         At the height of each stop: what the guide allows to the axis of a rigid needle.
-    mass : float [kg]
+    mass [kg]
         Of the needle.
-    points : mapping of str to int
+    points
         Contact points of each stop.
-    schematic : str
+    schematic
         Picture of the network (SVG); empty in older results.
     """
 

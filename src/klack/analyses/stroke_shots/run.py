@@ -67,19 +67,19 @@ def run_stroke_shots(
 
     Parameters
     ----------
-    case : ValveCase
+    case
         In three dimensions, with a guide and a section ``shots``.
-    variants : sequence of str
+    variants
         ``wet``, ``dry``; those of the case by default.
-    count, seed : int, optional
+    count, seed
         Instead of those of the case.
-    workers : int, optional
+    workers
         Processes; as many as there are cores without.
-    folder : Path, optional
+    folder
         Where finished strokes are kept until all are there: an interrupted run resumes from them.
-    progress : callable
+    progress
         Called with stage and fraction.
-    threads : int, optional
+    threads
         Of the factorisations.
 
     Raises

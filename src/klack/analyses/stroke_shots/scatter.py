@@ -50,9 +50,9 @@ class Scattered:
 
     Parameters
     ----------
-    stop : str
+    stop
         Whose first impact it is of; empty for the whole stroke.
-    values : array, shape (n,)
+    values (n,)
     """
 
     stop: str
@@ -105,9 +105,9 @@ class ScatterRatio:
 
     Parameters
     ----------
-    low, high : float
+    low, high
         95 % interval; nan for fewer than five pairs.
-    pairs : int
+    pairs
         Strokes that have a value in both.
     """
 
@@ -173,7 +173,7 @@ def stroke_answers(study: StrokeShotsStudy, told: Told = told_value) -> Iterator
 
     Parameters
     ----------
-    told : callable
+    told
         Writes a value with its unit and so many digits.
     """
     yield from scatter_answers(study, told)

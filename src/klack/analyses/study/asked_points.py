@@ -38,9 +38,9 @@ class PointSteps(NamedTuple):
 
     Parameters
     ----------
-    halvings : int
+    halvings
         How often all steps were halved.
-    change : float [-]
+    change [-]
         Largest change of the impacts that the measures depend on with all steps twice as long, over
         what the accuracy promises; inf where one has no counterpart, nan where nothing was checked.
     """
@@ -62,20 +62,20 @@ class PointRow:
 
     Parameters
     ----------
-    values : tuple of float or None
+    values
         Of the measures, in their order.
-    failure : str
+    failure
         Why there are none; empty if it was computed.
-    notes : tuple of str
+    notes
         Doubts about the numbers.
-    others : tuple of WarningMessage
+    others
         Warnings that are no doubt about a number.
-    by_chance : bool
+    by_chance
         True if the same point may be computed another time: the memory was full, or a component
         of the user's own has failed.
-    model : str
+    model
         What the numbers come from, in words: level, modes and meshes of an impact.
-    steps : PointSteps or None
+    steps
         Of a stroke.
     """
 
@@ -141,7 +141,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
 
         Parameters
         ----------
-        chosen : sequence of ChosenMeasure
+        chosen
             What the points are computed for.
 
         Returns
@@ -203,7 +203,7 @@ class PointKind(ABC, Generic[CaseT, Built]):
 
         Parameters
         ----------
-        tree : CaseTree
+        tree
             With the values of the group.
         case : Case or ValveCase
             Of the first point.
@@ -245,9 +245,9 @@ class PointKind(ABC, Generic[CaseT, Built]):
 
         Parameters
         ----------
-        check : callable
+        check
             Called now and then; raises :class:`~klack.analyses.study.computing.Stopped` to give up.
-        taken : callable
+        taken
             See :func:`klack.analyses.study.computing.warnings_of_threads`.
         """
 
@@ -267,11 +267,11 @@ class AskedPoints(Generic[CaseT]):
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
-    variant : str
+    variant
         Of the stroke; of an impact its level, ``"shots"``, or both.
-    checks : bool
+    checks
         Whether time steps of strokes are checked, unless the case says.
     """
 
@@ -298,7 +298,7 @@ class PointGroup:
     ----------
     made : mapping of Key to value
         What these points exchange that bodies and laws follow from.
-    places : tuple of int
+    places
         Of the points.
     """
 

@@ -64,14 +64,14 @@ def on_threads(
 
     Parameters
     ----------
-    items : sequence
+    items
         Taken in their order.
-    compute : callable
+    compute
         Gets an item and a function to call now and then, which raises :class:`Stopped` once the
         work has been given up.  Must not raise anything else.
-    keep : callable
+    keep
         Called in this thread with an item and its result, in the order of their end.
-    tell : callable
+    tell
         Called after it.
 
     Raises
@@ -206,9 +206,9 @@ class Agenda:
 
         Parameters
         ----------
-        worker : object
+        worker
             Compared with those of other calls; None for one that has no bodies yet.
-        most : int
+        most
             Points at a time.
         """
         group = self._group_for(worker)
@@ -241,11 +241,11 @@ class Tally(Closing):
 
     Parameters
     ----------
-    whole : int
+    whole
         Points of the study.
-    wanted : int
+    wanted
         Of them, those that are not known yet.
-    keep : callable
+    keep
         Gets the place of a point and its row.
     """
 
@@ -318,11 +318,11 @@ def compute_points(
 
     Parameters
     ----------
-    places : iterable of int
+    places
         Of the points that are wanted.
-    keep : callable
+    keep
         Called in this thread with each place and its row, in the order of their end.
-    builds : Builds
+    builds
         Bodies and laws that were made before.
 
     Returns
@@ -378,7 +378,7 @@ def compute_alone(asked: AskedPoints, builds: Builds) -> list[PointRow]:
 
     Parameters
     ----------
-    builds : Builds
+    builds
         Bodies and laws that were made before.
 
     Returns
@@ -485,9 +485,9 @@ class PointWorkers(Closing):
 
         Parameters
         ----------
-        places : sequence of int
+        places
             Of the points that are wanted.
-        keep : callable
+        keep
             Called in this thread with each place and its row, once, in the order of their end.
 
         Raises
@@ -504,7 +504,7 @@ class ThreadWorkers(PointWorkers):
 
     Parameters
     ----------
-    threads : int, optional
+    threads
         All cores by default.
     """
 

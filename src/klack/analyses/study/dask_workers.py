@@ -41,9 +41,9 @@ class DaskTasks:
 
     Parameters
     ----------
-    tally : Tally
+    tally
         Gets the rows.
-    learn : callable
+    learn
         Gets each answer.
     """
 
@@ -211,7 +211,7 @@ class DaskWorkers(PointWorkers):
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
     scheduler : str, Client or Cluster
         Address, a file with it, a client, which stays open, or a cluster.

@@ -54,7 +54,7 @@ class KeptPoint:
 
     Parameters
     ----------
-    steps : PointSteps or None
+    steps
         See :class:`~klack.analyses.study.asked_points.PointRow`.
     """
 

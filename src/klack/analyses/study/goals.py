@@ -37,8 +37,8 @@ class Bound:
 
     Parameters
     ----------
-    value : float [unit of the measure]
-    is_most : bool
+    value [unit of the measure]
+    is_most
         True for the largest allowed value, False for the smallest.
     """
 
@@ -58,9 +58,9 @@ class Goals:
 
     Parameters
     ----------
-    objectives : tuple of str
+    objectives
         Measures.
-    signs : tuple of float
+    signs
         1 for one to minimise, -1 for one to maximise.
     """
 
@@ -86,9 +86,9 @@ class Goals:
 
         Parameters
         ----------
-        units : mapping of str to str
+        units
             Of the measures.
-        name : callable
+        name
             Name of the column of a measure and side.
         """
         named = [(name(bound.measure, bound.is_most), bound) for bound in self.bounds]
@@ -126,9 +126,9 @@ def goals_of(
 
     Parameters
     ----------
-    measures : mapping of str to Measure
+    measures
         All that are computed, by their names in the study.
-    today : mapping of str to float
+    today
         Their values in the case as it is.
 
     Raises

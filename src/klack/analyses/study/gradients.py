@@ -70,11 +70,11 @@ class Gradients:
 
     Parameters
     ----------
-    runner : SlopeRunner
+    runner
         Of the case.
-    chosen : tuple of ChosenMeasure
+    chosen
         Of the objectives and bounds.
-    notes : list of str
+    notes
         Why a derivative could not be computed.
     """
 

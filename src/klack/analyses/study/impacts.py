@@ -76,10 +76,10 @@ class _Built:
 
     Parameters
     ----------
-    bodies : ImpactBodies or None
+    bodies
         Of the impact; None where every impact builds its own (in full, and of given models), and
         where no measure takes one.
-    shots : ImpactBodies or None
+    shots
         Of the shots, which start centred and in first touch; None where no measure takes them.
     """
 
@@ -210,9 +210,9 @@ class _Point:
 
     Parameters
     ----------
-    notes : tuple of str
+    notes
         Doubts; an empty one is none.
-    models : tuple of str
+    models
         Levels with their modes and laws.
     meshes : tuple of (str, int)
         Bodies and their nodes.

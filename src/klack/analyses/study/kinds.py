@@ -35,9 +35,9 @@ def ask(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
-    variant : str or None
+    variant
         Of a stroke; of an impact its level.
 
     Raises

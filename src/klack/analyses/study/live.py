@@ -21,7 +21,7 @@ class Pace:
 
     Parameters
     ----------
-    most : int
+    most
         Points that will have been asked for at the end.
     """
 
@@ -35,11 +35,11 @@ class Pace:
 
         Parameters
         ----------
-        done : int
+        done
             Points that have their values.
-        computed : int
+        computed
             Of them computed since the begin; the others were there.
-        best : str
+        best
             The best one so far, in words.
         """
         now = perf_counter()
@@ -82,7 +82,7 @@ class LiveRecord:
 
     Parameters
     ----------
-    progress : callable
+    progress
         Is told of a fault.
     """
 
@@ -122,7 +122,7 @@ class ProgressPage:
 
     Parameters
     ----------
-    progress : callable
+    progress
         Is told where the page is.
     """
 

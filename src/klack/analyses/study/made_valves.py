@@ -31,9 +31,9 @@ class _Scattered:
 
     Parameters
     ----------
-    deviation : float [SI]
+    deviation [SI]
         Standard deviation of made valves.
-    today : float or None [SI]
+    today [SI]
         In the case; None for a word whose value there is not known.
     """
 
@@ -49,9 +49,9 @@ class Scatter:
 
     Parameters
     ----------
-    space : Space
+    space
         Of the study.
-    cube : array, shape (valves, values)
+    cube (valves, values)
         Shares of probability of each valve.
     """
 

@@ -70,9 +70,9 @@ class PointNoise:
 
     Parameters
     ----------
-    source : callable
+    source
         Makes what the noise comes from.
-    transfers : Transfers
+    transfers
         Of the bodies, as far as they are known.
     """
 
@@ -113,12 +113,12 @@ class ChosenMeasure:
 
     Parameters
     ----------
-    name : str
+    name
         In the study.
-    of : str
+    of
         What it is of: the ``"variant"`` of a stroke or one ``"impact"`` in it, the ``"level"`` of
         an impact, all of its ``"shots"``, a ``"click"`` or the noise ``"design"``.
-    part : callable
+    part
         Of a run, what the measure is read from; None where the run does not have it.
     """
 
@@ -165,13 +165,13 @@ def choose_measures(
 
     Parameters
     ----------
-    find : callable
+    find
         Of a name; None where there is no such measure.
-    known : sequence of str
+    known
         All names, for the nearest one.
-    words : str
+    words
         What names are known.
-    example : str
+    example
         One of them.
 
     Raises
@@ -266,7 +266,7 @@ def shot_notes(names: Iterable[str], found: DroppedShots) -> tuple[str, ...]:
 
     Parameters
     ----------
-    names : iterable of str
+    names
         Of measures of the shots.
     """
     parts = [name.split(".")[1:] for name in names]
@@ -326,9 +326,9 @@ class ImpactOfPoint:
 
     Parameters
     ----------
-    level : LevelResult, optional
+    level
         Of the impact.
-    noise : PointNoise, optional
+    noise
         Of that impact.
     """
 

@@ -76,17 +76,17 @@ def run_optimisation(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
-    source : StudySource
+    source
         With objectives.
-    folder : Path, optional
+    folder
         Where computed points are kept.
-    where : Where
+    where
         Points are computed.
-    seen : callable, optional
+    seen
         Takes what was found so far, now and then.
-    live : callable, optional
+    live
         Is offered a record of what was found so far, often.
 
     Raises

@@ -19,11 +19,11 @@ def case_of_point(
 
     Parameters
     ----------
-    point : int or None
+    point
         The recommended one of an optimisation by default.
-    folder : Path
+    folder
         Where it will lie; files that the case names are looked for there.
-    study : str
+    study
         What it is called in the comment at the head of the text.
 
     Raises

@@ -56,9 +56,9 @@ class Parameter:
 
     Parameters
     ----------
-    name : str
+    name
         Path of its key in the case; a word of its own where only expressions use it.
-    kind : Kind or None
+    kind
         Of quantity; None for words and whole numbers.
     spread : Range, Normal or Listed
         Its values [SI].
@@ -297,13 +297,13 @@ class Linked:
 
     Parameters
     ----------
-    name : str
+    name
         Path of the key.
-    kind : Kind
+    kind
         Of quantity.
-    words : mapping of str to str
+    words
         Parameter, or other key, that each word of the expression means.
-    today : float [SI]
+    today [SI]
         In the case.
     """
 
@@ -330,11 +330,11 @@ class Space:
 
     Parameters
     ----------
-    parameters : tuple of Parameter
+    parameters
         All of the study.
-    linked : tuple of Linked
+    linked
         In the order in which they can be computed.
-    constants : mapping of str to float [SI]
+    constants [SI]
         What expressions need beside the parameters; no part of a point.
     """
 
@@ -416,9 +416,9 @@ class StudyPoints:
     ----------
     values : tuple of mapping of str to value
         Of each point by name [SI]: parameters, then what follows from them.
-    design : str
+    design
         In words.
-    cube : array, shape (points, parameters that vary), optional
+    cube (points, parameters that vary)
         Where they lie in the unit cube, if they were drawn there.
     """
 

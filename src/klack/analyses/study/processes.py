@@ -54,13 +54,13 @@ class SentCase:
 
     Parameters
     ----------
-    content : bytes
+    content
         The tree of the case: plain data, and components of the user's own by their module and name.
-    folder : str
+    folder
         Current folder of the sender: paths of the case are relative to it.
-    mark : str
+    mark
         Of the log of its points: content of the case, its files, components and of klack.
-    versions : mapping of str to str
+    versions
         See :func:`versions_here`.
     """
 
@@ -177,7 +177,7 @@ class PointOrder:
 
     Parameters
     ----------
-    keys : tuple of PointKey
+    keys
         All that the points of the study exchange.
     written : tuple of mapping of str to value
         What each point exchanges.
@@ -207,7 +207,7 @@ class Answer:
 
     Parameters
     ----------
-    seconds : float [s]
+    seconds [s]
         That the worker took.
     """
 
@@ -295,7 +295,7 @@ class ProcessWorkers(PointWorkers):
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
 
     Raises

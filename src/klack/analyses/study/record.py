@@ -37,21 +37,21 @@ class StudyColumn:
 
     Parameters
     ----------
-    name : str
+    name
         Path of a key of the case, a word of the study, or name of a measure.
-    title : str
+    title
         What it is, in words.
-    unit : str
+    unit
         SI; ``"1"`` for a pure number, empty for words.
-    spread : str
+    spread
         How its values are spread, or the expression that they follow from; empty for a measure.
-    today : float
+    today
         In the case as it is; nan where it has none.
-    values : array, shape (points,)
+    values (points,)
         Nan where there is none; of words, which of them.
-    words : tuple of str
+    words
         That ``values`` counts.
-    is_whole : bool
+    is_whole
         Whether the case has whole numbers there.
     """
 
@@ -77,15 +77,15 @@ class Sensitivity:
 
     Parameters
     ----------
-    first, first_low, first_high : array, shape (parameters,)
+    first, first_low, first_high (parameters,)
         Share that a parameter causes alone, with its interval of confidence.
-    total, total_low, total_high : array, shape (parameters,)
+    total, total_low, total_high (parameters,)
         Share that vanishes once the parameter is known and the others are free.
-    rows, discarded : int
+    rows, discarded
         Base points used, and those left out because one of their points has no value.
-    confidence : float
+    confidence
         Of the intervals.
-    reason : str
+    reason
         Why there are no numbers; empty if there are.
     """
 
@@ -109,14 +109,14 @@ class Screening:
 
     Parameters
     ----------
-    size, size_error : array, shape (parameters,) [unit of the measure]
+    size, size_error (parameters,) [unit of the measure]
         Mean of the sizes of the effects, mu*, and its standard error.
-    mean : array, shape (parameters,)
+    mean (parameters,)
         Mean of the effects with their signs, mu.
-    scatter : array, shape (parameters,)
+    scatter (parameters,)
         Standard deviation of the effects, sigma: of a parameter that acts differently at other
         places, by itself or through others.
-    effects : int array, shape (parameters,)
+    effects (parameters,)
         How many there are; those next to a point without a value are left out.
     """
 
@@ -135,9 +135,9 @@ class SurrogateEffect:
 
     Parameters
     ----------
-    at : array [SI]
+    at [SI]
         Values of the parameter; of words, which of them.
-    words : tuple of str
+    words
         That ``at`` counts.
     mean : array, as ``at`` [unit of the measure]
     """
@@ -154,23 +154,23 @@ class StudySurrogate:
 
     Parameters
     ----------
-    made_of : str
+    made_of
         In words.
-    points, failed, repeated : int
+    points, failed, repeated
         Different points with a value, which it was fitted to; points without a value; points that
         repeat another one.
-    predictivity : float
+    predictivity
         Q2 of the points, each predicted from the others.
-    error, largest : float [unit of the measure]
+    error, largest [unit of the measure]
         Root mean square and largest of the leave-one-out residuals.
-    residuals : array, shape (points of the study,)
+    residuals (points of the study,)
         Value minus prediction from the other points; nan where there is none.
-    reason : str
+    reason
         Why nothing follows from it; empty if something does.
-    first, first_low, first_high, total, total_low, total_high : array, shape (parameters,)
+    first, first_low, first_high, total, total_low, total_high (parameters,)
         Shares of the variance as of :class:`Sensitivity`, with the largest change that the error
         can make in them; nan with a reason.
-    effects : tuple of SurrogateEffect
+    effects
         Of each parameter; empty with a reason.
     """
 
@@ -201,20 +201,20 @@ class Optimum:
 
     Parameters
     ----------
-    algorithm : str
+    algorithm
         In words.
-    objectives : tuple of str
+    objectives
         Measures; ``ways`` says whether each is minimised or maximised.
-    bounds : tuple of str
+    bounds
         In words.
-    kept : bool array, shape (points,)
+    kept (points,)
         Points that keep all bounds.
-    front : int array
+    front
         Points that no other one beats in every objective, by the first objective.
-    best : int
+    best
         Of the front, nearest to the ideal point by the ranges of the front; the best one of a
         single objective.  -1 without a front.
-    feasible : bool
+    feasible
         False if no point keeps all bounds: the front is then of those that miss them least.
     """
 
@@ -234,9 +234,9 @@ class PointSound:
 
     Parameters
     ----------
-    point : int
+    point
         -1 for the case as it is.
-    pressure : TimeSeries [Pa]
+    pressure [Pa]
     """
 
     point: int
@@ -249,15 +249,15 @@ class MissedBound:
 
     Parameters
     ----------
-    bound : str
+    bound
         In words.
-    missed, points, failed : int
+    missed, points, failed
         Points that miss it, points with a value, and those without.
-    probability, low, high : float
+    probability, low, high
         Share that misses it, with its interval of 95 %.
-    at_most : float
+    at_most
         One-sided bound of 95 %: the one to state where none missed it.
-    low_if_none, high_if_all : float
+    low_if_none, high_if_all
         Ends of the interval if none or all of the points without a value miss it.
     """
 
@@ -279,38 +279,38 @@ class StudyRecord(CaseRecord):
 
     Parameters
     ----------
-    study_text : str
+    study_text
         Of the file of the study; empty if it stands in the case.
-    variant : str
+    variant
         Of the stroke; of an impact its level, ``"shots"``, or both.
-    design : str
+    design
         Where the points lie, in words.
-    threads : int
+    threads
         Points that were computed at a time.
-    computed, kept : int
+    computed, kept
         Points that were computed now, and that an earlier run had left.
-    point_time : float [s]
+    point_time [s]
         Wall-clock time of the points that were computed now.
-    failures : tuple of str
+    failures
         Why a point has no measures; empty where it was computed.
-    notes : tuple of str
+    notes
         Doubts about the numbers of each point.
-    sensitivities : tuple of Sensitivity
+    sensitivities
         Of each measure, from the design of Saltelli.
-    screenings : tuple of Screening
+    screenings
         Of each measure, from the trajectories of Morris.
-    surrogates : tuple of StudySurrogate
+    surrogates
         Of each measure, if asked for.
-    optimum : Optimum or None
+    optimum
         Of ``klack optimise``.
-    missed : tuple of MissedBound
+    missed
         Of drawn points: the probability of missing each bound.
-    workers : str
+    workers
         What computed them: threads, processes, or workers of dask.
-    model : str
+    model
         What the numbers of an impact come from: level, modes and meshes of the case as it is, and
         at how many points they differ; empty for strokes.
-    halvings, step_changes : array, shape (points,)
+    halvings, step_changes (points,)
         Of strokes, see :class:`~klack.analyses.study.asked_points.PointSteps`; nan without one, and
         empty for impacts.
     """

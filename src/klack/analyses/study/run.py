@@ -77,14 +77,14 @@ def run_study(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
-    folder : Path, optional
+    folder
         Where computed points are kept: an interrupted study resumes, and another study of the same
         case finds what both have.
-    where : Where
+    where
         Points are computed.
-    live : callable, optional
+    live
         Is offered a record of the points so far, often.
 
     Raises

@@ -32,19 +32,19 @@ def run_points(
 
     Parameters
     ----------
-    tree : CaseTree
+    tree
         The same as it was written.
     points : sequence of mappings, or mapping of sequences
         Key of the case to a value with its unit, for every point; or a list of values by key.
-    measures : iterable of str
+    measures
         See :func:`~klack.analyses.study.measures.stroke_measures` and
         :func:`~klack.analyses.study.measures.impact_measures`.
-    variant : str, optional
+    variant
         The first one of the case by default; of an impact its level, ``reduced`` by default.
-    where : Where
+    where
         Points are computed; one thread for a case whose components call Python or an FMU, which
         need not bear several calls at a time.
-    progress : callable
+    progress
         Called with a stage and the share of the points that are done.
 
     Raises

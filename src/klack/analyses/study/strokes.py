@@ -75,15 +75,15 @@ class _Built:
     ----------
     made : mapping of Key to value
         Of the group.
-    tree : CaseTree
+    tree
         With these values.
-    parts : CaseTree
+    parts
         The same, checked where no point changes it.
-    valve : Valve
+    valve
         Of one point, without meshes.
-    notes : tuple of str
+    notes
         Doubts about bodies and laws.
-    transfers : Transfers
+    transfers
         Of the bodies to the sound.
     """
 

@@ -34,13 +34,13 @@ class Where:
 
     Parameters
     ----------
-    threads : int, optional
+    threads
         All cores by default.
-    workers : int, optional
+    workers
         Processes, in place of threads.
     dask : str, Client or Cluster of distributed, optional
         Address of a scheduler, or a file that has it.
-    is_free : bool
+    is_free
         Whether klack may take processes in place of threads where that is faster.
 
     Raises

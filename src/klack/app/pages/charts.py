@@ -195,8 +195,7 @@ class DescribedChart:
 
     Parameters
     ----------
-    title : str
-    figure : dict
+    figure
         What Plotly draws.
     """
 

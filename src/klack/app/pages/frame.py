@@ -155,9 +155,7 @@ def read_first(
 
     Parameters
     ----------
-    words : str
-    read, show : callable
-    said : callable, optional
+    said
         What stays in place of the words.
 
     Returns
@@ -300,11 +298,10 @@ def choice_box(
 
     Parameters
     ----------
-    words : mapping of str to str
+    words
         What is shown for each value.
-    value : str or None
+    value
         None chooses none: a browser then shows the first one.
-    change : callable or None
     """
     box = element("select", "k-input", **props)
     with box:

@@ -53,15 +53,15 @@ class PartsStep:
 
     Parameters
     ----------
-    plan : callable
+    plan
         The plan now.
-    facts : callable
+    facts
         What was read in each body, or why it could not be; nothing of one that is being read.
-    keep : callable
+    keep
         Keeps another plan.
-    read : callable
+    read
         Reads the bodies of the plan, those that are named once more, and shows the facts.
-    files : tuple of str
+    files
         STEP files in the folder.
     """
 
@@ -262,9 +262,9 @@ class FacesStep:
     Parameters
     ----------
     faces : mapping of body to faces
-    plan : callable
+    plan
         The plan now.
-    keep : callable
+    keep
         Keeps another one.
     """
 

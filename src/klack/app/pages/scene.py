@@ -26,11 +26,11 @@ class Scene(Element, component="scene_element.js"):  # type: ignore[call-arg]
 
     Parameters
     ----------
-    address : str
+    address
         Of the payload, from :class:`klack.app.state.Sounds`.
-    on_pick, on_hover : callable or None
+    on_pick, on_hover
         Called when a face is clicked, and when the pointer comes to another one.
-    has_panel : bool
+    has_panel
         Whether views, bodies and names of faces stand beside; a click on a name copies it.
     """
 

@@ -46,8 +46,7 @@ class StudyPanel:
 
     Parameters
     ----------
-    state : State
-    path : str
+    path
         Of a study, or of a case with a study in it.
     """
 

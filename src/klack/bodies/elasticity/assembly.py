@@ -37,8 +37,7 @@ def assemble(mesh: Mesh, materials: Mapping[str, Material]) -> tuple[csr_array, 
 
     Parameters
     ----------
-    mesh : Mesh
-    materials : mapping of str to Material
+    materials
         Material of each solid, by the name of the solid.
 
     Returns
@@ -68,11 +67,11 @@ def assemble_order(
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         Of dimension 2.
-    materials : mapping of str to Material
+    materials
         By name of the solid.
-    order : int
+    order
         0 or more; 0 has the axisymmetric motion and the torsion.
 
     Returns

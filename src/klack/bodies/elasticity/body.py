@@ -38,12 +38,10 @@ class ElasticBody:
 
     Parameters
     ----------
-    name : str
-    mesh : Mesh
     K : csr_array, shape (n_dof, n_dof) [N/m]
         Stiffness of all degrees of freedom, supports not applied.
     M : csr_array, shape (n_dof, n_dof) [kg]
-    fixed : int array
+    fixed
         Sorted degrees of freedom that are held at zero.
     """
 
@@ -146,9 +144,7 @@ def elastic_body(
 
     Parameters
     ----------
-    name : str
-    mesh : Mesh
-    materials : mapping of str to Material
+    materials
         By name of the solid.
     fixed_nodes : node numbers
         Held in all directions.  None: the body is free.  On the axis of a body of revolution

@@ -21,13 +21,13 @@ class Budget:
 
     Parameters
     ----------
-    name : str
+    name
         Of the body.
-    later : float [byte]
+    later [byte]
         Memory of the stages that follow while the factor is held.
-    reason : str
+    reason
         What takes it, such as ``50 modes``.
-    tell : callable
+    tell
         Gets one line of text for a factor of 1 GB or more, before it is computed.
     """
 
@@ -43,12 +43,11 @@ class Budget:
 
         Parameters
         ----------
-        backend : str
-        size, nonzeros : int
+        size, nonzeros
             Rows and entries of the matrix.
-        needed : float [byte]
+        needed [byte]
             Of the factorisation.
-        precision : str
+        precision
             Of the factor.
 
         Raises

@@ -73,14 +73,14 @@ def condensed_inverse(
 
     Parameters
     ----------
-    factor : Factorization
+    factor
         Of A, shape (n, n).
     G : csr_array, shape (m, n)
         One load per row.
     groups : sequence of int arrays
         Rows of G, each in one group; one group of all of them without.  What is found for two
         groups does not depend on later ones, to the last bit: loads can be added.
-    largest : int [byte]
+    largest [byte]
         Memory up to which the cheaper way is taken.
 
     Returns

@@ -95,19 +95,19 @@ def block_lanczos(
 
     Parameters
     ----------
-    operator : callable
+    operator
         X (n, b) to A X (n, b).
     M : csr_array, shape (n, n)
-    start : array, shape (n, b)
+    start (n, b)
         Start block, in the range of A.
-    enough : callable
+    enough
         Told the converged leading eigenvalues, descending; says whether they suffice.
-    largest_subspace : int
+    largest_subspace
         Most basis vectors.
-    exact : int, optional
+    exact
         Leading values whose vectors shall leave a residual of 1e-8 of them, 1e-2 those after; all
         1e-8 by default.  Their own relative error is of the order of its square.
-    expected : int
+    expected
         Basis vectors to make room for, so that the basis is not copied while it grows; memory is
         taken when they are there.
 
@@ -184,11 +184,11 @@ class Modes:
 
     Parameters
     ----------
-    omega : array, shape (m,) [rad/s]
-    shapes : array, shape (n_dof, m) [1/sqrt(kg)]
+    omega (m,) [rad/s]
+    shapes (n_dof, m) [1/sqrt(kg)]
         Mass-normalised, zero at fixed degrees of freedom, free of rigid motion.  The first
         component of (nearly) the largest magnitude is positive.
-    richer : Modes, optional
+    richer
         These and further ones that are not converged, for an estimate.
     """
 
@@ -222,15 +222,14 @@ def eigenmodes(
 
     Parameters
     ----------
-    body : VibratingBody
-    count : int, optional
+    count
         Number of modes.
-    max_frequency : float, optional [Hz]
+    max_frequency [Hz]
         All modes up to this frequency; with ``count`` as well, at most so many.
-    rough : int
+    rough
         Find so many where that is more than ``count``, those beyond it in the iteration only as
         far as their frequencies are right to some 1e-4: ``richer`` of the result.
-    flexibility : Flexibility, optional
+    flexibility
         That of this body, if it is there already: saves its factorisation.
     backend, threads
         See :func:`klack.bodies.elasticity.factorization.factorize`; unused with ``flexibility``.

@@ -45,13 +45,12 @@ def require_factor_memory(
 
     Parameters
     ----------
-    backend : str
-    size, nonzeros : int
+    size, nonzeros
         Rows and entries of the matrix.
-    needed : float [byte]
-    beside : str
+    needed [byte]
+    beside
         What of it is for other things than the factor.
-    precision : str
+    precision
         Of the factor.
 
     Raises

@@ -107,13 +107,13 @@ def factorize(
         Full symmetric storage.
     backend : {"auto", "pardiso", "ngsolve", "superlu"}
         ``"auto"`` takes the first of these that is installed.
-    threads : int, optional
+    threads
         Threads of the factorisation and of each solve (pardiso only); the default is that of MKL.
         One thread is best for many single solves, two for the factorisation.
     precision : {"double", "single"}
         Of the factor; ``"single"`` (pardiso only, the others stay double) takes half the memory and
         0.6 of the time, with relative residuals of some 1e-6.
-    budget : Budget
+    budget
         What has to fit beside the factor, and who is told its memory before it is computed.
 
     Raises

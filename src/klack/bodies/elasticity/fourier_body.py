@@ -48,14 +48,12 @@ class FourierBody:
 
     Parameters
     ----------
-    name : str
-    mesh : Mesh
+    mesh
         The half section.
-    order : int
     K : csr_array, shape (n_dof, n_dof) [N/m]
         Stiffness of a, b, W of all nodes, supports not applied.
     M : csr_array, shape (n_dof, n_dof) [kg]
-    fixed : int array
+    fixed
         Sorted degrees of freedom that are held at zero, those on the axis among them.
     """
 
@@ -158,12 +156,11 @@ def fourier_body(
 
     Parameters
     ----------
-    name : str
-    mesh : Mesh
+    mesh
         Half section, of dimension 2.
-    materials : mapping of str to Material
+    materials
         By name of the solid.
-    order : int
+    order
         n, 0 or more; 1 is bending.
     fixed_nodes : node numbers
         Held in all directions, all round.  None: the body is free.
@@ -223,10 +220,10 @@ def rows_around(rows: csr_array, order: int, angles: Floats, *, towards: float =
     ----------
     rows : csr_array, shape (m, 2 n_nodes)
         On u_r and u_z of the nodes.
-    order : int
+    order
         n.
-    angles : array, shape (k,) [rad]
-    towards : float [rad]
+    angles (k,) [rad]
+    towards [rad]
         :math:`\theta_0`.
 
     Returns
@@ -258,11 +255,11 @@ def displacement_rows(
     ----------
     weights : csr_array, shape (m, n_nodes) [-]
         Shape functions at the points; the identity reads the nodes.
-    order : int
+    order
         n.
-    angles : array, shape (m,) [rad]
+    angles (m,) [rad]
         Of the points.
-    towards : float [rad]
+    towards [rad]
 
     Returns
     -------

@@ -116,17 +116,16 @@ class MatrixReport:
     ----------
     rows : tuple of (str, str)
         What, and its value in words.
-    mass : float [kg]
+    mass [kg]
         Without the share of degrees of freedom that are missing in the files.
-    centre_of_mass : tuple of float [m]
-    material : MaterialEstimate
-    strain : float [-]
+    centre_of_mass [m]
+    strain [-]
         Largest force of a rigid motion, relative to the forces that cancel in it.
-    first_frequency : float [Hz]
+    first_frequency [Hz]
         Lowest elastic eigenfrequency.
-    rigid : int
+    rigid
         Number of motions without strain.
-    held : int
+    held
         Degrees of freedom at zero.
     """
 
@@ -155,19 +154,19 @@ def check_matrices(
 
     Parameters
     ----------
-    where : str
+    where
         Files, for errors.
     K : csr_array, shape (n_dof, n_dof) [N/m]
     M : csr_array, shape (n_dof, n_dof) [kg]
-    mesh : Mesh
+    mesh
         Points [m]; elements and faces may be missing.
-    fixed : int array
+    fixed
         Sorted degrees of freedom at zero, absent ones among them.
-    absent : int array, optional
+    absent
         Those without rows in the files.
-    numbers : int array, optional
+    numbers
         Number of each node in its program, for the texts.
-    units : UnitSystem, optional
+    units
         In which the files were read; with it, a text names the system that would fit.
 
     Raises
@@ -232,8 +231,7 @@ def checked_body(
 
     Parameters
     ----------
-    name : str
-    mesh : Mesh
+    mesh
         With or without elements.
     K, M : csr_array, shape (n_dof, n_dof) [N/m], [kg]
     fixed_nodes : node indices

@@ -27,10 +27,9 @@ def node_graph(
 
     Parameters
     ----------
-    elements : int array, shape (sum of nodes per element,)
+    elements (sum of nodes per element,)
         Node numbers of all elements, one after the other.
-    offsets : int array, shape (n_elements + 1,)
-    node_count : int
+    offsets (n_elements + 1,)
 
     Returns
     -------
@@ -187,17 +186,17 @@ def add_elements(
 
     Parameters
     ----------
-    points : array, shape (n, d) [m]
-    connectivity : int array, shape (n_elements, n_nodes)
+    points (n, d) [m]
+    connectivity (n_elements, n_nodes)
     stiffness_rule, mass_rule : (N (q, n), dN (q, n, d), w (q,))
-    lame_lambda, shear_modulus : float [Pa]
-    density : float [kg/m^3]
-    order : int
+    lame_lambda, shear_modulus [Pa]
+    density [kg/m^3]
+    order
         Fourier order of a body of revolution with three displacements per node; -1 without.
     start, neighbours : result of :func:`node_graph`
     K : array, shape (start[-1] * c * c,) [N/m], c displacements per node
         Values in the order of the full CSR matrix; changed in place.
-    M : array, shape (start[-1],) [kg]
+    M (start[-1],) [kg]
         Values of the scalar mass matrix; changed in place.
 
     Returns

@@ -26,8 +26,6 @@ def traction_load(mesh: Mesh, surface: Surface, traction: Traction) -> NDArray[n
 
     Parameters
     ----------
-    mesh : Mesh
-    surface : Surface
     traction : function (points (q, d) [m], outward normals (q, d)) -> (q, d) [Pa]
         For example ``lambda x, n: -pressure * n``.
 
@@ -53,12 +51,11 @@ def order_load(mesh: Mesh, surface: Surface, traction: Traction, order: int) -> 
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         Half section.
-    surface : Surface
     traction : function (points (q, 2) [m], outward normals (q, 2)) -> (q, 3) [Pa]
         Amplitudes along the radius, around, and along the axis.
-    order : int
+    order
         n.
 
     Returns
@@ -89,9 +86,7 @@ def face_dashpots(mesh: Mesh, surface: Surface, resistance: float) -> csr_array:
 
     Parameters
     ----------
-    mesh : Mesh
-    surface : Surface
-    resistance : float [Pa s/m]
+    resistance [Pa s/m]
         z.
 
     Returns
@@ -178,10 +173,10 @@ class NearLoads:
 
         Parameters
         ----------
-        force : array, shape (n,) [N]
-        energy : float [J]
+        force (n,) [N]
+        energy [J]
             Twice the strain energy, ``f^T F f``.
-        solve : callable
+        solve
             For a load that is not close to those before.
         """
         for known, found in zip(self._forces, self._answers, strict=True):

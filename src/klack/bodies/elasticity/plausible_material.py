@@ -34,11 +34,11 @@ class MaterialEstimate:
 
     Parameters
     ----------
-    density : float [kg/m^3]
-    modulus : float [Pa]
+    density [kg/m^3]
+    modulus [Pa]
         lambda + 2 mu.
-    wave_speed : float [m/s]
-    exact_volume : bool
+    wave_speed [m/s]
+    exact_volume
         False where density and modulus are lower bounds, from the box around the nodes.
     """
 
@@ -83,9 +83,9 @@ def estimate_material(K: csr_array, mesh: Mesh, mass: float) -> MaterialEstimate
     Parameters
     ----------
     K : csr_array, shape (n_dof, n_dof) [N/m]
-    mesh : Mesh
+    mesh
         With blocks for the volume; without, the box around the nodes is taken.
-    mass : float [kg]
+    mass [kg]
     """
     d, x = mesh.dimension, mesh.points - mesh.points.mean(axis=0)
     energies = []

@@ -29,7 +29,7 @@ def quadrature(family: str, purpose: Purpose) -> Rule:
 
     Parameters
     ----------
-    family : str
+    family
         Key of :data:`klack.mesh.families.FAMILIES`.
     purpose : {"stiffness", "mass"}
         ``"mass"`` also serves for surface integrals of products of shape functions.

@@ -70,8 +70,7 @@ def rigid_motions(mesh: Mesh, about: NDArray[np.float64] | None = None) -> NDArr
 
     Parameters
     ----------
-    mesh : Mesh
-    about : array, shape (dimension,), optional [m]
+    about (dimension,) [m]
         The middle of the nodes without.
     """
     x = mesh.points - (mesh.points.mean(axis=0) if about is None else about)

@@ -88,13 +88,13 @@ class RingPoints:
 
     Parameters
     ----------
-    row : int array, shape (p,)
+    row (p,)
         Row of :class:`RingRows`.
-    turn : int array, shape (p,)
+    turn (p,)
         Number of the angle, 0 to ``count - 1``.
-    count : int
+    count
         N, equal angles of every ring.
-    is_sine : bool array, shape (rows,)
+    is_sine (rows,)
         Of :class:`RingRows`.
     """
 
@@ -136,7 +136,7 @@ class RingPoints:
 
         Parameters
         ----------
-        spectrum : array, shape (orders, rows, rows) [m/N]
+        spectrum (orders, rows, rows) [m/N]
             Of the rows in the orders 0 to N/2.
 
         Returns
@@ -184,10 +184,10 @@ class RingSections:
 
     Parameters
     ----------
-    heights : array, shape (k,) [m]
+    heights (k,) [m]
     weights : csr_array, shape (k, n_nodes) [-]
         Of the rings of each section: their sum is 1, their mean height that of the section.
-    points : array, shape (n_nodes, 2) [m]
+    points (n_nodes, 2) [m]
         (r, z) of all nodes.
     """
 

@@ -30,9 +30,9 @@ def shape_functions(family: str, xi: NDArray[np.float64]) -> Table:
 
     Parameters
     ----------
-    family : str
+    family
         Key of :data:`klack.mesh.families.FAMILIES`.
-    xi : array, shape (q, d) [-]
+    xi (q, d) [-]
         Reference coordinates.
 
     Returns

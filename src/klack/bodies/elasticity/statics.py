@@ -62,7 +62,7 @@ class RefinedFactorization(Closing):
     ----------
     A : sparse array, shape (n, n)
         Symmetric positive definite.
-    rough : Factorization
+    rough
         Of A, in single precision; closed with this one.
     """
 
@@ -141,17 +141,16 @@ class Flexibility(Closing):
 
     Parameters
     ----------
-    body : VibratingBody
     backend : {"auto", "pardiso", "ngsolve", "superlu"}
-    threads : int, optional
+    threads
         See :func:`klack.bodies.elasticity.factorization.factorize`.
-    cache : ResultCache, optional
+    cache
         Keeps what :meth:`deflections` and :meth:`remembered` compute, for later runs.
-    budget : Budget
+    budget
         What has to fit beside the factor.  Where a factor in double precision does not, one in
         single precision is taken and its solutions are refined (pardiso only;
         :mod:`klack.bodies.elasticity.statics`).
-    at_once : bool
+    at_once
         Other bodies may be solved for at the same time: ``threads`` leaves them their cores.
     """
 

@@ -40,14 +40,14 @@ class StressField:
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         Solid, or axisymmetric with columns r and z.
-    materials : mapping of str to Material
+    materials
         By name of the solid.
 
     Attributes
     ----------
-    mesh : Mesh
+    mesh
         The mesh with nodes of its own for every solid, without surfaces and sets.
     nodes : int array, shape (n_points,)
         Node of the given mesh that each point of that mesh is.
@@ -111,7 +111,7 @@ def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
 
     Parameters
     ----------
-    stress : array, shape (..., 6) [Pa]
+    stress (..., 6) [Pa]
         In the order of :data:`COMPONENTS`.
 
     Returns

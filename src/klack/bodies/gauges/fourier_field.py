@@ -20,12 +20,11 @@ def field_rows(body: FourierBody, points: Floats, *, where: str, towards: float 
 
     Parameters
     ----------
-    body : FourierBody
-    points : array, shape (m, 3) [m]
+    points (m, 3) [m]
         Cylindrical coordinates of points of the body: radius, height z, angle [rad].
-    where : str
+    where
         For the error, e.g. ``"probe"``.
-    towards : float [rad]
+    towards [rad]
         Angle of the direction in which the body bends.
 
     Returns

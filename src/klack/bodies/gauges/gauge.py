@@ -29,13 +29,12 @@ class Gauge:
 
     Parameters
     ----------
-    name, body : str
     kind : {"displacement", "velocity", "strain", "stress"}
-    row : array, shape (n_dof,)
+    row (n_dof,)
         Of a velocity the row of the displacement.
-    place : str
+    place
         In words, for example ``"along z over 3 mm at (10, -1260) mm"``.
-    low_pass : LowPass or None
+    low_pass
         Of the sensor.
     """
 
@@ -66,14 +65,13 @@ class GaugeRecord:
 
     Parameters
     ----------
-    name, body, kind, place : str
+    name, body, kind, place
         As of its :class:`Gauge`.
-    start, step : float [s]
+    start, step [s]
         First instant and the time between two; the clock is that of the contact force.
-    exact : array, shape (n,)
+    exact (n,)
         On the body, before the low pass, in :attr:`unit`; tension and motion along the direction
         are positive.
-    low_pass : LowPass or None
     """
 
     name: str

@@ -38,14 +38,13 @@ class LocatedPoint:
 
     Parameters
     ----------
-    block : ElementBlock
-    element : int
+    element
         Row of its connectivity.
-    xi : array, shape (dimension,) [-]
+    xi (dimension,) [-]
         Reference coordinates.
-    distance : float [m]
+    distance [m]
         From the point asked for.
-    place : array, shape (dimension,) [m]
+    place (dimension,) [m]
     """
 
     block: ElementBlock
@@ -67,11 +66,10 @@ def locate(
 
     Parameters
     ----------
-    mesh : Mesh
-    point : array, shape (dimension,) [m]
-    where : str
+    point (dimension,) [m]
+    where
         For the error, e.g. ``"outputs.front.at"``.
-    pose : Pose, optional
+    pose
         How the mesh came there from its drawing, in whose coordinates the error tells.
 
     Raises

@@ -45,15 +45,15 @@ class Line:
 
     Parameters
     ----------
-    at : array, shape (dimension,) [m]
+    at (dimension,) [m]
         Its middle.
     direction : array, shape (dimension,) [-], or ``"around"``
         Of length one.
-    length : float [m]
+    length [m]
         0 for a point.
-    where : str
+    where
         For errors.
-    pose : Pose, optional
+    pose
         How the body came there from its drawing, in whose coordinates errors tell.
     """
 
@@ -149,9 +149,7 @@ def stress_row(mesh: Mesh, line: Line, materials: Mapping[str, Material]) -> Flo
 
     Parameters
     ----------
-    mesh : Mesh
-    line : Line
-    materials : mapping of str to Material
+    materials
         By name of the solid.
     """
     row = np.zeros(mesh.dof_count)

@@ -76,7 +76,6 @@ def read_ansys_full(path: Path, name: str | None, role: Role | None) -> SystemMa
 
     Parameters
     ----------
-    path : Path
     name : {"K", "M"} or None
     role : {"stiffness", "mass"} or None
         Says which one without a name.

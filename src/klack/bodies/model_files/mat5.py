@@ -79,8 +79,7 @@ def read_mat5(path: Path, *, largest: int = _LARGEST) -> dict[str, MatValue]:
 
     Parameters
     ----------
-    path : Path
-    largest : int
+    largest
         Bytes that the numbers may take in memory.
 
     Returns

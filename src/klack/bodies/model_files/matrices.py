@@ -58,7 +58,7 @@ def read_matrix(
     ----------
     path : path
         With one of the endings of :data:`MATRIX_FORMATS`.
-    name : str, optional
+    name
         Of the matrix in a file of several.
     role : {"stiffness", "mass"}, optional
         Finds the usual names (K, KAA, ...) without ``name``.

@@ -89,10 +89,6 @@ class _Block:
 def read_listing(path: Path) -> tuple[Arrays, Texts]:
     """Read the matrices of a text file, and the names of their inputs and outputs.
 
-    Parameters
-    ----------
-    path : Path
-
     Returns
     -------
     arrays : dict of str to array

@@ -29,8 +29,7 @@ class NamedArrays:
 
     Parameters
     ----------
-    path : Path
-    arrays : mapping of str to array
+    arrays
         Two-dimensional; fields of a structure are called ``sys.A``.
     texts : mapping of str to tuple of str
         Lists of names.
@@ -93,7 +92,7 @@ def read_named_arrays(path: Path) -> NamedArrays:
 
     Parameters
     ----------
-    path : Path
+    path
         ``.mat`` (MATLAB up to 7.2, Octave ``save -v6`` or ``-v7``), ``.npz``, or text: see
         :func:`klack.bodies.model_files.matrix_listing.read_listing`.
 

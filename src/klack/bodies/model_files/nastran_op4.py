@@ -37,12 +37,11 @@ class Op4Header:
 
     Parameters
     ----------
-    name : str
-    columns : int
+    columns
         And rows: it is square.
-    double : bool
+    double
         Double precision.
-    big : bool
+    big
         Strings have a head of two integers.
     """
 

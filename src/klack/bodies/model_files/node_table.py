@@ -27,9 +27,9 @@ def read_node_table(
 
     Parameters
     ----------
-    path : Path
+    path
         A table, or a mesh file whose nodes are taken.
-    unit_length : float [m]
+    unit_length [m]
         Unit of the coordinates.
     dimension : {3, 2}
         Columns x, y, z, or r, z.

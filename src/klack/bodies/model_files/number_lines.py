@@ -44,12 +44,11 @@ def number_rows(
     ----------
     stream : binary file
         At the start of a line.
-    columns : int
-    where : str
+    where
         File, for errors.
-    line : int
+    line
         Number of that line.
-    comments : bytes
+    comments
         Lines that start with one of these are left out; so are empty ones.
 
     Returns
@@ -143,10 +142,6 @@ _LINES = 20_000
 
 class FixedFormat:
     """Format such as ``(1P,4E20.12)`` or ``(10I8)``.
-
-    Parameters
-    ----------
-    text : str
 
     Attributes
     ----------

@@ -19,9 +19,8 @@ class FileStateSpace:
 
     Parameters
     ----------
-    path : Path
     A, B, C, D : array, shapes (n, n), (n, n_inputs), (n_outputs, n), (n_outputs, n_inputs)
-    input_names, output_names : tuple of str
+    input_names, output_names
         Empty where the file gives none.
     """
 
@@ -39,7 +38,7 @@ def read_state_space(path: Path) -> FileStateSpace:
 
     Parameters
     ----------
-    path : Path
+    path
         ``.mat`` (plain arrays, or one structure such as ``sys``), ``.npz``, or text with named
         blocks: CSV and ANSYS ``SPMWRITE``.
 
@@ -97,10 +96,9 @@ class FileReducedMatrices:
 
     Parameters
     ----------
-    path : Path
-    K, M : array, shape (n, n)
+    K, M (n, n)
         Rows are boundary displacements and modal coordinates in any order.
-    names : tuple of str
+    names
         Of the rows; empty where the file gives none.
     """
 
@@ -115,7 +113,7 @@ def read_reduced_matrices(path: Path) -> FileReducedMatrices:
 
     Parameters
     ----------
-    path : Path
+    path
         ``.mat``, ``.npz``, text with the blocks K and M, or Nastran ``.op4``.
 
     Raises

@@ -21,14 +21,13 @@ class FileSystem:
 
     Parameters
     ----------
-    where : str
+    where
         Files, for errors.
     K, M : csr_array, shape (n, n)
-    rows : RowPlaces or None
+    rows
         Node and direction of each row; None where no file says it.
-    held : RowPlaces or None
+    held
         Degrees of freedom that the program has taken out.
-    notes : tuple of str
     """
 
     where: str
@@ -57,9 +56,8 @@ class NodeSystem:
     ----------
     K, M : csr_array, shape (n_dof, n_dof)
         Row ``dimension * i + d`` belongs to node i and direction d.
-    absent : int array
+    absent
         Sorted degrees of freedom that the files leave out: their program holds them at zero.
-    notes : tuple of str
     """
 
     K: csr_array
@@ -80,11 +78,11 @@ def read_system(
 
     Parameters
     ----------
-    stiffness, mass : Path
+    stiffness, mass
         May be the same file.
-    stiffness_name, mass_name : str, optional
+    stiffness_name, mass_name
         In files of several matrices.
-    dofs : Path, optional
+    dofs
         Table of node and direction; it goes before what the files say themselves.
 
     Raises
@@ -178,8 +176,7 @@ def on_nodes(system: FileSystem, numbers: NDArray[np.int64], dimension: int) -> 
 
     Parameters
     ----------
-    system : FileSystem
-    numbers : int array, shape (n,)
+    numbers (n,)
         Number in its program of every node.
     dimension : {3, 2}
 

@@ -41,9 +41,9 @@ class RowPlaces:
 
     Parameters
     ----------
-    node : int array, shape (n,)
+    node (n,)
         Number of the node in its program.
-    direction : int array, shape (n,)
+    direction (n,)
         1, 2, 3 for x, y, z (1, 2 for r, z of a body of revolution); 4 to 6 for rotations.
     """
 
@@ -57,16 +57,15 @@ class SystemMatrix:
 
     Parameters
     ----------
-    path : Path
-    name : str
+    name
         In the file; empty where the file holds one matrix without name.
     matrix : csr_array, shape (n, n)
         Both triangles.
-    rows : RowPlaces or None
+    rows
         None where the file does not say.
-    held : RowPlaces or None
+    held
         Degrees of freedom that the program has taken out because they are constrained.
-    notes : tuple of str
+    notes
         What was found while reading.
     """
 
@@ -132,12 +131,11 @@ def symmetric_matrix(
 
     Parameters
     ----------
-    where : str
+    where
         File, for errors.
-    row, column : int arrays
+    row, column
         From zero.
-    value : array
-    size : int
+    size
         Number of rows.
 
     Returns

@@ -99,11 +99,11 @@ class Receptance:
 
     Parameters
     ----------
-    response, reference : str
+    response, reference
         ``"17 z"``: node and direction; a negative direction has turned the sign already.
-    frequency : array, shape (n,) [Hz]
+    frequency (n,) [Hz]
         Above 0.
-    values : complex array, shape (n,)
+    values (n,)
     """
 
     response: str
@@ -117,10 +117,9 @@ def read_response(path: Path, lines: list[str], first: int, end: int) -> Recepta
 
     Parameters
     ----------
-    path : Path
-    lines : list of str
+    lines
         Of the file.
-    first, end : int
+    first, end
         Of the dataset, from 0, after its number.
     """
     if end - first < 12:
@@ -180,12 +179,12 @@ class FileModalData:
 
     Parameters
     ----------
-    frequency : array, shape (m,) [Hz]
+    frequency (m,) [Hz]
     damping : array, shape (m,) [-], or None
         None where the file gives none.
-    modal_mass : array, shape (m,)
+    modal_mass (m,)
         1 for mass-normalised shapes.
-    shapes : array, shape (m, n)
+    shapes (m, n)
     labels
         Of the columns of ``shapes``: names, or ``"17 z"`` for node and direction.
     residual : array, shape (n, n), or None
@@ -223,10 +222,6 @@ class _Mode:
 
 def read_uff_modes(path: Path) -> FileModalData:
     """Read all normal modes.
-
-    Parameters
-    ----------
-    path : Path
 
     Raises
     ------

@@ -72,10 +72,9 @@ def residual_attachment(body: ElasticBody, kept: Modes, deflections: NDArray[np.
 
     Parameters
     ----------
-    body : ElasticBody
-    kept : Modes
+    kept
         Retained elastic modes.
-    deflections : array, shape (n_dof, n_ports) [m/N]
+    deflections (n_dof, n_ports) [m/N]
         ``Flexibility(body).solve(patterns)``.
 
     Returns
@@ -114,13 +113,12 @@ def shifted_attachment(
 
     Parameters
     ----------
-    body : ElasticBody
-    kept : Modes
+    kept
         Retained elastic modes.
-    patterns : array, shape (n_dof, n_ports) [-]
-    shifts : sequence of float [(rad/s)^2]
+    patterns (n_dof, n_ports) [-]
+    shifts [(rad/s)^2]
         Of both signs, see the module text; a positive one is at a frequency (:func:`shift_at`).
-    flexibility : Flexibility
+    flexibility
         Of the same body.
 
     Raises

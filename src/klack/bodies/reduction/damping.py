@@ -61,8 +61,8 @@ class RayleighDamping:
 
     Parameters
     ----------
-    alpha : float [1/s]
-    beta : float [s]
+    alpha [1/s]
+    beta [s]
     """
 
     alpha: float
@@ -88,7 +88,7 @@ class LossFactor:
 
     Parameters
     ----------
-    eta : float [-]
+    eta [-]
 
     Examples
     --------

@@ -27,7 +27,7 @@ def solve_symmetric(A: csr_array, B: NDArray[np.float64]) -> NDArray[np.float64]
     ----------
     A : csr_array, shape (n, n)
         Full storage.
-    B : array, shape (n, m)
+    B (n, m)
 
     Examples
     --------

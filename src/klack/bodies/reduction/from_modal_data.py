@@ -29,16 +29,14 @@ def body_of_modal_data(
 
     Parameters
     ----------
-    name : str
     frequency, damping : array, shape (m,) [Hz], [-]
-    shapes : array, shape (m, n_ports) [1/sqrt(kg)]
+    shapes (m, n_ports) [1/sqrt(kg)]
         The mean displacement of each port along +z, weighted as its force.
-    port_names : sequence of str
-    residual : array, shape (n_ports, n_ports), optional [m/N]
+    residual (n_ports, n_ports) [m/N]
         Compliance of the modes that are left out.
-    where : str
+    where
         File, for messages.
-    mass : float, optional [kg]
+    mass [kg]
 
     Raises
     ------
@@ -96,15 +94,12 @@ def body_of_craig_bampton(
 
     Parameters
     ----------
-    name : str
     K, M : array, shape (n, n) [N/m], [kg]
-    port_names : sequence of str
-    rows : sequence of int
+    rows
         Row of the boundary displacement of each port, from 0.
-    damping : Damping
-    where : str
+    where
         File, for messages.
-    mass : float, optional [kg]
+    mass [kg]
 
     Raises
     ------
@@ -196,7 +191,7 @@ def fit_residual(
 
     Parameters
     ----------
-    where : str
+    where
         File and places, for messages.
     frequency, response : array, shape (n,) [Hz], [m/N]
     omega, damping, product : array, shape (m,) [rad/s], [-], [1/kg]

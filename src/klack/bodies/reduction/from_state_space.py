@@ -71,12 +71,11 @@ def body_of_state_space(
 
     Parameters
     ----------
-    name : str
-    model : StateSpace
+    model
         Forces [N] in, displacements [m] out, ``input_names`` being those of the ports.
-    where : str
+    where
         File, for messages.
-    mass : float, optional [kg]
+    mass [kg]
 
     Raises
     ------

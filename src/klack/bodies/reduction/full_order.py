@@ -67,14 +67,13 @@ class FullOrderReceptance:
 
     Parameters
     ----------
-    receptance : Receptance
-    basis_size : int
+    basis_size
         Number of basis vectors, rigid modes included.
-    error_bound : array, shape (n, n_ports) [-]
+    error_bound (n, n_ports) [-]
         Of the drive-point receptances, relative; the true error is mostly far smaller.
-    checked_frequencies : array, shape (k,) [Hz]
+    checked_frequencies (k,) [Hz]
         Where the undamped full system was solved directly.
-    checked_deviations : array, shape (k,) [-]
+    checked_deviations (k,) [-]
         Largest relative deviation of the (undamped) receptance there.
     """
 
@@ -118,21 +117,19 @@ def full_order_receptance(
 
     Parameters
     ----------
-    body : ElasticBody
-    ports : sequence of Port
-    frequencies : array, shape (n,) [Hz]
+    frequencies (n,) [Hz]
         Ascending, above zero.
-    loss_factor : float [-]
+    loss_factor [-]
         Structural damping ``eta`` of ``(1 + i eta) K``, above zero.
-    flexibility : Flexibility, optional
+    flexibility
         Of the same body; saves the factorisation.
-    modes : Modes, optional
+    modes
         Elastic eigenmodes computed before; the basis starts with them.
-    tolerance : float [-]
+    tolerance [-]
         Largest accepted bound of the relative error at any frequency.
-    max_vectors : int
+    max_vectors
         Give up above this basis size.
-    checks : int
+    checks
         Number of direct solutions, spread over the upper half of the axis.
     backend, threads
         Of the sparse direct solver.

@@ -34,15 +34,14 @@ class ModesAtPorts:
 
     Parameters
     ----------
-    port_names : tuple of str
     omega, damping : array, shape (m,) [rad/s], [-]
         Elastic modes, any order.
-    shapes : array, shape (m, n_ports) [1/sqrt(kg)]
-    rigid_gram : array, shape (n_ports, n_ports) [1/kg]
+    shapes (m, n_ports) [1/sqrt(kg)]
+    rigid_gram (n_ports, n_ports) [1/kg]
         Zero for a held body.
-    residual : array, shape (n_ports, n_ports) [m/N]
+    residual (n_ports, n_ports) [m/N]
         Compliance beside the modes.
-    coordinates : int
+    coordinates
         Degrees of freedom of the model that they come from.
     """
 
@@ -62,11 +61,9 @@ def body_of_modes(
 
     Parameters
     ----------
-    name : str
-    where : str
+    where
         File and model, for messages.
-    modes : ModesAtPorts
-    mass : float, optional [kg]
+    mass [kg]
         A free body is checked against it; needed if its ports tell translation and rotation apart.
         The mass of a held body without it is unknown (nan).
 

@@ -42,11 +42,11 @@ class FaceSamples:
 
     Parameters
     ----------
-    values : array, shape (q, n) [-]
+    values (q, n) [-]
         Shape functions.
-    area : array, shape (f, q) [m^2]
+    area (f, q) [m^2]
         Weight times area; of an axisymmetric face round the full circle.
-    normal : array, shape (f, q, dimension) [-]
+    normal (f, q, dimension) [-]
         Outwards, of length 1; zero where a face has no area.
     """
 
@@ -60,8 +60,7 @@ def face_samples(mesh: Mesh, block: FaceBlock) -> FaceSamples:
 
     Parameters
     ----------
-    mesh : Mesh
-    block : FaceBlock
+    block
         Faces of one family of this mesh.
     """
     xi, weights = quadrature(block.family, "mass")
@@ -90,8 +89,7 @@ class Port:
 
     Parameters
     ----------
-    name : str
-    pattern : array, shape (n_dof,) [-]
+    pattern (n_dof,) [-]
         Nodal forces ``b`` of a resultant of 1 N; the displacement of the port is ``b . u``.  The
         pattern of a contact port is ``G^T lam / P`` of the static contact problem.
     """
@@ -109,8 +107,7 @@ class Observer:
 
     Parameters
     ----------
-    name : str
-    weights : array, shape (n_dof,) [-]
+    weights (n_dof,) [-]
         The displacement is ``weights . u``.
     """
 
@@ -145,11 +142,9 @@ def surface_port(mesh: Mesh, surface: str | Surface, direction: Direction, *, na
 
     Parameters
     ----------
-    mesh : Mesh
     surface : str or Surface
     direction : "x", "y", "z", or array, shape (dimension,)
         An axisymmetric body takes ``"z"`` only: radial tractions have no resultant.
-    name : str
     """
     surface = mesh.surface(surface) if isinstance(surface, str) else surface
     where = f"port '{name}' on surface '{surface.name}'"
@@ -176,10 +171,8 @@ def pressure_port(mesh: Mesh, surface: str | Surface, *, name: str) -> Port:
 
     Parameters
     ----------
-    mesh : Mesh
     surface : str or Surface
         A closed surface has no resultant and is refused.
-    name : str
     """
     surface = mesh.surface(surface) if isinstance(surface, str) else surface
     load = np.zeros((mesh.node_count, mesh.dimension))
@@ -206,12 +199,10 @@ def node_set_port(mesh: Mesh, node_set: str, direction: Direction, *, name: str)
 
     Parameters
     ----------
-    mesh : Mesh
+    mesh
         With the set among its ``node_sets``.
-    node_set : str
     direction : "x", "y", "z", or array, shape (dimension,)
         An axisymmetric body takes ``"z"`` only.
-    name : str
 
     Raises
     ------
@@ -242,11 +233,9 @@ def node_observer(
 
     Parameters
     ----------
-    mesh : Mesh
     place : int or array, shape (dimension,) [m]
         Node number, or a point whose nearest node is taken.
     direction : "x", "y", "z", "r" (axisymmetric), or array, shape (dimension,)
-    name : str
     """
     where = f"observer '{name}'"
     unit = _unit_vector(mesh, direction, where)

@@ -19,10 +19,8 @@ class Receptance:
 
     Parameters
     ----------
-    label : str
-    port_names : tuple of str
-    frequencies : array, shape (n,) [Hz]
-    values : complex array, shape (n, n_ports, n_ports) [m/N]
+    frequencies (n,) [Hz]
+    values (n, n_ports, n_ports) [m/N]
         ``values[:, i, j]``: displacement of port i per force at port j.
     """
 
@@ -59,16 +57,15 @@ def reduced_receptance(
 
     Parameters
     ----------
-    reduced : ReducedBody
-    frequencies : array, shape (n,) [Hz]
+    frequencies (n,) [Hz]
         Ascending, above zero.
-    with_residual : bool
+    with_residual
         Add the residual compliance ``R``, which is what the consistent contact law does in the
         time domain; with attachment modes it is zero already.
     loss_factor : float [-], optional
         Replace the viscous damping by the structural one, ``omega_i^2 (1 + i eta)``, as the full
         order has it; equal at each resonance if ``eta = 2 zeta``.
-    label : str, optional
+    label
         Legend; made from the number of modes and the correction by default.
     """
     frequencies = frequency_axis("reduced_receptance: frequencies", frequencies)
@@ -124,8 +121,8 @@ def modal_sum(
 
     Parameters
     ----------
-    shapes : array, shape (m, p) [1/sqrt(kg)]
-    denominator : complex array, shape (n, m) [(rad/s)^2]
+    shapes (m, p) [1/sqrt(kg)]
+    denominator (n, m) [(rad/s)^2]
 
     Returns
     -------

@@ -53,29 +53,27 @@ def reduce_body(
 
     Parameters
     ----------
-    body : ElasticBody
-    ports : sequence of Port
+    ports
         At least one.
     modes : ByCount, ByFrequency or ByParticipation
     correction : "consistent", "attachment" or "none"
         See the module text.
     damping : ModalDamping, RayleighDamping or LossFactor
         For the elastic and attachment modes; rigid modes stay undamped.
-    observers : sequence of Observer
-    modes_pool : Modes, optional
+    modes_pool
         Elastic modes computed before, lowest first without gaps; saves the eigenvalue solution.
         With :class:`ByFrequency` it must reach that frequency.
-    flexibility : Flexibility, optional
+    flexibility
         Of the same body; saves the only factorisation that statics and modes need.
-    port_compliance : array, shape (n_ports, n_ports), optional [m/N]
+    port_compliance (n_ports, n_ports) [m/N]
         Static compliance at the ports, where it is known; saves the static solutions, unless
         attachment modes need them.
     shifts : sequence of float [(rad/s)^2], optional
         With ``correction="attachment"``: shifted instead of residual attachment modes, one per
         port and shift, for example ``(default_shift(pool.omega),)`` or ``shift_at`` of frequencies.
-    recovery_surfaces : sequence of str
+    recovery_surfaces
         Surfaces whose displacement can be recovered from the modes.
-    recovery_nodes : int array, optional
+    recovery_nodes
         Further nodes to recover.
     backend, threads
         Of the sparse direct solver.
@@ -131,8 +129,7 @@ def kept_modes(selection: ModeSelection, pool: Modes, patterns: NDArray[np.float
     Parameters
     ----------
     selection : ByCount, ByFrequency or ByParticipation
-    pool : Modes
-    patterns : array, shape (n_dof, n_ports) [-]
+    patterns (n_dof, n_ports) [-]
         Load patterns of the ports.
     """
     return pool.kept(select(selection, pool.omega, at_ports(pool.shapes, patterns)))

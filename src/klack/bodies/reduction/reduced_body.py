@@ -28,11 +28,9 @@ def write_arrays(path: Path, kind: str, version: int, arrays: Mapping[str, NDArr
 
     Parameters
     ----------
-    path : Path
-    kind : str
+    kind
         What the file holds, for example ``"klack.reduced_body"``.
-    version : int
-    arrays : mapping of str to array
+    arrays
         Numbers or text.
     """
     contents: Arrays = {"format": np.array(kind), "version": np.array(version), **arrays}
@@ -114,10 +112,10 @@ class Recovery:
 
     Parameters
     ----------
-    nodes : int array, shape (n,)
+    nodes (n,)
         Node numbers of the full mesh.
-    points : array, shape (n, dimension) [m]
-    shapes : array, shape (n * dimension, m) [1/sqrt(kg)]
+    points (n, dimension) [m]
+    shapes (n * dimension, m) [1/sqrt(kg)]
         ``u = shapes @ q``, ordered node by node like the degrees of freedom of the mesh.
     faces : int array, shape (f, 3) or (f, 2)
         Triangles (solid) or line segments (axisymmetric) in local numbers ``0 .. n-1``, through all
@@ -148,11 +146,10 @@ class StateSpace:
 
     Parameters
     ----------
-    A : array, shape (2 m, 2 m)
-    B : array, shape (2 m, n_ports)
-    C : array, shape (n_ports + n_observers, 2 m)
-    feedthrough : array, shape (n_ports + n_observers, n_ports) [m/N]
-    input_names, output_names : tuple of str
+    A (2 m, 2 m)
+    B (2 m, n_ports)
+    C (n_ports + n_observers, 2 m)
+    feedthrough (n_ports + n_observers, n_ports) [m/N]
     """
 
     A: NDArray[np.float64]
@@ -175,31 +172,26 @@ class ReducedBody:
 
     Parameters
     ----------
-    name : str
-    mass : float [kg]
-    omega : array, shape (m,) [rad/s]
-    damping : array, shape (m,) [-]
+    mass [kg]
+    omega (m,) [rad/s]
+    damping (m,) [-]
         Viscous ratios ``zeta``.
-    port_names : tuple of str
-    port_shapes : array, shape (m, n_ports) [1/sqrt(kg)]
+    port_shapes (m, n_ports) [1/sqrt(kg)]
         ``phi = V^T b``.
-    observer_names : tuple of str
-    observer_shapes : array, shape (m, n_observers) [1/sqrt(kg)]
-    static_compliance : array, shape (n_ports, n_ports) [m/N]
+    observer_shapes (m, n_observers) [1/sqrt(kg)]
+    static_compliance (n_ports, n_ports) [m/N]
         Of the *full* body at its ports; of a free body the elastic part only (inertia relief).
-    rigid_count : int
-    rigid_axial : array, shape (rigid_count,) [sqrt(kg)]
+    rigid_axial (rigid_count,) [sqrt(kg)]
         Modal velocities of a unit axial velocity, ``R^T M e_z``.  The axial velocity of the centre
         of mass is ``rigid_axial . q'_rigid / mass``; ``rigid_axial . rigid_axial = mass`` for a
         free body.
-    dof_count : int
+    dof_count
         Degrees of freedom of the full body.
-    correction : str
+    correction
         ``"consistent"``: modes only, the local contact law takes :attr:`residual_compliance`;
         ``"attachment"``: attachment modes are among the modes; ``"none"``.
-    attachment_count : int
+    attachment_count
         How many of the modes come from attachment modes.
-    recovery : Recovery or None
     """
 
     name: str
@@ -314,7 +306,7 @@ class ReducedBody:
 
         Parameters
         ----------
-        with_residual : bool
+        with_residual
             Put :attr:`residual_compliance` into the feedthrough between the ports.  Observers have
             none: their share of the residual is not known.
         """

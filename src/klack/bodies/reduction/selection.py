@@ -69,9 +69,9 @@ def participation(
 
     Parameters
     ----------
-    omega : array, shape (m,) [rad/s]
+    omega (m,) [rad/s]
         Elastic modes only, all above zero.
-    port_shapes : array, shape (m, n_ports) [1/sqrt(kg)]
+    port_shapes (m, n_ports) [1/sqrt(kg)]
         Modal amplitudes ``phi^T b`` of a pool of mass-normalised modes.
 
     Returns
@@ -97,9 +97,9 @@ def select(
     Parameters
     ----------
     selection : ByCount, ByFrequency or ByParticipation
-    omega : array, shape (m,) [rad/s]
+    omega (m,) [rad/s]
         Of the pool, ascending.
-    port_shapes : array, shape (m, n_ports) [1/sqrt(kg)]
+    port_shapes (m, n_ports) [1/sqrt(kg)]
     """
     if isinstance(selection, ByFrequency):
         return np.flatnonzero(omega <= 2.0 * np.pi * selection.maximum)

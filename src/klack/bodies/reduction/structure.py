@@ -48,43 +48,42 @@ class Structure:
 
     Parameters
     ----------
-    name : str
+    name
         Of the body.
-    mass : float [kg]
-    dimension : int
+    mass [kg]
+    dimension
         2: axisymmetric, in the meridian plane; areas are those of the full rings.
-    omega : array, shape (m,) [rad/s]
-    damping : array, shape (m,) [-]
-    port_names : tuple of str
-    port_stops : tuple of str
+    omega (m,) [rad/s]
+    damping (m,) [-]
+    port_stops
         Stop whose force acts at each port; empty for ports of other components.
-    port_signs : array, shape (p,) [-]
+    port_signs (p,) [-]
         Force at the port, along +z, for a force above zero of its stop: +1 on the upper body of
         the stop, -1 on the lower one.
-    port_shapes : array, shape (m, p) [1/sqrt(kg)]
-    static_compliance : array, shape (p, p) [m/N]
+    port_shapes (m, p) [1/sqrt(kg)]
+    static_compliance (p, p) [m/N]
         Of the full body.
-    participation : array, shape (m,) [sqrt(kg)]
+    participation (m,) [sqrt(kg)]
         ``R_z^T M phi``: axial momentum per modal velocity.
-    group_names : tuple of str
+    group_names
         Named surfaces that meet the air.
-    group_area : array, shape (g,) [m^2]
-    group_gram : array, shape (g, b, b) [m^2/kg for two modes]
+    group_area (g,) [m^2]
+    group_gram (g, b, b) [m^2/kg for two modes]
         ``int (n . u_i)(n . u_j) dA`` of two fields over each group, by the quadrature of the
         elements; symmetric.
-    group_volume : array, shape (g, b) [m^2/sqrt(kg) for a mode]
+    group_volume (g, b) [m^2/sqrt(kg) for a mode]
         ``int n . u_i dA``: volume displaced per displacement of a field.
-    points : array, shape (k, dimension) [m]
+    points (k, dimension) [m]
         Corners of the faces; (r, z) or (x, y, z).
     faces : int array, shape (f, 2), (f, 3) or (f, 4)
         Element faces by their corners; a triangle repeats its last corner among quadrangles.
-    face_group : int array, shape (f,)
-    face_area : array, shape (f,) [m^2]
+    face_group (f,)
+    face_area (f,) [m^2]
     face_shapes : float32 array, shape (f, m) [1/sqrt(kg)]
         Mean of ``n . phi_i`` over each face, n outwards.
     face_residual : float32 array, shape (f, p) [m/N]
         Static normal displacement of each face per force at each port, less the share of the modes.
-    axial_normals : array, shape (f,) [-]
+    axial_normals (f,) [-]
         Mean axial component of the outward normal: what the face sees of a rigid axial motion.
     """
 
@@ -149,11 +148,11 @@ class StructurePort:
 
     Parameters
     ----------
-    port : Port
+    port
         Resultant 1 N along +z.
-    stop : str
+    stop
         Stop whose force acts here; empty for a port of another component.
-    sign : float [-]
+    sign [-]
         Force along +z for a force above zero of the stop: +1 on its upper body, -1 on the lower.
     """
 
@@ -182,17 +181,15 @@ def build_structure(
 
     Parameters
     ----------
-    body : ElasticBody
+    body
         Held.
-    modes : Modes
+    modes
         Kept ones, with full shapes.
-    damping : Damping
-    ports : sequence of StructurePort
-    deflections : array, shape (n_dof, p) [m/N]
+    deflections (n_dof, p) [m/N]
         Static solutions ``K^-1 b`` of the ports.
-    surfaces : sequence of str
+    surfaces
         Named surfaces of the mesh that meet the air; those without area (an axis) fall away.
-    left_out : sequence of str
+    left_out
         Surfaces whose faces never count, whatever other surface they stand in.
 
     Raises

@@ -41,20 +41,19 @@ class TransferComparison:
 
     Parameters
     ----------
-    body, port : str
-    frequencies : array, shape (n,) [Hz]
+    frequencies (n,) [Hz]
     labels : tuple of str, length k
-    curves : complex array, shape (k, n) [m/N]
-    level_deviations : array, shape (k, n) [dB]
+    curves (k, n) [m/N]
+    level_deviations (k, n) [dB]
         Point by point, against the first curve.
-    mean_deviations : array, shape (k, n) [dB]
+    mean_deviations (k, n) [dB]
         Magnitude, averaged over a sliding window of one-third octave.
-    tolerance : float [dB]
-    valid_up_to : array, shape (k,) [Hz]
+    tolerance [dB]
+    valid_up_to (k,) [Hz]
         Highest frequency below which the mean deviation stays within the tolerance; 0 if it never
         does, the top of the axis if it always does.
-    loss_factor : float [-]
-    reference_note : str
+    loss_factor [-]
+    reference_note
         What the reference is and how well it was verified.
     """
 
@@ -85,15 +84,11 @@ def compare_receptances(
 
     Parameters
     ----------
-    reference : Receptance
-    candidates : sequence of Receptance
+    candidates
         On the same frequency axis.
-    port : str
-    body : str
-    loss_factor : float [-]
+    loss_factor [-]
         With which all of them were computed.
-    reference_note : str
-    tolerance : float [dB]
+    tolerance [dB]
     """
     for candidate in candidates:
         if not np.array_equal(candidate.frequencies, reference.frequencies):
@@ -128,7 +123,7 @@ def compare_curves(
 
     Parameters
     ----------
-    frequencies : array, shape (n,) [Hz]
+    frequencies (n,) [Hz]
     curves : mapping of label to complex array, shape (n,) [m/N]
     body, port, loss_factor, reference_note, tolerance
         As there.
@@ -159,10 +154,10 @@ def mean_level_deviation(
 
     Parameters
     ----------
-    frequencies : array, shape (n,) [Hz]
+    frequencies (n,) [Hz]
         At least two.
-    level : array, shape (n,) [dB]
-    octaves : float
+    level (n,) [dB]
+    octaves
         Width of the window; at the ends of the axis it is cut, not shifted.
 
     Returns

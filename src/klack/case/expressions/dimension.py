@@ -55,7 +55,7 @@ class Dimension:
         Base units with their powers, ordered by name, none of them 0.
     turns : frozenset of (Fraction, Fraction)
         Powers of rad and of cycle; several if the value can be read in several ways.
-    zero : bool
+    zero
         True for the number 0, which fits every unit.
     """
 

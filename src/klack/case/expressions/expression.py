@@ -69,9 +69,9 @@ class Expression:
 
     Parameters
     ----------
-    names : tuple of str
+    names
         Parameters in it, each once, in the order of the text.
-    where : str
+    where
         Key that it stands at, for errors.
     """
 
@@ -86,9 +86,9 @@ class Expression:
 
         Parameters
         ----------
-        text : str
+        text
             At most 500 characters, 200 parts, 100 levels of nesting.
-        where : str
+        where
             Key that it stands at, for errors.
 
         Raises
@@ -123,7 +123,7 @@ class Expression:
 
         Parameters
         ----------
-        values : mapping of str to float [SI]
+        values [SI]
 
         Returns
         -------
@@ -158,7 +158,7 @@ class Expression:
 
         Parameters
         ----------
-        units : mapping of str to str
+        units
             SI unit of every name (``Kind.unit``; ``"-"`` for a number).
 
         Returns
@@ -211,9 +211,9 @@ def ordered(expressions: Mapping[str, Expression], known: Collection[str]) -> tu
 
     Parameters
     ----------
-    expressions : mapping of str to Expression
+    expressions
         Each under the name that others refer to it by.
-    known : collection of str
+    known
         Names with a value of their own: the parameters.
 
     Returns

@@ -44,16 +44,16 @@ class Token:
 
     Parameters
     ----------
-    kind : str
+    kind
         ``"number"``, ``"name"``, or the sign itself; empty at the end.
-    start, end : int
+    start, end
         In the text of the expression.
-    number : float [SI]
-    dimension : Dimension or None
+    number [SI]
+    dimension
         Of a number with a unit.
-    words : tuple of str
+    words
         Of its unit.
-    celsius : bool
+    celsius
         Whether it is a temperature in degrees Celsius.
     """
 
@@ -175,14 +175,14 @@ class Node:
 
     Parameters
     ----------
-    place : int
+    place
         Of its first character in the expression.
-    number : float or None [SI]
-    dimension : Dimension or None
+    number [SI]
+    dimension
         Of a number with a unit.
-    words : tuple of str
+    words
         Of that unit.
-    depth : int
+    depth
         Levels of operations below and with it.
     """
 

@@ -37,9 +37,9 @@ def lowest_share(slope: Callable[[float], float], noise: float) -> float:
 
     Parameters
     ----------
-    slope : callable
+    slope
         Of the function along the step, which rises with the share.
-    noise : float
+    noise
         Slopes below it are round-off, and the whole step is taken.
 
     Returns
@@ -65,17 +65,17 @@ class LoadingState:
 
     Parameters
     ----------
-    approach : float [m]
+    approach [m]
         From first touch.
-    force : float [N]
-    pressures : array, shape (nc,) [N]
+    force [N]
+    pressures (nc,) [N]
         Forces of the contact points.
-    plastic_gap : array, shape (nc,) [m]
-    plastic_work : float [J]
+    plastic_gap (nc,) [m]
+    plastic_work [J]
         Of both bodies since the beginning.
-    plastic_strain : float [-]
+    plastic_strain [-]
         Largest equivalent one of both.
-    rounds : int
+    rounds
         Of Newton's method.
     """
 
@@ -110,10 +110,9 @@ class YieldingContact:
 
     Parameters
     ----------
-    space : ContactSpace
-    C : array, shape (nc, nc) [m/N]
+    C (nc, nc) [m/N]
         Elastic compliance of both.
-    bodies : sequence of YieldingBody
+    bodies
         Those that may yield.
     """
 

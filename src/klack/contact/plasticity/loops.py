@@ -66,9 +66,9 @@ class Opening:
 
     Parameters
     ----------
-    approach : array, shape (n,) [m]
+    approach (n,) [m]
         Rising from the set, the approach at which the faces part, to the largest one.
-    force : array, shape (n,) [N]
+    force (n,) [N]
     """
 
     approach: Floats
@@ -92,23 +92,22 @@ class YieldingLoops:
 
     Parameters
     ----------
-    first_yield : float [N]
+    first_yield [N]
         Force at which the first point yields.
-    elastic : Opening
+    elastic
         Of the faces as made.
-    states : tuple of LoadingState
+    states
         From first yield upwards; none where nothing yields.
-    openings : tuple of Opening
-    taken : array, shape (n,) [J]
+    taken (n,) [J]
         Work of closing up to each state.
-    half_width : array, shape (n,) [m]
+    half_width (n,) [m]
         Of the contact at each state: half the width of the land that it leaves.
-    radius : array, shape (nc,) [m]
+    radius (nc,) [m]
         Of the contact points, from the axis.
-    limit : str
+    limit
         Why they end before an opening gives back the energy of the impact, so that running-in may
         go beyond them; empty where they do not.
-    pressure_limit : PressureLimit or None
+    pressure_limit
         With which points that yield for themselves take the same force and loss; None where it has
         not been fitted, or nothing yields.
     """
@@ -149,11 +148,10 @@ def opening(
 
     Parameters
     ----------
-    space : ContactSpace
-    solver : ComplementaritySolver
+    solver
         Of the elastic compliance.
-    plastic_gap : array, shape (nc,) [m]
-    approach : float [m]
+    plastic_gap (nc,) [m]
+    approach [m]
     """
     start = min(space.clearance, space.touch)
     gap = space.gap + plastic_gap
@@ -174,13 +172,13 @@ def yielding_loops(
 
     Parameters
     ----------
-    contact : YieldingContact
+    contact
         Fresh.
-    deepest : float [m]
+    deepest [m]
         Approach of the same impact of bodies that do not yield, or more.
-    energy : float [J]
+    energy [J]
         Of the impact.
-    closing : float [N]
+    closing [N]
         Force that keeps working while the bodies approach.
 
     Raises
@@ -333,9 +331,9 @@ def yielding_law(loops: YieldingLoops, modal_compliance: float) -> YieldingLaw:
 
     Parameters
     ----------
-    loops : YieldingLoops
+    loops
         With at least four states.
-    modal_compliance : float [m/N]
+    modal_compliance [m/N]
         Of the kept modes, see :func:`klack.contact.local_law.consistent_law`.
 
     Raises

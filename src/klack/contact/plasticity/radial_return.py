@@ -46,9 +46,9 @@ class PlasticState:
 
     Parameters
     ----------
-    strain : array, shape (n, 4) [-]
+    strain (n, 4) [-]
         Plastic strain (rr, zz, tt, rz), without change of volume.
-    equivalent : array, shape (n,) [-]
+    equivalent (n,) [-]
         Equivalent plastic strain, which never falls.
     """
 
@@ -67,11 +67,10 @@ class Returned:
 
     Parameters
     ----------
-    state : PlasticState
-    taken : array, shape (m, 4, 4) [Pa]
+    taken (m, 4, 4) [Pa]
         Elastic less elastic-plastic stiffness of the yielding points.
-    yielding : int array, shape (m,)
-    work : array, shape (n,) [J/m^3]
+    yielding (m,)
+    work (n,) [J/m^3]
         Plastic work of the step, without what kinematic hardening stores; never negative.
     """
 
@@ -103,13 +102,12 @@ def radial_return(
 
     Parameters
     ----------
-    strain : array, shape (n, 4) [-]
+    strain (n, 4) [-]
         Whole strain at the end of the step.
-    before : PlasticState
+    before
         At its beginning.
-    hardening : Hardening
-    shear_modulus : float [Pa]
-    loading : bool
+    shear_modulus [Pa]
+    loading
         Points that are on the yield surface count as yielding: the tangent of a step of further
         loading, before anything of it is known.
     """

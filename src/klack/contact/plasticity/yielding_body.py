@@ -31,10 +31,9 @@ class LoadedBody:
 
     Parameters
     ----------
-    body : ElasticBody
+    body
         In the meridian plane.
-    flexibility : Flexibility
-    materials : mapping of str to Material
+    materials
         Of its solids; those with hardening yield.
     """
 
@@ -78,14 +77,14 @@ class Answer:
 
     Parameters
     ----------
-    plastic_gap : array, shape (nc,) [m]
-    compliance : array, shape (nc, nc) [m/N]
+    plastic_gap (nc,) [m]
+    compliance (nc, nc) [m/N]
         Symmetric, positive semi-definite.
-    step : array, shape (nz,) [m]
+    step (nz,) [m]
         Change of w at the present forces.
-    along : array, shape (nz, nc) [m/N]
+    along (nz, nc) [m/N]
         Change of w per contact force.
-    residual : float [-]
+    residual [-]
         Forces out of balance over the plastic ones; where these begin, over a thousandth of the
         contact force of a point.
     """
@@ -105,12 +104,11 @@ class YieldingBody:
 
     Parameters
     ----------
-    body : LoadedBody
     rows : csr_array, shape (nc, n_dof) [-]
         Gaps of the contact points per displacement.
-    place : array, shape (2,) [m]
+    place (2,) [m]
         Middle of the contact.
-    radius : float [m]
+    radius [m]
         Of the first zone about it.
     """
 
@@ -171,9 +169,9 @@ class YieldingBody:
 
         Parameters
         ----------
-        lam : array, shape (nc,)
-        w : array, shape (nz,)
-        loading : bool
+        lam (nc,)
+        w (nz,)
+        loading
             As in :func:`klack.contact.plasticity.radial_return.radial_return`.
         """
         kept = self.zone.kept

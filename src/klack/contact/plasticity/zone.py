@@ -55,14 +55,13 @@ class StrainPoints:
 
     Parameters
     ----------
-    dofs : int array, shape (e, 2 n)
+    dofs (e, 2 n)
         Degrees of freedom of each element.
-    B : array, shape (e, q, 4, 2 n) [1/m]
+    B (e, q, 4, 2 n) [1/m]
         Strain (rr, zz, tt, rz) with engineering shear per displacement.
-    volume : array, shape (e, q) [m^3]
+    volume (e, q) [m^3]
         Of the whole ring.
-    material : Material
-    elements : int array, shape (e,)
+    elements (e,)
         Their numbers in the mesh, in the order of its blocks.
     """
 
@@ -107,12 +106,11 @@ def strain_points(
 
     Parameters
     ----------
-    mesh : Mesh
-    materials : mapping of str to Material
+    materials
         Of each solid.
-    chosen : bool array, shape (n_elements,)
+    chosen (n_elements,)
         In the order of the blocks.
-    name : str
+    name
         Of the body, for words.
 
     Raises
@@ -181,13 +179,13 @@ class PlasticZone:
 
     Parameters
     ----------
-    dofs : int array, shape (nz,)
+    dofs (nz,)
         Sorted degrees of freedom of the body that are free and belong to the zone.
     K : csr_array, shape (nz, nz) [N/m]
         With the rest condensed onto the border; of a free body one is held (``kept``).
-    kept : int array
+    kept
         Positions in ``dofs`` that are solved for.
-    points : tuple of StrainPoints
+    points
         With degrees of freedom numbered as ``dofs``; held ones come last, as number nz.
     """
 
@@ -204,11 +202,11 @@ def plastic_zone(
 
     Parameters
     ----------
-    body : ElasticBody
+    body
         In the meridian plane.
-    materials : mapping of str to Material
+    materials
         Of each solid; those of the chosen elements harden.
-    chosen : bool array, shape (n_elements,)
+    chosen (n_elements,)
     """
     points = strain_points(body.mesh, materials, chosen, body.name)
     used = np.unique(np.concatenate([block.dofs.ravel() for block in points]))

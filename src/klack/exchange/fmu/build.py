@@ -36,8 +36,7 @@ def data_header(model: ModalModel, guid: str) -> str:
 
     Parameters
     ----------
-    model : ModalModel
-    guid : str
+    guid
         What an importing program has to show at the instantiation.
 
     Raises
@@ -197,13 +196,13 @@ def build_fmu(
 
     Parameters
     ----------
-    model : ModalModel
+    model
         Its name is the model identifier.
-    path : Path
+    path
         Of the FMU; a file there is replaced.
     fmi : 2 or 3
         Version of the standard.
-    platforms : sequence of str, optional
+    platforms
         Of the binaries, see :data:`klack.exchange.fmu.compiler.PLATFORMS`; that of this program by
         default.  The sources are inside, so an importing program may compile its own.
 

@@ -21,15 +21,15 @@ class Target:
 
     Parameters
     ----------
-    folders : tuple of str
+    folders
         Of its binaries inside an FMU of version 2 and of version 3.
-    suffix : str
+    suffix
         Of a shared library.
-    triple : str
+    triple
         What zig calls it.
-    package : str
+    package
         Words for who has no compiler.
-    cross : tuple of str
+    cross
         Programs that compile for it on any machine.
     """
 
@@ -98,12 +98,11 @@ def compile_library(
 
     Parameters
     ----------
-    sources : sequence of Path
-    include : sequence of Path
+    include
         Folders of headers.
-    library : Path
+    library
         Written; its folder exists.
-    platform : str
+    platform
         One of :data:`PLATFORMS`.
 
     Raises

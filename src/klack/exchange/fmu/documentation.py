@@ -193,7 +193,6 @@ def documentation_files(model: ModalModel, *, fmi: Literal[2, 3] = 2) -> dict[st
 
     Parameters
     ----------
-    model : ModalModel
     fmi : 2 or 3
         Version of the standard.
     """

@@ -53,11 +53,10 @@ class Dependencies:
 
     Parameters
     ----------
-    outputs, derivatives : tuple of int
     running : mapping of output or derivative to states and inputs
     at_start : mapping of output, calculated state or derivative to parameters, inputs and states
         that are given before the start.
-    indicators : tuple of int
+    indicators
         Event indicators: the gap of each contact.
     """
 
@@ -140,10 +139,9 @@ def model_description(model: ModalModel, *, fmi: Literal[2, 3], guid: str) -> st
 
     Parameters
     ----------
-    model : ModalModel
     fmi : 2 or 3
         Version of the standard.
-    guid : str
+    guid
         What the binary compares at its instantiation.
     """
     variables = fmu_variables(model)

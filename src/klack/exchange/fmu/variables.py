@@ -38,13 +38,11 @@ class FmuVariable:
 
     Parameters
     ----------
-    name, description, unit : str
     causality : "input", "output", "parameter" or "local"
     variability : "continuous" or "fixed"
-    start : float or None
+    start
         For inputs, parameters and states.
-    minimum, maximum, nominal : float or None
-    derivative_of : int or None
+    derivative_of
         Value reference of the state.
     """
 

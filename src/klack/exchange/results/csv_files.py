@@ -21,8 +21,7 @@ def write_csv(table: ResultTable, folder: Path) -> tuple[Path, ...]:
 
     Parameters
     ----------
-    table : ResultTable
-    folder : Path
+    folder
         Files of the same names are replaced, once all are complete.
 
     Returns

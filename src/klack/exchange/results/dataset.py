@@ -49,10 +49,6 @@ def noise_variables(design: NoiseDesign) -> tuple[dict[str, Variable], dict[str,
     Over ``band``, the middles of third octaves: energies of force, radiated energy, sound
     exposure.  Forces share the axis ``time`` where they are sampled alike; every stop has a
     frequency axis of its own.
-
-    Parameters
-    ----------
-    design : NoiseDesign
     """
     bands = design.band_middle
     coordinates = {
@@ -117,10 +113,6 @@ def points_variables(study: StudyRecord) -> tuple[dict[str, Variable], dict[str,
     Parameters and measures are of shape (points,) over ``point``, by their names with underscores
     for what Python does not take; ``failure`` says why a point has no measures, ``doubts`` what
     speaks against its numbers.
-
-    Parameters
-    ----------
-    study : StudyRecord
     """
     names = identifiers([item.name for item in study.columns], ("point", *_SAID))
     variables = {
@@ -147,10 +139,6 @@ def shots_variables(study: ShotsStudy) -> tuple[dict[str, Variable], dict[str, V
 
     Numbers of a shot are of shape (n + 1,) over ``shot``; height and force of shape (n + 1, k)
     over ``shot`` and time.  Shots are counted from 1; the last row, shot 0, is the centred one.
-
-    Parameters
-    ----------
-    study : ShotsStudy
     """
     shots, centred = study.shot_traces, study.centric_traces
     count = study.shots.count
@@ -234,7 +222,7 @@ def dataset_of(record: object, measured: Iterable[Measured], run: str | None = N
     record : ImpactStudy, StrokeStudy, ShotsStudy, StrokeShotsStudy, StudyRecord or NoiseStudy
     measured : iterable of (name, part of the record, measures)
         Those of the record; the numbers of a noise study are read from them.
-    run : str, optional
+    run
         Level, variant or design; the answer of an impact, the reference of a stroke, the first
         design by default.  Shots and studies have one run.
 

@@ -24,11 +24,6 @@ def write_mat(table: ResultTable, path: Path) -> Path:
     ``run.numbers`` holds the numbers of the run, ``about`` what made them.  Text with characters
     beyond ASCII ends in blanks.
 
-    Parameters
-    ----------
-    table : ResultTable
-    path : Path
-
     Returns
     -------
     Path

@@ -19,8 +19,7 @@ def write_mdf(table: ResultTable, path: Path) -> Path:
 
     Parameters
     ----------
-    table : ResultTable
-    path : Path
+    path
         Ends in ``.mf4``; another suffix is kept, but few tools look for it.
 
     Returns

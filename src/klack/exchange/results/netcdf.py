@@ -30,11 +30,6 @@ def write_netcdf(table: ResultTable, path: Path) -> Path:
     them and the numbers of the run as variables without dimension.  Names of variables have
     underscores for blanks and points; ``long_name`` keeps the name of klack.
 
-    Parameters
-    ----------
-    table : ResultTable
-    path : Path
-
     Returns
     -------
     Path

@@ -38,14 +38,13 @@ class BodyShapes:
 
     Parameters
     ----------
-    body : ElasticBody
-    shapes : array, shape (n_dof, m) [1/sqrt(kg)]
+    shapes (n_dof, m) [1/sqrt(kg)]
         Rigid ones first.
-    omega : array, shape (m,) [rad/s]
-    above : mapping of str to float [m]
+    omega (m,) [rad/s]
+    above [m]
         By stop: how far the upper body stands above its drawing where the network has its
         displacements 0, the lower one as it is drawn; of the stops of this body.
-    is_upper : mapping of str to bool
+    is_upper
         By stop.
     """
 
@@ -62,12 +61,6 @@ def valve_shapes(
     """Mesh the bodies of a valve, and compute the modes that its network keeps.
 
     Meshes, factors and modes are those that a run has cached.
-
-    Parameters
-    ----------
-    case : ValveCase
-    progress : callable
-    threads : int, optional
 
     Raises
     ------
@@ -112,11 +105,10 @@ def write_ring(
 
     Parameters
     ----------
-    path : Path
-    radius, height : float [m]
-    fields : mapping of str to array, shape (S,)
+    radius, height [m]
+    fields (S,)
         Values of the sectors, the first of which begins at +x; in single precision.
-    time : float [s]
+    time [s]
     """
     count = len(next(iter(fields.values())))
     angle = 2.0 * np.pi / count * np.arange(count)
@@ -180,19 +172,16 @@ def write_spatial_series(
 
     Parameters
     ----------
-    study : StrokeStudy
-    case : ValveCase
+    case
         That the study was computed from.
-    folder : Path
+    folder
         What stands there under the same names is replaced when everything is complete.
-    impact : int
+    impact
         As the report numbers the impacts of the variant, from 1.
-    variant : str, optional
+    variant
         The first one by default.
-    frames : int
+    frames
         At most so many instants, evenly among those that were recorded.
-    progress : callable
-    threads : int, optional
 
     Returns
     -------

@@ -36,9 +36,9 @@ def about_study(
     Parameters
     ----------
     study : CaseRecord or NoiseStudy
-    own : mapping of str to str
+    own
         Lines of this kind of study.
-    bodies : iterable of BodySummary
+    bodies
         Whose meshes are named.
     """
     about = {
@@ -81,10 +81,6 @@ def impact_table(study: ImpactStudy) -> ResultTable:
     """Time histories of all levels, numbers of the impact, modal energies, transfer functions.
 
     Pressure fields and pictures of the study are left out: they are no curves.
-
-    Parameters
-    ----------
-    study : ImpactStudy
     """
     about = about_study(
         study,
@@ -240,12 +236,7 @@ def _transfer(item: TransferComparison) -> ResultRun:
 
 
 def stroke_table(study: StrokeStudy) -> ResultTable:
-    """All channels of all variants, the fine record of every end stop, impacts and energy balance.
-
-    Parameters
-    ----------
-    study : StrokeStudy
-    """
+    """All channels of all variants, fine records of every end stop, impacts, energy balance."""
     own = {
         "reference": study.reference.name,
         "needle": study.needle,

@@ -28,14 +28,14 @@ class ResultAxis:
 
     Parameters
     ----------
-    name : str
+    name
         For example ``"time"``; its own within a run.
     quantity : ``"time"`` or ``"frequency"``
-    unit : str
+    unit
         SI.
-    values : array, shape (n,) [unit]
+    values (n,) [unit]
         Rising strictly.
-    meaning : str
+    meaning
         In words.
     """
 
@@ -52,14 +52,14 @@ class ResultChannel:
 
     Parameters
     ----------
-    name : str
+    name
         In the words of klack, for example ``"needle.tip displacement"``.
-    axis : str
+    axis
         Name of a :class:`ResultAxis` of the same run.
-    unit : str
+    unit
         SI; ``"1"`` for a pure number.
-    values : array, shape (n,) [unit]
-    meaning : str
+    values (n,) [unit]
+    meaning
         Sign and where between two instants the value holds.
     """
 
@@ -86,15 +86,12 @@ class ResultRun:
 
     Parameters
     ----------
-    name : str
+    name
         For example ``"reduced"`` or ``"wet"``.
-    label : str
+    label
         What a legend says.
-    solver : str
+    solver
         What computed it, in words.
-    axes : tuple of ResultAxis
-    channels : tuple of ResultChannel
-    scalars : tuple of ResultScalar
     """
 
     name: str
@@ -132,11 +129,11 @@ class ResultTable:
     Parameters
     ----------
     kind : ``"impact"`` or ``"stroke"``
-    about : mapping of str to str
+    about
         Case, title, version of klack, date, mesh, ...: what made the numbers.
-    case_text : str
+    case_text
         The case file as it was read.
-    runs : tuple of ResultRun
+    runs
         The reference first.
     """
 
@@ -159,8 +156,7 @@ def identifiers(names: Sequence[str], taken: Collection[str] = ()) -> tuple[str,
 
     Parameters
     ----------
-    names : sequence of str
-    taken : collection of str
+    taken
         Names that are used already.
 
     Examples

@@ -48,14 +48,11 @@ def write_impact_series(
 
     Parameters
     ----------
-    case : Case
-    folder : Path
+    folder
         What stands there under the same names is replaced when everything is complete.
     level : "full" or "reduced"
-    frames : int
+    frames
         Instants, evenly spaced over ``run.duration``; fewer if the run has fewer steps.
-    progress : callable
-    threads : int, optional
 
     Returns
     -------

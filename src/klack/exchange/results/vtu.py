@@ -32,10 +32,6 @@ class VtuGrid:
 
     An axisymmetric mesh lies in the plane y = 0: x is the radius and z the axis, so that it fits to
     solids and can be revolved about z (ParaView: *Rotational Extrusion*).
-
-    Parameters
-    ----------
-    mesh : Mesh
     """
 
     def __init__(self, mesh: Mesh) -> None:
@@ -60,10 +56,9 @@ class VtuGrid:
 
         Parameters
         ----------
-        path : Path
         fields : mapping of str to array, shape (n_points,) or (n_points, components)
             Written in single precision.  Two components are those along x and z.
-        time : float [s]
+        time [s]
         """
         three = {name: self._three(values) for name, values in fields.items()}
         write_grid(path, self._piece, three, time)
@@ -122,13 +117,7 @@ class SeriesFile:
 
 
 def write_pvd(path: Path, files: Iterable[SeriesFile]) -> None:
-    """Write the list that makes a series of grids: ParaView opens it as one.
-
-    Parameters
-    ----------
-    path : Path
-    files : iterable of SeriesFile
-    """
+    """Write the list that makes a series of grids: ParaView opens it as one."""
     lines = [
         f'<DataSet timestep="{item.time!r}" part="{item.part}" name={quoteattr(item.name)} '
         f"file={quoteattr(item.file)}/>\n"

@@ -35,14 +35,14 @@ def restriction_flow(
 
     Parameters
     ----------
-    p1, p2 : float [Pa]
+    p1, p2 [Pa]
         Before and behind, ``p1 >= p2``.
-    T1 : float [K]
+    T1 [K]
         Before.
-    factor : float [kg K^0.5/(s Pa)]
+    factor [kg K^0.5/(s Pa)]
         ``C rho_0 sqrt(T_0)``.
-    b, m : float [-]
-    crack : float [Pa]
+    b, m [-]
+    crack [Pa]
         Cracking pressure.
 
     Returns

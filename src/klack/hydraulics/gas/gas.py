@@ -22,20 +22,17 @@ class Gas:
 
     Parameters
     ----------
-    name : str
-    gas_constant : float [J/(kg K)]
-    kappa : float [-]
+    gas_constant [J/(kg K)]
+    kappa [-]
         Ratio of the heat capacities.
-    viscosity : float [Pa s]
+    viscosity [Pa s]
         Dynamic, at 20 degC and 1 bar.
-    highest_pressure : float [Pa]
+    highest_pressure [Pa]
         Up to it the compressibility factor at 20 degC is within 5 % of 1.
     temperatures : (float, float) [K]
         Between them ``kappa`` is within 2 % of its value, and the gas far from boiling.
     pressures, compressibility : tuple of float [Pa], [-]
         Compressibility factor ``Z = p V / (m R T)`` of the real gas at 20 degC; may be empty.
-    source : str
-    constants : tuple of Constant
     """
 
     name: str

@@ -40,14 +40,7 @@ _STATE_IT = "Try: state the 'pressure' of these chambers, and check their outlet
 
 
 class GasNetwork:
-    """Numbers of the element: parameters, states, and the start.
-
-    Parameters
-    ----------
-    rows : GasRows
-    gas : Gas
-    ambient : Ambient
-    """
+    """Numbers of the element: parameters, states, and the start."""
 
     def __init__(self, rows: GasRows, gas: Gas, ambient: Ambient) -> None:
         self.rows, self.gas, self.ambient = rows, gas, ambient

@@ -57,9 +57,8 @@ class Entry:
 
     Parameters
     ----------
-    arrays : mapping of str to array
+    arrays
         Each comes back with the same type, shape, order of storage and bits.
-    text : str
     """
 
     arrays: Mapping[str, NDArray[Any]]

@@ -98,15 +98,15 @@ def remembered(
 
     Parameters
     ----------
-    cache : ResultCache or None
+    cache
         None computes.
-    kind : str
+    kind
         What it is, e.g. ``"modes"``.
     parts : tuple
         Everything that the result depends on; see :func:`klack.machine.cache.content.content_key`.
-    compute : callable
+    compute
         Must depend on nothing else and warn of nothing: a warning would come only once.
-    pack, unpack : callable
+    pack, unpack
         To arrays and back, bit by bit.
     """
     if cache is None:

@@ -46,9 +46,9 @@ class ResultCache:
 
     Parameters
     ----------
-    folder : Path
+    folder
         Made when the first result is stored.  Only files named like entries are ever deleted.
-    limit : int [byte]
+    limit [byte]
         Above it the entries that were not used for the longest time go.
     """
 

@@ -30,9 +30,9 @@ def compiling_ahead(groups: Sequence[str], threads: int | None = None) -> Iterat
 
     Parameters
     ----------
-    groups : sequence of str
+    groups
         Of :data:`klack.warming.groups.GROUPS`, those first that this process needs last.
-    threads : int, optional
+    threads
         Cores that may be used.
     """
     starting = _Starting(groups)

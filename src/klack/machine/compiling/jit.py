@@ -18,7 +18,6 @@ def njit(function: Callable[..., Any] | None = None, **options: Any) -> Any:
 
     Parameters
     ----------
-    function : callable
     options
         Those of :func:`numba.njit`; ``cache=True`` has no meaning of its own: all are kept, in the
         store of :mod:`klack.machine.compiling.compiled_store`.

@@ -16,8 +16,7 @@ class Marked:
 
     Parameters
     ----------
-    function : callable
-    make : callable
+    make
         Makes of the function what numba knows.
     """
 

@@ -34,7 +34,7 @@ class TangentNumber(types.Type):  # as a number, numba would ask NumPy for its k
 
     Parameters
     ----------
-    lanes : int
+    lanes
         One more than there are directions.
     """
 
@@ -79,7 +79,6 @@ class _Lanes:
     ----------
     context, builder
         Of numba and of LLVM.
-    kind : TangentNumber
     """
 
     def __init__(self, context: Any, builder: Any, kind: TangentNumber) -> None:

@@ -49,11 +49,11 @@ def take_turn(path: Path, done: Path, patience: float = _PATIENCE) -> Turn | Non
 
     Parameters
     ----------
-    path : Path
+    path
         File to lock; made, and removed at the end.
-    done : Path
+    done
         What the process that has the lock will have written.
-    patience : float [s]
+    patience [s]
         From when on the other process has the lock: those of functions within functions run out at
         the same time.
     """

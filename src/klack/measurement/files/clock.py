@@ -93,9 +93,9 @@ def clock_factor(unit: str, step: float, where: str) -> tuple[float, str]:
 
     Parameters
     ----------
-    unit : str
+    unit
         As the file says; may be empty.
-    step : float [unit]
+    step [unit]
         Mean step of the time.
 
     Raises

@@ -111,9 +111,9 @@ def find_dialect(head: Sequence[str], samples: Iterable[str]) -> Dialect | None:
 
     Parameters
     ----------
-    head : sequence of str
+    head
         First lines of the file.
-    samples : iterable of str
+    samples
         Complete lines from anywhere in the file.
     """
     lines = [line for line in samples if line.strip() and line.lstrip()[0] not in "#%!"]
@@ -335,13 +335,12 @@ class TableHeader:
 
     Parameters
     ----------
-    starts, steps : tuple of float [s]
-    units, names : tuple of str
-    origins : tuple of int [ns]
+    starts, steps [s]
+    origins [ns]
         Dates of the zero of time since 1970.
-    count : int
+    count
         Rows of the table, of each segment; 0 if it is not said.
-    words : str
+    words
         Where the step comes from, ``"Sample Interval"``.
     """
 

@@ -49,13 +49,12 @@ class NumberTable:
 
     Parameters
     ----------
-    path : Path
+    path
         For errors.
     data : array of bytes
         Text of the whole file, in an encoding that agrees with ASCII.
-    start : int
+    start
         First byte of the rows.
-    dialect : Dialect
 
     Raises
     ------
@@ -177,8 +176,7 @@ class CsvFile(Recording):
 
     Parameters
     ----------
-    path : Path
-    time_step : float, optional [s]
+    time_step [s]
         If the file has no time, or a time without unit.
     """
 

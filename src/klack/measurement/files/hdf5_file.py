@@ -32,8 +32,7 @@ class Hdf5File(ArrayRecording):
 
     Parameters
     ----------
-    path : Path
-    time_step : float, optional [s]
+    time_step [s]
         Of data sets without time.
     """
 
@@ -57,8 +56,7 @@ class NetCdf3File(ArrayRecording):
 
     Parameters
     ----------
-    path : Path
-    time_step : float, optional [s]
+    time_step [s]
         Of variables without time.
     """
 

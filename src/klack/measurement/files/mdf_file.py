@@ -41,8 +41,7 @@ class MdfFile(Recording):
 
     Parameters
     ----------
-    path : Path
-    time_step : float, optional [s]
+    time_step [s]
         Of groups without time.
     """
 

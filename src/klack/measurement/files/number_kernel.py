@@ -140,15 +140,15 @@ def parse_rows(
     Parameters
     ----------
     data : array of bytes, shape (n,)
-    at : int
+    at
         First byte of a line.
-    separator, decimal : int
+    separator, decimal
         Bytes; separator 0 stands for runs of blanks.
     comments : array of bytes
         Lines that begin with one of them are left out, as are empty ones.
-    place : array, shape (width,)
+    place (width,)
         Row of ``out`` that takes each column of the text; -1 leaves the column out.
-    out : array, shape (columns, most rows)
+    out (columns, most rows)
         Missing cells become nan.
 
     Returns

@@ -68,10 +68,9 @@ class StoredArray:
 
     Parameters
     ----------
-    name : str
-    shape : tuple of int
+    shape
         One axis, or two for a matrix.
-    read : callable
+    read
         Called with the index of a line (0 for a vector), the axis of time, first and last sample.
     about : mapping of str to str or float
         Attributes by name in lower case.
@@ -154,9 +153,7 @@ class ArrayRecording(Recording):
 
     Parameters
     ----------
-    path : Path
-    root : StoredGroup
-    time_step : float, optional [s]
+    time_step [s]
     """
 
     def __init__(self, path: Path, root: StoredGroup, time_step: float | None) -> None:
@@ -439,8 +436,7 @@ class MatlabFile(ArrayRecording):
 
     Parameters
     ----------
-    path : Path
-    time_step : float, optional [s]
+    time_step [s]
         Of variables without time.
     """
 

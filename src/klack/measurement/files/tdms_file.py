@@ -39,8 +39,7 @@ class TdmsFile(Recording):
 
     Parameters
     ----------
-    path : Path
-    time_step : float, optional [s]
+    time_step [s]
         Of channels without time.
     """
 

@@ -30,12 +30,7 @@ _SI = {8: "m", 11: "m/s", 12: "m/s^2", 13: "N", 9: "N", 15: "Pa"}
 
 
 class UffFile(Recording):
-    """Time records of a universal file.
-
-    Parameters
-    ----------
-    path : Path
-    """
+    """Time records of a universal file."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

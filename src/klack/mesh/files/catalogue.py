@@ -32,15 +32,15 @@ class MeshFormat:
 
     Parameters
     ----------
-    path : str
+    path
         Where its :class:`MeshReader` is, below ``klack.mesh.files``.
-    program : str
+    program
         Whose files these are, in words.
-    endings : tuple of str
+    endings
         Of the names of such files.
-    mark : bytes, optional
+    mark
         Pattern of a line that only these files have: it decides where formats share an ending.
-    open_end : bool, optional
+    open_end
         Whether the format has neither an end mark nor counts of all its content: what a file
         loses behind a whole block is not seen.
     """

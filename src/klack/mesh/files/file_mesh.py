@@ -112,11 +112,10 @@ class FileElements:
 
     Parameters
     ----------
-    family : str
-    name : str
+    name
         Of the solid, or of the surface that surface elements mark.
-    numbers : int array, shape (n,)
-    nodes : int array, shape (n, k)
+    numbers (n,)
+    nodes (n, k)
         Node numbers of the file; of surface elements the corners are enough.
     """
 
@@ -132,21 +131,21 @@ class FileMesh:
 
     Parameters
     ----------
-    numbers : int array, shape (n,)
+    numbers (n,)
         Of the nodes, in any order.
-    points : array, shape (n, 3) [unit of the file]
-    solids, faces : tuple of FileElements
+    points (n, 3) [unit of the file]
+    solids, faces
         Elements with volume (in an axisymmetric mesh: plane ones), and those that mark surfaces.
     node_sets : mapping of name to node numbers
-    faces_of_sets : bool
+    faces_of_sets
         True: a node set that holds all nodes of some outer faces is a surface as well.
-    loose_faces : bool
+    loose_faces
         True: surface elements on no solid are ignored, since they have no stiffness.
-    solids_only : bool
+    solids_only
         True: surface elements on no solid are left out and counted.
-    left_out : mapping of str to int
+    left_out
         Elements of other kinds that the reader left out already, by their type.
-    foreign_materials : mapping
+    foreign_materials
         As in :class:`~klack.mesh.files.mesh_model.MeshModel`.
     materials, sections : mappings
         As in :class:`~klack.mesh.files.mesh_model.MeshModel`.

@@ -54,9 +54,9 @@ def read_mesh_file(
         With one of the endings of :data:`~klack.mesh.files.catalogue.MESH_FORMATS`.
     unit_length : float [m] or None
         Unit of the coordinates: 1e-3 for millimetres.  None where the file names it.
-    solids : sequence of str or None
+    solids
         Keep these solids only; None keeps all.
-    solids_only : bool
+    solids_only
         Leave out beams, springs, masses, rigid elements, and shells on no solid, with a warning
         that counts them; they are an error otherwise.  Volumes that klack does not know (pyramids,
         gaskets) are an error in any case: the body would have a hole.

@@ -17,9 +17,8 @@ class FileMaterial:
 
     Parameters
     ----------
-    name : str
-    young : float [stress unit of the file]
-    poisson : float [-]
+    young [stress unit of the file]
+    poisson [-]
     density : float [density unit of the file], or None
     """
 
@@ -35,17 +34,16 @@ class MeshModel:
 
     Parameters
     ----------
-    mesh : Mesh
-    node_numbers : int array, shape (n_nodes,)
+    node_numbers (n_nodes,)
         Number in the file of every node of the mesh.
     element_numbers : tuple of int arrays
         The same for the elements, one array per block.
     materials : mapping of name to FileMaterial
     sections : mapping of solid name to material name
         Where the file says it.
-    unit_length : float [m]
+    unit_length [m]
         Length of one unit of the file.
-    left_out : mapping of str to int
+    left_out
         Elements of the file that are no solids and were left out, counted by their type.
     foreign_materials : mapping of name to str
         Materials that are not isotropic and linear, and what they are.

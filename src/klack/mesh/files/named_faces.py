@@ -27,10 +27,9 @@ class MarkedFaces:
 
     Parameters
     ----------
-    name : str
-    numbers : int array, shape (n,)
+    numbers (n,)
         Element numbers of the file, for error texts.
-    corners : int array, shape (n, 2..4)
+    corners (n, 2..4)
         Nodes counted from 0; -1 for a node of no element.
     """
 
@@ -51,13 +50,11 @@ def named_faces(
 
     Parameters
     ----------
-    where : str
+    where
         The file, for error texts.
-    blocks : tuple of ElementBlock
-    marks : tuple of MarkedFaces
     sets : mapping of name to sorted nodes
         Node sets that may cover faces.
-    all_solids : bool
+    all_solids
         True: every surface element must lie on a solid.  False: the solids of some may be left
         out.
 

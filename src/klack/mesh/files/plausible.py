@@ -36,10 +36,9 @@ def require_plausible_size(where: str, mesh: Mesh, unit_length: float) -> None:
 
     Parameters
     ----------
-    where : str
+    where
         Start of the error text: the file.
-    mesh : Mesh
-    unit_length : float [m]
+    unit_length [m]
         Unit that the coordinates were read in, for the hint.
     """
     size = float(np.ptp(mesh.points, axis=0).max())

@@ -28,9 +28,9 @@ class TextLines:
     Parameters
     ----------
     text : uint8 array
-    start, end : int array, shape (n_lines,)
+    start, end (n_lines,)
         First byte of every line, and the one behind its last.
-    file : str
+    file
         For error texts.
     """
 
@@ -242,7 +242,7 @@ def within(ordered: NDArray[np.int64], ranges: Sequence[tuple[int, int]]) -> NDA
 
     Parameters
     ----------
-    ordered : int array, shape (n,)
+    ordered (n,)
         Numbers that exist, ascending.
     ranges : sequence of (first, last)
 

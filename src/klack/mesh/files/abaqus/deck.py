@@ -31,9 +31,9 @@ class Placement:
 
     Parameters
     ----------
-    shift : array, shape (3,)
-    turn : array, shape (3, 3)
-    about : array, shape (3,)
+    shift (3,)
+    turn (3, 3)
+    about (3,)
         A point of the axis, after the shift.
     """
 

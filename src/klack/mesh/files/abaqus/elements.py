@@ -47,22 +47,21 @@ class ElementGroup:
 
     Parameters
     ----------
-    family : str
+    family
         "" for elements that are left out, of which only the numbers are kept.
-    solid : bool
+    solid
         False for surface elements.
-    numbers : int array, shape (n,)
+    numbers (n,)
         As in the file.
-    nodes : int array, shape (n, k)
+    nodes (n, k)
         Rows of the nodes.
-    first : int
+    first
         Row of the first element; the others follow.
-    elset : str
+    elset
         Set that the keyword names, or "".
-    instance : str
+    instance
         Instance of a part, or "".
-    place : str
-    kind : str
+    kind
         Type of the element in the file.
     """
 

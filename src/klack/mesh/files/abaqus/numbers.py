@@ -69,11 +69,10 @@ def records(
 
     Parameters
     ----------
-    keyword : Keyword
     lengths : (least, most)
         Fields per record; one with fewer than ``most`` is only complete if it is one line with
         at least ``least``.
-    what : str
+    what
         For the error text: what a record holds.
     """
     least, most = lengths

@@ -23,8 +23,8 @@ class NodeSystem:
 
     Parameters
     ----------
-    origin : array, shape (3,)
-    axes : array, shape (3, 3)
+    origin (3,)
+    axes (3, 3)
         One unit vector per row.
     """
 
@@ -102,9 +102,9 @@ class FaceSelection:
 
     Parameters
     ----------
-    elements : int array
+    elements
         Rows.
-    side : int
+    side
         Number of the face from 1; 0 for the exposed faces, and for surface elements.
     """
 

@@ -25,7 +25,7 @@ class Names(Generic[T]):
 
     Parameters
     ----------
-    kind : str
+    kind
         ``"node set"``, ``"element set"`` or ``"surface"``, for error texts.
     """
 
@@ -93,7 +93,7 @@ class Names(Generic[T]):
 
         Parameters
         ----------
-        single : bool
+        single
             True where there is one instance: its names are shown without it, if they are free.
             Otherwise those of instances come with the instance, and without it too if unique.
         """
@@ -215,7 +215,7 @@ class NamedSets:
     ----------
     names : Names of int arrays
         Rows of the members.
-    size : int
+    size
         Members that were added so far.
     """
 
@@ -267,8 +267,6 @@ def read_members(
 
     Parameters
     ----------
-    keyword : Keyword
-    numbering : Numbering
     resolve : function of a data line and a text to int array
         Rows of a value that is not a number that is known; raises if there is no such set.
     """

@@ -28,11 +28,11 @@ class ElementTable:
 
     Parameters
     ----------
-    material, kind, number : int array, shape (n,)
+    material, kind, number (n,)
         Material number, number of the element type, and number of the element.
-    nodes : int array, shape (n, 20)
+    nodes (n, 20)
         0 where there is none.
-    row : int array, shape (n,)
+    row (n,)
         Line of the file.
     """
 
@@ -49,10 +49,8 @@ class Archive:
 
     Parameters
     ----------
-    lines : TextLines
-    node_numbers : int array, shape (n,)
-    points : array, shape (n, 3)
-    elements : ElementTable
+    node_numbers (n,)
+    points (n, 3)
     commands : tuple of (line, fields)
         Fields stripped, names of commands in capitals, parameters replaced by their values.
     components : tuple of (name, "NODE" or "ELEM", ranges of numbers)

@@ -63,10 +63,9 @@ def shapes_of(lines: TextLines, table: ElementTable, kind: Ints) -> Ints:
 
     Parameters
     ----------
-    lines : TextLines
+    lines
         For the places in error texts.
-    table : ElementTable
-    kind : int array, shape (n,)
+    kind (n,)
         185, 186, ...
 
     Raises
@@ -135,9 +134,9 @@ def faces_of(
 
     Parameters
     ----------
-    nodes : int array, shape (n, 20)
-    kind : int array, shape (n,)
-    option : int array, shape (n,)
+    nodes (n, 20)
+    kind (n,)
+    option (n,)
         KEYOPT(1), which is the shape of MESH200.
     """
     facet = kind == 200

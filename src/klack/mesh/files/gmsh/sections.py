@@ -143,12 +143,12 @@ class GmshElements:
 
     Parameters
     ----------
-    kind : int
+    kind
         Element type of Gmsh.
-    groups : tuple of int
+    groups
         Numbers of the physical groups, of the dimension of the elements.
-    numbers : int array, shape (n,)
-    nodes : int array, shape (n, k)
+    numbers (n,)
+    nodes (n, k)
         Node numbers, in the order of Gmsh.
     """
 

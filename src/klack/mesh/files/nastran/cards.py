@@ -126,10 +126,9 @@ class Card:
 
     Parameters
     ----------
-    place : str
+    place
         File and line.
-    name : str
-    fields : list of str
+    fields
         Data fields, stripped, without blanks at the end.
     """
 
@@ -171,23 +170,22 @@ class BulkData:
 
     Parameters
     ----------
-    lines : TextLines
+    lines
         Of the file with its includes; line ends cut at ``$``.
-    rows : int array, shape (n_cards,)
+    rows (n_cards,)
         First line of every card of the bulk data.
-    counts : int array, shape (n_cards,)
+    counts (n_cards,)
         Number of its lines, counted in ``order``.
-    order : int array
+    order
         Lines of the bulk data without comments and empty ones.
-    position : int array, shape (n_cards,)
+    position (n_cards,)
         Place of the first line in ``order``.
     words : bytes array
         First field of every line in ``order``, in capitals.
     names : bytes array, shape (n_cards,)
         In capitals, without ``*``.
-    head : tuple of str
+    head
         Lines before BEGIN BULK.
-    comments : tuple of str
     pieces : tuple of (first line, file name, its first line there)
     """
 
@@ -246,8 +244,7 @@ class BulkData:
 
         Parameters
         ----------
-        name : str
-        most : int
+        most
             Number of data fields of interest; blanks fill up.
 
         Yields

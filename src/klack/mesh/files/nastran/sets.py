@@ -22,8 +22,7 @@ def node_sets(bulk: BulkData, numbers: NDArray[np.int64]) -> dict[str, NDArray[n
 
     Parameters
     ----------
-    bulk : BulkData
-    numbers : int array
+    numbers
         All node numbers.
 
     Returns
@@ -185,7 +184,6 @@ class Frames:
 
     Parameters
     ----------
-    bulk : BulkData
     node : function
         Gives the place of a node by its number, in basic coordinates.
     """

@@ -28,12 +28,12 @@ class VtkGrid:
 
     Parameters
     ----------
-    points : array, shape (n_points, 3)
-    connectivity : int array, shape (n,)
+    points (n_points, 3)
+    connectivity (n,)
         Points of all cells, one cell after the other, counted from 0.
-    offsets : int array, shape (n_cells + 1,)
+    offsets (n_cells + 1,)
         Where the points of every cell begin.
-    types : int array, shape (n_cells,)
+    types (n_cells,)
     point_data, cell_data : mappings of name to array
         Those of one integer per point or cell.
     """
