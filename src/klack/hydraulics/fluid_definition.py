@@ -252,7 +252,7 @@ class FixedProperties:
         Dynamic, at one atmosphere.
     pressure_viscosity [1/Pa]
     vapour_pressure [Pa]
-    vapour_density : float [kg/m^3], optional
+    vapour_density [kg/m^3]
         Of the saturated vapour; by default of an ideal gas of 0.1 kg/mol.
     """
 

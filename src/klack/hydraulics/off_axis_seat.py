@@ -104,7 +104,7 @@ def edge_gap(face: SeatFace, placement: ArrayLike, angles: ArrayLike) -> Vector:
 
     Parameters
     ----------
-    placement : array, shape (5,) [m], [m], [m], [-], [-]
+    placement (5,) [m], [m], [m], [-], [-]
         Lift, offset, tilt.
     angles (S,) [rad]
         Round the edge.
@@ -117,7 +117,7 @@ def flow_area(face: SeatFace, placement: ArrayLike, *, angles: int = 72) -> floa
 
     Parameters
     ----------
-    placement : array, shape (5,) [m], [m], [m], [-], [-]
+    placement (5,) [m], [m], [m], [-], [-]
         Lift, offset, tilt.
     angles
         Points round the edge, at least 8.  Exact to round-off with 72 while nothing overlaps; where

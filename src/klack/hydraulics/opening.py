@@ -54,7 +54,7 @@ def opening_flow(
     discharge [-]
     number [s/kg]
         ``2 / (mu lambda_c)``.
-    contraction, vapour : float [-], [Pa]
+    contraction, vapour [-], [Pa]
         See :func:`~klack.hydraulics.orifice.choked_flow`.
 
     Returns

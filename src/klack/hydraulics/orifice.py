@@ -66,10 +66,10 @@ def choked_flow(
 
     Parameters
     ----------
-    flow, up, down : float [kg/s], [kg/(s Pa)]
+    flow, up, down [kg/s], [kg/(s Pa)]
         Without the limit, zero or more; its slopes with the pressure before and behind, the second
         negative.
-    supply, density : float [Pa], [kg/m^3]
+    supply, density [Pa], [kg/m^3]
         Before the restriction.
     throat [m^2]
         ``C_c A``; zero switches the limit off.
@@ -120,7 +120,7 @@ def orifice_flow(
         ``C_q A``.
     number [m s/kg]
         ``2 D_h / (mu lambda_c)``.
-    throat, vapour : float [m^2], [Pa]
+    throat, vapour [m^2], [Pa]
         See :func:`choked_flow`.
 
     Returns

@@ -147,10 +147,10 @@ class PropertyTable:
         Increasing.
     pressure (n,) [Pa]
         Absolute, increasing.
-    density, viscosity : array, shape (m, n) [kg/m^3], [Pa s]
-    bulk_modulus : array, shape (m, n) [Pa], optional
+    density, viscosity (m, n) [kg/m^3], [Pa s]
+    bulk_modulus (m, n) [Pa]
         Isentropic; without it the slope of the density is the stiffness.
-    vapour_pressure : array, shape (m,) [Pa], optional
+    vapour_pressure (m,) [Pa]
     """
 
     name: str

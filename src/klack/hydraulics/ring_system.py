@@ -77,17 +77,17 @@ def eliminate_ring(
 
     Parameters
     ----------
-    blocks : array (S, o, o)
+    blocks (S, o, o)
         Of each cell, S at least 3.
-    links : array (S, o, o)
+    links (S, o, o)
         Of a cell (rows) with the next one (columns).
-    shared : array (S, o, s)
+    shared (S, o, s)
         Of a cell with what all share.
-    corner : array (s, s)
-    held : bool array (S,)
+    corner (s, s)
+    held (S,)
         Cells whose unknowns move only across ``normal``.
-    normal : array (o,)
-    x, y : array (S, o, 1), (s, 1)
+    normal (o,)
+    x, y (S, o, 1), (s, 1)
         In place, as of :func:`solve_ring`.
 
     Returns
@@ -205,10 +205,10 @@ def solve_ring(
     ----------
     ring
         Of :func:`eliminate_ring`.
-    links : array (S, o, o)
-    x : array (S, o, n)
+    links (S, o, o)
+    x (S, o, n)
         Right-hand sides of the cells.
-    y : array (s, n)
+    y (s, n)
         Of what all share.
     """
     _chain(ring[0], ring[1], x[: len(ring[0])])

@@ -73,7 +73,7 @@ def gap_flow(drop: float, linear: float, square: float) -> tuple[float, float]:
     Parameters
     ----------
     drop [Pa]
-    linear, square : float [Pa s/m^3], [Pa s^2/m^6]
+    linear, square [Pa s/m^3], [Pa s^2/m^6]
         ``a``, above zero, and ``b``.
     """
     root = sqrt(linear * linear + 4.0 * square * abs(drop))

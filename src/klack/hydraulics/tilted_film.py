@@ -54,27 +54,27 @@ class SectorFilm:
     ----------
     inner_radius, outer_radius [m]
         An inner radius of 0 makes a disc.
-    angles : array (S,) [rad]
+    angles (S,) [rad]
         Middles of the sectors.
-    radii : array (N,) [m]
+    radii (N,) [m]
         Of the circles on which heights are given; of a single one the centre of the pressure of
         parallel faces.
     spread [-]
         Mean of ``cos`` over a sector, over that of its middle.
     shared
         How many of the functions of the radius have one amplitude for all sectors.
-    between : array (G, N) [-]
+    between (G, N) [-]
         Shares of the circles in the height of the points of quadrature.
-    along, around : array (G, Q, Q) [-]
+    along, around (G, Q, Q) [-]
         ``f_a' f_b' r dr`` times the angle of a sector, and ``f_a f_b dr / r`` over it, at the
         points; functions ``f`` have no unit.
-    load : array (G, Q) [m^2]
+    load (G, Q) [m^2]
         ``f_a r dr`` times the angle of a sector.
-    head : array (G, Q) [-]
+    head (G, Q) [-]
         ``f_a' l' r dr`` times the angle, of the logarithm ``l`` that is 1 at the inner edge.
-    inward : array (N,) [m^2]
+    inward (N,) [m^2]
         ``int l r dr`` times the angle, shared among the circles.
-    area : array (N,) [m^2]
+    area (N,) [m^2]
         Of a sector, shared among the circles.
     """
 
@@ -219,9 +219,9 @@ def sector_forces(
 
     Parameters
     ----------
-    heights : array (S, N) [m]
+    heights (S, N) [m]
         Above 0: gap and what the roughness leaves.
-    closing : array (S, N) [m/s]
+    closing (S, N) [m/s]
         ``-dh/dt``.
     viscosity [Pa s]
     tension [Pa]
@@ -260,7 +260,7 @@ def sector_step(
     ----------
     film, viscosity, tension, inner_pressure, outer_pressure
         As of :func:`sector_forces`.
-    before, after : array (S, N) [m]
+    before, after (S, N) [m]
         Heights at both ends of the step, above 0.
     step [s]
 
@@ -368,13 +368,13 @@ def film_pressure(
 
     Parameters
     ----------
-    mobility : array (S, G) [m^3/(Pa s)]
+    mobility (S, G) [m^3/(Pa s)]
         ``h^3/12 mu`` at the points of all sectors.
-    closing : array (S, N) [m/s]
+    closing (S, N) [m/s]
     head, still : array (G, Q) [Pa m^2], (N,) [N]
         Of the pressures at the edges.
     tension [Pa]
-    held : bool array (S,)
+    held (S,)
         In: sectors with which the search for those at the limit of tension begins; out: those.
     """
     shared = land.shared
@@ -449,11 +449,11 @@ def film_slopes(
         As of :func:`film_pressure`.
     pressed
         Its pressure.
-    change : array (S, G) [m^2/(Pa s)]
+    change (S, G) [m^2/(Pa s)]
         Slope of the mobility with the height.
     rate [1/s]
         How the closing falls with the heights: 1 over a step.
-    ways : array (S N, w)
+    ways (S N, w)
     """
     between, along, around, shared = land.between, land.along, land.around, land.shared
     S, G = mobility.shape

@@ -47,7 +47,7 @@ class ForceComparison:
 
     Parameters
     ----------
-    current, gap : float [A], [m]
+    current, gap [A], [m]
         Point of the largest difference of the forces.
     given, derived [N]
         Both forces there.
@@ -119,7 +119,7 @@ class FluxMap:
             Increasing.
         linkage (k, n) [Wb]
             Increasing with the current.
-        force : array, shape (k, n) [N], optional
+        force (k, n) [N]
             Negative where it closes the gap; compared only.
 
         Warns

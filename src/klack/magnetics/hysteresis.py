@@ -67,7 +67,7 @@ class LoopWidth:
     ----------
     flux_density (k,) [T]
         From 0, evenly spaced; beyond the last point the width stays as it is there.
-    width, slope : array, shape (k,) [A/m], [m/H]
+    width, slope (k,) [A/m], [m/H]
         ``w`` and ``dw/dB`` there: a cubic between.
     reversal [T]
         ``b``: flux density from the demagnetised state at which the last stop yields.

@@ -61,7 +61,7 @@ class IronCurve:
     ----------
     flux_density (k,) [T]
         Increasing from 0.
-    field_strength, slope : array, shape (k,) [A/m], [m/H]
+    field_strength, slope (k,) [A/m], [m/H]
         ``H`` and ``dH/dB`` there.
     """
 

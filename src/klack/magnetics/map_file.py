@@ -50,7 +50,7 @@ class MapTable:
     gap (n,) [m]
         Increasing.
     linkage (k, n) [Wb]
-    force : array, shape (k, n) [N], optional
+    force (k, n) [N]
     """
 
     current: Vector

@@ -81,7 +81,7 @@ def guide_ring(
     Parameters
     ----------
     inner, outer, length [m]
-    place : array, shape (4,) [m], [m], [-], [-]
+    place (4,) [m], [m], [-], [-]
         Offset in the middle of the ring, and tilt.
     stations
         Cross sections; with 32 the slopes are within 1e-8 where an end comes to 90 % of the
@@ -202,7 +202,7 @@ def sector_pulls(areas: Vector, gaps: Vector, mmf: float) -> tuple[Vector, Vecto
 
     Parameters
     ----------
-    areas, gaps : array, shape (S,) [m^2], [m]
+    areas, gaps (S,) [m^2], [m]
     mmf [A]
     """
     require_positive("sector_pulls: smallest gap", float(np.min(gaps)), "m")

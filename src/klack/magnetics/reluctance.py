@@ -87,7 +87,7 @@ class GapReluctance:
     ----------
     points (k,) [m]
         Working gaps ``x``, increasing.
-    reluctance, slope : array, shape (k,) [A/Wb], [A/(Wb m)]
+    reluctance, slope (k,) [A/Wb], [A/(Wb m)]
         ``R`` and ``dR/dx`` there: a cubic between (C1), straight beyond both ends.
 
     Examples
@@ -168,7 +168,7 @@ class IronReluctance:
     ----------
     points (k,) [Wb]
         Fluxes, increasing from 0.
-    mmf_points, slope_points : array, shape (k,) [A], [A/Wb]
+    mmf_points, slope_points (k,) [A], [A/Wb]
         Magnetomotive force and its slope there; a cubic between, straight beyond the last point.
         Both must rise: the solver relies on one solution.
     """

@@ -18,7 +18,7 @@ class SideInputs(NamedTuple):
 
     Parameters
     ----------
-    axis : array, shape (4,) [m], [m], [-], [-]
+    axis (4,) [m], [m], [-], [-]
         ``a_x, a_y, s_x, s_y``, in the middle of the step.
     ports [m]
         Displacements of the ports of the row along z, in the middle of the step.

@@ -23,11 +23,11 @@ class PressureBounds(Protocol):
 
     Attributes
     ----------
-    lowest, highest : float [Pa]
+    lowest, highest [Pa]
         Between them its numbers are right.
-    usable : float [Pa]
+    usable [Pa]
         Above it a number means nothing any more, and a run stops.
-    source : str
+    source
     """
 
     @property
@@ -45,11 +45,11 @@ class NetworkFluid(Protocol):
 
     Attributes
     ----------
-    name : str
-    temperature : float [K]
-    vapour_pressure : float [Pa]
+    name
+    temperature [K]
+    vapour_pressure [Pa]
         At which it boils.
-    all_liquid_from : float [Pa]
+    all_liquid_from [Pa]
         Above it no vapour is left.
     kinks : tuple of float [Pa]
         Where the second derivative of the density jumps, increasing.
@@ -90,7 +90,7 @@ class NetworkGas(Protocol):
 
     Attributes
     ----------
-    name : str
+    name
     """
 
     @property
@@ -102,9 +102,9 @@ class LawNumbers(Protocol):
 
     Attributes
     ----------
-    kind : int
-    parameters : array
-    dissipation : float [-]
+    kind
+    parameters
+    dissipation [-]
         0 for an elastic law.
     """
 

@@ -57,7 +57,7 @@ class MotionCourse:
     ----------
     time (n,) [s]
         Rising.
-    displacement, slope : array, shape (n,) [m], [m/s]
+    displacement, slope (n,) [m], [m/s]
         At each of them; both slopes of a jump of the speed are given by two intervals of
         ``slope_after`` and ``slope_before``.
     """
@@ -362,7 +362,7 @@ class LineRow:
         Friction acts between segments and, half each, at both ends.
     resistance [Pa s/m^3]
         Steady laminar friction of the whole line.
-    unsteady_gain, unsteady_rate : array (k,) [Pa s/m^3], [1/s]
+    unsteady_gain, unsteady_rate (k,) [Pa s/m^3], [1/s]
         Terms of the frequency-dependent friction of the whole line:
         ``dp = resistance q + sum_k gain_k int exp(-rate_k (t - s)) dq/ds ds``.
     vapour_pressure [Pa]

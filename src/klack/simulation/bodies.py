@@ -87,8 +87,8 @@ def rod_body(
 
     Parameters
     ----------
-    length, area : float [m], [m^2]
-    young, density : float [Pa], [kg/m^3]
+    length, area [m], [m^2]
+    young, density [Pa], [kg/m^3]
     support : "free" or "bottom"
     damping [-]
         Ratio of every elastic mode.

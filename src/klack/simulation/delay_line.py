@@ -79,28 +79,28 @@ class Lines(NamedTuple):
         Fine steps of a coarse step.
     near
         Fine steps of a step between both.
-    node : array of int, shape (2 n,)
+    node (2 n,)
         Hydraulic node of each end.
     impedance (n,) [Pa s/m^3]
     resistance (n,) [Pa s/m^3]
         Steady friction of one whole lump.
     vapour (n,) [Pa]
         ``P`` in an open cavity, about ambient.
-    first_segment : array of int, shape (n + 1,)
+    first_segment (n + 1,)
         The segments of a line, from a to b, are ``first_segment[line] : first_segment[line + 1]``.
-    depth : array of int, shape (s,)
+    depth (s,)
         Samples under way in each wave: whole steps of the delay, plus one.
     fraction (s,) [-]
         Rest of the delay, in steps.
-    start : array of int, shape (s, 2)
+    start (s, 2)
         Where the memory of the wave towards b (0) and towards a (1) starts in the samples; it is
         several times as long as needed, the window of samples under way moves up, then back to its
         start.
-    room : array of int, shape (s,)
+    room (s,)
         Samples that this window may move up.
-    first_term : array of int, shape (n + 1,)
+    first_term (n + 1,)
         Terms of frequency-dependent friction of each line.
-    first_memory : array of int, shape (n,)
+    first_memory (n,)
         Where the memories of a line start; ordered by lump, then by term.
     impedance_of_term (3, k) [Pa s/m^3]
         Mean ``dp / (q - i)`` of one whole lump over a fine (0), a coarse (1) and a near step (2).
@@ -142,7 +142,7 @@ class LineState(NamedTuple):
     ----------
     samples [Pa]
         All waves ``w``, means over fine steps.
-    head : array of int, shape (s,)
+    head (s,)
         Oldest sample under way in both waves of a segment, from its start.
     memory [m^3/s]
         Flows ``i_k`` of the friction terms; counted into the line at its ends, towards b inside.
@@ -154,7 +154,7 @@ class LineState(NamedTuple):
         Scratch: energy that interpolation and averaging take in the present step.
     fastest (n,) [m^3/s]
         Largest flow through an end since the start of the run, whichever its direction.
-    moment : array of int, shape (n, 2)
+    moment (n, 2)
         Fine steps since then until that flow, and until now.
     """
 

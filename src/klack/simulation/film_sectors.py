@@ -47,7 +47,7 @@ class SectorPressure:
         Middles of the sectors, from +x towards +y.
     pressure (k, S) [Pa]
         Mean over each sector, above ambient.
-    cavitates : array of bool, shape (k, S)
+    cavitates (k, S)
         Whether the tension is the largest that the film bears.
     height (k, S) [m]
         Mean height of the film in each sector at the end of the step.

@@ -284,7 +284,7 @@ class SystemRecord:
     ----------
     integration_step, step [s]
         Of the integration, and of the records.
-    force, peak_force, gap : array, shape (n, contacts) [N], [N], [m]
+    force, peak_force, gap (n, contacts) [N], [N], [m]
         Mean force, largest force of a step, mean gap of each interval.
     displacement (n + 1, contacts, 2) [m]
         Of port a and port b of each contact, from the start.

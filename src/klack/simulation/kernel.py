@@ -424,12 +424,12 @@ def run_steps(
 
     Parameters
     ----------
-    q, v : array (m,)
+    q, v (m,)
         Modal state, overwritten by the state at the end.  Elastic modes are counted from their rest
         position under the constant forces.
     modes, contacts, losses, watched, record
         See :mod:`klack.simulation.kernel`.
-    books : array (4 + 2 c,)
+    books (4 + 2 c,)
         Out: contact dissipation, loss at release of a series spring, modal damping loss, loss of
         friction (of exactly one contact only); then for each contact the last gap and the last
         compression of its series spring.

@@ -54,7 +54,7 @@ class RowPoint:
     row : ElementRow or BranchRow
     y [m]
         Of its ports.
-    p, density, compressed : array [Pa], [kg/m^3], [kg/(m^3 Pa)]
+    p, density, compressed [Pa], [kg/m^3], [kg/(m^3 Pa)]
         Of both nodes of a branch, with the slope of the density; empty for an element.
     inputs (inputs, parameters)
         Directions in which its parameters change.

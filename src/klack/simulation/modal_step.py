@@ -163,9 +163,9 @@ def advance(W: Any, n: int, F: Any, port0: int, port1: int, y: Any) -> None:
         The block: state, step matrices, pending matrices, scratch, port shapes.
     n
         Modes in it, a multiple of four.
-    F : array (ports,) [N]
+    F (ports,) [N]
         Pending forces; those of this body are ``F[port0:port1]``.
-    y : array (ports,) [m]
+    y (ports,) [m]
         The free displacements are *added* (a body may have several blocks).
     """
     count = port1 - port0
@@ -218,7 +218,7 @@ def kick(W: Any, of: Any, n: int, F: Any, port0: int, port1: int, row: int) -> f
 
     Parameters
     ----------
-    W, of : pointers
+    W, of
         Block whose state changes, and the same block for the step of these forces.
     n, F, port0, port1
         As of :func:`advance`.

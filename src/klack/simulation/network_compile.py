@@ -90,7 +90,7 @@ class CompiledNetwork:
         What stays, with the states of bodies, elements, branches and waves.
     node_state, line_state, interface_state, slider_state
         What changes from step to step.
-    account_kind : array of int
+    account_kind
         ``STORE``, ``SUPPLY`` or ``LOSS`` of each of ``accounts.rows``.
     kinks [s]
         Of :func:`klack.simulation.step_sizes.kinks`.

@@ -121,7 +121,7 @@ def simulate_network(
     accuracy : "normal" or "fine"
         Chooses the steps.  ``"normal"``: first impacts to 0.05 % and 0.05 us; ``"fine"`` takes
         about four times as long.
-    step : float [s], optional
+    step [s]
         Fine step, in place of that of the accuracy (20 ns or 5 ns).
     coarse
         Fine steps of a macro step in flight, in place of what

@@ -118,7 +118,7 @@ def slider_force(
         Way per force, above 0.
     D [m/(N s)]
         Speed at the end of the step per force, above 0.
-    way, speed : float [m], [m/s]
+    way, speed [m], [m/s]
         Without the force.
 
     Returns

@@ -29,11 +29,11 @@ class Propagator:
     Parameters
     ----------
     step [s]
-    A11, A12, A21, A22 : array [-], [s], [1/s], [-]
+    A11, A12, A21, A22 [-], [s], [1/s], [-]
         State ``(q, q')`` at the end of the step from the state at its start.
-    B1, B2 : array [s^2], [s]
+    B1, B2 [s^2], [s]
         ``q`` and ``q'`` at the end of the step from a unit modal force during the step.
-    R1, R2 : array [s^2], [s]
+    R1, R2 [s^2], [s]
         The same from a modal force that rises evenly by one over the step and has no mean.
     """
 

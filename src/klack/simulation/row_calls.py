@@ -119,9 +119,9 @@ def call_rows(
         Elements or branches.
     t, h [s]
         Start and length of the step.
-    y, v : array [m], [m/s]
+    y, v [m], [m/s]
         Of every port at the end of the step; the last one is the ground.
-    p, rho : array [Pa], [kg/m^3]
+    p, rho [Pa], [kg/m^3]
         Of every node.
 
     Returns

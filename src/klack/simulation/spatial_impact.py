@@ -55,7 +55,7 @@ class FilmMoments:
         Start and length of the step.
     film_force (k,) [N]
         Mean axial force over the step.
-    before, after : array, shape (k, 3) [m], [-]
+    before, after (k, 3) [m], [-]
         Lift and both tilts of the land at the start and at the end of the step.
     """
 

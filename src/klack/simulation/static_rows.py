@@ -241,9 +241,9 @@ def at_rest(
 
     Parameters
     ----------
-    hint : array of int
+    hint
         Where the densities were found last.
-    column : array of int, shape (branches,)
+    column (branches,)
         1 for a branch whose flow is a state: an unknown of its own, which is left out here.
     h [s]
         Length of the step before time zero that sources and states are asked for.
@@ -257,7 +257,7 @@ def at_rest(
         Out.
     size : array [N], then [kg/s]
         Out: the same sums of absolute values, forces first: what their round-off belongs to.
-    report : array of int, shape (3,)
+    report (3,)
         Out: 0 for an element or 3 for a branch, its row, its status.
 
     Returns

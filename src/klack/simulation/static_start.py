@@ -134,7 +134,7 @@ class SteadySlopes:
         Coordinate of each rigid mode per metre of its body along +z.
     body
         Component of the body of each rigid mode.
-    moves : array of bool, shape (r,)
+    moves (r,)
         False for a body that is held.
     compliance (n, n) [m/N]
         Static one of the elastic modes.
@@ -146,10 +146,10 @@ class SteadySlopes:
     density (f,) [kg/m^3]
     left (f,) [kg/s]
         What still flows into each of them.
-    ends : array of int, shape (c, 2)
+    ends (c, 2)
         Free volumes at the ends of columns; -1 for a known pressure.
     friction (c,) [J s/kg^2]
-    known : array of bool, shape (f,)
+    known (f,)
         Volumes with a way for the fluid to a prescribed pressure; the others are enclosed.
     """
 

@@ -63,7 +63,7 @@ def step_sizes(
     Parameters
     ----------
     accuracy : "normal" or "fine"
-    step : float [s], optional
+    step [s]
         Fine step, in place of that of the accuracy.
     coarse
         Fine steps of a macro step in flight, in place of that of the accuracy.

@@ -317,7 +317,7 @@ def compile_tangents(rows: Rows, *, step: float | None = None) -> None:
 
     Parameters
     ----------
-    step : float [s], optional
+    step [s]
     """
     for function in [row.step for row in rows.elements] + [row.step for row in rows.branches]:
         tangent_address(function)

@@ -57,7 +57,7 @@ def heat_step(
     Parameters
     ----------
     start (n,) [K]
-    flow : two arrays, shape (n,) [W]
+    flow (n,) [W]
         Into each free node, at the start and at the end of the step.
     length [s]
     """

@@ -139,7 +139,7 @@ def solve_active(
         Gaps without contact forces.
     carrying
         In: first guess; out: the points that carry.
-    lam, gap : array, shape (n,) [N], [m]
+    lam, gap (n,) [N], [m]
         Out.
     tolerance [m]
         Gap that counts as zero; over ``scale`` [m/N] the force that does.

@@ -76,7 +76,7 @@ def guide_of_shaft(
         Of the bore at each height; rigid without.
     consistent
         Add the compliance of the shaft that the kept modes miss.
-    friction, viscous : float [-], [N s/m]
+    friction, viscous [-], [N s/m]
         The drag is shared equally between the heights.
 
     Raises
@@ -120,7 +120,7 @@ class ShaftSection(NamedTuple):
 
     Parameters
     ----------
-    motion : array, shape (6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
+    motion (6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
         Displacement and rotation vector per unit coordinate of the modes of the shaft.
     centre (3,) [m]
         The axis there.

@@ -171,7 +171,7 @@ def follow(
         Start of step 0, and length of the steps.
     force (n, S) [N]
         Mean force of each sector in each step.
-    levers : array, shape (n, 3) [N m], [N m^2], [N m]
+    levers (n, 3) [N m], [N m^2], [N m]
         Force times radius, its square, and height.
     film (n,) [N]
         Axial force of the film; empty without.
@@ -400,7 +400,7 @@ class ImpactRecorder:
         Stop and land of each film, in the order of the record of steps.
     shape_marks (M,)
         By which the shapes of the modes are known again.
-    felt, pause, rest : array, shape (stops,) [N], [s], [s]
+    felt, pause, rest (stops,) [N], [s], [s]
         Force from which on a film is felt; contacts that are closer together are one impact; a
         contact that lasts so long ends the impact.
     """
@@ -593,11 +593,11 @@ class StopRecord:
 
     Attributes
     ----------
-    side : array, shape (contacts,)
+    side (contacts,)
         1 where the force on the needle is upwards, -1 where downwards.
-    closed : array, shape (contacts,)
+    closed (contacts,)
         Fine step since which a stop is closed; nan while open.
-    force : array, shape (contacts,) [N]
+    force (contacts,) [N]
         Axial force of the last step.
     """
 

@@ -92,7 +92,7 @@ class InterfaceContact:
     ----------
     upper, lower
         Names of the bodies a and b of ``space``.
-    compliance : array, shape (nc, nc) [m/N], optional
+    compliance (nc, nc) [m/N]
         Static compliance of both bodies at these points, if it is known already; with tangential
         directions of all rows.
     """
@@ -152,7 +152,7 @@ class InterfaceModel:
         The moving body first.
     masses [kg]
         ``inf`` for a supported body.
-    omega, damping : array, shape (M,) [rad/s], [-]
+    omega, damping (M,) [rad/s], [-]
         Of all modal coordinates: body by body, rigid modes first.
     owner (M,)
         Body of each coordinate.
@@ -169,7 +169,7 @@ class InterfaceModel:
     points (nc, dimension) [m]
     contacts : tuple of (name, first, last)
         Rows ``first <= k < last`` belong to the contact.
-    rim, beyond : array, shape (nc,) [-], [m]
+    rim, beyond (nc,) [-], [m]
         See :class:`klack.contact.mortar.ContactSpace`.
     rigid (6, M) [1/sqrt(kg)]
         Translation of the centre of mass and rotation vector of the moving body per unit modal
@@ -287,7 +287,7 @@ class PointBody:
         Centre of mass.
     rigid (6, r) [1/sqrt(kg)]
         Translation of the centre of mass and rotation vector per unit rigid mode, the first modes.
-    omega, damping : array, shape (m,) [rad/s], [-]
+    omega, damping (m,) [rad/s], [-]
         Of all modes; 0 for rigid ones.
     traces (n, m) [1/sqrt(kg)]
         Change of the gaps of all contact points per unit modal coordinate, and after them of the
@@ -405,7 +405,7 @@ def model_at_points(
         In the order of the rows of ``traces``.
     whole (n, n) [m/N]
         Static compliance of all bodies at these rows.
-    loads, answers : array, shape (n, 2) [N], [m]
+    loads, answers (n, 2) [N], [m]
         :func:`uneven_loads`, and what they open, from static solutions of their own.
 
     Raises

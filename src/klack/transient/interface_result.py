@@ -25,10 +25,10 @@ class ImpactSegment:
         the other body below, so velocities and outside forces along +z are ``side`` times these.
     point_force : float32 array, shape (n, nc) [N]
         Mean force of every contact point in each step; no rows when points were not asked for.
-    position : array, shape (6,) [m], [rad]
+    position (6,) [m], [rad]
         Rigid placement of the moving body when the segment began: translation of the centre of
         mass and rotation vector.
-    velocity : array, shape (6,) [m/s], [rad/s]
+    velocity (6,) [m/s], [rad/s]
     friction_force : float32 array, shape (n, ways nc) [N]
         Mean friction of every contact point on the moving body's side in each step, all points in
         the first tangential direction, then in the second; no rows without friction or points.

@@ -124,10 +124,10 @@ def simulate_interface(
     spring_stiffness [N/m]
         Of a spring that pulls the centre of mass back to where it started; its preload belongs to
         ``force``.
-    offset : array, shape (6,), optional [m], [rad]
+    offset (6,) [m], [rad]
         Rigid placement of the moving body, from that of the meshes: translation of the centre of
         mass and rotation vector.
-    velocity : array, shape (6,), optional [m/s], [rad/s]
+    velocity (6,) [m/s], [rad/s]
         Besides ``speed``.
     height [m]
         Start this far above first touch; without it, where the offset puts the body.

@@ -34,7 +34,7 @@ class GapCourse:
     ----------
     slopes (n, 6)
         Per translation [-] and rotation vector [m].
-    bends : array, shape (n, 6) [1/m], [m]
+    bends (n, 6) [1/m], [m]
         Second derivatives along each of these motions, without a sign.
     """
 

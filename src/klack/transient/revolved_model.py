@@ -73,7 +73,7 @@ class RevolvedPoints:
         Static compliance of the whole body, of a free one with inertia relief.
     answers (p, k) [m]
         What the loads move the points by, solved apart from ``compliance``.
-    sections : array, shape (s, 6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
+    sections (s, 6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
         Displacement and rotation vector of sections of the body per unit modal coordinate.
     section_compliance (s,) [m/N]
         Static one of each section across the axis, of a free body with inertia relief.

@@ -196,7 +196,7 @@ def solve_rough(
         Gaps without contact forces.
     pressed
         In: first guess and an inverse; out: those for the next step.
-    lam, gap : array, shape (n,) [N], [m]
+    lam, gap (n,) [N], [m]
         Out; the gap of a pressed point is negative by its closure.
     """
     n = len(q)

@@ -682,9 +682,9 @@ class RubbingPoints:
 
         Parameters
         ----------
-        q : array, shape ((ways + 1) n,) [m]
+        q ((ways + 1) n,) [m]
             Gaps at the end of the step, then slips within it, without these forces.
-        guess : array, shape ((ways + 1) n,) [N]
+        guess ((ways + 1) n,) [N]
 
         Returns
         -------
@@ -730,7 +730,7 @@ class RubbingPoints:
 
         Parameters
         ----------
-        force, slip : array, shape (ways nc,) [N], [m]
+        force, slip (ways nc,) [N], [m]
             Of all points, across their normals.
         """
         force, slip = force.reshape(self._ways, -1), slip.reshape(self._ways, -1)

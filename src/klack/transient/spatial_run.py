@@ -142,10 +142,10 @@ class SpatialValve:
         Exact gaps at a rigid placement of the needle; without it they stay linear.
     course
         Of these gaps; made of them if not given.
-    placement : array, shape (6,) [m], [rad]
+    placement (6,) [m], [rad]
         Of the needle at the start: translation of its centre of mass and rotation vector, beside
         the displacement along the axis that the network has.
-    velocity : array, shape (6,) [m/s], [rad/s]
+    velocity (6,) [m/s], [rad/s]
         At the start, beside what the network has.
     films
         Lands of squeeze films, for the stops that have one in the network.

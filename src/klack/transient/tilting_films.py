@@ -109,7 +109,7 @@ def film_arrays(
         Of each of their stops, between parallel faces along the axis.
     series [m/N]
         Compliance along the axis of the bulk of the bodies at these stops.
-    bearing, room : array, shape (g,) [N s], [m]
+    bearing, room (g,) [N s], [m]
         Of the films at the heights of the guide; empty without.
     """
     at = {name: slice(first, last) for name, first, last in model.contacts}
