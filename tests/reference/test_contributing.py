@@ -9,9 +9,10 @@ import json
 import re
 import subprocess
 import sys
-from math import exp
+from math import exp, pi, radians, tan
 from pathlib import Path
 from types import ModuleType
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -19,12 +20,14 @@ import pytest
 from klack.case.any_case import load_valve_case
 from klack.cli.main import main
 from klack.errors import InputError
+from klack.mechanics.end_stop import EndStop
 from klack.mesh.files import catalogue as mesh_catalogue
 from klack.mesh.files.mesh_file import read_mesh_file
 from klack.network import catalogue
 from klack.network.network import Network
 from klack.report.wording import quantity
 from klack.simulation.network_run import simulate_network
+from klack.verification.drivers import linear_coil, run_coil
 from klack.verification.lattice import lattice_mesh
 
 pytestmark = pytest.mark.filterwarnings("ignore::klack.network.checks.LooseBodyWarning")
@@ -86,6 +89,94 @@ def test_the_recipe_of_a_component(tmp_path, monkeypatch):
     speed = result.channels["needle velocity"].values[-1]
     assert speed == pytest.approx(exp(-2.0 * 2e-3 / 3e-3), rel=1e-7)
     assert result.books.relative_residual < 1e-12
+
+
+def test_the_recipe_of_a_coil_driver(tmp_path, monkeypatch):
+    """One file and one line; without resistance the current has the slopes u/L and the corner.
+
+    Instants of switching are located to 1e-12 of the current.
+    """
+    source, line = blocks("a coil driver", "python")
+    entry = ast.literal_eval(line)
+    made = module(entry[1].rpartition(".")[0], source, tmp_path, monkeypatch)
+    monkeypatch.setattr(catalogue, "COMPONENTS", (*catalogue.COMPONENTS, entry))
+    kind = catalogue.component_class("two-voltages")
+    assert kind is made.TwoVoltages
+    driver = kind(high=60.0, peak=10.0, low=2.0, start=3e-6, end=150e-6, decay=60.0)
+
+    run = run_coil(
+        linear_coil(),
+        driver.program(),
+        resistance=1e-14,
+        gap=1e-4,
+        step=1e-6,
+        lift=np.zeros(201),
+    )
+
+    inductance = 60.0**2 * (1 / 2e7 + 1 / 2e8)  # of linear_coil()
+    top = 3e-6 + inductance * 10.0 / 60.0
+    assert 10e-6 < top < 140e-6
+    end = 10.0 + 2.0 * (150e-6 - top) / inductance
+    bends = [0.0, 3e-6, top, 150e-6, 150e-6 + end * inductance / 60.0, 1.0]
+    exact = np.interp(run.time, bends, [0.0, 0.0, 10.0, end, 0.0, 0.0])
+    np.testing.assert_allclose(run.current, exact, atol=1e-8 * end)
+
+
+CONE = """
+klack: 1
+title: A cone that falls on a face
+network:
+  components:
+    needle: {{type: rigid-mass, mass: 3 g, speed: -1 m/s}}
+    seat: {{type: end-stop-of-the-recipe, gap: 1 um, {law}}}
+  connections: [[needle.body, seat.upper], [seat.lower, ground]]
+run: {{duration: 0.2 ms, step: 10 ns, coarse: 1, record: 1 us, variants: [dry]}}
+"""
+
+
+def test_the_recipe_of_a_contact_law(tmp_path, monkeypatch):
+    """One class and its name in the union; a mass rebounds from it as by its first integral.
+
+    Truth: ``m v^2 / 2 = K d^3 / 3`` at the turning point.  The peak is a mean over a
+    step of h = 10 ns, (h/T)^2 = 4e-8 below it, with T = 49 us of contact and a factor of pi^2/24 to
+    pi^2/6.
+    """
+    (code,) = blocks("a contact law of an end stop", "python")
+    (words,) = blocks("a contact law of an end stop", "yaml-part")
+    text = (ROOT / "src/klack/mechanics/stop_law.py").read_text(encoding="utf-8")
+    text = text.replace("\nStopLaw = ", f"\n{code}\nStopLaw = ").replace(
+        "    ConsistentStopLaw | Lin", "    ConeStopLaw | ConsistentStopLaw | Lin"
+    )
+    text = text.replace("from math import ", "from math import pi, tan, ")
+    text = text.replace("from klack.units import ", "from klack.units import Angle, ")
+    laws = module("klack.mechanics.stop_law_of_the_recipe", text, tmp_path, monkeypatch)
+    name = "klack.mechanics.end_stop_of_the_recipe"
+    stop = ModuleType(name)
+    stop.Stop = type(
+        "Stop",
+        (EndStop,),
+        {
+            "__module__": name,
+            "__doc__": EndStop.__doc__,
+            "__annotations__": {"type": ClassVar[str], "law": laws.StopLaw},
+            "type": "end-stop-of-the-recipe",
+        },
+    )
+    monkeypatch.setitem(sys.modules, name, stop)
+    entry = ("end-stop-of-the-recipe", f"{name}.Stop")
+    monkeypatch.setattr(catalogue, "COMPONENTS", (*catalogue.COMPONENTS, entry))
+    (tmp_path / "case.yaml").write_text(CONE.format(law=words.strip()))
+
+    case = load_valve_case(tmp_path / "case.yaml")
+    network = Network(case.network.components, case.network.connections)
+    result = simulate_network(network.rows(), duration=0.2e-3, step=10e-9, coarse=1, record=1e-6)
+
+    stiffness = 2.0 * 115e9 / (pi * tan(radians(5.0)))
+    depth = (1.5 * 3e-3 / stiffness) ** (1 / 3)
+    (event,) = result.events
+    assert event.peak_force == pytest.approx(stiffness * depth**2, rel=1e-6)
+    assert event.restitution == pytest.approx(1.0, rel=1e-9)
+    assert abs(result.books.residual) < 1e-12 * result.books.scale
 
 
 def medit(mesh) -> str:
