@@ -1,8 +1,4 @@
-"""Bodies that need no finite elements: rigid mass, immovable wall, elastic rod.
-
-They are :class:`klack.bodies.reduction.reduced_body.ReducedBody` objects like any other, so the
-lumped level and the exact one-dimensional tests run through the same code as a reduced valve.
-"""
+"""Bodies without finite elements, for the lumped level and the exact one-dimensional tests."""
 
 from math import pi, sqrt
 from typing import Literal
@@ -16,14 +12,7 @@ __all__ = ["fixed_body", "rigid_mass_body", "rod_body"]
 
 
 def rigid_mass_body(name: str, mass: float, *, port: str = "contact") -> ReducedBody:
-    """Rigid mass that moves along z: one mode, shape ``1/sqrt(m)``.
-
-    Parameters
-    ----------
-    mass [kg]
-    port
-        Name of its one port.
-    """
+    """Rigid mass [kg] that moves along z: one mode, shape ``1/sqrt(m)``, one ``port``."""
     require_positive(f"rigid_mass_body '{name}': mass", mass, "kg")
     return ReducedBody(
         name=name,
@@ -43,13 +32,7 @@ def rigid_mass_body(name: str, mass: float, *, port: str = "contact") -> Reduced
 
 
 def fixed_body(name: str, *, port: str = "contact") -> ReducedBody:
-    """Immovable wall: a body without modes.
-
-    Parameters
-    ----------
-    port
-        Name of its one port.
-    """
+    """Immovable wall: a body without modes, with one ``port``."""
     return ReducedBody(
         name=name,
         mass=np.inf,
@@ -87,9 +70,6 @@ def rod_body(
 
     Parameters
     ----------
-    length, area [m], [m^2]
-    young, density [Pa], [kg/m^3]
-    support : "free" or "bottom"
     damping [-]
         Ratio of every elastic mode.
 

@@ -1,14 +1,14 @@
 r"""The scalar contact equation of one time step, compiled.
 
 With a constant force over a step the modes move exactly, so the indentation at its end is ``d1 =
-d_free - G F`` and the work done is exactly ``F (d1 - d0)``.  The force is the discrete gradient
-of the potential (Gonzalez 1996),
+d_free - G F`` and the work done is exactly ``F (d1 - d0)``.  The force is the discrete gradient of
+the potential (Gonzalez 1996),
 
 .. math:: F = \frac{V(d_1) - V(d_0)}{d_1 - d_0}\,\Bigl(1 + \chi\frac{d_1 - d_0}{h}\Bigr),
 
-which makes that work equal to the stored energy plus a loss that is never negative: an energy
-identity for every step size.  ``V(d_1) - V(d_0)`` is never formed by subtraction where digits
-would be lost.  Laws arrive as flat numbers, see :class:`klack.contact.laws.FlatLaw`.
+so that work is stored energy plus a loss that is never negative, for every step size.  ``V(d_1) -
+V(d_0)`` is never formed by subtraction where digits would be lost.  Laws are flat numbers, see
+:class:`klack.contact.laws.FlatLaw`.
 """
 
 from math import sqrt
@@ -46,7 +46,7 @@ def _power(d: float, n: float) -> float:
 
 @njit(inline="always")
 def _interval(p: Vector, start: int, d: float, hint: int) -> int:
-    """Offset in ``p`` of the table interval that holds ``d``, searched from where it was last."""
+    """Offset in ``p`` of the table interval that holds ``d``, searched from ``hint`` on."""
     first = start + 1
     last = first + 6 * (int(p[start]) - 1)
     i = first + 6 * hint
@@ -77,7 +77,7 @@ def law_potential(kind: int, p: Vector, start: int, d: float) -> float:
 
 @inner
 def _hertz_mean(K: float, n: float, low: float, high: float) -> float:
-    """Mean of ``K d^n`` over ``low < d < high``, both positive and close together or not."""
+    """Mean of ``K d^n`` over ``low < d < high``, both positive."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
     r = half / middle
     if r < HERTZ_SERIES_BELOW:
@@ -90,7 +90,7 @@ def _hertz_mean(K: float, n: float, low: float, high: float) -> float:
 
 @njit(inline="always")
 def _cubic_mean(p: Vector, i: int, s0: float, s1: float) -> tuple[float, float]:
-    """Mean force between two places of one table interval, and its slope over ``s1``."""
+    """Mean force between two places of one interval, and its slope over ``s1``."""
     c1, c2, c3 = p[i + 2], p[i + 3], p[i + 4]
     sum1, sum2 = s0 + s1, s0 * s0 + s1 * s1
     mean = p[i + 1] + c1 / 2 * sum1 + c2 / 3 * (sum2 + s0 * s1) + c3 / 4 * sum1 * sum2
@@ -100,13 +100,11 @@ def _cubic_mean(p: Vector, i: int, s0: float, s1: float) -> tuple[float, float]:
 
 @njit(inline="always")
 def _within(p: Vector, start: int, i: int, d0: float, d1: float) -> bool:
-    """Whether both indentations lie in the table interval at offset ``i``."""
     return min(d0, d1) >= p[i] and (i + 6 > start + 6 * int(p[start]) or max(d0, d1) < p[i + 6])
 
 
 @inner
 def _table_mean(p: Vector, start: int, d0: float, d1: float, hint: int) -> tuple[float, float, int]:
-    """Mean force of a table, its slope over ``d1``, and the interval of ``d1``."""
     i = _interval(p, start, max(d1, 0.0), hint)
     number = (i - start - 1) // 6
     if _within(p, start, i, d0, d1):
@@ -190,13 +188,11 @@ def solve_step(
     guess: float,
     hint: int,
 ) -> tuple[float, int, float]:
-    """Contact force of one step.
+    """Contact force of one step, table interval, and lost part of the work ``F (d1 - d0)``.
 
-    Solves ``excess = d1 - df + G F(d0, d1) = 0``.  ``excess`` rises with a slope of 1 or more, so
-    there is one root, and it lies within ``|excess|`` of any ``d1``: the bracket of the safeguarded
-    Newton iteration costs nothing.
-
-    Returns the force, the table interval, and the part of the work ``F (d1 - d0)`` that is lost.
+    Solves ``excess = d1 - df + G F(d0, d1) = 0``.  Its slope is 1 or more, so the one root lies
+    within ``|excess|`` of any ``d1``: the bracket of the safeguarded Newton iteration costs
+    nothing.
     """
     if d0 <= TOUCH and df <= TOUCH:
         return 0.0, hint, 0.0

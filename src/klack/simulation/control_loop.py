@@ -1,6 +1,6 @@
-"""Controllers of a network: at their sampling instants they read channels and set one number.
+"""Controllers of a network: at their sampling instants they read channels and set one number each.
 
-The time loop runs from one instant to the next; between them nothing knows of controllers.
+The time loop runs from one instant to the next without them.
 """
 
 from collections.abc import Mapping
@@ -51,7 +51,7 @@ class ControlLoop:
     look [s]
         Time between two looks at the network.
     begun
-        Looks before the start of this run, of one that continues.
+        Looks before the start of a continued run.
     """
 
     def __init__(
@@ -65,12 +65,12 @@ class ControlLoop:
         self._all = [self._running(row) for row in network.rows.controllers]
 
     def next(self, looked: int) -> int:
-        """Looks until the next instant, after so many."""
+        """Looks from ``looked`` until the next instant."""
         now = looked + self._begun
         return min(running.looks - now % running.looks for running in self._all)
 
     def act(self, looked: int, values: NDArray[np.float64]) -> None:
-        """Set the outputs of all controllers that are due, from the recorded values now."""
+        """Set the outputs of the controllers that are due, from the values recorded now."""
         now = looked + self._begun
         time = now * self._look
         self._acted = now
@@ -94,7 +94,7 @@ class ControlLoop:
                     self._network.bodies.at[row + port] += share * change
 
     def memory(self) -> dict[str, NDArray[np.generic]]:
-        """What a run needs to continue: outputs, and the memory of all that can be stored."""
+        """Outputs, and the memory of all controllers that can be stored, to continue from."""
         kept: dict[str, NDArray[np.generic]] = {_ACTED: np.array([self._acted])}
         for running in self._all:
             head = f"{_STORED}{running.row.component}."
@@ -104,17 +104,12 @@ class ControlLoop:
         return kept
 
     def recall(self, state: Mapping[str, NDArray[np.generic]]) -> bool:
-        """Continue from :meth:`memory` in a stored state.
-
-        Returns
-        -------
-        bool
-            Whether the controllers have acted at the start of this run already.
+        """Continue from :meth:`memory`; whether the controllers have already acted at this start.
 
         Raises
         ------
         InputError
-            For a controller whose memory is not stored, and for the memory of another one.
+            For a controller whose memory is not stored, or the memory of another one.
         """
         if not self._begun and _ACTED not in state:  # an operating point, at time zero
             return False
@@ -200,7 +195,7 @@ class ControlLoop:
     def _actuator(
         self, row: ControllerRow
     ) -> tuple[NDArray[np.float64], int, tuple[tuple[int, float], ...]]:
-        """Array that the output is written to, the place in it, and whom it pushes at once."""
+        """Array and place that the output is written to, and whom it pushes at once."""
         network = self._network
         elements, parameters = network.elements, network.elements.parameters
         if row.actuator == "force":

@@ -1,16 +1,16 @@
 r"""Lines with water hammer as pure delays: two waves per segment, exact in volume and energy.
 
 A wave that enters a segment at one end leaves it at the other after the delay ``T`` (d'Alembert).
-With ``P`` the pressure about ambient and ``q`` the flow *into* the segment, both means over a
-step, and ``Z`` the impedance,
+With the pressure ``P`` about ambient and the flow ``q`` *into* the segment, means over a step, and
+the impedance ``Z``,
 
 .. math:: P = c + Z q, \qquad w = P + Z q = c + 2 Z q, \qquad c_b(t) = w_a(t - T),
 
-``c`` is the wave that arrives at an end and ``w`` the one that leaves it.  Waves are kept as means
-over fine steps ``h``; a delay that is no multiple of ``h`` is read by linear interpolation, and a
-step of ``m`` fine steps reads the mean of ``m`` samples and writes ``m`` equal ones.  Every read
-is a mean with weights that add up to one, so the volume of a pulse is kept, and by convexity the
-energy ``h w^2 / (4 Z)`` per sample can only fall: the loss is counted.
+``c`` arrives at an end, ``w`` leaves it.  Waves are kept as means over fine steps ``h``; a delay
+that is no multiple of ``h`` is read by linear interpolation, and a step of ``m`` fine steps reads
+the mean of ``m`` samples and writes ``m`` equal ones.  The weights of a read add up to one, so the
+volume of a pulse is kept, and by convexity the energy ``h w^2 / (4 Z)`` per sample can only fall:
+that loss is counted.
 
 Friction sits between segments and, half each, at both ends: ``R q`` and resistance-inductance
 pairs ``dp_k = gain_k (q - i_k)``, ``di_k/dt = rate_k (q - i_k)``, advanced exactly for a flow that
@@ -19,7 +19,7 @@ is constant over the step.  Between two segments a cavity opens when the pressur
 
 ``P`` is ``rho_ref g(p)`` with ``g`` the integral of ``dp/rho`` from ambient pressure and
 ``rho_ref`` the density at ambient pressure; ``q`` is the mass flow over ``rho_ref``.  Then ``P q``
-is the power ``g mdot`` that the hydraulic nodes count with.
+is the power ``g mdot`` of the hydraulic nodes.
 
 In a time loop: :func:`compile_lines` and :func:`start_lines` once; then per step
 :func:`lines_incoming`, the solution of the nodes with ``P = c + Z q``, :func:`lines_commit`.
@@ -68,17 +68,14 @@ _A_WHOLE = 1e-9  # [-] a delay this close to a whole number of steps is taken as
 class Lines(NamedTuple):
     """Constants of all lines, ``n`` lines with ``s`` segments in all.
 
-    End ``e = 2 line`` is port a of a line, end ``e = 2 line + 1`` its port b.  A lump is what
-    carries the friction between two segments (whole) or at an end (half).
+    End ``2 line`` is port a of a line, end ``2 line + 1`` its port b; ``coarse`` and ``near`` steps
+    are of so many fine ones.  A lump is what carries the friction between two segments (whole) or
+    at an end (half).
 
     Parameters
     ----------
     step [s]
         Fine step.
-    coarse
-        Fine steps of a coarse step.
-    near
-        Fine steps of a step between both.
     node (2 n,)
         Hydraulic node of each end.
     impedance (n,) [Pa s/m^3]
@@ -93,11 +90,10 @@ class Lines(NamedTuple):
     fraction (s,) [-]
         Rest of the delay, in steps.
     start (s, 2)
-        Where the memory of the wave towards b (0) and towards a (1) starts in the samples; it is
-        several times as long as needed, the window of samples under way moves up, then back to its
-        start.
+        Where the memory of the wave towards b (0) and a (1) starts in the samples; it is several
+        times as long as needed: the window of samples under way moves up, then back.
     room (s,)
-        Samples that this window may move up.
+        By which this window may move up.
     first_term (n + 1,)
         Terms of frequency-dependent friction of each line.
     first_memory (n,)
@@ -141,7 +137,7 @@ class LineState(NamedTuple):
     Parameters
     ----------
     samples [Pa]
-        All waves ``w``, means over fine steps.
+        All waves ``w``.
     head (s,)
         Oldest sample under way in both waves of a segment, from its start.
     memory [m^3/s]
@@ -153,9 +149,9 @@ class LineState(NamedTuple):
     scatter (n,) [J]
         Scratch: energy that interpolation and averaging take in the present step.
     fastest (n,) [m^3/s]
-        Largest flow through an end since the start of the run, whichever its direction.
+        Largest absolute flow through an end since the start of the run.
     moment (n, 2)
-        Fine steps since then until that flow, and until now.
+        Fine steps from that start to that flow, and to now.
     """
 
     samples: Vector
@@ -181,9 +177,7 @@ def compile_lines(
     step [s]
         Fine step.
     coarse
-        Fine steps of a coarse step; 1 without coarse steps.
-    near
-        Fine steps of a step between both.
+        1 without coarse steps.
     ambient_pressure [Pa]
         From which ``P`` counts.
 
@@ -255,9 +249,9 @@ def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: Array
     Parameters
     ----------
     pressure (2 n,) [Pa]
-        ``P`` at the ends, about ambient: a and b of each line.
+        ``P`` at ends a and b of each line.
     flow (n,) [m^3/s]
-        From a to b; 0 starts a line at rest.
+        From a to b.
     """
     ends = np.broadcast_to(np.asarray(pressure, dtype=float), lines.node.shape)
     flows = np.broadcast_to(np.asarray(flow, dtype=float), lines.impedance.shape)
@@ -289,7 +283,7 @@ def start_lines(lines: Lines, state: LineState, pressure: ArrayLike, flow: Array
 
 
 def _segment_steps(row: LineRow, step: float, coarse: int) -> Vector:
-    """Delays of the segments of a line in fine steps, all but the last multiples of ``coarse``."""
+    """Delays of the segments of a line in fine steps."""
     total = row.delay / step
     blocks = total / (row.segments * coarse)
     if blocks < 1.0 - _A_WHOLE:
@@ -316,7 +310,7 @@ def _concatenate(parts: Sequence[Vector]) -> Vector:
 
 @inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
 def _memory(memory: Any, z: Any, count: int) -> float:
-    """Part of the pressure drop of a lump that its memory takes back [Pa]; pointers."""
+    """Part of the pressure drop of a lump that its memory takes back [Pa]."""
     drop = 0.0
     for k in range(count):
         drop += z[k] * memory[k]
@@ -325,7 +319,7 @@ def _memory(memory: Any, z: Any, count: int) -> float:
 
 @inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
 def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
-    """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]; pointers."""
+    """Advance the terms of a whole lump under the flow ``q``; returns the heat [J]."""
     total = 0.0
     for k in range(count):
         d = q - memory[k]
@@ -336,7 +330,7 @@ def _rub(memory: Any, decay: Any, heat: Any, count: int, q: float) -> float:
 
 @inner(error_model="numpy", fastmath=_FAST, _nrt=False, forceinline=True)
 def _mean_of(window: Any, m: int, f: float) -> tuple[float, float]:
-    """Mean of ``m`` interpolated samples, and the sum of squares that reading it so takes; pointer.
+    """Mean of ``m`` interpolated samples, and the sum of squares that this reading takes.
 
     The sums count from one of the samples, so that small differences keep their digits.
     """
@@ -374,18 +368,11 @@ def _level(lines: Lines, m: int) -> int:
 
 @njit(error_model="numpy", forceinline=True, _nrt=False)  # two dozen arrays to hand over
 def lines_incoming(lines: Lines, state: LineState, m: int, c: Vector, Z: Vector) -> None:
-    """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for the step that begins now.
+    """Fill ``c[e]`` [Pa] and ``Z[e]`` [Pa s/m^3] of every end for a step of ``m`` fine steps.
 
-    Then ``P = c[e] + Z[e] q`` at the node of the end, means over the step, with end friction
-    included and ``q`` into the line.  Changes only the scratch of ``state``: a step that is given
-    up is repeated by calling this again, with another ``m`` if wanted.
-
-    Parameters
-    ----------
-    m
-        Fine steps of this step: 1, ``lines.near`` or ``lines.coarse``.
-    c, Z (2 n,)
-        Written.
+    ``m`` is 1, ``lines.near`` or ``lines.coarse``.  Then ``P = c[e] + Z[e] q`` at the node of the
+    end, means over the step, with end friction included and ``q`` into the line.  Changes only the
+    scratch of ``state``: to repeat a discarded step, call it again.
     """
     level = _level(lines, m)
     z = lines.impedance_of_term[level]
@@ -427,8 +414,6 @@ def lines_commit(lines: Lines, state: LineState, m: int, q: Vector, books: Matri
 
     Parameters
     ----------
-    m
-        As in :func:`lines_incoming`.
     q (2 n,) [m^3/s]
         Flow into each end, mean over the step.  The work that came in is ``(c + Z q) q m h``.
     books (n, 3) [J]

@@ -19,16 +19,12 @@ def check_energy_balance(
 ) -> None:
     """Warn when the energy balance does not close, or a loss is negative.
 
-    Every solver calls it once at the end of each run.
-
     Parameters
     ----------
     run
         What was run, start of the text.
-    residual [-]
-        Residual of the energy balance, over the energy throughput.
-    least_loss [-]
-        Smallest entry of the losses, over the energy turned over; below zero it is a source.
+    residual, least_loss [-]
+        Residual and smallest loss over the energy throughput.
     limit [-]
         What the solver promises.
     advice
@@ -39,12 +35,7 @@ def check_energy_balance(
     Raises
     ------
     ConvergenceError
-        When one of them is not a finite number: then nothing in the run can be trusted.
-
-    Warns
-    -----
-    AccuracyWarning
-        When the residual is larger than the limit, or a loss is below its negative.
+        When one of them is not finite: then nothing in the run can be trusted.
 
     Examples
     --------

@@ -1,12 +1,12 @@
 r"""Pressure in the sectors of a squeeze film, from its recorded lift and tilts.
 
-A step that begins with lift and tilts :math:`u_0` and ends with :math:`u_1` has the heights
+A step from the lift and tilts :math:`u_0` to :math:`u_1` has the heights
 
 .. math:: h = \max(g + r\,(t_x \cos\theta + t_y \sin\theta), 0) + h_r
 
-at its ends, of which :func:`klack.hydraulics.tilted_film.film_pressure` has the mean forces of the
-sectors over the step.  Divided by the area of a sector they are its mean pressure above ambient.
-With the drag along a cone,
+at its ends, from which :func:`klack.hydraulics.tilted_film.film_pressure` computes the mean forces
+of the sectors.  Divided by the area of a sector they are its mean pressure above ambient.  With the
+drag along a cone,
 
 .. math:: f_s = c_s \frac{\ln(h_0 / h_1)}{h_0 - h_1} \frac{h_0 - h_1}{\Delta t}, \qquad
     F = s \Bigl(\sum_k F_k + f_s\Bigr),
@@ -48,11 +48,11 @@ class SectorPressure:
     pressure (k, S) [Pa]
         Mean over each sector, above ambient.
     cavitates (k, S)
-        Whether the tension is the largest that the film bears.
+        Where the tension is the largest that the film bears.
     height (k, S) [m]
         Mean height of the film in each sector at the end of the step.
     axial_force (k,) [N]
-        Of all sectors and of the drag along a cone; to be compared with the recorded one.
+        Of all sectors and the drag along a cone; comparable with the recorded one.
     """
 
     time: Floats
@@ -64,13 +64,7 @@ class SectorPressure:
 
 
 def sector_pressure(film: FilmMoments, at: NDArray[np.int64] | None = None) -> SectorPressure:
-    """Compute the pressure of a film in its sectors.
-
-    Parameters
-    ----------
-    at
-        Moments; all by default.
-    """
+    """Compute the pressure of a film in its sectors at some moments, all by default."""
     land = film.land
     cut = sector_film(
         land.inner_radius, land.outer_radius, sectors=land.sectors, circles=land.circles
@@ -101,7 +95,7 @@ def sector_pressure(film: FilmMoments, at: NDArray[np.int64] | None = None) -> S
 
 
 def _forces(cut: SectorFilm, land: FilmLand, open0: Floats, open1: Floats, step: float) -> Floats:
-    """Forces on the circles of the sectors; heights of the points are cut off as in the run."""
+    """Forces on the circles of the sectors; heights are cut off as in the run."""
     a, b = (np.maximum(gap @ cut.between.T, 0.0) + land.lowest for gap in (open0, open1))
     mobility = mean_mobility(a, b, land.viscosity)
     closing = (np.maximum(open0, 0.0) - np.maximum(open1, 0.0)) / step

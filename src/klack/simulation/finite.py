@@ -1,4 +1,4 @@
-"""Values that are not finite: a run with one in its record has failed."""
+"""Values that are not finite."""
 
 from collections.abc import Mapping
 
@@ -11,7 +11,7 @@ __all__ = ["require_finite"]
 
 
 def require_finite(run: str, step: float, record: Mapping[str, NDArray[np.floating]]) -> None:
-    """Refuse a record with nan or infinity in it.
+    """Reject a record with NaN or infinity in it, with the name and time of the first one.
 
     Parameters
     ----------
@@ -19,13 +19,6 @@ def require_finite(run: str, step: float, record: Mapping[str, NDArray[np.floati
         What was run, start of the text.
     step [s]
         From one row of the record to the next.
-    record (n, ...)
-        What was recorded, by name; rows in order of time.
-
-    Raises
-    ------
-    ConvergenceError
-        With the name and the time of the first such number.
 
     Examples
     --------

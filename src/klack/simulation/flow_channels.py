@@ -11,13 +11,13 @@ _MASS_FLOW, _MEAN, _FORMER = "mass flow", "mean mass flow", "flow"
 
 
 def flow_label(row: BranchRow) -> str:
-    """Label of the mean flow over a step; that of a column of fluid stands beside its state."""
+    """Label of the mean flow over a step; a column of fluid has also a state with its flow."""
     own = any(channel.label == _MASS_FLOW for channel in row.channels)
     return _MEAN if own else _MASS_FLOW
 
 
 def present_name(name: str, known: Collection[str]) -> str:
-    """Name of a channel today: formerly a mass flow was called flow; other names stay.
+    """Name of a channel today: mass flows were once called flows.
 
     >>> present_name("nozzle flow", ["nozzle mass flow", "nozzle area"])
     'nozzle mass flow'

@@ -1,8 +1,6 @@
 r"""Integrate a system of reduced bodies and keep its energy balance.
 
-From bodies and contacts to the flat arrays of the kernel.
-
-Three things happen on the way, all exact:
+On the way to the flat arrays of the kernel three things happen, all exact:
 
 - a spring to ground joins the modes of its body:
   :math:`\mathrm{diag}(\omega^2) + k\varphi\varphi^T` is diagonalised again through the singular
@@ -60,7 +58,7 @@ class BodyBlock:
     basis (m, m) [-]
         Own modal coordinates from those of the kernel.
     rest (m,)
-        Rest position of the kernel's coordinates (their origin).
+        Origin of the kernel's coordinates.
     constant (m,)
         Modal force of the constant forces, springs' preload not included.
     springs : tuple of (shape (m,), stiffness, preload)
@@ -91,14 +89,7 @@ class FlatSystem:
 
 
 def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float) -> FlatSystem:
-    """Build the kernel's arrays.
-
-    Parameters
-    ----------
-    velocities : mapping of body name to float [m/s]
-        Axial velocity of free bodies at the start, + in z; 0 for those not named.
-    step [s]
-    """
+    """Build the kernel's arrays; ``velocities`` as in :func:`simulate`."""
     blocks, omega, zeta, pushes, speeds = [], [], [], [], []
     first = 0
     for body in system.bodies:
@@ -161,20 +152,12 @@ def flatten(system: ReducedSystem, velocities: Mapping[str, float], step: float)
 
 
 def propose_step(system: ReducedSystem, *, speed: float) -> float:
-    r"""Step that resolves the modes and the rise of the contact force, rounded down to 1-2-5.
+    r"""Step [s] that resolves the modes and the rise of the contact force, rounded down to 1-2-5.
 
     ``0.05 / f_max`` and ``0.05 / (k (1/Z_a + 1/Z_b))`` with the wave impedance that the modes show
     at the port, :math:`1/Z = \pi\sum\varphi^2/(2\omega_\text{max})` (exact for a rod); for rigid
-    bodies 1 % of the time of contact.
-
-    Parameters
-    ----------
-    speed [m/s]
-        Of approach; a curved law is stiffest at the deepest indentation.
-
-    Returns
-    -------
-    float [s]
+    bodies 1 % of the time of contact.  A curved law is stiffest at the deepest indentation, hence
+    the approach ``speed`` [m/s].
     """
     limits = []
     for contact in system.contacts:
@@ -218,7 +201,7 @@ def _stiffest(law: InterfaceLaw | YieldingLaw, speed: float, yielding: float) ->
 def _block(
     system: ReducedSystem, body: ReducedBody, first: int
 ) -> tuple[BodyBlock, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return the block, its frequencies and damping ratios, and constant forces on rigid modes."""
+    """The block, its frequencies and damping ratios, and constant forces on rigid modes."""
     m, rigid = body.omega.size, body.rigid_count
     constant = np.zeros(m)
     for force in system.forces:
@@ -313,13 +296,7 @@ class SystemRecord:
     pressed: tuple[float, ...]
 
     def impact(self, contact: int = 0) -> ImpactHistory:
-        """Return the history of one contact.
-
-        Parameters
-        ----------
-        contact
-            Its place among ``system.contacts``.
-        """
+        """Return the history of one of ``system.contacts``."""
         pair = self.system.contacts[contact]
         names = [body.name for body in self.system.bodies]
         a, b = names.index(pair.body_a), names.index(pair.body_b)
@@ -360,7 +337,7 @@ def simulate(
     velocities : mapping of body name to float [m/s]
         Axial velocity at the start, + in z; bodies not named are at rest.
     step [s]
-        Of the integration, see :func:`klack.simulation.impact.propose_step`.
+        See :func:`propose_step`.
     duration [s]
         Rounded up to whole records.
     steps_per_record
@@ -486,11 +463,10 @@ def simulate_impact(
     ----------
     speed [m/s]
         Of body a of the contact, in -z; everything else is at rest.
-    duration [s]
     step : float [s] or None
-        ``None``: :func:`klack.simulation.impact.propose_step`.
+        By default :func:`propose_step`.
     contact
-        Which contact is returned.
+        The one that is returned.
 
     Examples
     --------

@@ -2,16 +2,15 @@
 
 A peak force is the largest mean of a step.  Two things make it too low:
 
-- *A narrow peak*: of a stop of low restitution, a stiff one, a film that closes fast.  The impulse
-  up to the ends of the step and of its two neighbours lies on a cubic, whose slope is a parabola;
-  its highest point is better by two orders in the step, where little is missing.
-- *A film that is hardest at the moment of touch*, where the model ends it.  Its force rises
-  like a power of the gap up to there, from one step to the next by the same factor; the step that
-  closes the contact tells how far away the touch is.
+- *A narrow peak*: low restitution, a stiff stop, a film that closes fast.  A cubic through the
+  impulse at the ends of the step and its neighbours has a parabola as its slope; where little is
+  missing, its highest point is better by two orders in the step.
+- *A film that is hardest at the moment of touch*, where the model ends it.  Its force rises by the
+  same factor from step to step; the step that closes the contact tells how far away the touch is.
 
-A stop on which the needle swings without leaving it, until a load is taken away, has its first
-impact by the phase of that swing.  Steps of length ``h`` follow a period ``T`` late by
-``(2 pi h / T)^2 / 12`` of it, each time anew; of small swings little of that is seen.
+Where the needle swings on its stop until a load is taken away, the first impact depends on the
+phase of that swing.  Steps of length ``h`` make each period ``T`` late by ``(2 pi h / T)^2 / 12``
+of it.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -44,9 +43,10 @@ def impact_doubts(
     interfaces: Mapping[str, InterfaceRecord],
     step: float,
 ) -> Iterator[str]:
-    """Sentences on the first complete impact on each stop, where the peak misses 0.05 % or more.
+    """Sentences on the first complete impact on each stop that the steps do not resolve.
 
-    Also where it begins late or early by 0.05 us or more, because the stop swung before.
+    That is, the peak misses 0.05 % or more, or the impact starts 0.05 us or more off, because the
+    stop swung before.
     """
     seen = set[str]()
     for event in events:
@@ -97,7 +97,6 @@ def _unresolved(event: ImpactEvent, step: float) -> str:
 
 
 def _last(events: Sequence[ImpactEvent], time: float) -> float:
-    """When a stop was touched last before some time [s]."""
     return max((event.time for event in events if event.time < time), default=0.0)
 
 
@@ -134,7 +133,7 @@ def missing_peak(
     at_touch : bool
         Whether a film is hardest at the moment of touch.
     step : float [s]
-        Length of the step with the peak.
+        With the peak.
     """
     record = _behind_nothing(record)
     middle = record.time + 0.5 * record.step
@@ -157,20 +156,15 @@ def missing_peak(
 def late_by_swinging(
     record: InterfaceRecord, time: float, since: float = 0.0
 ) -> tuple[float, int, float]:
-    """By how much the swings of the last contact before some time are late, how many, and how long.
+    """Delay [s] of the last contact before ``time``, a first touch, by its swings.
 
-    None where it had ended before ``since`` [s], when a stop was touched.
-
-    Parameters
-    ----------
-    time [s]
-        Of a first touch.
+    None where that contact had ended before ``since`` [s], when a stop was touched.
 
     Returns
     -------
     late : float [s]
     swings : int
-        Of more than half of the largest, within that contact.
+        Of more than half of the largest.
     period : float [s]
         Their mean.
     """
@@ -210,13 +204,13 @@ def _behind_nothing(record: InterfaceRecord) -> InterfaceRecord:
 
 
 def _adjacent(record: InterfaceRecord, k: int) -> bool:
-    """Whether nothing is missing between this step and its neighbours."""
+    """Whether no step is missing between this one and its neighbours."""
     t, h = record.time[k - 1 : k + 2], record.step[k - 1 : k + 2]
     return bool(np.all(np.abs(t[1:] - t[:-1] - h[:-1]) <= 0.01 * h[:-1]))
 
 
 def _closes(record: InterfaceRecord, k: int) -> bool:
-    """Whether a contact closes in this step out of a film that rises up to it."""
+    """Whether a contact closes in this step out of a film that rises until then."""
     contact, film = record.contact_force, record.film_force
     touches = contact[k - 1] == 0.0 and contact[k] > 0.0 and record.gap[k - 1] > record.gap[k]
     return bool(touches and contact[k - 2] == 0.0 and film[k - 1] > film[k - 2] > 0.0)
@@ -231,10 +225,7 @@ def _at_touch(record: InterfaceRecord, force: Vector, k: int) -> float:
 
 
 def _highest(h: Vector, mean: Vector, returned: float) -> float:
-    """Highest force about three steps with these means [N]; the middle mean where none is higher.
-
-    ``returned`` is the share of the energy that comes back [-].
-    """
+    """Highest force about three steps with these means [N]; ``returned``: share of the energy."""
     begin = 0.5 * h[1]  # time counts from the middle of the middle step
     edges = np.array([-begin - h[0], -begin, begin, begin + h[2]])
     moments = np.column_stack([np.diff(edges ** (n + 1)) / ((n + 1) * h) for n in range(3)])

@@ -1,9 +1,7 @@
 """Impacts in a run: when, how fast, how hard, how long, and what was left.
 
-They are found during the run, with a few numbers per interface, so that their memory does not
-grow with time.  :class:`ImpactFinder` is fed with the steps in which an interface carried force and
-with the speed of its gap between them; where the run is cut into parts does not matter, not even
-for the last bit.
+:class:`ImpactFinder` finds them during the run with a few numbers per interface, so its memory
+does not grow with time.  Where the run is cut into parts changes nothing, not even the last bit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -57,22 +55,22 @@ class ImpactFinder:
     """Finds the impacts on all interfaces of a network.
 
     Contacts that follow each other within the longest period of the two bodies are one impact, and
-    so are contacts between which the centres of mass do not move apart.  Rigid bodies have no
-    period; for it stands half the time of the shorter contact.  A contact that is closed at the
-    start is none.  A film acts before the first touch and after the last one: the speeds are the
+    so are contacts between which the centres of mass do not move apart.  For rigid bodies half the
+    time of the shorter contact stands for that period.  A contact that is closed at the start is
+    no impact.  A film acts before the first touch and after the last one: the speeds are the
     highest ones while it presses, and within two of these periods while it pulls.  An impact whose
-    last contact lasts until the bodies are at rest ends there; the stop is left later.
+    last contact lasts until the bodies are at rest ends there.
 
-    Steps tell the speed of the gap at which they begin.  Where they do not, it follows between two
-    records from the impulse of the interface itself, step by step: a film stops a body within less
-    than their spacing.  All other forces change evenly.
+    Where a step does not know the speed of the gap at its start, it follows between two records
+    from the impulse of the interface itself, step by step (a film stops a body within less than
+    their spacing); all other forces change evenly.
 
     Parameters
     ----------
     start [s]
-        Of the run; what is closed then was not hit.
+        Of the run.
     step [s]
-        The shortest that the run is made of, but for parts of one that is cut.
+        The shortest of the run, but for parts of one that is cut.
     """
 
     def __init__(self, rows: Rows, start: float, step: float) -> None:
@@ -115,11 +113,11 @@ class ImpactFinder:
         time (n,) [s]
             After the last time that was fed.
         velocity (n,) [m/s]
-            Of the centre of mass of each body that moves, at these times, by component.
+            Of the centre of mass of each body that moves, by component.
         steps (k, 6)
-            Per interface: start, length [s], contact force, film force [N], gap [m], speed of the
-            gap at its start [m/s] of every step in which it carried force, up to the last of these
-            times.  The speed is asked where the contact is open or closes; nan where not known.
+            Per interface, of every step in which it carried force: start, length [s], contact
+            force, film force [N], gap [m], speed of the gap at the start [m/s], needed where the
+            contact is open or closes; nan where not known.
         """
         for c, rows in enumerate(steps):
             rate = self._gap_rate(c, time, velocity)
@@ -135,9 +133,9 @@ class ImpactFinder:
     def events(self, channels: Mapping[str, ChannelData]) -> tuple[ImpactEvent, ...]:
         """All impacts so far, in order of time, complete or not.
 
-        One that is not over yet is reported again, whole, by a finder that resumes from
-        :attr:`state`; it has the same stop and the same time.  Not those that are no harder than
-        the round-off of the largest force in the ``channels``: nothing presses a contact there.
+        An unfinished one is reported again, whole, by a finder that resumes from :attr:`state`,
+        with the same stop and time.  Impacts no harder than the round-off of the largest force in
+        the ``channels`` are left out.
         """
         forces = [np.abs(data.values).max() for data in channels.values() if data.unit == "N"]
         least = FORCE_ROUND_OFF * float(max(forces, default=0.0))
@@ -150,12 +148,12 @@ class ImpactFinder:
         return tuple(event for event in found if not event.peak_force <= least)
 
     def told(self) -> None:
-        """Mark all impacts so far as reported; only changed ones are reported again."""
+        """Mark all impacts so far as reported; only those that change are reported again."""
         self._found.clear()
         self._state["news"] = self._state["impact_news"] = 0.0
 
     def _gap_rate(self, c: int, time: Vector, velocity: Mapping[str, Vector]) -> Vector:
-        """Relative velocity of the centres of mass, above zero when the gap opens."""
+        """Relative velocity of the centres of mass, positive when the gap opens."""
         rate = np.zeros(len(time))
         bodies: tuple[BodyRow | None, ...] = self._bodies[c]
         for body, sign in zip(bodies, (1.0, -1.0), strict=True):
@@ -218,7 +216,6 @@ def _feed(
 
 @inner
 def _record(s: Any, period: float, mobility: float, time: float, rate: float) -> None:
-    """Take in the speed of the gap at a time."""
     if s.time > -np.inf:
         before, had_one = s.trend, s.span > 0.0
         s.span = time - s.time
@@ -237,7 +234,7 @@ def _record(s: Any, period: float, mobility: float, time: float, rate: float) ->
 
 @inner
 def _rate_at(s: Any, mobility: float, time: float) -> float:
-    """Speed of the gap after the last record: by the interface, and by all other forces as before.
+    """Speed of the gap after the last record: by the interface, and by all other forces.
 
     These changed it at the mean rate ``trend`` in the middle of the last interval, ``bend`` more
     per time since then.
@@ -253,7 +250,7 @@ def _rate_at(s: Any, mobility: float, time: float) -> float:
 def _closing(
     s: Any, mobility: float, t: float, h: float, contact: float, film: float, opening: float
 ) -> float:
-    """Speed at which a gap closes at the start of a step, the highest in one that is open."""
+    """Closing speed of a gap at the start of a step, the highest in one that is open."""
     if np.isfinite(opening):
         return -opening  # the next step tells of its end
     begin = _rate_at(s, mobility, t)
@@ -312,7 +309,7 @@ def _closed_step(
 
 @inner
 def _contact_over(s: Any, period: float, mobility: float, t: float, out: Any, count: int) -> int:
-    """End the contact at ``t``: a part of the impact so far, or the beginning of the next one."""
+    """End the contact at ``t``: part of the impact so far, or the start of the next one."""
     s.until = t
     emitted = 0
     if s.impact > 0.0 and not _joins(s, period, t - s.begin):
@@ -335,7 +332,7 @@ def _contact_over(s: Any, period: float, mobility: float, t: float, out: Any, co
 
 @inner
 def _joins(s: Any, period: float, duration: float) -> bool:
-    """Whether the present contact, of this duration so far, belongs to the impact before it."""
+    """Whether the present contact belongs to the impact before it."""
     if s.opened <= 0.0:
         return True
     pause = period
@@ -346,7 +343,7 @@ def _joins(s: Any, period: float, duration: float) -> bool:
 
 @inner
 def _merge(s: Any) -> None:
-    """Add the present contact to the impact, or begin one with it and the film before it."""
+    """Add the present contact to the impact, or begin one with it and its film."""
     if s.impact == 0.0:
         s.impact, s.first = 1.0, s.begin
         s.impact_before, s.impact_from_start = s.before, s.from_start
@@ -410,7 +407,7 @@ def _open_step(
 
 @inner
 def _emit(s: Any, out: Any, count: int) -> int:
-    """Write the impact as a row of ``_EVENT``; 0 if it was none, or nothing of it is new."""
+    """Write the impact as a row of ``_EVENT``; 0 if there is none, or nothing new."""
     if s.impact_from_start > 0.0 or s.impact_news == 0.0:
         return 0
     if not s.impact_before < 0.0:
@@ -437,7 +434,7 @@ def _emit(s: Any, out: Any, count: int) -> int:
 
 @njit
 def _unfinished(state: Any, c: int, period: float, out: Any) -> int:
-    """Unfinished impacts as if nothing followed; leaves the state as it is."""
+    """Unfinished impacts as if nothing followed; the state stays."""
     copy = state[c : c + 1].copy()
     s = copy[0]
     count = 0

@@ -94,16 +94,7 @@ def _film_mean(
 def interface_store(
     kind: int, law_data: Vector, law_start: int, series: float, g: float, e: float
 ) -> float:
-    """Energy [J] held by the contact law and the series compliance.
-
-    Parameters
-    ----------
-    kind, law_data, law_start
-        As in :func:`solve_interface`.
-    series [m/N]
-    g, e [m]
-        Gap of the bodies and compression of the series compliance.
-    """
+    """Energy [J] held by the contact law and the series compliance; as :func:`solve_interface`."""
     stored = 0.0
     if kind != NO_LAW:
         stored = law_potential(kind, law_data, law_start, -(g + e))
@@ -134,31 +125,21 @@ def solve_interface(
 ) -> Step:
     """Forces of an interface over one step, and where it ends.
 
-    A pure function: it may be called again for the same step with another ``g_free``.
-
     Parameters
     ----------
     kind, law_data, law_start
-        A contact law as flat numbers, see :class:`klack.contact.laws.FlatLaw`, from
-        ``law_data[law_start]`` on; :data:`NO_LAW` for none.
+        :class:`klack.contact.laws.FlatLaw` from ``law_data[law_start]`` on; :data:`NO_LAW` for
+        none.
     chi_over_h [1/m]
         Dissipation factor of Hunt and Crossley, ``alpha / (v0 h)``; 0 for an elastic law.
     cubic, linear, cut_off, suction
         Film, see :class:`klack.network.rows.FilmRow`; ``cubic = linear = 0`` for none.
-    h [s]
-        Step, above 0.
     G [m/N]
-        Change of the gap at the end of the step by a unit force during it, above 0.
-    series [m/N]
-        Compliance in series; 0 for none.
+        Gap at the end of the step per force during it, above 0.
     g0, g_free [m]
         Gap of the bodies at the start, and at the end without this interface's force.
     e0 [m]
-        Compression of the series compliance at the start.
-    guess [N]
-        Total force, from the last step or sweep.
-    hint
-        Interval of a table law that was used last.
+        Compression of the ``series`` compliance [m/N] at the start.
     film_before [N]
         Film force of the last step, if the contact closed in it; else 0.
 
@@ -170,8 +151,8 @@ def solve_interface(
         Gap and compression at the end.
     hint : int
     contact_loss, film_loss : float [J]
-        What a compression that relaxes in the open contact loses belongs to the film, or, where
-        there is none, to the contact.
+        A compression that relaxes in the open contact loses to the film, or, without one, to the
+        contact.
     """
     z0 = g0 + e0
     if cubic == 0.0 and linear == 0.0:
@@ -226,22 +207,9 @@ def open_film(
     e0: float,
     guess: float,
 ) -> tuple[float, float, float]:
-    """Film of an interface that stays open while its bodies go a known way.
+    """Film of an interface that stays open over a known motion: mean force [N], compression, loss.
 
-    Parameters
-    ----------
-    cubic, linear, cut_off, suction, h, series, e0, guess
-        As of :func:`solve_interface`.
-    g0, g1 [m]
-        Gap of the bodies at the start and at the end, with the compression above 0.
-
-    Returns
-    -------
-    film_force : float [N]
-        Mean over the step.
-    e1 : float [m]
-        Compression at the end.
-    film_loss : float [J]
+    Arguments as of :func:`solve_interface`; the gap with the compression stays above 0.
     """
     z0, theta = g0 + e0, 0.5
     if series > 0.0:
@@ -263,7 +231,7 @@ def _line(G: float, series: float, theta: float, g_free: float, e0: float) -> tu
 
 @njit(inline="always", error_model="numpy")
 def _compressed(series: float, theta: float, force: float, e0: float) -> tuple[float, float]:
-    """Compression at the end of the step, and what it lost by relaxing."""
+    """Compression at the end of the step, and its loss by relaxing."""
     if series == 0.0:
         return 0.0, 0.0
     if theta == 0.5:
@@ -282,7 +250,7 @@ def _relaxing(
     z0: float,
     reach: float,
 ) -> float:
-    """``theta`` of a step that starts open in a film; 1/2 where the step closes the gap."""
+    """``theta`` of a step that starts open in a film; 1/2 where it closes the gap."""
     inverse = 1.0 / (z0 + cut_off)
     damping = (cubic * inverse * inverse + linear) * inverse
     most = 0.5 - series * damping / h
@@ -477,7 +445,7 @@ def _both(
 def _contact(
     kind: int, p: Vector, start: int, chi_over_h: float, z0: float, z: float, hint: int
 ) -> tuple[float, float, float, int]:
-    """Contact force, its slope over the indentation, longest last Newton step, table interval."""
+    """Contact force, its slope, longest last Newton step, table interval."""
     deep = -min(z0, z)
     if chi_over_h * deep > 1.0:
         deep = 1.0 / chi_over_h

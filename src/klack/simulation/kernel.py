@@ -1,8 +1,7 @@
 """The time loop: exact modes, discrete-gradient contacts, decimated records, energy balance.
 
-Everything is a flat array; :mod:`klack.simulation.system` builds them.  One step is one pass over
-the modes (free motion, with the contact force of the step before folded in) and a scalar equation
-for each contact that is closed or closes.
+One step is one pass over the modes (free motion, with the contact force of the step before folded
+in) and a scalar equation for each contact that is closed or closes.
 """
 
 from typing import NamedTuple, Self
@@ -35,8 +34,8 @@ __all__ = [
 class StepMatrices(NamedTuple):
     """Exact step of ``m`` modes, and of constant forces on ``p`` rigid ones.
 
-    Within a record the motion under constant forces runs beside that of all modes (superposition),
-    because single numbers written into the state stall the vector loads; at its end it is added.
+    The motion under constant forces runs beside that of all modes and is added at the end of a
+    record, because single numbers written into the state stall the vector loads.
     """
 
     A: Matrix  # (4, m) A11, A12, A21, A22
@@ -77,7 +76,7 @@ class Watched(NamedTuple):
 
 
 class Record(NamedTuple):
-    """Out: ``n`` records; row 0 of ``q`` and ``v`` is filled in by the caller."""
+    """Output: ``n`` records; the caller fills row 0 of ``q`` and ``v``."""
 
     force: Matrix  # (n, c) [N] mean
     peak: Matrix  # (n, c) [N] largest of a step
@@ -139,7 +138,7 @@ def _watch(rows: Matrix, k: int, state: Vector) -> float:
 
 @phase
 def push_on(modes: StepMatrices, pushed_q: Vector, pushed_v: Vector) -> None:
-    """One step of the motion that constant forces alone give to rigid modes."""
+    """One step of the motion of rigid modes under constant forces alone."""
     A = modes.A
     for k in range(modes.push_index.size):
         i, pq, pv = modes.push_index[k], pushed_q[k], pushed_v[k]
@@ -293,7 +292,7 @@ def _move(
 
 @phase
 def _near(modes: StepMatrices, contacts: Contacts, now: _Now) -> bool:
-    """Complete the free gaps; whether any contact is closed or would close."""
+    """Complete the free gaps; whether any contact is or would be closed."""
     near = False
     for c in range(contacts.gap.size):
         now.free[c] = contacts.gap[c] + now.free[c]
@@ -305,7 +304,7 @@ def _near(modes: StepMatrices, contacts: Contacts, now: _Now) -> bool:
 
 @phase
 def _settle(contacts: Contacts, now: _Now) -> tuple[bool, bool, float]:
-    """Contact forces of the step: whether they settled, whether any acts, and their loss [J]."""
+    """Contact forces: whether they settled, whether any acts, and their loss [J]."""
     F, free, G = now.F, now.free, contacts.G
     count = contacts.gap.size
     for c in range(count):
@@ -347,7 +346,7 @@ def _settle(contacts: Contacts, now: _Now) -> tuple[bool, bool, float]:
 
 @phase
 def _damp(B: Matrix, rows: Matrix, losses: Losses, now: _Now, at: Damped, closed: bool) -> Damped:
-    """Damping loss; flight: energy at its two ends, contact: the exact loss of each step."""
+    """Damping loss: in flight from the energy at both ends, in contact of each step."""
     loss, in_flight, flight_energy = at
     if closed:
         for i in range(now.f.size):
@@ -368,7 +367,7 @@ def _damp(B: Matrix, rows: Matrix, losses: Losses, now: _Now, at: Damped, closed
 
 @phase
 def _end_step(contacts: Contacts, now: _Now, closed: bool, release_loss: float) -> float:
-    """Gaps, series springs and dissipation after the step; returns the losses at release [J]."""
+    """Gaps, series springs and dissipation after the step; returns losses at release [J]."""
     for c in range(contacts.gap.size):
         after = now.free[c]
         if closed:
@@ -396,7 +395,7 @@ def _end_step(contacts: Contacts, now: _Now, closed: bool, release_loss: float) 
 def _end_record(
     modes: StepMatrices, q: Vector, v: Vector, now: _Now, record: Record, at: int, steps: int
 ) -> None:
-    """Means of a record; the motion under constant forces joins that of the modes."""
+    """Means of a record; adds the motion under constant forces to that of the modes."""
     for c in range(now.gap.size):
         record.force[at, c] = now.sum_force[c] / steps
         record.peak[at, c] = now.peak[c]
@@ -420,24 +419,17 @@ def run_steps(
     record: Record,
     books: Vector,
 ) -> int:
-    """Integrate the records of ``record`` with ``steps_per_record`` steps each.
+    """Integrate the records of ``record``; ``STATUS_FINE``, or ``STATUS_CONTACTS`` if unsettled.
 
     Parameters
     ----------
     q, v (m,)
-        Modal state, overwritten by the state at the end.  Elastic modes are counted from their rest
-        position under the constant forces.
-    modes, contacts, losses, watched, record
-        See :mod:`klack.simulation.kernel`.
+        Modal state, overwritten.  Elastic modes are counted from their rest position under the
+        constant forces.
     books (4 + 2 c,)
         Out: contact dissipation, loss at release of a series spring, modal damping loss, loss of
         friction (of exactly one contact only); then for each contact the last gap and the last
         compression of its series spring.
-
-    Returns
-    -------
-    int
-        ``STATUS_FINE`` or ``STATUS_CONTACTS`` (the forces of several contacts did not settle).
     """
     now = _begin(modes, contacts)
     for c in range(contacts.gap.size):

@@ -1,33 +1,27 @@
-r"""Contact law with memory in a time step, compiled: see :mod:`klack.contact.rubbing_law`.
+r"""Contact laws with memory in a time step, compiled.
 
-The force of a step is the mean of the law along the straight way from d0 to d1 with all that
-happens on it (sliders that let go, springs that touch), in closed form:
+**Rubbing** (:mod:`klack.contact.rubbing_law`).  The force of a step is the mean of the law along
+the straight way from d0 to d1 with all that happens on it (sliders that let go, springs that
+touch), in closed form:
 
 .. math:: F = \frac{1}{d_1 - d_0} \int_{d_0}^{d_1} F(d)\, \mathrm dd ,
 
-so that the work is what the springs store and what the sliders lose, for steps of any size.  No
-loss is negative, spring by spring.
+so that the work is what the springs store and the sliders lose, for steps of any size.  No loss
+is negative, spring by spring.  The places of the sliders [m] lie behind the numbers of the law,
+then a copy of them for steps that are taken back; :func:`slide` takes them along once a step is
+accepted.
 
-The places of the sliders [m] lie behind the numbers of the law, then a copy of them for steps that
-are taken back.  Trying a force leaves them where they are; :func:`slide` takes them along once a
-step is accepted.
-
-Contact law of faces that yield in a time step, compiled: see :mod:`klack.contact.yielding_law`.
-
-With the work W along the way from an indentation to another, elastic up to the largest one so far
-and along the loading curve beyond,
+**Yielding** (:mod:`klack.contact.yielding_law`).  With the work W along the way from an indentation
+to another, elastic up to the largest one so far and along the loading curve beyond,
 
 .. math:: F = \frac{W(d_1) - W(d_0)}{d_1 - d_0} ,
 
-so that the work of a step is what the faces store and what they lose, for steps of any size.
-Trying a force changes nothing; :func:`press` takes the largest indentation along once a step is
-accepted, and takes the loss as the difference, which is right for any tables.
-
+so that again the work is stored or lost.  :func:`press` takes the largest indentation along once a
+step is accepted, and takes the loss as the difference, which is right for any tables.
 Indentations count from first touch of the faces as they were when the run began, or, with
-:func:`settle`, as they are now: a film lies on those.
-
-Behind the two sizes of its tables, the numbers of the law are the largest indentation [m], the set
-[m] that indentations count from, and a copy of both for steps that are taken back.
+:func:`settle`, as they are now: a film lies on those.  Behind the two sizes of its tables, the
+numbers of the law are the largest indentation [m], the set [m] that indentations count from, and a
+copy of both for steps that are taken back.
 """
 
 from math import sqrt
@@ -180,7 +174,7 @@ def keep_sliders(p: Vector, start: int) -> None:
 
 @njit
 def take_back_sliders(p: Vector, start: int) -> None:
-    """Put the sliders back to where they were remembered."""
+    """Put the sliders back to their remembered places."""
     count = int(p[start])
     s = start + 2 + 3 * count
     for j in range(count):
@@ -200,7 +194,7 @@ def pressed_state(p: Vector, start: int) -> Vector:
 
 @inner
 def _state(p: Vector, start: int, deep: float) -> tuple[int, float]:
-    """State below a largest indentation, and the share of the way to the next one."""
+    """State below a largest indentation, and the share to the next one."""
     count, first = int(p[start]), start + _TABLES
     low, high = 0, count - 1
     while high - low > 1:
@@ -273,7 +267,7 @@ def _closing(p: Vector, start: int, d: float) -> tuple[float, float, float]:
 
 @inner
 def _along(p: Vector, start: int, d: float) -> tuple[float, float, float]:
-    """Force, stiffness and work of the faces as they are now, up to an indentation."""
+    """Force, stiffness and work of the faces as they are now."""
     deep = p[start + _DEEP]
     if d <= deep:
         return _elastic(p, start, deep, d)
@@ -315,13 +309,7 @@ def press(p: Vector, start: int, d0: float, d1: float, force: float) -> float:
 
 @njit
 def settle(p: Vector, start: int) -> float:
-    """Count indentations from the faces as they are now, in place.
-
-    Returns
-    -------
-    float [m]
-        By how much they become smaller, and gaps larger.
-    """
+    """Count indentations from the faces as they are now, in place; the growth of gaps [m]."""
     i, share = _state(p, start, p[start + _DEEP])
     before = p[start + _FROM]
     p[start + _FROM] = _parted(p, start, p[start + _DEEP], i, share)
@@ -344,7 +332,7 @@ def keep_faces(p: Vector, start: int) -> None:
 
 @njit
 def settled_since(p: Vector, start: int) -> float:
-    """By how much gaps have become larger since the faces were remembered [m]."""
+    """Growth of gaps [m] since the faces were remembered."""
     return p[start + _FROM] - p[start + _KEPT + 1]
 
 

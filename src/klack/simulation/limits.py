@@ -1,7 +1,6 @@
-"""Ranges of laws while a network runs: left, they are warned of once; left grossly, the run stops.
+"""Ranges of laws while a network runs: a departure is warned of once, a gross one stops the run.
 
-Looked at are the records of the time loop, not its steps: an excursion shorter than a record may be
-missed, one that matters for a result is not.
+Only records are looked at, not steps: an excursion shorter than a record may be missed.
 """
 
 import warnings
@@ -41,8 +40,7 @@ class Limits:
     Parameters
     ----------
     columns
-        Names of the recorded columns, displacements of all ports first: see
-        :func:`klack.simulation.network_record.record_points`.
+        Names of the recorded columns: see :func:`klack.simulation.network_record.record_points`.
     """
 
     def __init__(self, network: CompiledNetwork, columns: list[str]) -> None:
@@ -64,18 +62,7 @@ class Limits:
             self._watched.append(_Watched(limit, used, weights[used]))
 
     def left(self, points: Matrix, time: Vector) -> tuple[int, ConvergenceError] | None:
-        """First of some records in which a quantity has left what can be computed with.
-
-        Parameters
-        ----------
-        points (n, columns)
-        time (n,) [s]
-
-        Returns
-        -------
-        (int, ConvergenceError) or None
-            Its place, and what to say: component and time.
-        """
+        """First record in which a quantity has left what can be computed with, and the error."""
         found: tuple[int, ConvergenceError] | None = None
         for watched in self._watched:
             limit, values = watched.limit, watched.values(points)
@@ -87,13 +74,7 @@ class Limits:
         return found
 
     def tell(self, points: Matrix, time: Vector) -> None:
-        """Warn of ranges that are left in some records.
-
-        Warns
-        -----
-        AccuracyWarning
-            Once for each law.
-        """
+        """Warn of ranges that are left in some records, once for each law."""
         for watched in self._watched:
             limit, values = watched.limit, watched.values(points)
             if limit.at_start and time[0] > 0.0:

@@ -1,4 +1,4 @@
-r"""Linear equations of a whole network about the point where it has been put to rest.
+r"""Linear equations of a whole network about the point where it rests.
 
 Bodies keep their modes, volumes their compliance, rows the laws of
 :mod:`klack.simulation.linear_rows`, contacts and films their stiffness and damping, and lines their
@@ -40,11 +40,11 @@ _BENT = 1e-2  # change of the compressibility within a thousandth of a pressure
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearNetwork:
-    """Linear equations of a network, and what has to be known of them.
+    """Linear equations of a network.
 
     Parameters
     ----------
-    adds : mapping of int to (int, float)
+    adds
         Outputs that one component adds at a place, each with the input there and its sign.
     """
 
@@ -60,17 +60,17 @@ def linear_network(
     held: Collection[str] = (),
     drives: Mapping[str, tuple[str, Rows]] | None = None,
 ) -> LinearNetwork:
-    """Linearise a network about the state that it is in: see the module text.
+    """Linearise a network about the state that it is in.
 
     Parameters
     ----------
     network
-        Put to rest, with everything that drives it constant.
+        At rest, with everything that drives it constant.
     h [s]
         Step whose laws are linearised, and half of it.
     held
         Bodies that do not move.
-    drives : mapping of str to (str, Rows)
+    drives
         By the name of an input: its unit, and the rows with one such unit more of it.
 
     Raises
@@ -160,7 +160,7 @@ class _Assembly:
         return found
 
     def _contacts(self) -> None:
-        """Stiffness and damping of contacts and films, each with its series compliance."""
+        """Stiffness and damping of contacts and films."""
         at, state = self.network.interfaces, self.network.interface_state
         gap = at.gap0 + self.y[at.upper] - self.y[at.lower]
         force, slope = contacts_at_rest(at.kind, at.law, at.law0, at.series, gap)
@@ -221,7 +221,6 @@ class _Assembly:
     # ------------------------------------------------------------------ variables
 
     def _number(self) -> None:
-        """Give every state, input and wave its place."""
         self.states: list[Signal] = []
         self.inputs: list[Signal] = []
         self.rigid: list[int] = []  # first state of the rigid mode of each body, or -1
@@ -368,7 +367,7 @@ class _Assembly:
         return LinearNetwork(system=system, adds=adds, doubts=tuple(dict.fromkeys(self.doubts)))
 
     def _without_junctions(self, forms: Matrix) -> Matrix:
-        """Put the pressures at which what flows into each junction adds up to zero into forms."""
+        """Put into forms the pressures at which the flows into each junction add up to zero."""
         kept, last = slice(0, self.first_junction), slice(self.first_junction, None)
         inflow = self.inflow[self.junction]
         pressure = -np.linalg.solve(inflow[:, last], inflow[:, kept])
@@ -408,7 +407,7 @@ class _Assembly:
             self.outputs.append((signal, form))
 
     def _adds_flow(self, name: str, ends: Sequence[int], signs: Sequence[float]) -> None:
-        """Remember into which volume a flow goes, the first one that is free."""
+        """Remember the first free volume that a flow goes into."""
         for i, sign in zip(ends, signs, strict=True):
             if i < self.network.nodes.volumes:
                 self.adds.setdefault(name, (f"{self.node_names[i]}.mass_flow", sign))
@@ -419,7 +418,6 @@ class _Assembly:
             self.adds.setdefault(name, (f"{at.component}.{at.port}.force", sign))
 
     def _columns(self, k: int, ports: Sequence[int], ends: Sequence[int]) -> Matrix:
-        """Forms that the columns of the law of a row stand for."""
         kept = [self._unit(self.row_states[k] + j) for j in range(len(self.linear[k].kept))]
         inputs = [self._unit(self.input_at[key]) for key in self.drives]
         forms = [
@@ -592,7 +590,7 @@ class _Assembly:
 
 
 def _state_signals(row: ElementRow | BranchRow) -> dict[int, Signal]:
-    """States of a row by their index, each with the component whose it is."""
+    """States of a row by their index."""
     found = {c.index: Signal(c.owner or row.component, c.label, c.unit) for c in row.channels}
     for index, (label, unit) in row.state_names.items():
         owner, dot, quantity = label.partition(".")

@@ -14,8 +14,8 @@ give, with :math:`M = (1 + P)^{-1}`,
 
     \dot s = \tfrac2h M\,[(P - 1)\,s + (Q_0 + Q_1)\,y + \tfrac12 h (Q_1 - Q_0)\,v + Q_p p].
 
-For the implicit midpoint rule this is exact, for any other rule of second order the error is
-quadratic in the step: two steps remove it, and their difference tells whether there is a limit.
+For the implicit midpoint rule this is exact, for any other rule of second order two steps remove
+the quadratic error, and their difference tells whether there is a limit.
 """
 
 from dataclasses import dataclass, replace
@@ -51,7 +51,6 @@ class RowPoint:
 
     Parameters
     ----------
-    row : ElementRow or BranchRow
     y [m]
         Of its ports.
     p, density, compressed [Pa], [kg/m^3], [kg/(m^3 Pa)]
@@ -74,7 +73,7 @@ class RowPoint:
         return 3 if isinstance(self.row, BranchRow) else 0
 
     def told(self, h: float, side: float) -> Vector:
-        """Inputs of the step function for a step a little to one side of the point."""
+        """Inputs of the step function for a step to one side of the point."""
         along = side * np.arange(1.0, self.y.size + 1.0)
         y, way = self.y + _MOVED * along, 0.5 * h * _SPEED * along
         rise = side * _PRESSED * self.p * np.where(np.arange(self.p.size) % 2, -1.0, 1.0)
@@ -90,9 +89,8 @@ class LinearRow:
     Parameters
     ----------
     kept
-        States that matter: what they are changes what the row does.  Of states that a constraint
-        ties to each other (fluxes without eddy currents) some are left, less what the constraint
-        makes of ports and pressures.
+        States that change what the row does.  Of states tied by a constraint (fluxes without eddy
+        currents) some are left, less what the constraint makes of ports and pressures.
     rate (kept, columns)
         Their derivatives with time.
     acts (flows + forces, columns)
@@ -100,7 +98,7 @@ class LinearRow:
     channels (channels, columns)
         Recorded states.
     doubt
-        Difference between the laws of two steps over the largest of their kind.
+        Difference between the laws of two steps, relative to the largest of their kind.
     kink
         The same between the laws to both sides of the point.
     """
@@ -124,7 +122,7 @@ def linear_row(at: RowPoint, h: float) -> LinearRow:
     Raises
     ------
     InputError
-        For a component whose step function is not compiled: it has no derivatives.
+        For a step function that is not compiled: it has no derivatives.
     ConvergenceError
         If the row refuses the step.
     """
@@ -174,9 +172,9 @@ def _warm(at: RowPoint, h: float) -> RowPoint:
 
 
 def _apart(a: Matrix, b: Matrix, changes: Vector) -> float:
-    """Largest difference of two laws over their numbers.
+    """Largest relative difference of two laws.
 
-    Numbers with less than 1e-4 of the effect of their row are not compared: round-off.
+    Numbers with less than 1e-4 of the effect of their row are left out: round-off.
     ``changes`` are usual ones of states, displacements, speeds, pressures and inputs.
     """
     if a.shape != b.shape:  # a state more, or less
@@ -203,7 +201,7 @@ def _usual(at: RowPoint, kept: tuple[int, ...]) -> Vector:
 
 
 def _derivatives(at: RowPoint, h: float, side: float) -> Matrix:
-    """Derivatives of all outputs, by states, starts and ends of ports, pressures, inputs."""
+    """Derivatives of all outputs by states, starts and ends of ports, pressures, inputs."""
     row = at.row
     told, first_port = at.told(h, side), 2 + 2 * at.p.size
     seeds: list[tuple[str, int, Vector | float]] = []
@@ -258,7 +256,6 @@ def _states_at(at: RowPoint) -> slice:
 
 
 def _kept(at: RowPoint, d: Matrix) -> tuple[int, ...]:
-    """States that change what the row does, and that something changes."""
     n, states = at.state.size, _states_at(at)
     P = d[states, :n]
     acting = np.vstack([d[:1] if at.head else d[:0], d[at.head : states.start]])
@@ -286,7 +283,7 @@ def _kept(at: RowPoint, d: Matrix) -> tuple[int, ...]:
 def _law(
     at: RowPoint, d: Matrix, kept: tuple[int, ...], h: float
 ) -> tuple[Matrix, Matrix, Matrix, tuple[int, ...]]:
-    """Rates, forces and channels in the middle of a step; and after which states they are named."""
+    """Rates, forces and channels in the middle of a step; and the states that name them."""
     n, ports, k = at.state.size, at.y.size, list(kept)
     states = _states_at(at)
     acting = np.vstack([d[:1] if at.head else d[:0], d[at.head : states.start]])
@@ -319,9 +316,9 @@ def _law(
 
 
 def _split(P: Matrix) -> tuple[Matrix, Matrix, list[int]]:
-    """Bases of what a step keeps and of what it does not, and states that tell the former.
+    """Bases of what a step keeps and of what it does not, and states that name the former.
 
-    A constraint without memory is turned round by the trapezoidal rule, and forgotten by others.
+    The trapezoidal rule reverses a constraint without memory, other rules forget it.
     """
     if not len(P):
         return np.zeros((0, 0)), np.zeros((0, 0)), []

@@ -8,9 +8,9 @@ The frequency response takes :math:`e^{-sT}` as it is.  Without delays the eigen
 
 .. math:: \det\begin{pmatrix} s - A & -B_w \\ -e^{-sT} C_z & 1 - e^{-sT} D_{zw}\end{pmatrix} = 0,
 
-infinitely many.  Those up to a frequency are found from a rational model (each delay cut into equal
-pieces, each Padé's fraction of degree 4 over 5, whose magnitude is nowhere above one) and carried
-to roots of the determinant itself by Newton's method.
+infinitely many.  A rational model (each delay cut into equal pieces, each Padé's fraction of degree
+4 over 5, whose magnitude is nowhere above one) gives starting values up to a frequency for Newton's
+method on the determinant itself.
 """
 
 from collections.abc import Iterator
@@ -46,7 +46,7 @@ _EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """State, input or output: whose it is, what, and its unit."""
+    """State, input or output."""
 
     owner: str
     quantity: str
@@ -60,7 +60,7 @@ class Signal:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class LinearSystem:
-    """A linear system with delays: see the module text.
+    """A linear system with delays.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class LinearSystem:
     Bw, Dw
         From waves that arrive.
     Cz, Dz, Dzw
-        To waves that leave, from states, inputs and waves that arrive.
+        To waves that leave, from states, inputs and arriving waves.
     delays [s]
     waves
         Component of each delay.
@@ -135,7 +135,7 @@ def transfer(system: LinearSystem, frequency: Vector) -> Iterator[Complex]:
 
 
 def _balance(A: Matrix) -> Vector:
-    """Factors that bring rows and columns to one size: states have units of all kinds."""
+    """Factors that bring rows and columns with all kinds of units to one size."""
     factors = np.ones(len(A))
     size = np.abs(A - np.diag(np.diag(A)))
     for _ in range(20):
@@ -161,7 +161,7 @@ def _response(system: LinearSystem, s: complex, factors: Vector) -> Complex:
 
 
 def _bordered(system: LinearSystem, s: complex, late: Complex, factors: Vector) -> Complex:
-    """Matrix of the characteristic equation; states divided by their factors."""
+    """Matrix of the characteristic equation; states divided by ``factors``."""
     n, d = len(system.A), len(system.delays)
     found = np.zeros((n + d, n + d), dtype=complex)
     found[:n, :n] = s * np.eye(n) - system.A * factors[None, :] / factors[:, None]
@@ -175,7 +175,7 @@ def _bordered(system: LinearSystem, s: complex, late: Complex, factors: Vector) 
 
 
 def _late(delay: float, pieces: int) -> tuple[Matrix, Vector, Vector]:
-    """State space of a delay: equal pieces in series, each a fraction of Padé."""
+    """State space of a delay, equal pieces in series."""
     tau, n = delay / pieces, ORDER
     m = n - 1
     # e^-x = N(x)/P(x), x = s tau; no feedthrough, so that no reflection closes an algebraic loop
@@ -266,10 +266,10 @@ def rational(system: LinearSystem, band: float) -> LinearSystem:
 
 
 def modes(system: LinearSystem, band: float) -> tuple[list[Mode], int]:
-    """Eigenvalues, those that grow first, then by frequency; and how many were not confirmed.
+    """Eigenvalues, growing ones first, then by frequency; and how many were not confirmed.
 
     Without delays all of them; with delays the roots up to ``band`` [Hz] and those that grow
-    faster, and how many eigenvalues of the rational model there led to no root.
+    faster, and how many eigenvalues of the rational model led to no root.
     """
     if not len(system.A) and not len(system.delays):
         return [], 0
@@ -314,9 +314,9 @@ def modes(system: LinearSystem, band: float) -> tuple[list[Mode], int]:
 def _newton(
     system: LinearSystem, start: complex, factors: Vector
 ) -> tuple[complex, Complex, float] | None:
-    """Root of the characteristic equation near a number, products of its vectors, uncertainty.
+    """Root of the characteristic equation near ``start``, products of its vectors, uncertainty.
 
-    The last is what a change of every number by some units in the last place does to the root.
+    The last is by how much the root changes with some units in the last place of every number.
     """
     s, n = start, len(system.A)
     late = np.exp(-s * system.delays)

@@ -24,8 +24,8 @@ class MovingBodies(Protocol):
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
         """Place them, at rest under the forces of the network, which ``balance`` finds anew.
 
-        It is told by how much each port is elsewhere than bodies along the axis have it [m].
-        Without it they start as they are.  Returns the last balance found, None without any.
+        Its argument is how far each port is from where bodies along the axis have it [m].  Without
+        it they start as they are.  Returns the last balance found.
         """
 
     def resume(self) -> None:
@@ -41,7 +41,7 @@ class MovingBodies(Protocol):
         looks: int,
         report: Vector,
     ) -> int:
-        """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
+        """Advance by ``looks`` of ``look`` times ``block`` fine steps; a status."""
 
     def changing(self) -> dict[str, Changing]:
         """All arrays that a step changes and the next one begins with."""
@@ -59,10 +59,10 @@ class MovingBodies(Protocol):
         """Begin a new energy balance."""
 
     def recorded_impacts(self, end: float) -> tuple[SpatialImpact, ...]:
-        """What was recorded of the impacts up to a moment [s], in order of their first touch."""
+        """What was recorded of the impacts up to ``end`` [s], in order of first touch."""
 
     def gap(self) -> Vector:
-        """Add this to a recorded gap to have the true one, of each interface [m]."""
+        """What to add to the recorded gap of each interface to have the true one [m]."""
 
     def channels(self, time: Vector) -> dict[str, ChannelData]:
-        """Quantities that no axial motion has, at these moments."""
+        """Quantities at these moments that no axial motion has."""

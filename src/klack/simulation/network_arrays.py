@@ -1,4 +1,4 @@
-"""What the time loop of a network works on: named groups of flat arrays and their rows."""
+"""Named groups of flat arrays that the time loop of a network works on."""
 
 from typing import NamedTuple
 
@@ -82,7 +82,7 @@ smooth films; and parts of a sub-step in which a contact closes or opens."""
 
 
 AT_ONCE = 1e30
-"""Rate [1/s] of what follows at once, whatever the step: infinite has no derivative."""
+"""Rate [1/s] of what follows at once; infinity has no derivative."""
 
 PARTS = 8
 """Parts of each fine step in a sub-step that is cut."""
@@ -361,7 +361,7 @@ class InterfaceTrial(NamedTuple):
 
 
 KEPT = 16
-"""Numbers of an interface that a repeated macro step begins with."""
+"""Numbers of an interface that a repeated macro step starts from."""
 
 
 class SliderTrial(NamedTuple):
@@ -378,11 +378,11 @@ class SliderTrial(NamedTuple):
 
 
 KEPT_SLIDER = 5
-"""Numbers of a slider that a repeated macro step begins with."""
+"""The same of a slider."""
 
 
 class Scratch(NamedTuple):
-    """Memory of the time loop: it cannot ask for any itself."""
+    """Memory of the time loop, which cannot ask for any."""
 
     nodes: NodeTrial
     flows: FlowTrial

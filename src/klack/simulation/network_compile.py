@@ -82,7 +82,7 @@ class PortName:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CompiledNetwork:
-    """All arrays of the time loop, and the words that belong to them.
+    """All arrays of the time loop, with their names.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class CompiledNetwork:
     kinks [s]
         Of :func:`klack.simulation.step_sizes.kinks`.
     node_order
-        Handle of every node of the loop.
+        Handle of every node.
     body_blocks (bodies + 1,)
         First block of each body.
     moving
@@ -222,7 +222,7 @@ def _number_ports(rows: Sequence[BodyRow]) -> tuple[dict[int, int], tuple[PortNa
 
 
 def compile_bodies(rows: Sequence[BodyRow], steps: Sequence[float]) -> tuple[Bodies, Index]:
-    """Lay out the modes in blocks for each step size; also the first block of each body."""
+    """Lay out the modes in blocks for each step size; also return the first block of each body."""
     laid_out: tuple[list[Vector], ...] = tuple([] for _ in steps)
     start, count, port0, port1 = [0], list[int](), list[int](), list[int]()
     blocks = [0]
@@ -564,7 +564,7 @@ def _sliders(
 
 
 def _speed_per_force(rows: Sequence[BodyRow], steps: Sequence[float]) -> Vector:
-    """Speed of each port at the end of a step per force at another, shape (SIZES, PORTS, PORTS)."""
+    """Speed of each port at the end of a step per force at another, (SIZES, PORTS, PORTS)."""
     found = np.zeros((len(steps), PORTS, PORTS))
     for level, h in enumerate(steps):
         first = 0
@@ -578,7 +578,7 @@ def _speed_per_force(rows: Sequence[BodyRow], steps: Sequence[float]) -> Vector:
 
 
 def _jumps(upper: Index, lower: Index) -> Vector:
-    """Displacement between two ports per displacement of each port, shape (n, PORTS)."""
+    """Displacement between two ports per displacement of each port, (n, PORTS)."""
     jump = np.zeros((len(upper), PORTS))
     jump[np.arange(len(upper)), upper] += 1.0
     jump[np.arange(len(lower)), lower] -= 1.0

@@ -1,4 +1,4 @@
-"""Energy balance of a run: what is held at a moment, what came in and was lost between two."""
+"""Energy balance of a run: stores at a moment, supplies and losses between two."""
 
 from collections.abc import Mapping
 
@@ -26,7 +26,7 @@ from klack.simulation.wave_rows import wave_store
 __all__ = ["WITHIN_STEPS", "balance_since", "energy_stores", "reset_accounts"]
 
 WITHIN_STEPS = "forces that change within steps"
-"""Supply [J]: work that they do beyond that of their mean over a macro step, of either sign."""
+"""Supply [J]: work beyond that of the mean over a macro step, of either sign."""
 
 
 def reset_accounts(network: CompiledNetwork) -> None:
@@ -42,9 +42,9 @@ def reset_accounts(network: CompiledNetwork) -> None:
 def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
     """Work [J] of the last forces, port by port, that elements and fluid see in the next step.
 
-    They are behind the bodies by what the guess of the last step missed.  The differences of the
-    forces times it cancel or are repaid; at the ends of a run the whole force counts, and of a
-    preloaded needle that is far more than what moves it.  Contacts and films, too.
+    They are behind the bodies by what the guess of the last step missed.  Times the differences
+    of the forces this cancels or is repaid; at the ends of a run the whole force counts, and of a
+    preloaded needle that is far more than what moves it.  The same holds for contacts and films.
     """
     at, rows, state = network.bodies.at, network.interfaces, network.interface_state
     force, end, seen = (at[row : row + PORTS] for row in (LAST, Y0, SEEN))
@@ -67,8 +67,8 @@ def _unseen_work(network: CompiledNetwork) -> NDArray[np.float64]:
 def energy_stores(network: CompiledNetwork) -> dict[str, float]:
     """Energy [J] that each part holds now, by name.
 
-    Of a body without the work that elements have still to see; of the first one also without what
-    bodies got beyond their due, which the next steps take back.
+    Bodies are counted without the work that elements have still to see, and the first one without
+    what bodies got beyond their due, which the next steps take back.
     """
     rows, nodes, state = network.rows, network.nodes, network.node_state
     interfaces, touching = network.interfaces, network.interface_state
@@ -116,10 +116,7 @@ def energy_stores(network: CompiledNetwork) -> dict[str, float]:
 
 
 def balance_since(network: CompiledNetwork, before: Mapping[str, float]) -> EnergyBooks:
-    """Energy balance from the moment of ``before`` until now.
-
-    The damping of modes is what is missing in the balance of its body.
-    """
+    """Energy balance since the moment of ``before``; modal damping is what a body misses."""
     rows, nodes, accounts = network.rows, network.nodes, network.accounts
     after = energy_stores(network)
     supplies: dict[str, float] = {}

@@ -1,13 +1,13 @@
 r"""Phases of a step for gas that leaves and enters the liquid of chambers with time constants.
 
-The law of the mixture is that of :mod:`klack.hydraulics.gas_release`; its share is found with the
-pressures of a step.  Then flows carry it: with the flows ``q`` of a step ``H``,
+The share of free gas by :mod:`klack.hydraulics.gas_release` is found with the pressures of a step.
+Then the flows ``q`` of a step ``H`` carry it:
 
 .. math:: \Bigl(m_i + H \sum_j q_{ji}\Bigr) y_i^* - H \sum_j q_{ji}\,y_j^* = m_i\,y_i
 
 mixes what flows in, with the share of the chamber that it leaves (implicit upwind): shares stay
-between those of all chambers, and no gas is made or lost on the way.  A given pressure gives fluid
-at equilibrium.  The next step begins with these shares.
+between those of all chambers, and no gas is made or lost.  A given pressure gives fluid at
+equilibrium.  The next step begins with these shares.
 """
 
 from math import expm1
@@ -45,10 +45,10 @@ __all__ = [
 def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
     """Gauss without pivoting and without subtracting, ``A`` row by row and its column sums ``own``.
 
-    What leaves a volume fills another: beside the diagonal ``A`` is below zero, and its column sums
-    are what a pressure changes in all volumes together, above zero.  Pivots follow from these sums
-    (Grassmann, Taksar & Heyman 1985), the diagonal is not looked at.  So a wide channel between two
-    almost empty volumes, whose storage is less than the round-off of its flow, is solved as well.
+    Off the diagonal ``A`` is below zero, since what leaves a volume fills another; its column sums,
+    what a pressure changes in all volumes together, are above zero.  Pivots follow from these sums
+    (Grassmann, Taksar & Heyman 1985), not from the diagonal, which solves even a wide channel
+    between two almost empty volumes, whose storage is less than the round-off of its flow.
     """
     for k in range(n):
         pivot = own[k]
@@ -72,7 +72,7 @@ def solve_mass_balance(A: Any, own: Any, r: Any, n: int) -> None:
 
 
 def require_chambers(rows: Rows) -> None:
-    """Refuse parts that hold fluid and cannot tell how much of its gas is free."""
+    """Reject parts that hold fluid without a share of free gas."""
     wrong = [row.component for row in rows.lines] + [row.component for row in rows.waves]
     wrong += [row.component for row in rows.branches if row.step is fluid_store_step]
     if wrong:
@@ -85,7 +85,7 @@ def require_chambers(rows: Rows) -> None:
 
 
 def settle_gas(nodes: Nodes, state: NodeState) -> None:
-    """Let all chambers begin with the share of equilibrium."""
+    """Start all chambers with the share of equilibrium."""
     for i in range(nodes.volumes * nodes.slow_gas):
         state.free[i], _ = settled_share(nodes.gas, state.p[i])
         state.dissolved[i] = state.mass[i] * (1.0 - state.free[i])
@@ -100,7 +100,7 @@ def dissolution_energy(nodes: Nodes, state: NodeState, i: int) -> float:
 
 @compiled(_nrt=False, error_model="numpy")
 def begin_gas(fluid: Any, H: float) -> None:
-    """Ways to equilibrium that release and absorption go in a step."""
+    """Shares of the way to equilibrium that release and absorption cover in a step."""
     law, trial = fluid.nodes.gas, fluid.trial
     trial.freed[0] = -expm1(-H / law[5])
     trial.taken[0] = -expm1(-H / law[6])
@@ -137,7 +137,7 @@ def look_up_mixture(fluid: Any) -> None:
 
 @compiled(_nrt=False, error_model="numpy")
 def pressure_of_mixture(fluid: Any, i: int, rho: float) -> float:
-    """Pressure at the end of the step at which a chamber has this density."""
+    """Pressure at the end of the step for this density of a chamber."""
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     p, state.hint[i] = mixture_pressure(
         nodes.fluid,
@@ -163,7 +163,7 @@ def end_energy(fluid: Any) -> None:
 
 @compiled(_nrt=False, error_model="numpy")
 def end_gas(fluid: Any, H: float, accounts: Any) -> None:
-    """Take over the shares of all chambers, with their energy, and mix what flows in."""
+    """Accept the shares of all chambers, with their energy, and mix what flows in."""
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     law = nodes.gas
     for i in range(nodes.volumes):
@@ -183,7 +183,6 @@ def end_gas(fluid: Any, H: float, accounts: Any) -> None:
 
 @compiled(_nrt=False, error_model="numpy")
 def _mix(fluid: Any, H: float) -> None:
-    """Solve for the shares of all chambers after the flows of the step."""
     nodes, state, trial, branches = fluid.nodes, fluid.state, fluid.trial, fluid.branches
     n, A, own, y = nodes.volumes, trial.matrix, trial.own, trial.share
     for i in range(n):

@@ -1,11 +1,9 @@
 """Phases of a step for interfaces: contacts and films between bodies.
 
-Phases of a step for interfaces far apart: their films answer once per macro step.
-
-The film of an open interface changes little in a macro step as long as its gap does, so sub-steps
-need not ask it.  It answers for the way really gone, as elements do, and its force is among theirs
-(rows ``ANSWER``, ``BEFORE``, ``LAST``) for so long: guessed, asked, repaired, judged with them.
-The mean force over a gap that goes from one value to another is exact at any length of the step.
+The film of an open interface far apart changes little in a macro step, so sub-steps leave it out.
+It answers once for the motion that happened, as elements do, and its force is guessed, asked,
+repaired and judged among theirs (rows ``ANSWER``, ``BEFORE``, ``LAST``).  The mean force over a gap
+that goes from one value to another is exact at any length of the step.
 """
 
 from typing import Any
@@ -94,14 +92,14 @@ def begin_interfaces(contacts: Any, peaks: Any) -> None:
 
 @phase
 def forget_interfaces(contacts: Any) -> None:
-    """Forces of the last step, where a step was discarded."""
+    """Forces of the last step, after a discarded one."""
     for c in range(contacts.rows.interfaces):
         contacts.trial.force[c] = contacts.state.force[c]
 
 
 @phase
 def _steady(before: float, now: float, share: float = 1.0) -> bool:
-    """Whether a contact at rest carries a force that macro steps follow, in a ``share`` of one."""
+    """Whether macro steps follow the force of a contact at rest, within a ``share``."""
     return abs(now - before) <= share * _SHAKEN * max(abs(now), abs(before))
 
 
@@ -138,7 +136,7 @@ def may_fly(contacts: Any, now: float, length: float) -> bool:
 def push_by_guess(contacts: Any, sliding: Any, bodies: Any, late: float) -> None:
     """Forces of the ports: the guess of elements and fluid, and those of the sub-step so far.
 
-    ``late`` is where in the macro step the middle of the sub-step is, of its length, -1/2 to 1/2.
+    ``late``: place of the middle of the sub-step in the macro step, -1/2 to 1/2.
     """
     rows, force, S = contacts.rows, contacts.trial.force, bodies.at
     for p in range(bodies.ports + 1):
@@ -158,15 +156,10 @@ def gap_between(rows: Any, S: Any, c: int) -> float:
 
 @phase
 def solve_interfaces(contacts: Any, sliding: Any, bodies: Any, G: Any, step: Step) -> bool:
-    """Forces of all interfaces and sliders, one after another, until they agree with each other.
+    """Forces of all interfaces and sliders, in turn until they agree; whether they do.
 
-    Each moves the ports of its two bodies.  All live on the gaps and ways that they saw, which the
-    last change of the others moved; they catch up in the next step.
-
-    Returns
-    -------
-    bool
-        Whether what is left of that change matters no more.
+    Each moves the ports of its two bodies.  All live on the gaps and displacements that they saw,
+    which the last change of the others moved; they catch up in the next step.
     """
     rows, state, trial, S = contacts.rows, contacts.state, contacts.trial, bodies.at
     for sweep in range(_MOST_SWEEPS):
@@ -250,7 +243,7 @@ def _solve_interface(contacts: Any, S: Any, c: int, step: Step) -> None:
 
 @phase
 def coarse_step_holds(contacts: Any) -> bool:
-    """Whether a coarse step met nothing that it cannot see: a touch, a release, a film."""
+    """Whether a coarse step met nothing that it cannot resolve: a touch, a release, a film."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     holds = True
     for c in range(rows.interfaces):
@@ -266,7 +259,7 @@ def coarse_step_holds(contacts: Any) -> bool:
 
 @phase
 def _remembered(contacts: Any, accounts: Any, peaks: Any) -> tuple[Any, ...]:
-    """What a repeated macro step begins with, its gap second and its force fourth."""
+    """What a repeated macro step starts from, its gap second and its force fourth."""
     state = contacts.state
     return (
         state.e,
@@ -288,7 +281,7 @@ def _remembered(contacts: Any, accounts: Any, peaks: Any) -> tuple[Any, ...]:
 def begin_macro_interfaces(
     contacts: Any, accounts: Any, recording: Recording, sums: Any, peaks: Any
 ) -> None:
-    """Keep what a repeated macro step begins with."""
+    """Keep what a repeated macro step starts from."""
     state, trial = contacts.state, contacts.trial
     for c in range(contacts.rows.interfaces):
         k = KEPT * c
@@ -344,8 +337,8 @@ def take_back_interfaces(
 def smooth_films(contacts: Any, H: float, middle: float) -> bool:
     """Whether films follow steps of ``middle`` [s] for the next ``H`` [s].
 
-    Not where the gap changes much meanwhile, nor about a release: the film that begins then decides
-    how fast the bodies part.
+    Not where the gap changes much meanwhile, nor about a release: the film that begins then
+    determines how fast the bodies part.
     """
     rows, state = contacts.rows, contacts.state
     smooth = True
@@ -427,11 +420,8 @@ def cost_of_catching_up(contacts: Any, S: Any) -> tuple[float, float]:
 def end_macro_interfaces(contacts: Any, S: Any, step: Step, longest: float) -> float:
     """End a macro step of interfaces, one of ``longest`` [s] at most.
 
-    Returns
-    -------
-    float [J]
-        Energy that bodies got before beyond what the interfaces give: each was behind by what had
-        been missed, until its first sub-step.
+    Returns the energy [J] that bodies got beyond what the interfaces give: each was behind by what
+    had been missed, until its first sub-step.
     """
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     excess = 0.0
@@ -458,10 +448,7 @@ def end_interfaces(
     sums: Any,
     peaks: Any,
 ) -> None:
-    """Take over gaps, forces and compressions of all interfaces, and record what acted.
-
-    ``first`` is for the first step of a macro step.
-    """
+    """Accept gaps, forces and compressions, and record them; ``first`` in its macro step."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     for c in range(rows.interfaces):
         if state.far[c] != 0.0:
@@ -492,9 +479,9 @@ def end_interfaces(
 
 @phase
 def _opening(bodies: Any, recording: Recording, c: int, level: int) -> float:
-    """Speed at which the centres of mass part where the step begins [m/s].
+    """Speed at which the centres of mass part at the start of the step [m/s].
 
-    Modes have moved freely since, which leaves those of a body as a whole their speed.
+    Modes have moved freely since, which does not change the speed of a body as a whole.
     """
     at = recording.parting
     upper = port_speed(bodies, level, at[c, 0], at[c, 1], -1)
@@ -512,13 +499,7 @@ def end_force(
     sums: Any,
     peaks: Any,
 ) -> float:
-    """Take over what one interface did in a step that ends at this gap, with its losses.
-
-    Returns
-    -------
-    float [m]
-        By how much the gap is larger from now on, because the faces have yielded.
-    """
+    """Accept a step of one interface that ends at ``gap``; the growth [m] of gaps by yielding."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     settled = 0.0
     contact, film = trial.contact[c], trial.film[c]
@@ -552,7 +533,7 @@ def end_force(
 
 @phase
 def _record_step(recording: Recording, c: int, step: Step, trial: Any, gap: float) -> None:
-    """Keep one step in which an interface carried force, as long as there is room."""
+    """Keep one step in which an interface carried force, while there is room."""
     place = recording.filled[c]
     if place < recording.fine.shape[1]:
         recording.fine[c, place, 0] = step.t
@@ -572,7 +553,7 @@ _NEAR = 0.5  # of the gap at the start: far ones do not come so near
 
 @phase
 def mark_far_ones(contacts: Any, bodies: Any, level: int, H: float) -> None:
-    """Mark the interfaces that the sub-steps of the next macro step of this size leave out."""
+    """Mark the interfaces that sub-steps of the next macro step of this size leave out."""
     rows, state = contacts.rows, contacts.state
     for c in range(rows.interfaces):
         gap, way = state.gap[c], abs(state.rate[c]) * H
@@ -602,7 +583,7 @@ def mark_none_far(contacts: Any, bodies: Any) -> None:
 
 @phase
 def _take_turns(contacts: Any, S: Any, c: int, far: bool) -> None:
-    """Bring the force of an interface among those of elements, or take it out, as it was last."""
+    """Add the last force of an interface to those of elements, or take it out."""
     rows, state = contacts.rows, contacts.state
     if far == (state.far[c] != 0.0):
         return
@@ -628,7 +609,7 @@ def far_ones_stay(contacts: Any, S: Any) -> bool:
 
 @phase
 def push_by_far_films(contacts: Any, S: Any, step: Step) -> None:
-    """Forces of films far apart for the way that their gaps went."""
+    """Forces of films far apart for the motion of their gaps."""
     rows, state, trial = contacts.rows, contacts.state, contacts.trial
     force = shift(S, ANSWER)
     for c in range(rows.interfaces):

@@ -1,17 +1,16 @@
 """The time loop of a network: bodies, elements, fluid nodes, branches, lines, contacts and films.
 
-One macro step ``H = M h`` while what elements and fluid do is slow beside it:
+One macro step ``H = M h`` while elements and fluid are slow beside it:
 
 1. **Guess** the forces of elements and fluid, their mean over the macro step and an even rise.
-2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far from
-   each other or at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of
-   one where films change fast.  A sub-step, or a fine step, in which a contact closes or opens is
-   cut into parts.
-3. **Answer**: elements, pressures and lines are asked once, for the way that their ports went.
+2. **Act**: modes move exactly; contacts, films and dry friction find their mean forces.  Far apart
+   or at rest, in one step of ``H``; else in sub-steps of a few fine ones ``h``, or of one where
+   films change fast.  A sub-step in which a contact closes or opens is cut into parts.
+3. **Answer**: elements, pressures and lines are asked once, for the motion of their ports.
 4. **Repair**: what the guess missed of their forces acts as if it had acted all the time.  Modes
-   are linear, so that adding the response is exact.  Elements, fluid and interfaces see the
-   displacement ``d`` that it makes in the next macro step; of the energy this costs
-   ``d`` times the change of the forces meanwhile.
+   are linear, so that is exact.  Elements, fluid and interfaces see the displacement ``d`` that it
+   makes in the next macro step; of the energy this costs ``d`` times the change of the forces
+   meanwhile.
 5. **Judge**: where that is more than a small share of the work of the step, the macro step is
    repeated with the answer as the guess.
 
@@ -154,7 +153,7 @@ MACRO_REPEATS = 6  # without success: fine steps
 
 
 class _Loop(NamedTuple):
-    """All that the loop works on; bundles of pointers but for lines and records."""
+    """All that the loop works on; pointers but for lines and records."""
 
     bodies: Bodies
     elements: StepRows
@@ -194,8 +193,8 @@ def run_network(
     """Integrate ``macros`` blocks of ``M`` fine steps, in place.
 
     ``near`` fine steps are a macro step about a touch, ``R`` of them a sub-step while films are
-    smooth.  ``clock`` counts: see :data:`CLOCK`; its time zero is at ``origin``.  ``report`` gets
-    the row of a failure, its status and its time.
+    smooth.  ``clock`` counts: :data:`CLOCK`, from time ``origin`` on.  ``report`` gets the row of a
+    failure, its status and its time.
     """
     loop = _begin(network, recording, scratch)
     bodies, contacts = loop.bodies, loop.contacts
@@ -318,7 +317,7 @@ def _steps_of(level: int, M: int, near: int) -> int:
 
 @unfolded
 def _begin(network: NetworkArrays, recording: Recording, scratch: Scratch) -> _Loop:
-    """Begin a run: no force is pending, no density known, nothing summed."""
+    """Begin a run: no force pending, no density known, nothing summed."""
     loop = _Loop(
         bodies=pointers(network.bodies),
         elements=pointers(network.elements),
@@ -370,10 +369,10 @@ def _settle(
     clock: Any,
     report: Any,
 ) -> int:
-    """One step up to what it would change: again and again, until its guess missed nothing.
+    """One step up to its end, repeated until its guess missed nothing.
 
-    ``whole`` where what acts cannot be cut, so that its free motion is asked once; ``ratio`` is
-    its length over that of the step before, 0 where there was none.
+    ``whole``: it cannot be cut, so that its free motion is computed once; ``ratio``: its length
+    over that of the step before, 0 without one.
 
     Returns
     -------
@@ -432,12 +431,7 @@ def _act(
     """Modes, contacts and films over one step, or over all sub-steps of a macro step.
 
     A step that may meet a touch, a release or a film that begins to cavitate is cut there.
-
-    Returns
-    -------
-    int
-        ``STATUS_DONE``; ``STATUS_MET``; ``STATUS_REFUSED``; ``STATUS_FORCES`` where contacts do not
-        settle in a fine step.
+    Returns also ``STATUS_FORCES`` where contacts do not settle in a fine step.
     """
     bodies, contacts, sliding = loop.bodies, loop.contacts, loop.sliding
     move = first or not whole
@@ -543,7 +537,7 @@ def _slider_sums(loop: Any) -> Any:
 def push_by_rows(
     step: Step, bodies: Any, elements: Any, fluid: Any, contacts: Any, report: Any
 ) -> int:
-    """Forces of elements, fluid and far films for the way that their ports went."""
+    """Forces of elements, fluid and far films for the motion of their ports."""
     S = bodies.at
     for i in range(row_length(bodies)):
         S[ANSWER + i] = 0.0
@@ -558,11 +552,11 @@ def push_by_rows(
 
 @phase
 def moved_by_round_off(G: Any, ports: int, elements: Any, fluid: Any, contacts: Any) -> float:
-    """Displacement that the round-off of the forces of a sweep makes [m], the largest of a port.
+    """Largest displacement of a port by the round-off of the forces of a sweep [m].
 
-    Forces that hold each other in balance leave a sum of nothing, but not without the round-off of
-    each.  A pressure that follows from the mass in a volume is known to the round-off of that mass
-    times the bulk modulus ``rho dp/drho``.  ``G`` of its level is zero between bodies.
+    Forces in balance leave a sum of nothing, but not without the round-off of each.  A pressure
+    follows from the mass in a volume to the round-off of that mass times the bulk modulus
+    ``rho dp/drho``.  ``G`` of its level is zero between bodies.
     """
     nodes, trial, largest = fluid.nodes, fluid.trial, 0.0
     for port in range(ports):
@@ -584,7 +578,7 @@ def moved_by_round_off(G: Any, ports: int, elements: Any, fluid: Any, contacts: 
 
 @phase
 def _moved_by_rows(G: Any, rows: Any, total: float) -> float:
-    """Add what each force of elements or branches moves one port by, whatever its sign."""
+    """Add what the magnitude of each force of elements or branches moves one port by."""
     for k in range(rows.rows):
         o0, q0 = rows.output0[k] + rows.head, rows.port0[k]
         for j in range(q0, rows.port0[k + 1]):

@@ -91,7 +91,7 @@ _ROUND_OFF = 4e-16  # of the displacements themselves
 
 @phase
 def row_length(bodies: Any) -> int:
-    """Ports with the ground, in whole vector registers."""
+    """Ports with the ground, rounded up to whole vector registers."""
     return 4 * (bodies.ports // 4 + 1)
 
 
@@ -105,7 +105,7 @@ def begin_ports(bodies: Any) -> None:
 
 @phase
 def block_of(bodies: Any, k: int, level: int) -> Any:
-    """Numbers of a block of modes, with the matrices of a size of step."""
+    """Numbers of a block of modes, with the matrices of a step size."""
     return shift(bodies.laid_out, level * bodies.size + bodies.start[k])
 
 
@@ -118,7 +118,7 @@ def _copy_state(bodies: Any, source: int, target: int) -> None:
 
 @phase
 def bring(bodies: Any, source: int, target: int) -> None:
-    """Bring the modes from one size of step to another, with the forces that are pending."""
+    """Bring the modes from one step size to another, with the pending forces."""
     S = bodies.at
     for k in range(bodies.blocks):
         block = block_of(bodies, k, source)
@@ -131,7 +131,7 @@ def bring(bodies: Any, source: int, target: int) -> None:
 
 @phase
 def keep_modes(bodies: Any, level: int) -> None:
-    """Keep the state of the modes, where another size of step has none meanwhile."""
+    """Keep the state of the modes, where another step size has none meanwhile."""
     _copy_state(bodies, level, _kept_at(level))
 
 
@@ -142,13 +142,13 @@ def _kept_at(level: int) -> int:
 
 @phase
 def keep_for_cut(bodies: Any, level: int) -> None:
-    """Keep the state of the modes where a sub-step begins, for the parts it may be cut into."""
+    """Keep the state of the modes at the start of a sub-step that may be cut."""
     _copy_state(bodies, level, CUT)
 
 
 @phase
 def _kick_block(bodies: Any, k: int, level: int, of: int, forces: int, row: int) -> float:
-    """Let the forces of a row have acted over a step of size ``of``; the energy that this adds."""
+    """Add the response to the forces of a row over a step of size ``of``; its energy."""
     block, step = block_of(bodies, k, level), block_of(bodies, k, of)
     port0, port1 = bodies.port0[k], bodies.port1[k]
     return kick(block, step, bodies.modes[k], shift(bodies.at, forces), port0, port1, row)
@@ -156,7 +156,7 @@ def _kick_block(bodies: Any, k: int, level: int, of: int, forces: int, row: int)
 
 @phase
 def begin_cut(bodies: Any, level: int) -> None:
-    """Begin a sub-step once more, in parts, with the forces that were pending."""
+    """Begin a sub-step once more, in parts, with the forces pending then."""
     S = bodies.at
     for k in range(bodies.blocks):
         _kick_block(bodies, k, CUT, level, PENDING, ROW_B1)
@@ -166,7 +166,7 @@ def begin_cut(bodies: Any, level: int) -> None:
 
 @phase
 def begin_macro_step(bodies: Any) -> None:
-    """Keep what a repeated macro step begins with."""
+    """Keep what a repeated macro step starts from."""
     S = bodies.at
     for i in range(row_length(bodies)):
         S[BEGIN + i] = S[Y0 + i]
@@ -190,7 +190,7 @@ def take_back_ports(bodies: Any, level: int, kept: bool) -> None:
 
 @phase
 def move_free(bodies: Any, level: int) -> None:
-    """Move all modes over the step, without its forces; those of the last step are pending."""
+    """Move all modes over the step without its forces; those of the last step are pending."""
     S = bodies.at
     for i in range(row_length(bodies)):
         S[FREE + i] = 0.0
@@ -202,7 +202,7 @@ def move_free(bodies: Any, level: int) -> None:
 
 @phase
 def guess_forces(bodies: Any) -> None:
-    """Forces of elements and fluid on the parabola through those of the last three steps."""
+    """Forces of elements and fluid on the parabola through the last three steps."""
     S = bodies.at
     for i in range(row_length(bodies)):
         S[GUESS + i] = 3.0 * (S[BEFORE + i] - S[BEFORE_2 + i]) + S[BEFORE_3 + i]
@@ -211,10 +211,7 @@ def guess_forces(bodies: Any) -> None:
 
 @phase
 def guess_rise(bodies: Any, ratio: float) -> None:
-    """Forces rise as they did in the last step, of which this one is ``ratio`` times as long.
-
-    0 for a fine step, in which they do not rise.
-    """
+    """Forces rise as in the last step, ``1/ratio`` times as long; 0 for a fine step: no rise."""
     S = bodies.at
     for i in range(row_length(bodies)):
         rise = ratio * (S[RISE + i] + S[RISE_MISSED + i])
@@ -226,8 +223,8 @@ def guess_rise(bodies: Any, ratio: float) -> None:
 def respace_forces(bodies: Any, ratio: float) -> None:
     """Forces of the last three steps as if they had been longer by ``ratio``.
 
-    They are means, so on the same parabola in the middle of such steps.  Longer ones that reach far
-    beyond what is known begin with the last force.
+    As means they lie on the same parabola.  Longer steps that reach far beyond what is known begin
+    with the last force.
     """
     S = bodies.at
     for i in range(row_length(bodies)):
@@ -244,7 +241,7 @@ def respace_forces(bodies: Any, ratio: float) -> None:
 
 @phase
 def guess_answer(bodies: Any) -> None:
-    """Take the forces that elements and fluid gave as the guess of the repeated step."""
+    """Take the forces that elements and fluid gave as the next guess."""
     S = bodies.at
     for i in range(row_length(bodies)):
         S[GUESS + i] = S[ANSWER + i]
@@ -253,7 +250,7 @@ def guess_answer(bodies: Any) -> None:
 
 @phase
 def _port_end(bodies: Any, G: Any, p: int, force: int) -> float:
-    """Displacement of a port under the forces of its body, those of row ``force``."""
+    """Displacement of a port under the forces of its body in row ``force``."""
     S, total = bodies.at, 0.0
     for j in range(bodies.first[p], bodies.last[p]):
         total += G[p * PORTS + j] * S[force + j]
@@ -264,8 +261,8 @@ def _port_end(bodies: Any, G: Any, p: int, force: int) -> float:
 def move_ports_by_guess(bodies: Any, G: Any) -> None:
     """Displacements at the end of a step under the forces so far; ``G`` of its level.
 
-    These loops over ports stay scalar on purpose: a vector that is loaded from numbers stored one
-    by one a moment before has to wait until they have left the store buffer.
+    Loops over ports stay scalar: a vector loaded from numbers stored one by one a moment before
+    waits until they have left the store buffer.
     """
     S = bodies.at
     for p in range(bodies.ports):
@@ -274,7 +271,7 @@ def move_ports_by_guess(bodies: Any, G: Any) -> None:
 
 @phase
 def _turned(bodies: Any, level: int, p: int, rise: int) -> float:
-    """Displacement of a port by forces of row ``rise``, whose mean over the step is none."""
+    """Displacement of a port by forces of row ``rise``, whose mean over the step is zero."""
     return _port_end(bodies, shift(bodies.Gr, level * PORTS * PORTS), p, rise)
 
 
@@ -288,7 +285,7 @@ def turn_ports(bodies: Any, level: int) -> None:
 
 @phase
 def move_body(bodies: Any, G: Any, port: int, change: float, moved: float) -> float:
-    """Move the ports of a body by a change of the force at one of them; the largest move so far."""
+    """Move the ports of a body by a changed force at one of them; the largest move so far."""
     S = bodies.at
     for i in range(bodies.first[port], bodies.last[port]):
         way = G[i * PORTS + port] * change
@@ -299,9 +296,9 @@ def move_body(bodies: Any, G: Any, port: int, change: float, moved: float) -> fl
 
 @phase
 def port_speed(bodies: Any, level: int, block0: int, block1: int, row: int) -> float:
-    """Velocity of a row of the shapes [m/s], of the last one for -1, over the blocks of a body.
+    """Velocity of a row of shapes [m/s] over the blocks of a body, -1 for the last row.
 
-    That of the modes as they are, without the forces that are pending.
+    Pending forces are not included.
     """
     total = 0.0
     for k in range(block0, block1):
@@ -314,7 +311,7 @@ def port_speed(bodies: Any, level: int, block0: int, block1: int, row: int) -> f
 
 @phase
 def end_sub_step(bodies: Any, late: float) -> None:
-    """Take over displacements and the work of interfaces; the forces stay pending.
+    """Accept displacements and the work of interfaces; the forces stay pending.
 
     ``late`` as in ``push_by_guess``: the share of the rise is taken out of the forces.
     """
@@ -330,10 +327,7 @@ def end_sub_step(bodies: Any, late: float) -> None:
 
 @phase
 def miss(bodies: Any, G: Any) -> None:
-    """What the guess missed, and the displacements that it makes over the whole macro step.
-
-    Modes are linear: the response to a constant force adds to what they did without it.
-    """
+    """What the guess missed, and the displacements that it makes over the whole macro step."""
     S = bodies.at
     for p in range(bodies.ports):
         S[MISSED + p] = S[ANSWER + p] - S[GUESS + p]
@@ -360,7 +354,7 @@ def miss_rise(bodies: Any, level: int, ratio: float) -> None:
 
 @phase
 def matters(bodies: Any, level: int, share: float, energy: float, left: float, work: float) -> bool:
-    """Whether what the guess missed matters: then the step is repeated with a better one.
+    """Whether what the guess missed matters, so that the step is repeated.
 
     ``left`` and ``work`` are what the interfaces add to both sums.  Elements and fluid live
     ``d = AHEAD`` behind the bodies, and catch up in the next step: of ``F dy`` the energy
@@ -388,7 +382,7 @@ def matters(bodies: Any, level: int, share: float, energy: float, left: float, w
 
 @phase
 def largest_missed(bodies: Any) -> float:
-    """Longest displacement of a port that the missed force makes [m]."""
+    """Largest displacement of a port by the missed force [m]."""
     moved = 0.0
     for p in range(bodies.ports):
         moved = max(moved, abs(bodies.at[AHEAD + p]))
@@ -397,7 +391,7 @@ def largest_missed(bodies: Any) -> float:
 
 @phase
 def finite(bodies: Any) -> bool:
-    """Whether all ports are somewhere; looked at while it can be seen which part is to blame."""
+    """Whether all ports are finite; checked while the part to blame can be found."""
     total = 0.0
     for p in range(bodies.ports):
         total += bodies.at[Y1 + p] + bodies.at[AHEAD + p]
@@ -406,11 +400,11 @@ def finite(bodies: Any) -> bool:
 
 @phase
 def repay(bodies: Any, G: Any) -> None:
-    """Take the energy that bodies got beyond what was given to them back, by a minute force.
+    """Take back the energy that bodies got beyond what was given to them, by a minute force.
 
     Elements, fluid and interfaces see what was missed a step late, at the forces of that step.  The
-    force acts where the way is longest, and is limited: then the rest is left for the next step.
-    About a body at rest it must not nudge more than it repays.
+    force acts where the displacement is largest, and is limited: then the rest is left for the next
+    step.  A body at rest must not be nudged by more than is repaid.
     """
     S = bodies.at
     port, longest, largest = 0, 0.0, 0.0
@@ -441,15 +435,14 @@ def _response(bodies: Any, level: int, port: int) -> float:
 def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
     """Let what the guess missed act as if it had acted all the time, in the macro step ``macro``.
 
-    Its modal response is that of a constant force over the macro step; where this was ``one_step``
-    it only joins the forces that are pending.  Counted are the work on the bodies, and the energy
-    that they got beyond what is given to them: elements and fluid are behind by what was missed
-    before, interfaces will be by what is missed now.
+    The response is that to a constant force over the macro step; in ``one_step`` it only joins the
+    pending forces.  Counted are the work on the bodies, and the energy beyond what is given to
+    them: elements and fluid are behind by what was missed before, interfaces will be by what is
+    missed now.
 
     The rise of the forces acts after that, all of it in ``one_step``, else what is missing of it.
-    Parts see the displacement that it makes, under the mean forces, and so give a work that
-    differs from what bodies get: this is no excess, since a force that rises while a body speeds
-    up does more than its mean.
+    Parts see the displacement that it makes under the mean forces; the difference of the works is
+    no excess, since a force that rises while a body speeds up does more than its mean.
     """
     S = bodies.at
     excess, rise = 0.0, RISE_MISSED
@@ -494,7 +487,7 @@ def catch_up(bodies: Any, level: int, macro: int, one_step: bool) -> None:
 
 @phase
 def _rise(bodies: Any, p: int, ratio: float) -> float:
-    """Rise over a step, ``ratio`` times as long as the one before; none known without one (0)."""
+    """Rise over a step ``ratio`` times as long as the one before; 0 without one."""
     S = bodies.at
     return 2.0 * ratio / (1.0 + ratio) * (S[ANSWER + p] - S[MEAN + p])
 

@@ -98,9 +98,9 @@ def _table(time: Any, value: Any, first: int, last: int, t: float) -> float:
 def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
     r"""Pressures of volumes as they were, or ``straight`` on; given ones at the end of the step.
 
-    What acts in the step is :math:`\hat p = \theta p_1 + (1 - \theta) p_0`: of second order for
-    :math:`\theta = 1/2`, which would let a pressure that flows balance at the rate :math:`k` swing
-    about its end where :math:`k H > 2`; :math:`\theta = 1 - 1/(k H)` is the smallest that does not.
+    What acts is :math:`\hat p = \theta p_1 + (1 - \theta) p_0`: of second order for :math:`\theta =
+    1/2`, which would let a pressure that flows balance at the rate :math:`k` oscillate where
+    :math:`k H > 2`; :math:`\theta = 1 - 1/(k H)` is the smallest that does not.
     """
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     for i in range(nodes.chambers, nodes.volumes):
@@ -126,10 +126,10 @@ def guess_pressures(fluid: Any, end: float, H: float, straight: bool) -> None:
 
 @phase
 def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
-    """All pressures and flows at the end of the step, with ports where the last sweep left them.
+    """Pressures and flows at the end of the step, with ports where the last sweep left them.
 
-    Newton's method, in which the cavities of the junctions are those of the linear equations of
-    each iteration: see :func:`_cavities_change`.
+    The cavities of the junctions are those of the linear equations of each Newton iteration: see
+    :func:`_cavities_change`.
     """
     nodes, trial = fluid.nodes, fluid.trial
     p, r = trial.p, trial.r
@@ -187,8 +187,8 @@ def solve_pressures(fluid: Any, S: Any, step: Step, report: Any) -> int:
 def _fully_implicit(fluid: Any) -> bool:
     """Let volumes that boil or fill within the step feel its end alone; whether any did not.
 
-    Between both ends the energy of such a volume is no parabola: a mean pressure could return more
-    than the step loses.  With the pressure of its end it cannot, as that energy is convex.
+    Its energy is no parabola in between: a mean pressure could return more than the step loses,
+    that of the end cannot, as the energy is convex.
     """
     nodes, state, trial, changed = fluid.nodes, fluid.state, fluid.trial, False
     for i in range(nodes.chambers):
@@ -203,7 +203,7 @@ def _fully_implicit(fluid: Any) -> bool:
 
 @phase
 def _is_curved(slope: float, before: float) -> bool:
-    """Whether the slope of the density changes so much in a step that no mean pressure fits."""
+    """Whether the slope of the density changes too much in a step for a mean pressure."""
     return abs(slope - before) > _CURVED * slope
 
 
@@ -211,9 +211,9 @@ def _is_curved(slope: float, before: float) -> bool:
 def _flows_follow(fluid: Any, H: float) -> bool:
     """Whether flows follow the last Newton step, which they take with their slopes.
 
-    Where a wide opening holds a small volume at a pressure, a step that is nothing beside the
-    pressure may be as large as the drop that drives the flow.  A junction holds nothing: there it
-    is compared with what the whole pressure would let through in the step.
+    Where a wide opening holds a small volume at a pressure, a step that is small beside the
+    pressure may be as large as the drop that drives the flow.  A junction holds nothing: there the
+    step is compared with what the whole pressure would let through.
     """
     branches, flows, trial, r = fluid.branches, fluid.flows, fluid.trial, fluid.trial.r
     chambers, mass, follow = fluid.nodes.chambers, fluid.state.mass, True
@@ -235,7 +235,7 @@ def _flows_follow(fluid: Any, H: float) -> bool:
 
 @phase
 def _place_walls(fluid: Any, S: Any) -> None:
-    """Volumes with the walls where the last sweep left them, at the pressures that it had."""
+    """Volumes with the walls and pressures of the last sweep."""
     nodes, trial = fluid.nodes, fluid.trial
     for i in range(nodes.volumes):
         trial.V_used[i] = nodes.volume[i]
@@ -280,7 +280,7 @@ def _look_up(fluid: Any) -> None:
 
 @phase
 def _add_up_volumes(fluid: Any, gamma: Any) -> None:
-    """Mass that each volume misses, without flows, and what the pressures change in it."""
+    """Mass that each volume misses, without flows, and its change with the pressures."""
     nodes, trial = fluid.nodes, fluid.trial
     p, rho, V = trial.p, trial.rho_end, trial.V
     for i in range(nodes.volumes):
@@ -298,7 +298,7 @@ def _add_up_volumes(fluid: Any, gamma: Any) -> None:
 
 @phase
 def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
-    """Flows of all branches at the present pressures; the row that failed and its status."""
+    """Flows of all branches; the row that failed and its status."""
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
     volumes, H = fluid.nodes.volumes, step.H
     A, own, r = trial.matrix, trial.own, trial.r
@@ -327,7 +327,6 @@ def _add_up_branches(fluid: Any, S: Any, step: Step) -> tuple[int, int]:
 
 @phase
 def _add_up_ends(fluid: Any, H: float) -> None:
-    """Flows into all ends of lines at the present pressures."""
     nodes, trial, flows = fluid.nodes, fluid.trial, fluid.flows
     for e in range(nodes.ends):
         i = nodes.end_node[e]
@@ -339,13 +338,13 @@ def _add_up_ends(fluid: Any, H: float) -> None:
 
 @phase
 def _cavities_change(fluid: Any, H: float) -> bool:
-    r"""Open and close cavities as the solved linear equations want them; whether any changes.
+    r"""Open and close cavities by the solved linear equations; whether any changes.
 
     At each junction either nothing is missing and :math:`p \ge p_b`, or :math:`p = p_b` and
-    :math:`M \le 0`.  Of linear equations whose matrix is an M-matrix, as that of the flows is, this
-    has one solution.  Policy iteration finds it, whatever cavities it begins with, in at most one
-    solution more than there are junctions (Howard 1960; Bokanowski, Maroso & Zidani 2009): close
-    those that would be filled, open those whose pressure would be too low, solve again.
+    :math:`M \le 0`.  As the matrix of the flows is an M-matrix, there is one solution.  Policy
+    iteration finds it from any start in at most one solution more than there are junctions (Howard
+    1960; Bokanowski, Maroso & Zidani 2009): close those that would be filled, open those whose
+    pressure would be too low, solve again.
     """
     nodes, trial, changes = fluid.nodes, fluid.trial, False
     for i in range(nodes.chambers, nodes.volumes):
@@ -368,7 +367,7 @@ def _forget_intervals(fluid: Any) -> None:
 
 @phase
 def _fills(fluid: Any, i: int, H: float) -> bool:
-    """Whether the flows at the end of a Newton iteration fill the cavity of a junction."""
+    """Whether the flows after a Newton iteration fill the cavity of a junction."""
     nodes, trial, branches, flows = fluid.nodes, fluid.trial, fluid.branches, fluid.flows
     net, size, r = 0.0, 0.0, trial.r
     for k in range(branches.rows):
@@ -390,7 +389,7 @@ def _fills(fluid: Any, i: int, H: float) -> bool:
 
 @phase
 def _compare_storage(fluid: Any) -> None:
-    """What a pressure changes in the flows of its volume, beside what it changes in the volume."""
+    """What a pressure changes in the flows of its volume, relative to the volume."""
     nodes, trial = fluid.nodes, fluid.trial
     for j in range(nodes.volumes):
         total = trial.own[j]
@@ -404,10 +403,10 @@ def _compare_storage(fluid: Any) -> None:
 def bracketed(
     target: float, density: float, lower: float, upper: float
 ) -> tuple[float, float, float]:
-    """Density to go to from ``density``, and the interval known to hold the root.
+    """Next density after ``density``, and the interval known to hold the root.
 
-    Where a chamber is about to fill with liquid, the slope on the boiling side leads far into the
-    liquid, and that of the liquid back: Newton alone goes to and fro.
+    Where a chamber is about to fill, the slope on the boiling side leads far into the liquid, and
+    that of the liquid back: Newton's method alone would alternate.
     """
     if upper - lower < _NARROW * density:
         lower, upper = 0.0, np.inf
@@ -422,7 +421,7 @@ def bracketed(
 
 @phase
 def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
-    """Newton steps that the fluid can follow; the largest over its pressure, and their sum."""
+    """Newton steps that the fluid can follow; the largest relative one, and their sum."""
     nodes, trial, hint = fluid.nodes, fluid.trial, fluid.state.hint
     p, r, rho, lower, upper = trial.p, trial.r, trial.rho_end, trial.lower, trial.upper
     worst, total = 0.0, 0.0
@@ -459,10 +458,10 @@ def _limit_steps(fluid: Any, iteration: int) -> tuple[float, float]:
 
 @phase
 def _size(fluid: Any, i: int) -> float:
-    """Newton step over the pressure, or over the ambient one, and of a density over the density.
+    """Newton step over the pressure, or the ambient one, and of a density over the density.
 
-    In a volume that is all but empty a step that is nothing beside the ambient pressure is many
-    times its own, and its density.
+    In an almost empty volume a step that is small beside the ambient pressure is many times its
+    own, and its density.
     """
     trial, step = fluid.trial, abs(fluid.trial.r[i])
     size = step / max(trial.theta[i] * trial.end[i], fluid.nodes.ambient)
@@ -513,7 +512,7 @@ def push_by_fluid(fluid: Any, S: Any) -> None:
 
 @phase
 def end_branches(fluid: Any, S: Any, H: float, accounts: Any, kind: Any, sums: Any) -> None:
-    """Take over flows and states of branches; the hydraulic power is stored, supplied or lost."""
+    """Accept flows and states of branches; the hydraulic power is stored, supplied or lost."""
     trial, branches, flows = fluid.trial, fluid.branches, fluid.flows
     inflow, g = trial.inflow, trial.g
     for i in range(fluid.nodes.nodes):
@@ -578,7 +577,7 @@ def end_ends(fluid: Any, H: float) -> None:
 
 @phase
 def end_nodes(fluid: Any, H: float, accounts: Any) -> None:
-    """Take over masses, volumes and pressures, with the loss of the implicit step."""
+    """Accept masses, volumes and pressures, with the loss of the implicit step."""
     nodes, state, trial = fluid.nodes, fluid.state, fluid.trial
     p, g, V, inflow = trial.p, trial.g, trial.V, trial.inflow
     if nodes.slow_gas > 0:

@@ -1,4 +1,4 @@
-"""What the time loop writes at the end of a record: means, peaks, and the state of the moment."""
+"""What the time loop writes at the end of a record."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ __all__ = ["Moment", "moment_of", "record_means", "record_moment", "record_point
 
 
 class Moment(NamedTuple):
-    """Where the state of the moment is: of a whole network only what is recorded of it."""
+    """Where the present state is, as far as it is recorded."""
 
     bodies: Any
     elements: Any  # states
@@ -42,7 +42,7 @@ def moment_of(network: NetworkArrays) -> Moment:
 
 @phase
 def record_means(recording: Recording, record: int, duration: float, sums: Any, peaks: Any) -> None:
-    """Means and peaks of a record of this duration [s]; both start again."""
+    """Means and peaks of a record of this duration [s]; both restart."""
     per_time = 1.0 / duration
     for j in range(recording.means.shape[1]):
         recording.means[record, j] = sums[j] * per_time
@@ -56,7 +56,7 @@ def record_means(recording: Recording, record: int, duration: float, sums: Any, 
 def record_points(recording: Recording, record: int, level: int, now: Moment) -> None:
     """Columns of ports, centres of mass, pressures, shares of free gas, states, gaps, drives.
 
-    The modes are those of a size of step, with no force pending.
+    The modes are those of step size ``level``, with no force pending.
     """
     out, place, bodies = recording.points[record], 0, now.bodies
     for i in range(bodies.ports):
@@ -90,7 +90,7 @@ def record_points(recording: Recording, record: int, level: int, now: Moment) ->
 
 @njit(_nrt=False, error_model="numpy")
 def record_moment(recording: Recording, record: int, now: Moment) -> None:
-    """Record the present state as the end of a record, or as that before the first step."""
+    """Record the present state as the end of a record, or before the first step."""
     bodies = pointers(now.bodies)
     record_points(
         recording,

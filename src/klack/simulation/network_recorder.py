@@ -1,14 +1,12 @@
 """Memory for what a run records, and the words for its columns.
 
-The loop runs in chunks and fills memory for one of them: steps in which an interface carried force,
-and records as closely spaced as the impacts need.  After each chunk the impacts are found in it,
-the records are thinned to the spacing that was asked for, and the steps are kept until there is no
-more room for them.  So the memory of a run follows from the number of its records alone.
+The loop fills memory for one chunk: steps in which an interface carried force, and records as
+closely spaced as the impacts need.  Then the impacts are found, the records are thinned to the
+requested spacing, and the steps are kept while there is room.  So the number of records alone
+determines the memory of a run.
 
-Forces at the start of a run: the record before its first step.
-
-Later records hold means over the time before them; the first one holds the limit of that, values of
-the started state itself.
+Records hold means over the time before them; the one before the first step holds their limit, the
+values of the start itself.
 """
 
 from collections.abc import Sequence
@@ -54,11 +52,9 @@ class Recorder:
     records
         Of the whole run, beside that of its start.
     looks
-        Looks at the network in a record; the records of a chunk are one look apart.
-    chunk
-        Most looks of a chunk.
-    fine
-        Most steps of a chunk.
+        Per record; the records of a chunk are one look apart.
+    chunk, fine
+        Most looks and most steps of a chunk.
     """
 
     def __init__(
@@ -161,7 +157,7 @@ class Recorder:
         return np.append(self._points[ports : 2 * ports, 0], 0.0)
 
     def first(self, acting: Vector, states: Vector | None = None) -> None:
-        """Put what acts at the start in front of the records.
+        """Put what acts at the start before the records.
 
         Parameters
         ----------
@@ -170,7 +166,7 @@ class Recorder:
             peaks of interfaces [N] and forces of driven bodies [N]; a state of an earlier version
             lacks the last.
         states
-            Recorded states of elements, then of branches; those that the rows hold by default.
+            Recorded states of elements, then of branches; by default those in the rows.
         """
         means, peaks = len(self.means), len(self.peaks)
         self._means[:, 0], self._peaks[:, 0], drives = np.split(acting, [means, means + peaks])
@@ -183,21 +179,21 @@ class Recorder:
         self._begun = True
 
     def start_values(self) -> Vector:
-        """Return what is recorded at the start: means, then points."""
+        """Means at the start, then points."""
         return np.concatenate([self._means[:, 0], self._points[:, 0]])
 
     def values(self, look: int) -> Vector:
-        """Return what the present chunk recorded at its look of this number, from 1 on."""
+        """What the present chunk recorded at look ``look``, from 1 on."""
         at = self.recording
         return np.concatenate([at.means[look - 1], at.points[look - 1]])
 
     def last(self, records: int) -> Vector:
-        """Return the first values of a continued run: see :meth:`first`."""
+        """First values of a continued run: see :meth:`first`."""
         drives = self._points[len(self.points) - self._driven :, records]
         return np.concatenate([self._means[:, records], self._peaks[:, records], drives])
 
     def take(self, time: Vector, finder: ImpactFinder) -> None:
-        """Take over a chunk of as many looks as there are times [s]."""
+        """Take over a chunk with a look at each ``time``."""
         recording, count = self.recording, len(time)
         steps = [recording.fine[c, : recording.filled[c]] for c in range(len(self._fine))]
         finder.feed(time, self._velocities(count), steps)
@@ -210,7 +206,7 @@ class Recorder:
             self._complete[c] &= len(kept) == len(rows)
 
     def channels(self, records: int) -> dict[str, ChannelData]:
-        """All channels by name, as long as so many records."""
+        """All channels by name, with so many records."""
         result = {}
         for columns, values in (
             (self.means, self._means),
@@ -243,7 +239,7 @@ class Recorder:
         return result
 
     def first_not_finite(self, count: int) -> tuple[int, str] | None:
-        """First sample of a chunk of ``count`` that is not finite, and the channel's name."""
+        """First sample of a chunk that is not finite, and the channel's name."""
         found: tuple[int, str] | None = None
         recording = self.recording
         for columns, values in (
@@ -259,11 +255,11 @@ class Recorder:
         return found
 
     def _velocities(self, count: int) -> dict[str, Vector]:
-        """Of the centres of mass [m/s] in the present chunk, by component."""
+        """Velocities of the centres of mass [m/s] in this chunk, by component."""
         return {name: self.recording.points[:count, i] for name, i in self.moving.items()}
 
     def _thin(self, count: int) -> None:
-        """Records of the present chunk: means of means, largest peaks, last points."""
+        """Records of this chunk: means of means, largest peaks, last points."""
         recording, looks = self.recording, self.looks
         first = self.looked + 1
         self.looked += count
@@ -281,7 +277,7 @@ class Recorder:
 
 
 def _parting(rows: Rows, blocks: NDArray[np.int64]) -> NDArray[np.int64]:
-    """First and last block of the upper and of the lower body of each interface."""
+    """First and last block of both bodies of each interface, the upper one first."""
     free = {
         port: (blocks[b], blocks[b + 1])
         for b, row in enumerate(rows.bodies)
@@ -327,14 +323,12 @@ def _column(row: ElementRow | BranchRow, what: str, port: str = "") -> str:
 
 
 def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vector, Vector]:
-    """Forces, flows and recorded states now, after a short step of all rows up to now.
+    """Forces, flows and recorded states now, by a short step ``h`` [s] of all rows.
 
     Parameters
     ----------
     speeds [m/s]
         Of all ports, the ground last.
-    h [s]
-        Length of that step.
 
     Returns
     -------
@@ -343,7 +337,7 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
         interface [N], those of sliders [N], then the sums of each interface [N], and the forces of
         driven bodies [N].
     states : array
-        Recorded states of elements, then of branches.
+        Of elements, then of branches.
     """
     elements, branches, rows = network.elements, network.branches, network.rows
     forces = [
@@ -369,7 +363,7 @@ def values_now(network: CompiledNetwork, speeds: Vector, h: float) -> tuple[Vect
 
 
 def _states(data: StepRows, rows: Sequence[ElementRow | BranchRow]) -> list[float]:
-    """Recorded states as they are, derived ones as the step functions gave them."""
+    """Recorded states, derived ones as the step functions gave them."""
     found = []
     for k, row in enumerate(rows):
         after = data.outputs[data.output0[k] + data.head + len(row.ports) :]
@@ -404,7 +398,7 @@ def _sliders(network: CompiledNetwork, speeds: Vector) -> Vector:
 
 
 def _drives(network: CompiledNetwork, pressing: Vector, friction: Vector) -> Vector:
-    """Force [N] of every driven body: minus the sum of what acts on its ports."""
+    """Force [N] of every driven body: minus the sum of what acts on it."""
     bodies, nodes = network.bodies, network.nodes
     if bodies.driven == 0:
         return np.zeros(0)

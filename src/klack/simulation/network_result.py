@@ -1,4 +1,4 @@
-"""Result of a network run: channels, impacts, energy balance, and the state to continue from."""
+"""Result of a network run, and the state to continue from."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -34,8 +34,8 @@ class ChannelData:
     unit
         SI.
     values (n,)
-        At :attr:`NetworkResult.time`; forces and flows are means over the record before, the first
-        one the value at the start.
+        At :attr:`NetworkResult.time`; forces and flows are means over the record before, first
+        their value at the start.
     """
 
     unit: str
@@ -49,15 +49,15 @@ class InterfaceRecord:
     Parameters
     ----------
     time (k,) [s]
-        Start of the step.
+        Starts.
     step (k,) [s]
     contact_force, film_force (k,) [N]
         Means over the step, above zero when they press; a film may pull.
     gap (k,) [m]
         At the end of the step, negative when closed; of the bodies, without the series compliance.
     complete
-        False when there were more than a million of these steps: the later ones are missing.
-        Impacts are found nevertheless, and means of the forces are among the channels.
+        False after more than a million steps: the later ones are missing, but impacts are found,
+        and means of the forces are among the channels.
     """
 
     time: NDArray[np.float64]
@@ -79,16 +79,16 @@ class ImpactEvent:
     time [s]
         First touch.
     approach_speed [m/s]
-        Closing speed of the centres of mass when the stop begins to be felt: at first touch, or the
-        highest one since its film began to press.
+        Closing speed of the centres of mass: at first touch, or the highest one since the film
+        began to press.
     peak_force [N]
         Of contact and film together.
     peak_time [s]
     contact_time [s]
-        Closed, all contacts of the impact together; up to rest if the bodies come to rest, which
-        is when they have been closed for :func:`~klack.simulation.rest.rest_time`.
+        Closed, all contacts together; up to rest, that is when they have been closed for
+        :func:`~klack.simulation.rest.rest_time`.
     separation_time [s]
-        End of the last contact, with the rest; nan if it stays closed to the end of the run.
+        End of the last contact, with the rest; nan if it lasts to the end of the run.
     impulse [N s]
         Of contact and film, while it presses before and pulls after the contact; up to rest.
     restitution [-]
@@ -96,7 +96,7 @@ class ImpactEvent:
         if the run ends in the contact.  With a film the opening speed is the highest one while it
         pulls.
     energy_loss [J]
-        Kinetic energy of the centre of mass before less after; nan if the run ends in the contact.
+        Kinetic energy of the centre of mass before less after; nan as above.
     """
 
     stop: str
@@ -131,7 +131,7 @@ class EnergyBooks:
 
     @property
     def throughput(self) -> float:
-        """Larger of what came in and what was spent or stored [J], the scale of the residual."""
+        """Larger of what came in and what was spent or stored [J]."""
         rises = {key: self.stores_after[key] - self.stores_before[key] for key in self.stores_after}
         incoming = [*self.supplies.values(), *(-x for x in self.losses.values())]
         incoming += [-x for x in rises.values()]
@@ -151,13 +151,12 @@ class EnergyBooks:
     def scale(self) -> float:
         """What a residual is judged by [J]: the largest of three.
 
-        - The throughput.  It compares the ends of the run only: a mass that swings on a spring
-          passes its energy on twice in every period, but after whole periods its stores are as
-          they were, and the throughput is zero.
-        - Hence what the bodies held at the start or at the end, kinetic and strain: they move, so
-          it is turned over.  The energy balance of an impact counts in the same way.
-        - A thousandth of all that is stored: a valve at rest turns no energy over, but the
-          round-off of what it stores is left.
+        - The throughput.  It compares only the ends of the run: after whole periods of a mass that
+          swings on a spring it is zero.
+        - Hence the kinetic and strain energy of the bodies at the start or the end, as in the
+          energy balance of an impact.
+        - A thousandth of all that is stored: a valve at rest turns no energy over, but leaves the
+          round-off of its stores.
         """
         held = (self.stores_before, self.stores_after)
         moving = [
@@ -170,7 +169,7 @@ class EnergyBooks:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StaticStart:
-    """Where a run began: the equilibrium at time zero.
+    """Equilibrium at time zero, in which a run began.
 
     Parameters
     ----------
@@ -183,7 +182,7 @@ class StaticStart:
     flow [kg/s]
         Of each branch and line.
     residual [N]
-        Force that is left on each free body.
+        Force left on each free body.
     notes
         What has no steady state, and how it starts instead.
     """
@@ -203,7 +202,7 @@ class PressedFaces:
     Parameters
     ----------
     set [m]
-        By which they part later than when they were new.
+        By which they part later than new ones.
     force [N]
         Largest force so far; they are elastic up to it.
     known_force [N]
@@ -222,7 +221,7 @@ class StepCounts:
     Parameters
     ----------
     fine
-        Fine steps that bodies, elements and fluid took together.
+        Taken by bodies, elements and fluid together.
     flight
         Macro steps in flight or at rest.
     near
@@ -230,9 +229,9 @@ class StepCounts:
     sub
         These sub-steps.
     sub_fine
-        Those of them that were fine ones.
+        Those that were fine ones.
     repeats
-        Steps done again, since their guess of the forces of elements and fluid had missed too much.
+        Steps repeated because the guess of the forces of elements and fluid missed too much.
     """
 
     fine: int = 0
@@ -250,7 +249,7 @@ class StepCounts:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class NetworkResult:
-    """Everything that a run of a network leaves behind.
+    """Result of a network run.
 
     Parameters
     ----------
@@ -260,30 +259,22 @@ class NetworkResult:
         ``"<component> <label>"``, for example ``"needle velocity"`` (centre of mass),
         ``"needle.tip displacement"``, ``"seat contact force"``, ``"seat film force"``,
         ``"seat gap"``, ``"coil current"``, ``"sac pressure"``, ``"spring.end force"``.
-    interfaces
-        By component.
-    events
-        In order of time.
-    sizes
-        Lengths of the steps.
-    steps
-        How many of them.
     wall_time [s]
         Of the time loop.
     state
-        Everything needed to continue: the continued run is bit-identical.  An impact that is not
-        over is reported again, whole, by the continued run, with the same stop and time.
+        Everything needed to continue, bit-identically.  The continued run reports an unfinished
+        impact again, whole, with the same stop and time.
     failure
-        Why the run ended before its time, all else is the record up to there; empty if it did not.
+        Why the run ended early, with the record up to there; else empty.
     start
-        The equilibrium from which it began; None for a continued or free start.
+        None for a continued or free start.
     path
-        Way of a needle in three dimensions; not stored with a result.
+        Of a needle in three dimensions; not stored with a result.
     faces
         By component, where faces yield.
     spatial_impacts
-        What was recorded of the first impacts of bodies that meet point by point; empty for a
-        motion along the axis, None in results of versions that did not record it.
+        First impacts of bodies that meet point by point; empty for a motion along the axis, None in
+        results of versions that did not record it.
     """
 
     time: NDArray[np.float64]
@@ -308,7 +299,7 @@ class NetworkResult:
 
     @property
     def fine_steps(self) -> int:
-        """Fine steps of the bodies, with elements and fluid or without."""
+        """Fine steps of the bodies, with or without elements and fluid."""
         return self.steps.fine + self.steps.sub_fine
 
     @property
@@ -318,13 +309,7 @@ class NetworkResult:
 
 
 class IncompleteRunError(ConvergenceError):
-    """A run failed on its way; ``result`` is what it left behind until then.
-
-    Parameters
-    ----------
-    result
-        With the text as its ``failure``.
-    """
+    """A run failed on its way; ``result``, with the text as ``failure``, holds it until then."""
 
     def __init__(self, text: str, result: NetworkResult) -> None:
         super().__init__(text)

@@ -86,11 +86,7 @@ _LOOK = 1.5e-6  # [s] longest time between two looks of the search for impacts
 
 
 class SpatialMotion(Protocol):
-    """Bodies of a valve that meet point by point.
-
-    All other bodies of a network meet at interfaces along the axis, in the loop of
-    :mod:`klack.simulation.network_kernel`.
-    """
+    """Bodies of a valve that meet point by point; all others meet at interfaces along the axis."""
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> MovingBodies:
         """Return them in a network."""
@@ -114,45 +110,41 @@ def simulate_network(
 
     Parameters
     ----------
-    rows
-        From :meth:`klack.network.network.Network.rows`.
     duration [s]
         Rounded up to whole records.
     accuracy : "normal" or "fine"
-        Chooses the steps.  ``"normal"``: first impacts to 0.05 % and 0.05 us; ``"fine"`` takes
-        about four times as long.
+        ``"normal"``: first impacts to 0.05 % and 0.05 us; ``"fine"`` takes about four times as
+        long.
     step [s]
-        Fine step, in place of that of the accuracy (20 ns or 5 ns).
+        Fine step; by the accuracy 20 ns or 5 ns.
     coarse
-        Fine steps of a macro step in flight, in place of what
-        :func:`klack.simulation.step_sizes.step_sizes` chooses; 1 switches macro steps off: bodies,
-        elements and fluid take every fine step together.
+        Fine steps of a macro step in flight, by default of
+        :func:`klack.simulation.step_sizes.step_sizes`; 1 switches macro steps off: bodies, elements
+        and fluid take every fine step together.
     sizes
         All steps, in place of what the three above choose.
     record [s]
-        Spacing of the records; rounded to whole macro steps.  Impacts do not depend on it: they
-        are found during the run, at most 1.5 us (or a macro step) apart.  The memory of a
-        run is that of its records, eight bytes per channel, and 50 MB.
+        Spacing of the records, rounded to whole macro steps.  Impacts do not depend on it: they are
+        found during the run, at most 1.5 us (or a macro step) apart.  A run takes eight bytes per
+        channel and record, and 50 MB.
     start : "rest" or "free"
         ``"rest"``: bodies start in static equilibrium under all forces of the first moment;
         ``"free"``: undeformed, with the speeds of their rows.
     state
-        :attr:`NetworkResult.state` of a former run of the same network and steps, to continue from;
-        ``start`` then has no meaning, time continues, and the energy balance starts there.
+        Of a former run of the same network and steps, to continue from; ``start`` then has no
+        meaning, and the energy balance starts there.
     spatial
-        Bodies that meet point by point, in place of the interfaces of the network, which only give
-        names to what is recorded.
+        Bodies that meet point by point; the interfaces of the network only give names to the
+        record.
     progress
-        Told the fraction done.
+        Called with the fraction done.
 
     Raises
     ------
     InputError
-        For steps that do not fit, for records that do not fit into the memory, and for a state of
-        another network.
+        For steps that do not fit, records larger than the memory, and a state of another network.
     IncompleteRunError
-        When a step fails, or a number is not finite: time, component, its state, and what to try;
-        it holds the result up to there.
+        When a step fails, or a number is not finite; it holds the result up to there.
     ConvergenceError
         The same before the first record.
 
@@ -325,7 +317,7 @@ def grid_of(duration: float, sizes: StepSizes, record: float) -> Grid:
 
 
 def has_python_steps(rows: Rows) -> bool:
-    """Whether the time loop calls back into Python, or into an FMU."""
+    """Whether the time loop calls Python, or an FMU."""
     steps = [row.step for row in rows.elements] + [row.step for row in rows.branches]
     return any(hasattr(step, "errors") for step in steps)
 
@@ -340,7 +332,7 @@ def _run(
     progress: Callable[[float], None],
     control: ControlLoop | None,
 ) -> ConvergenceError | None:
-    """Run chunk by chunk; the error that ended it early, with the record up to the look before."""
+    """Run chunk by chunk; the error that ended it early, with the record before."""
     looks = grid.records * grid.looks
     chunk = len(recorder.recording.points)
     chunk -= chunk % grid.looks if chunk > grid.looks else 0
@@ -382,13 +374,8 @@ def _up_to(
 ) -> tuple[int, ConvergenceError]:
     """Compute a chunk again without the looks that failed, so that all of it is of one moment.
 
-    Returns
-    -------
-    good : int
-        Looks that are done: the most that run without a failure.  0 where nothing can be repeated:
-        an FMU does not go back.
-    failure : ConvergenceError
-        That of the first look that fails.
+    Returns the looks done, 0 where nothing can be repeated (an FMU does not go back), and the error
+    of the first look that fails.
     """
     low, high = 0, good + 1
     count = good
@@ -419,7 +406,7 @@ def _try_chunk(
     grid: Grid,
     count: int,
 ) -> tuple[int, ConvergenceError | None]:
-    """Advance by so many looks; how many of them are good, and why not all."""
+    """Advance by so many looks; how many are good, and why not all."""
     report, first = np.zeros(3), int(clock[0])
     good = count
     failure: ConvergenceError | None = None
@@ -453,7 +440,7 @@ def _try_chunk(
 def _compile(
     network: CompiledNetwork, recording: Recording, clock: NDArray[np.int64], grid: Grid
 ) -> None:
-    """Compile the time loop, or load it, by a run of no steps: not a part of its wall time."""
+    """Compile or load the time loop by a run of no steps, not counted as wall time."""
     _advance(network, recording, clock, grid, 0, report=np.zeros(3))
 
 
@@ -565,7 +552,7 @@ def _not_a_number(name: str, time: float) -> ConvergenceError:
 
 
 def _not_finite_part(network: CompiledNetwork) -> str:
-    """Component in whose last step a number was none; empty if all were."""
+    """Component whose last step gave a number that is not finite; else empty."""
     elements = [row.component for row in network.rows.elements]
     branches = [row.component for row in network.rows.branches]
     for names, data in ((elements, network.elements), (branches, network.branches)):
@@ -588,7 +575,7 @@ def _not_finite_part(network: CompiledNetwork) -> str:
 
 
 def _not_finite_account(network: CompiledNetwork) -> str:
-    """Component in whose state or energy a number is none; empty if all are."""
+    """Component whose state or energy is not finite; else empty."""
     for name, value in zip(network.account_names, network.accounts.rows, strict=True):
         if not np.isfinite(value):
             return name
@@ -618,10 +605,7 @@ def _numbers(values: Vector) -> str:
 
 
 def read_rows(network: CompiledNetwork, t: float, h: float, speeds: Vector, row: int = Y0) -> None:
-    """Ask all rows for a step that ends in the present state: see :func:`call_rows`.
-
-    ``row`` of the ports holds their displacements.
-    """
+    """Ask all rows for a step that ends in the present state, with displacements in ``row``."""
     table, p = network.nodes.settled, network.node_state.p
     rho = np.array([fluid_at(table, pressure, 0)[0] for pressure in p])
     if network.nodes.slow_gas:
@@ -661,7 +645,7 @@ def _balance(network: CompiledNetwork, step: float, near: RestState, shift: Vect
 
 
 def _changing(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
-    """All arrays that a step changes and the next one begins with, as a stored state calls them."""
+    """All arrays that a step changes and the next one starts from, by their stored names."""
     line, faces = network.line_state, network.interfaces
     yielding = np.flatnonzero(faces.kind == LAW_YIELDING)
     groups = {
@@ -710,7 +694,7 @@ def _pressed_faces(network: CompiledNetwork) -> dict[str, PressedFaces]:
 
 
 def everything(network: CompiledNetwork, clock: NDArray[np.int64]) -> Kept:
-    """All arrays that a step changes, and what they hold now."""
+    """All arrays that a step changes, and their present content."""
     arrays = [*_changing(network, clock).values(), *network.accounts]
     return [(array, array.copy()) for array in arrays]
 
@@ -722,7 +706,7 @@ def put_back(kept: Kept) -> None:
 
 
 def saved_state(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str, Changing]:
-    """All that a run needs to continue from here; what its record holds beside is left out."""
+    """All that a run needs to continue from here, without its record."""
     saved = {name: array.copy() for name, array in _changing(network, clock).items()}
     for row in (WORK, WORK_BEGIN):  # count from the start of each run
         saved["bodies.at"][row : row + PORTS] = 0.0
@@ -731,7 +715,7 @@ def saved_state(network: CompiledNetwork, clock: NDArray[np.int64]) -> dict[str,
 
 
 def restore_state(network: CompiledNetwork, clock: NDArray[np.int64], state: State) -> None:
-    """Put a network into a state of :func:`saved_state`, in place."""
+    """Put a network into a :func:`saved_state`, in place."""
     for key, target in _changing(network, clock).items():
         if key not in state and key.startswith((_SLIDERS, _RECORDS)):  # of an earlier version
             continue

@@ -1,8 +1,6 @@
-r"""Phases of a step for friction between ports, found in each sub-step with the interfaces.
+r"""Phases of a step for friction between ports: Coulomb's law, set-valued.
 
-Friction of two bodies that slide along each other, over one step: Coulomb's law, set-valued.
-
-With a constant force *f* over a step of length *h* the modes move exactly, so that way and speed of
+With a constant force *f* over a step *h* the modes move exactly, so that displacement and speed of
 slip at its end are
 
 .. math:: \Delta = \Delta_f + G f, \qquad v_1 = v_f + D f .
@@ -13,16 +11,16 @@ Friction is a viscous part and a dry one,
     0 \le C \le L(|\Delta|/h), \qquad L(v) = F_c + (F_s - F_c)\, e^{-(v/v_s)^2} ,
 
 and of all *C* the largest with which neither :math:`\Delta` nor :math:`v_1` turns round.  So it
-holds a body at rest against any force up to :math:`F_s`, without creep; slides against it with
-*L*; and in the step in which a body comes to rest it stops the body there.  (A force that makes
-:math:`\Delta` vanish would leave :math:`v_1 = -v_0`, and a body at rest would tremble.)  The loss
-:math:`-f \Delta` is never negative.
+holds a body at rest against any force up to :math:`F_s`, without creep; opposes slip with *L*; and
+stops a body in the step in which it comes to rest.  (A force that makes :math:`\Delta` vanish would
+leave :math:`v_1 = -v_0`, and a body at rest would tremble.)  The loss :math:`-f \Delta` is never
+negative.
 
-Where *L* falls with the speed, a body may stick or slip in the same step.  Which of both is decided
-once in a step, before the contacts answer: else these and the friction would take turns endlessly.
+Where *L* falls with the speed, a body may stick or slip in the same step.  This is decided once in
+a step, before the contacts answer, or both would alternate endlessly.
 
-Where *v* turns round within the step by other forces, *C* is 0 for this step: an error of the
-impulse below :math:`F_s h`.
+Where other forces reverse *v* within the step, *C* is 0 for this step: an error of the impulse
+below :math:`F_s h`.
 """
 
 from math import exp
@@ -63,7 +61,7 @@ def largest_friction(
     G: float,
     way: float,
 ) -> float:
-    """Dry friction [N] of a step at most: ``Fs`` where it holds, else ``L`` at its speed of slip.
+    """Largest dry friction [N] of a step: ``Fs`` where it holds, else ``L`` at its speed of slip.
 
     Parameters
     ----------
@@ -73,9 +71,9 @@ def largest_friction(
     viscous [N s/m]
     h [s]
     G [m/N]
-        Way per force, above 0.
+        Displacement per force, above 0.
     way [m]
-        Without the force.
+        Displacement without the force.
     """
     yielding = 1.0 / (1.0 + G * viscous / h)
     g, a = G * yielding, abs(way) * yielding
@@ -106,27 +104,18 @@ def largest_friction(
 def slider_force(
     most: float, viscous: float, h: float, G: float, D: float, way: float, speed: float
 ) -> tuple[float, float]:
-    """Friction of one slider over a step, and the way that it slips.
+    """Mean friction of one slider over a step, on the body whose way counts, and its slip [m].
 
     Parameters
     ----------
     most [N]
-        Dry friction at most, see :func:`largest_friction`.
+        From :func:`largest_friction`.
     viscous [N s/m]
     h [s]
-    G [m/N]
-        Way per force, above 0.
-    D [m/(N s)]
-        Speed at the end of the step per force, above 0.
+    G, D [m/N], [m/(N s)]
+        Displacement and speed at the end of the step per force, above 0.
     way, speed [m], [m/s]
         Without the force.
-
-    Returns
-    -------
-    force : float [N]
-        Mean over the step, on the body whose way counts.
-    way : float [m]
-        With the force.
     """
     drag = viscous / h
     yielding = 1.0 / (1.0 + G * drag)
@@ -148,13 +137,13 @@ _LEAST_CHANGE = 1e-3  # of a force in the next step, where it happened to stay t
 
 @phase
 def _apart(rows: Any, S: Any, row: int, s: int) -> float:
-    """Displacement of the upper port relative to the lower one in a row of the ports."""
+    """Displacement of the upper port relative to the lower one, from a row of the ports."""
     return S[row + rows.upper[s]] - S[row + rows.lower[s]]
 
 
 @phase
 def begin_macro_sliders(sliding: Any, accounts: Any, sums: Any) -> None:
-    """Keep what a repeated macro step begins with."""
+    """Keep what a repeated macro step starts from."""
     state, trial = sliding.state, sliding.trial
     for s in range(sliding.rows.sliders):
         k = KEPT_SLIDER * s
@@ -190,7 +179,7 @@ def take_back_sliders(sliding: Any, accounts: Any, sums: Any) -> None:
 
 @phase
 def begin_sub_sliders(sliding: Any, bodies: Any, level: int) -> None:
-    """Speeds of slip at the end of a step without its forces, once the modes have moved freely."""
+    """Speeds of slip at the end of a step without its forces, after the free motion."""
     rows, state, trial = sliding.rows, sliding.state, sliding.trial
     for s in range(rows.sliders):
         u, low = 2 * s, 2 * s + 1
@@ -211,9 +200,9 @@ def push_by_last_friction(sliding: Any, S: Any) -> None:
 
 @phase
 def slip(sliding: Any, bodies: Any, G: Any, step: Step, first: bool, moved: float) -> float:
-    """Friction of all sliders for the other forces so far; the largest move of a port.
+    """Friction of all sliders under the other forces so far; the largest move of a port.
 
-    In the ``first`` sweep of a step it is decided which of them hold.
+    The ``first`` sweep of a step determines which of them hold.
     """
     rows, state, trial, S = sliding.rows, sliding.state, sliding.trial, bodies.at
     for s in range(rows.sliders):
@@ -264,7 +253,7 @@ def slip_seen_late(sliding: Any, S: Any) -> tuple[float, float]:
 def sliders_hold(sliding: Any) -> bool:
     """Whether friction changed so little in a step that nothing turned or came to rest.
 
-    In a step in which slip turns, friction is anything up to its largest value.
+    Where slip turns, friction is anything up to its largest value.
     """
     rows, state, trial = sliding.rows, sliding.state, sliding.trial
     holds = True
@@ -279,7 +268,7 @@ def sliders_hold(sliding: Any) -> bool:
 
 @phase
 def end_sliders(sliding: Any, step: Step, first: bool, accounts: Any, sums: Any) -> None:
-    """Take over ways and forces; ``first`` is for the first step of a macro step."""
+    """Accept displacements and forces; ``first`` is for the first step of a macro step."""
     rows, state, trial = sliding.rows, sliding.state, sliding.trial
     for s in range(rows.sliders):
         force = trial.force[s]
@@ -307,7 +296,7 @@ def cost_of_late_sliders(sliding: Any, S: Any) -> tuple[float, float]:
 
 @phase
 def end_macro_sliders(sliding: Any, S: Any) -> float:
-    """Energy that bodies got before beyond what sliders give [J]: these were behind."""
+    """Energy that bodies got before beyond what sliders, being behind, give [J]."""
     rows, trial = sliding.rows, sliding.trial
     excess = 0.0
     for s in range(rows.sliders):

@@ -1,16 +1,15 @@
-r"""A contact closed over observers instead of its ports, to show what that costs in energy.
+r"""A contact whose gap is read beside its ports, to show what that costs in energy.
 
-The force enters each body by the load vector ``b`` of its contact port, but the gap is that of one
-node (``c`` instead of ``b``), as in state-space models with one node as output.  The force then
-does the work ``F d(b^T u)`` on the body and takes ``F d(c^T u)`` from the spring of the contact;
-the difference comes from nowhere,
+The force enters each body by the load vector ``b`` of its port, but the gap is that of one node
+(``c``), as in state-space models with one node as output.  The work on the body, ``F d(b^T u)``,
+and that from the spring, ``F d(c^T u)``, then differ by
 
 .. math:: \Delta E = \sum_\text{bodies} \int F \, \mathrm d(b^T u - c^T u),
 
-which appears as energy of the impact or disappears from it.  The integration itself adds nothing:
-modes are propagated exactly, the force of a step is that of the discrete gradient
-(:func:`klack.simulation.contact_step.solve_step`), so that with ``c = b`` the energy is kept to
-round-off.  Bodies are taken without damping, springs and constant forces.
+which the impact gains or loses from nowhere.  The integration adds nothing: modes are propagated
+exactly, the force is the discrete gradient of :func:`klack.simulation.contact_step.solve_step`, so
+that with ``c = b`` the energy is kept to round-off.  Bodies are taken without damping, springs and
+constant forces.
 """
 
 from dataclasses import dataclass
@@ -39,8 +38,7 @@ class ObservedImpact:
     restitution [-]
         Of the centre of mass of the upper body, at the end of the run.
     energy [-]
-        Of bodies and contact at the end, over that at the start: 1 where the gap is read where the
-        force does its work.
+        Of bodies and contact at the end, over that at the start: 1 for ``c = b``.
     """
 
     step: float
@@ -64,13 +62,11 @@ def observed_impact(
     duration: float,
     step: float,
 ) -> ObservedImpact:
-    """Impact of two reduced bodies on a linear spring between two outputs of theirs.
+    """Impact of two reduced bodies, at their first ports, on a linear spring.
 
     Parameters
     ----------
-    upper, lower
-        Contact at their first ports.
-    outputs : pair of array, shape (m,) [1/sqrt(kg)]
+    outputs (m,) [1/sqrt(kg)]
         Modal amplitudes of the displacement along z that the gap is made of, of the upper and of
         the lower body; those of the ports for a reciprocal contact.
     stiffness [N/m]

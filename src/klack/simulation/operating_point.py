@@ -1,11 +1,10 @@
-r"""Operating point of a network: where it rests while everything that drives it is constant.
+"""Operating point of a network: where it rests while everything that drives it is constant.
 
 The equations are those of :mod:`klack.simulation.static_start`, with the pressure of every volume
-as an unknown.  What the case states of a volume is where the search begins.  Beside the point
-itself there are its *static stiffnesses*: with the slopes of all forces and flows about it, a force
-:math:`f` on a body along +z shifts the body by :math:`d` while pressures and flows find their new
-balance, and :math:`f/d` is the stiffness of springs, contacts, magnets and fluid together.  A
-stiffness below zero belongs to a point from which the body moves away.
+as an unknown; what the case states of it is where the search begins.  The point has *static
+stiffnesses*: by the slopes of all forces and flows a force :math:`f` along +z shifts a body by
+:math:`d` while pressures and flows find their new balance, and :math:`f/d` is the stiffness of
+springs, contacts, magnets and fluid together.  Below zero, the body moves away from the point.
 """
 
 from collections.abc import Collection, Mapping
@@ -45,22 +44,20 @@ class OperatingPoint:
 
     Parameters
     ----------
-    start
-        Displacements, pressures, flows, and the force that is left on each free body.
     values
         Everything that a run records, one value each.
     state
         From which :func:`~klack.simulation.network_run.simulate_network` continues with steps of
         the usual size.
     inflow [m^3/s]
-        What still flows into each volume, at its density.
+        Rest of the flow into each volume, at its density.
     compliance [m/N]
         Displacement of each free body per force on it.
     friction [m]
-        How far away from the point dry friction may hold each body that has some.
+        How far from the point dry friction may hold each body.
     enclosed
-        Volumes from which no way that is open leads to a known pressure: they have that of the
-        start of the search, or share it.
+        Volumes without an open way to a known pressure: they keep that of the start of the search,
+        or share it.
     stable
         Whether a small push of the bodies is answered by a force back, the fluid at rest again.
     """
@@ -89,10 +86,8 @@ def operating_point(
 
     Parameters
     ----------
-    rows
-        From :meth:`klack.network.network.Network.rows`.
     first [m]
-        Displacement of free bodies from which the search begins, by component; 0 by default.
+        Displacements of free bodies where the search begins, by component; 0 by default.
     held
         Bodies that are held at that displacement.
 
@@ -102,11 +97,6 @@ def operating_point(
         If a body has no equilibrium, or a volume no steady pressure.
     ConvergenceError
         If none is found, or only one in which a law cannot be evaluated.
-
-    Warns
-    -----
-    AccuracyWarning
-        For a quantity that is out of the range of its law.
     """
     free = steady_rows(rows)
     sizes = step_sizes(free, "normal")
@@ -130,7 +120,7 @@ def operating_point(
 
 
 def compiled_at(rows: Rows, point: OperatingPoint) -> tuple[CompiledNetwork, float]:
-    """The network of a point, in its state, and the step of its arrays [s]."""
+    """The network in the state of a point, and the step of its arrays [s]."""
     free = steady_rows(rows)
     sizes = step_sizes(free, "normal")
     network = compile_network(free, sizes)
@@ -139,7 +129,7 @@ def compiled_at(rows: Rows, point: OperatingPoint) -> tuple[CompiledNetwork, flo
 
 
 def without_guesses(rows: Rows) -> Rows:
-    """Rows in which the search begins with ambient pressure in every volume."""
+    """Rows that begin with ambient pressure in every volume."""
     ambient = np.array([rows.ambient.pressure])
     nodes = {
         handle: node if node.prescribed else replace(node, pressure=ambient)
@@ -172,9 +162,9 @@ def steady_rows(rows: Rows) -> Rows:
 
 
 def far_ends(rows: Rows) -> list[dict[str, float]]:
-    """Displacements of the free bodies at the stops that are farthest from where they start.
+    """Displacements of the free bodies at their farthest stops: all together, then each alone.
 
-    All of them together, then each alone where there are several.  Bodies that nothing stops stay.
+    Bodies that nothing stops stay.
     """
     travel, ends = Travel.of(rows), dict[str, float]()
     for row in rows.bodies:
@@ -191,10 +181,10 @@ def far_ends(rows: Rows) -> list[dict[str, float]]:
 
 
 def static_compliance(slopes: SteadySlopes) -> tuple[Matrix, bool]:
-    """Displacement of each body that moves per force on each of them [m/N], and whether it holds.
+    """Displacement of each moving body per force on each of them [m/N], and whether it holds.
 
-    Pressures and flows follow; those of enclosed volumes keep their mean.  The second answer is
-    whether the work of a small push, fluid and magnet at rest again, is positive for all of them.
+    Pressures and flows follow; those of enclosed volumes keep their mean.  It holds where the work
+    of a small push, fluid and magnet at rest again, is positive for all of them.
     """
     moving = np.flatnonzero(slopes.moves)
     n, r, f = slopes.compliance.shape[0], slopes.axial.size, slopes.density.size
@@ -238,7 +228,7 @@ def _moving(slopes: SteadySlopes) -> list[str]:
 
 
 def _friction(network: CompiledNetwork, compliance: Mapping[str, float]) -> dict[str, float]:
-    """Way over which the friction of all sliders of a body may hold it [m]."""
+    """Distance over which sliders may hold each body [m]."""
     rows = network.rows
     owner = {handle: row.component for row in rows.bodies for handle in row.ports}
     held: dict[str, float] = {}
@@ -251,7 +241,7 @@ def _friction(network: CompiledNetwork, compliance: Mapping[str, float]) -> dict
 
 
 def _put_states(network: CompiledNetwork, states: Vector) -> None:
-    """Write recorded states into the rows: some of them follow from what else is known."""
+    """Write recorded states into the rows; some follow from what else is known."""
     at = 0
     channels = (
         *((network.elements, k, row.channels) for k, row in enumerate(network.rows.elements)),
@@ -265,7 +255,7 @@ def _put_states(network: CompiledNetwork, states: Vector) -> None:
 
 
 def _recorded(network: CompiledNetwork, step: float) -> dict[str, ChannelData]:
-    """Channels of a network that has been put to rest, as a run begins with them."""
+    """Channels of a network at rest, as a run begins with them."""
     recorder = Recorder(network, records=1, looks=1, chunk=1, fine=1)
     recorder.start(0.0, ImpactFinder(network.rows, 0.0, step), fresh=True)
     short, speeds = SHARE_OF_STEP * step, recorder.port_speeds()

@@ -30,9 +30,9 @@ class Propagator:
     ----------
     step [s]
     A11, A12, A21, A22 [-], [s], [1/s], [-]
-        State ``(q, q')`` at the end of the step from the state at its start.
+        End state ``(q, q')`` from the start.
     B1, B2 [s^2], [s]
-        ``q`` and ``q'`` at the end of the step from a unit modal force during the step.
+        End state from a unit modal force during the step.
     R1, R2 [s^2], [s]
         The same from a modal force that rises evenly by one over the step and has no mean.
     """
@@ -74,9 +74,9 @@ def modal_propagator(
     Parameters
     ----------
     omega (m,) [rad/s]
-        Undamped angular frequencies, 0 for rigid modes.
+        Undamped.
     damping (m,) [-]
-        Damping ratios, 0 or more.
+        0 or more.
     step [s]
     """
     require_positive("modal_propagator: step", step, "s")
@@ -99,7 +99,7 @@ def modal_propagator(
 
 @lru_cache(maxsize=100)
 def _matrices(omega: bytes, damping: bytes, h: float) -> NDArray[np.float64]:
-    """``A11`` to ``B1``, and its integral; kept, because strokes of one valve share them."""
+    """``A11`` to ``B1``, and its integral; cached, because strokes of one valve share them."""
     w, z = np.frombuffer(omega), np.frombuffer(damping)
     A11, A12, A22 = np.ones(w.size), np.full(w.size, h), np.ones(w.size)
     B1 = np.full(w.size, 0.5 * h * h)
@@ -120,7 +120,7 @@ def damping_loss(
 ) -> DampingLoss:
     """Quadratic forms of the modal damping loss, by Gauss integration of the exact velocity.
 
-    It does not use the energy balance, so a balance with it is an independent check.
+    Independent of the energy balance, which it therefore checks.
 
     Parameters
     ----------

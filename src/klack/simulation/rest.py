@@ -1,4 +1,7 @@
-"""Two bodies that lie on each other: since when, and how much their contact damps."""
+"""Two bodies that lie on each other: since when, and how much their contact damps.
+
+``bodies`` are the upper and the lower one; None is the ground.
+"""
 
 from collections.abc import Sequence
 
@@ -23,23 +26,13 @@ _DEPTHS = 2.0 ** np.arange(-80, 21)  # [m]
 
 
 def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
-    r"""Time closed after which two bodies are at rest on each other [s].
+    r"""Time closed after which two bodies are at rest on each other [s]; 0 without a law.
 
     Three of the longest periods of the moving bodies or four bounces of their masses on the law,
-    whichever is longer: both belong to the bodies, not to the steps of a run.  A bounce at the
-    speed :math:`v = 1` m/s, to the depth :math:`d` where the law holds :math:`m v^2 / 2`, takes
-    :math:`3 d / v` (linear law: :math:`\pi`, law of Hertz: 2.94) beside :math:`\pi \sqrt{m c}` of
-    the series compliance; faster ones are as long or shorter.
-
-    Parameters
-    ----------
-    bodies
-        Upper and lower one; None is the ground.
-
-    Returns
-    -------
-    float
-        0 without a law: nothing is ever closed.
+    whichever is longer: properties of the bodies, not of the steps.  A bounce at the speed :math:`v
+    = 1` m/s, to the depth :math:`d` where the law holds :math:`m v^2 / 2`, takes :math:`3 d / v`
+    (linear law: :math:`\pi`, law of Hertz: 2.94) beside :math:`\pi \sqrt{m c}` of the series
+    compliance; faster ones are as long or shorter.
     """
     if row.law is None:
         return 0.0
@@ -48,19 +41,9 @@ def rest_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 
 
 def bounce_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
-    """Time of contact in a bounce at 1 m/s [s]: see :func:`rest_time`.
+    """Time of contact in a bounce at 1 m/s [s], infinite where neither body can fly.
 
-    Parameters
-    ----------
-    row
-        With a law.
-    bodies
-        Upper and lower one; None is the ground.
-
-    Returns
-    -------
-    float
-        Infinite where neither body can fly.
+    See :func:`rest_time`; the row has a law.
     """
     mass = effective_mass(bodies)
     if row.law is None or not np.isfinite(mass):
@@ -72,24 +55,12 @@ def bounce_time(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
 def resting_dissipation(
     row: InterfaceRow, bodies: Sequence[BodyRow | None], indentation: float
 ) -> float:
-    r"""Dissipation factor of a contact that nothing approached, held closed by a load [s/m].
+    r"""Dissipation factor [s/m] of a contact that a load holds closed to an ``indentation`` [m].
 
     Impact laws damp by :math:`\chi = \alpha / v` with the speed of approach :math:`v`.  A contact
-    that is closed from the start has none; it takes that of the impact that reaches as deep as the
-    load presses, :math:`m v^2 / 2 = V(d)`.  On a linear law small motions then have a damping ratio
-    of :math:`\alpha / 2`, whatever load, mass and stiffness.
-
-    Parameters
-    ----------
-    bodies
-        Upper and lower one; None is the ground.
-    indentation [m]
-        Of the law, by the load.
-
-    Returns
-    -------
-    float
-        0 without dissipation, while open, and where neither body can fly.
+    closed from the start takes that of the impact that reaches as deep, :math:`m v^2 / 2 = V(d)`.
+    On a linear law small motions then have a damping ratio of :math:`\alpha / 2`, whatever load,
+    mass and stiffness.  0 without dissipation, while open, and where neither body can fly.
     """
     alpha = 0.0 if row.law is None else row.law.flat().dissipation
     mass = effective_mass(bodies)
@@ -116,17 +87,9 @@ def effective_mass(bodies: Sequence[BodyRow | None]) -> float:
 
 
 def mobility(row: InterfaceRow, bodies: Sequence[BodyRow | None]) -> float:
-    """Speed at which the centres of mass of both bodies part, per impulse of the interface [1/kg].
+    """Speed at which the centres of mass part, per impulse of the interface [1/kg].
 
-    Parameters
-    ----------
-    bodies
-        Upper and lower one; None is the ground.
-
-    Returns
-    -------
-    float
-        0 where neither body can fly, or a given motion drives it.
+    0 where neither body can fly, or a given motion drives it.
     """
     found = 0.0
     for handle, owner in zip((row.upper, row.lower), bodies, strict=True):

@@ -1,4 +1,4 @@
-"""Ask the rows of a network for their forces and flows, in the time loop and outside of it."""
+"""Ask the rows of a network for forces and flows, in the time loop and outside of it."""
 
 from typing import Any
 
@@ -25,12 +25,12 @@ __all__ = [
 
 
 SHARE_OF_STEP = 1e-6
-"""Of a fine step: over so short a time sources and states are asked for their value at its end."""
+"""Of a fine step: so short that sources and states are asked for their value at its end."""
 
 
 @phase
 def ask_again(rows: Any, k: int) -> int:
-    """Call row ``k`` with the inputs that lie there; returns its status."""
+    """Call row ``k`` with its present inputs; returns its status."""
     return call(
         rows.function[k],
         shift(rows.parameters, rows.parameter0[k]),
@@ -76,16 +76,16 @@ def ask_branch(rows: Any, k: int, t: float, h: float, y0: Any, y1: Any, p: Any, 
 
 @phase
 def failed_at(level: int, status: int, failure: int) -> int:
-    """What the failure of a row means: of a macro step, that fine steps may do.
+    """Meaning of the failure of a row: of a macro step, that fine steps may succeed.
 
-    One with an exception, whose status is negative, is not asked again: an FMU does not go back.
+    One with an exception (status below zero) is not asked again: an FMU does not go back.
     """
     return STATUS_REFUSED if level != FINE and status > 0 else failure
 
 
 @phase
 def push_ports(rows: Any, k: int, force: Any) -> None:
-    """Add the forces that row ``k`` gave out to those of its ports [N]."""
+    """Add the forces of row ``k`` to those of its ports [N]."""
     o0, q0 = rows.output0[k] + rows.head, rows.port0[k]
     for j in range(q0, rows.port0[k + 1]):
         force[rows.ports[j]] += rows.outputs[o0 + j - q0]
@@ -93,14 +93,14 @@ def push_ports(rows: Any, k: int, force: Any) -> None:
 
 @phase
 def push_walls(nodes: Any, p: Any, force: Any) -> None:
-    """Add the forces of the pressures on all walls to those of their ports [N]."""
+    """Add the pressure forces on all walls to those of their ports [N]."""
     for w in range(nodes.walls):
         force[nodes.wall_port[w]] += nodes.wall_area[w] * (p[nodes.wall_node[w]] - nodes.ambient)
 
 
 @phase
 def take_states(rows: Any, k: int) -> int:
-    """Take over the next states of row ``k``; returns where its accounts lie in the outputs."""
+    """Accept the next states of row ``k``; returns the place of its accounts in the outputs."""
     o0 = rows.output0[k] + rows.head + rows.port0[k + 1] - rows.port0[k]
     for j in range(rows.states[k]):
         rows.state[rows.state0[k] + j] = rows.outputs[o0 + j]
@@ -111,23 +111,16 @@ def take_states(rows: Any, k: int) -> int:
 def call_rows(
     rows: StepRows, t: float, h: float, y: Vector, v: Vector, p: Vector, rho: Vector
 ) -> tuple[int, int]:
-    """Call every row over a step whose end has these displacements and speeds.
+    """Call every row of elements or branches over a step; the row that failed (-1) and its status.
 
     Parameters
     ----------
-    rows
-        Elements or branches.
     t, h [s]
         Start and length of the step.
     y, v [m], [m/s]
-        Of every port at the end of the step; the last one is the ground.
+        Of every port at the end of the step, the ground last.
     p, rho [Pa], [kg/m^3]
         Of every node.
-
-    Returns
-    -------
-    (int, int)
-        The row that failed and its status; -1 and 0 if none did.
     """
     before = np.empty(y.size)
     for i in range(y.size):

@@ -1,9 +1,8 @@
-"""The time loop for one contact, which is nearly every impact, laid out for speed.
+"""The time loop of :func:`klack.simulation.kernel.run_steps` for one contact, laid out for speed.
 
-The same steps as :func:`klack.simulation.kernel.run_steps`.  One pass over the modes reads seven
-to nine numbers per mode and is bound by that, so state and matrices are packed in chunks of
-``CHUNK`` modes with constant distances: the compiler then needs no test of overlapping arrays,
-which costs as much as the pass itself.
+Nearly every impact has one.  A pass over the modes is bound by reading seven to nine numbers per
+mode, so state and matrices are packed in chunks of ``CHUNK`` modes with constant distances: a test
+of overlapping arrays would cost as much as the pass itself.
 """
 
 from typing import NamedTuple
@@ -78,7 +77,7 @@ def _whole(modes: int) -> int:
 
 @inner
 def _pack(q: Vector, v: Vector, A: Matrix, P: Matrix, row: Vector) -> tuple[Matrix, Matrix]:
-    """State (chunks, 2 * 64) and step matrices (chunks, 7 * 64), filled up with still modes."""
+    """State (chunks, 2 * 64) and step matrices (chunks, 7 * 64), padded with still modes."""
     chunks = (q.size + CHUNK - 1) // CHUNK
     S, K = np.zeros((chunks, 2 * CHUNK)), np.zeros((chunks, 7 * CHUNK))
     for m in range(q.size):
@@ -94,7 +93,7 @@ def _pack(q: Vector, v: Vector, A: Matrix, P: Matrix, row: Vector) -> tuple[Matr
 
 @inner
 def _pack_losses(B: Matrix, W: Matrix, Q: Matrix, row: Vector) -> Matrix:
-    """What a unit force leaves pending, energy weights and loss forms, (chunks, 10 * 64)."""
+    """Effect of a pending unit force, energy weights and loss forms, (chunks, 10 * 64)."""
     chunks = (row.size + CHUNK - 1) // CHUNK
     L = np.zeros((chunks, 10 * CHUNK))
     for m in range(row.size):
@@ -112,7 +111,7 @@ def _pack_losses(B: Matrix, W: Matrix, Q: Matrix, row: Vector) -> Matrix:
 
 @inner
 def _pack_watched(rows: Matrix) -> tuple[Cube, Matrix]:
-    """Recorded rows in chunks, and how many modes of each count: whole vectors, from its start."""
+    """Recorded rows in chunks, and the modes of each that count, in whole vectors."""
     chunks = (rows.shape[1] + CHUNK - 1) // CHUNK
     packed = np.zeros((rows.shape[0], chunks, CHUNK))
     counts = np.zeros((rows.shape[0], chunks), np.int64)
@@ -147,7 +146,7 @@ def _watch(
 
 @phase
 def _push_in(S: Matrix, index: NDArray[np.int64], pushed_q: Vector, pushed_v: Vector) -> None:
-    """Let the motion under constant forces join that of all modes."""
+    """Add the motion under constant forces to that of all modes."""
     for k in range(index.size):
         c, i = index[k] // CHUNK, index[k] % CHUNK
         S[c, i] += pushed_q[k]
@@ -242,7 +241,7 @@ def _move(S: Matrix, K: Matrix, modes: int, F: float, gap: float) -> float:
 
 @phase
 def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tuple[_Contact, float]:
-    """Solve for the contact force of the step; returns also what it loses [J]."""
+    """Contact force of the step, and its loss [J]."""
     own = contacts.G[0, 0] + 2.0 * contacts.series[0]
     d0, d_free = -now.gap - now.e, now.e - free
     force, lost, chi, approaching, hint = 0.0, 0.0, now.chi, now.approaching, now.hint
@@ -275,10 +274,7 @@ def _press(contacts: Contacts, linear: bool, now: _Contact, free: float) -> tupl
 
 @phase
 def _damp(L: Matrix, S: Matrix, now: _Contact, at: Damped) -> Damped:
-    """Damping loss; flight: energy at its two ends, contact: the exact loss of each step.
-
-    ``S`` is the state before the step.
-    """
+    """As in :mod:`klack.simulation.kernel`; ``S`` is the state before the step."""
     loss, in_flight, flight_energy = at
     if now.F > 0.0:
         if in_flight:
@@ -297,7 +293,7 @@ def _damp(L: Matrix, S: Matrix, now: _Contact, at: Damped) -> Damped:
 def _end_step(
     contacts: Contacts, now: _Contact, after: float, loss: float
 ) -> tuple[_Contact, float]:
-    """Series spring and dissipation after the step; returns also the losses at release [J]."""
+    """Series spring and dissipation after the step; also losses at release [J]."""
     e, chi, approaching, deepest = now.e, now.chi, now.approaching, now.deepest
     if now.F > 0.0:
         e = 2.0 * contacts.series[0] * now.F - e

@@ -15,7 +15,7 @@ _RING = 0.25  # spread of the force over its mean radius, below which it lies on
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FilmLand:
-    """Numbers that the pressure of a film follows from, beside its lift and tilts.
+    """Numbers that, beside lift and tilts, determine the pressure of a film.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ class ModalMoments:
     coordinates (k, M) [m sqrt(kg)]
         Body by body.
     shape_marks (M,) [1/sqrt(kg)]
-        By which the shapes of the modes are known again; empty for bodies without meshes.
+        Identify the shapes of the modes; empty for bodies without meshes.
     """
 
     bodies: tuple[str, ...]
@@ -100,17 +100,15 @@ class ModalMoments:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SpatialImpact:
-    r"""Contact forces round the ring of one impact, and what else was recorded of it.
+    """Contact forces round the ring of one impact, and what else was recorded of it.
 
-    A contact point gives its force to the sectors that its share of the circumference lies in, so
-    that the sum over the sectors is the contact force, and with the intervals its impulse.
+    The sum over the sectors is the contact force: a contact point gives its force to the sectors
+    that its share of the circumference lies in.
 
     Parameters
     ----------
     number
-        Of the impacts of the run that were recorded, from 1, in order of their first touch.
-    stop
-        Component.
+        From 1, in order of first touch.
     edges (n + 1,) [s]
         Ends of the intervals, from the first touch.
     sector_force (n, S) [N]
@@ -123,9 +121,9 @@ class SpatialImpact:
     height [m]
         Mean height of the force, in the drawing of the lower body of the stop.
     film
-        Of a stop without a film, or whose film no tilt changes.
+        None for a stop without a film, or whose film no tilt changes.
     modes
-        Of the first impacts of a run.
+        Only of the first impacts of a run.
     """
 
     number: int
@@ -161,7 +159,7 @@ class SpatialImpact:
 
     @property
     def is_ring(self) -> bool:
-        """Whether the force lies on a ring, and not on a disc or a spot aside."""
+        """Whether the force lies on a ring, not on a disc or an eccentric spot."""
         return self.spread < _RING * self.radius
 
 
@@ -178,7 +176,7 @@ class SpatialPath:
     def add(
         self, time: float, place: Vector, speed: Vector, guide: Vector, side: Vector | None = None
     ) -> None:
-        """Add a moment; what was later is forgotten, since it has been computed again.
+        """Add a moment and forget later ones, which are computed again.
 
         ``side`` are forces and moments of magnets and seats across the axis, shape (n, 4).
         """

@@ -1,10 +1,8 @@
-"""What elements and fluid of a network do in a step of bodies that others move.
+"""Elements and fluid of a network in a step of bodies that others move.
 
-Bodies that meet point by point are moved by :class:`klack.simulation.network_run.MovingBodies`;
-each of their steps, short or long, is what a macro step is in
-:mod:`klack.simulation.network_kernel`: :func:`begin_step` guesses forces, the bodies act,
-:func:`answer_step` asks elements and fluid for the way that the ports went, and :func:`end_step`
-takes over.
+Each step of :class:`klack.simulation.network_run.MovingBodies`, short or long, is what a macro step
+is in :mod:`klack.simulation.network_kernel`: :func:`begin_step` guesses forces, the bodies act,
+:func:`answer_step` asks elements and fluid, and :func:`end_step` accepts the step.
 """
 
 from klack.arrays import Vector
@@ -74,7 +72,7 @@ def begin_step(
 ) -> None:
     """Guess forces and pressures of a step of ``H`` [s], ``steps`` fine ones, from ``t`` [s].
 
-    ``ratio`` is its length over that of the last one; ``fresh`` after steps of another loop.
+    ``ratio``: its length over that of the last one; ``fresh``: after steps of another loop.
     """
     bodies = pointers(network.bodies)
     fluid = Fluid(
@@ -107,13 +105,10 @@ def answer_step(
     scratch: Scratch,
     report: Vector,
 ) -> int:
-    """Forces of elements and fluid for the way that the ports went, and what was missed.
+    """Forces of elements and fluid for the motion of the ports, and what was missed.
 
-    Returns
-    -------
-    int
-        ``STATUS_DONE``; ``STATUS_REPEAT`` where what was missed matters; ``STATUS_REFUSED`` where a
-        port is nowhere; or what failed.
+    Returns ``STATUS_REPEAT`` where what was missed matters, ``STATUS_REFUSED`` where a port is not
+    finite.
     """
     bodies, elements = pointers(network.bodies), pointers(network.elements)
     fluid = Fluid(
@@ -165,10 +160,10 @@ def end_step(
     recording: Recording,
     scratch: Scratch,
 ) -> None:
-    """Take over states, masses, waves and accounts.
+    """Accept states, masses, waves and accounts.
 
-    ``excess`` [J] is what the bodies got beyond what was given to them; ``record`` is the row that
-    a record of ``record_time`` [s] ends in, below zero for none.
+    ``excess`` [J] is what the bodies got beyond what was given to them; ``record`` is the row of a
+    record of ``record_time`` [s] that ends here, below zero for none.
     """
     bodies, elements = pointers(network.bodies), pointers(network.elements)
     fluid = Fluid(

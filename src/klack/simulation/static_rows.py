@@ -1,8 +1,6 @@
-"""Forces and flows of all rows of a network at rest, and how they answer to small changes.
+"""Forces and flows of a network at rest, and how they answer to small changes.
 
-Forces of all contacts of a network at rest, and how they answer to their gaps.
-
-A law with memory is on its closing curve: the faces have slipped up and hold nothing back.
+A contact law with memory is on its closing curve: the faces have slipped up and hold nothing back.
 """
 
 from typing import Any, NamedTuple
@@ -45,11 +43,11 @@ def contacts_at_rest(
     Parameters
     ----------
     kind, law, law0
-        Contact laws, as in :class:`klack.simulation.network_arrays.Interfaces`.
+        As in :class:`klack.simulation.network_arrays.Interfaces`.
     series [m/N]
-        Compliance behind each of them.
+        Compliance behind each law.
     gap [m]
-        Of the bodies; negative when they press on each other.
+        Of the bodies; negative when pressed.
     """
     force, slope = np.zeros(gap.size), np.zeros(gap.size)
     for c in range(gap.size):
@@ -83,7 +81,7 @@ def _pressed(kind: int, law: Vector, first: int, series: float, gap: float) -> t
 
 
 class Couplings(NamedTuple):
-    """What joins the unknowns, whatever their values: see :mod:`klack.simulation.static_start`.
+    """What joins the unknowns of :mod:`klack.simulation.static_start`, whatever their values.
 
     Ports ``n``, rigid modes ``r``, free volumes ``f``, columns of fluid ``c``.
     """
@@ -121,7 +119,7 @@ class Balance(NamedTuple):
 
 @njit(error_model="numpy")
 def newton_system(at: Couplings, now: Balance, creep: Vector, tau: float) -> tuple[Matrix, Vector]:
-    """Matrix, every row scaled to one, and right-hand side in the units of the unknowns."""
+    """Matrix with rows scaled to one, and right-hand side in the units of the unknowns."""
     r, n = at.shapes.shape
     f, c = at.free.size, at.friction.size
     count = n + r + f + c
@@ -182,7 +180,7 @@ def _fill_volumes(A: Matrix, left: Vector, at: Couplings, now: Balance, tau: flo
 
 @njit(error_model="numpy")
 def least_share(at: Couplings, change: Vector, p: Vector) -> float:
-    """Smallest share of a pressure that a step leaves, 1 at most; nan for a step that is none."""
+    """Smallest share of a pressure that a step leaves, 1 at most; nan for an invalid step."""
     r, n = at.shapes.shape
     least = 1.0
     for i in range(change.size):
@@ -197,7 +195,7 @@ def least_share(at: Couplings, change: Vector, p: Vector) -> float:
 def last_change(at: Couplings, change: Vector, y: Vector, p: Vector, length: float) -> float:
     """Largest change of a displacement over the largest one, and of a pressure over itself.
 
-    ``length`` [m] is the least that displacements are compared with.
+    Displacements are compared with ``length`` [m] at least.
     """
     r, n = at.shapes.shape
     longest, moved, pressed = length, 0.0, 0.0
@@ -237,7 +235,7 @@ def at_rest(
     size: Vector,
     report: Index,
 ) -> bool:
-    """Sum what pushes each port and what flows into each node while all ports are at rest.
+    """Sum what pushes each port and flows into each node with all ports at rest; False on failure.
 
     Parameters
     ----------
@@ -248,22 +246,17 @@ def at_rest(
     h [s]
         Length of the step before time zero that sources and states are asked for.
     y [m]
-        Displacement of every port; the last one is the ground.
+        Of every port, the ground last.
     p [Pa]
         Of every node.
     force [N]
         Out: of elements, walls and branches, without the interfaces.
     inflow [kg/s]
         Out.
-    size : array [N], then [kg/s]
-        Out: the same sums of absolute values, forces first: what their round-off belongs to.
+    size [N], then [kg/s]
+        Out: the same sums of absolute values, the scale of their round-off.
     report (3,)
         Out: 0 for an element or 3 for a branch, its row, its status.
-
-    Returns
-    -------
-    bool
-        False if a row failed.
     """
     rho = np.ones(p.size)
     for i in range(p.size):
@@ -295,7 +288,7 @@ def at_rest(
 
 @inner
 def _gather(rows: StepRows, force: Vector, size: Vector) -> None:
-    """Add the forces of all rows to those of their ports, and what their round-off belongs to."""
+    """Add the forces of all rows to those of their ports, and the scale of their round-off."""
     for k in range(rows.rows):
         push_ports(pointers(rows), k, first(force))
         o0, q0 = rows.output0[k] + rows.head, rows.port0[k]
@@ -307,7 +300,7 @@ def _gather(rows: StepRows, force: Vector, size: Vector) -> None:
 def _difference(
     to: Any, column: int, first: int, after: Vector, before: Vector, change: float
 ) -> None:
-    """Write a difference quotient into a column, row by row: quicker to compile than a slice."""
+    """Write a difference quotient into a column; a loop compiles faster than a slice."""
     for i in range(after.size):
         to[first + i, column] = (after[i] - before[i]) / change
 

@@ -12,16 +12,14 @@ columns of fluid (lines, inertances):
 with the static compliance :math:`C = \Phi_e^T \Omega^{-2} \Phi_e` of the elastic modes and the
 forces :math:`F` of everything that acts, contacts with their full laws.
 
-Newton's method finds a root from nearby.  To get near, and to the root that the valve itself would
-come to rest in, the same equations are first led through pseudo-time (Kelley & Keyes, SIAM J.
-Numer. Anal. 35 (1998) 508): implicit Euler steps in which a body creeps with
-:math:`\Delta z = \tfrac12 \tau^2 \Phi_r F` and a volume fills with
-:math:`V \varrho' \Delta p = \tau \sum \dot m`.  Steps :math:`\tau` grow from microseconds until
-they are so long that nothing but the equilibrium is left; a step whose Newton iteration fails is
-shortened.  What moves ever on has no equilibrium.
+To reach the root that the valve itself would come to rest in, pseudo-time first leads near it
+(Kelley & Keyes, SIAM J. Numer. Anal. 35 (1998) 508): implicit Euler steps in which a body creeps
+with :math:`\Delta z = \tfrac12 \tau^2 \Phi_r F` and a volume fills with :math:`V \varrho' \Delta p
+= \tau \sum \dot m`.  Steps :math:`\tau` grow from microseconds until nothing but the equilibrium is
+left; a step whose Newton iteration fails is shortened.  What never stops has no equilibrium.
 
-No state is tried in which a magnet is beyond the range of its gaps: past its pole it would pull all
-the same, and hold an armature where none can be.
+No state with a magnet beyond the range of its gaps is tried: past its pole it would still pull, and
+hold an armature where none can be.
 """
 
 import warnings
@@ -112,7 +110,7 @@ class _State:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RestState:
-    """Equilibrium of a network, from which that of one hardly different is found at once."""
+    """Equilibrium of a network, from which that of a similar one is found at once."""
 
     _state: _State
     _first: Vector  # pressures from which the search for it began
@@ -123,7 +121,7 @@ class RestState:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class SteadySlopes:
-    """Linear equations about an equilibrium, as :mod:`klack.simulation.static_start` has them.
+    """Linear equations of :mod:`klack.simulation.static_start` about an equilibrium.
 
     Ports ``n``, rigid modes ``r``, free volumes ``f``, columns of fluid ``c``.
 
@@ -133,7 +131,7 @@ class SteadySlopes:
     axial (r,) [sqrt(kg)]
         Coordinate of each rigid mode per metre of its body along +z.
     body
-        Component of the body of each rigid mode.
+        Component of each rigid mode.
     moves (r,)
         False for a body that is held.
     compliance (n, n) [m/N]
@@ -145,7 +143,7 @@ class SteadySlopes:
         Components of the free volumes.
     density (f,) [kg/m^3]
     left (f,) [kg/s]
-        What still flows into each of them.
+        Rest of the flow into each of them.
     ends (c, 2)
         Free volumes at the ends of columns; -1 for a known pressure.
     friction (c,) [J s/kg^2]
@@ -186,18 +184,18 @@ def begin_at_rest(
 ) -> tuple[StaticStart, RestState]:
     """Find the static equilibrium and put the network there, in place.
 
-    Bodies with a speed at the start do not rest: they stay where they are.  So do those without an
-    equilibrium whose friction holds them there.  Volumes with a stated pressure keep it; where
-    nothing flows in or out, so do those without, at ambient pressure.
+    Bodies with a speed at the start stay where they are, and so do those without an equilibrium
+    that friction holds.  Volumes keep a stated pressure; those without one, where nothing flows in
+    or out, ambient pressure.
 
     Parameters
     ----------
     step [s]
         Fine step of the run.
     near
-        Equilibrium of a network of the same parts that hardly differs; it has warned already.
+        Of a similar network of the same parts; it has warned already.
     shift (ports,) [m]
-        By which the ports are elsewhere than bodies that move along the axis have them.
+        Of the ports from where bodies that move along the axis have them.
 
     Raises
     ------
@@ -205,11 +203,6 @@ def begin_at_rest(
         If a body has no equilibrium, with its name.
     ConvergenceError
         If none is found.
-
-    Warns
-    -----
-    AccuracyWarning
-        For a volume whose pressure has no steady state; it starts from ambient pressure.
     """
     problem, found, closed = _settled(network, step, near, shift=shift)
     notes = [_no_pressure(network, i) for i in closed]
@@ -231,19 +224,17 @@ def begin_steady(
     Parameters
     ----------
     network
-        No volume of it has a stated pressure: what it has at the start is where the search begins.
+        Without stated pressures: those at the start are where the search begins.
     step [s]
     first [m]
-        Displacements of free bodies from which the search begins; 0 where it names none.
+        Displacements of free bodies from which the search begins; else 0.
     held
-        Bodies that stay at their ``first`` displacement: what is left on them holds them.
+        Bodies that stay at their ``first`` displacement, whatever force is left on them.
 
     Raises
     ------
     InputError
         If a body has no equilibrium, or a volume no steady pressure.
-    ConvergenceError
-        If none is found.
     """
     bodies = [row.component for row in network.rows.bodies]
     fixed = frozenset(bodies.index(name) for name in held)
@@ -265,7 +256,7 @@ def _settled(
     fixed: frozenset[int] = frozenset(),
     lifts: Vector | None = None,
 ) -> tuple["_Balance", RestState, list[int]]:
-    """Equilibrium, and the volumes that have no steady pressure, which keep that of the start."""
+    """Equilibrium, and the volumes without a steady pressure, which keep that of the start."""
     held = set(near._held) if near is not None else set[int]()
     stuck = set(near._stuck) if near is not None else set[int]()
     closed: list[int] = []
@@ -291,9 +282,9 @@ def _settled(
 
 
 def _march(problem: "_Balance", near: RestState | None) -> _State:
-    """Lead the start through pseudo-time to the equilibrium, with long steps from a near one.
+    """Lead the start through pseudo-time to the equilibrium, from a near one with long steps.
 
-    A body that is held by nothing and on which nothing acts stays: in a long step it would drift.
+    A body that nothing holds and on which nothing acts stays: in a long step it would drift.
     """
     begin, step = problem.first(), problem.step
     state = begin if near is None else problem.nearby(begin, near)
@@ -416,7 +407,7 @@ class _Balance:
         self.beyond: tuple[LimitRow, float] | None = None  # range that was left last, and how far
 
     def _dry_friction(self, rigid: list[int]) -> Vector:
-        """Force by which friction on what cannot move away holds each body at most [N]."""
+        """Largest force by which friction on what cannot move away holds each body [N]."""
         held = np.zeros(len(rigid))
         for slider in self.network.rows.sliders:
             ends = [self.network.port_of[handle] for handle in (slider.upper, slider.lower)]
@@ -426,13 +417,7 @@ class _Balance:
         return held
 
     def held_by_friction(self) -> list[str]:
-        """Words for bodies that friction holds where they are drawn.
-
-        Raises
-        ------
-        InputError
-            Where it does not suffice.
-        """
+        """Notes on bodies that friction holds where they are drawn; an error where it cannot."""
         left, told = self.left_on_bodies(), []
         for b in self.stuck:
             name = self.network.rows.bodies[b].component
@@ -445,7 +430,7 @@ class _Balance:
         return told
 
     def _columns(self) -> None:
-        """Lines and inertances with a free volume at one end carry an unknown flow."""
+        """Give lines and inertances with a free volume at one end an unknown flow."""
         rows, density, p = self.network.rows, self.network.nodes.density, self.network.node_state.p
         place = {handle: i for i, handle in enumerate(self.network.node_order)}
         free = set(self.free.tolist())
@@ -506,13 +491,13 @@ class _Balance:
         return any(i < nodes.volumes and self.body_of_port[port] in bodies for i, port in walls)
 
     def first(self) -> _State:
-        """Undeformed bodies, stated pressures, others at ambient pressure, no flow in columns."""
+        """Undeformed bodies, stated or ambient pressures, no flow in columns."""
         z = self.axial * self.lifts[self.of_body]
         y = np.append(self.shapes.T @ z, 0.0)
         return _State(z, y, self.at_first.copy(), np.zeros(len(self.ends)))
 
     def nearby(self, begin: _State, near: RestState) -> _State:
-        """Equilibrium of a network that hardly differs, with what is given in this one."""
+        """Equilibrium of a similar network, with what is given in this one."""
         state = near._state.copy()
         state.p += begin.p - near._first  # a volume that nothing fills keeps what it begins with
         known = np.setdiff1d(np.arange(state.p.size), self.free)
@@ -520,9 +505,9 @@ class _Balance:
         return state
 
     def unbalanced(self, state: _State, share: float = _ROUND_OFF) -> NDArray[np.bool_] | None:
-        """Rigid modes that are free to creep; None if all is in equilibrium.
+        """Rigid modes that are free to creep; None in equilibrium.
 
-        One on which nothing but round-off acts, and which no force answers, is not.
+        One with round-off alone, which no force answers, is not.
         """
         if not self.evaluate(state):
             raise self.failed()
@@ -551,7 +536,7 @@ class _Balance:
         return (pushed & self.moves) | self.answering()
 
     def answering(self) -> NDArray[np.bool_]:
-        """Rigid modes that move, and that a force answers."""
+        """Rigid modes that move and whose motion a force answers."""
         answers = np.any(self.shapes @ self.by_port[: self.ports] != 0.0, axis=1)
         return np.asarray(answers & self.moves)
 
@@ -562,9 +547,9 @@ class _Balance:
         open_modes: NDArray[np.bool_],
         mass: Vector | None = None,
     ) -> _State | None:
-        """One implicit Euler step of pseudo-time; None if Newton's method finds no end of it.
+        """One implicit Euler step of pseudo-time; None if Newton's method fails.
 
-        ``mass`` is what the free volumes hold at its begin, in place of what ``start`` has.
+        ``mass`` is what the free volumes hold before, in place of that of ``start``.
         """
         state, before, self.beyond, self.emptied = start.copy(), np.inf, None, []
         creep = np.where(open_modes, 0.5 * tau * tau, 0.0)
@@ -603,7 +588,7 @@ class _Balance:
         return None
 
     def check(self, state: _State) -> None:
-        """Raise :class:`_RunawayError` for what has gone where nothing real goes."""
+        """Raise :class:`_RunawayError` for what has left all real bounds."""
         volumes = self._unstated(state.p > self.high)
         far = np.flatnonzero(np.abs(state.y[:-1]) > _FAR * self.step)
         bodies = sorted({int(self.body_of_port[port]) for port in far})
@@ -614,7 +599,7 @@ class _Balance:
         return [int(i) for i in self.free if which[i] and not self.given[i]]
 
     def answers(self, state: _State) -> bool:
-        """Whether every part knows its force or flow in this state."""
+        """Whether every part has a force or flow in this state."""
         return (
             self._in_range(state.y)
             and self._keep_states(state.y)
@@ -633,7 +618,7 @@ class _Balance:
         )
 
     def evaluate(self, state: _State) -> bool:
-        """Forces and flows with their slopes, contacts included; False if a part fails."""
+        """Forces and flows with their slopes, with contacts; False if a part fails."""
         found = self._keep_states(state.y) and slopes_at_rest(
             *self._rows,
             self.h,
@@ -674,7 +659,7 @@ class _Balance:
         return list(zip(forces.tolist(), slopes.tolist(), strict=True))
 
     def _in_range(self, y: Vector) -> bool:
-        """Whether no armature is beyond its pole, and none far outside its map."""
+        """Whether no armature is beyond its pole or far outside its map."""
         for limit in self.ranges:
             moved = sum(factor * y[self.network.port_of[port]] for port, factor in limit.ports)
             value = limit.start + float(moved)
@@ -684,7 +669,7 @@ class _Balance:
         return True
 
     def _keep_states(self, y: Vector) -> bool:
-        """Give every element that says so the state in which it stays; False if it has none."""
+        """Give elements that ask for it the state in which they stay; False if one has none."""
         elements = self.network.elements
         for k, state_at in self.kept:
             ports = elements.ports[elements.port0[k] : elements.port0[k + 1]]
@@ -703,7 +688,7 @@ class _Balance:
         return True
 
     def _slopes_of_kept_states(self, state: _State) -> None:
-        """Repeat the slopes with those ports whose motion changes such a state."""
+        """Repeat the slopes by ports whose motion changes such a state."""
         elements = self.network.elements
         if not self.kept:
             return
@@ -733,16 +718,16 @@ class _Balance:
         return np.asarray(bent - self.shift)
 
     def _net(self, state: _State) -> Vector:
-        """Mass that flows into each free volume [kg/s]; an enclosed one lets none through."""
+        """Mass flow into each free volume [kg/s]; an enclosed one lets none through."""
         inflow = self.inflow.copy()
         np.add.at(inflow, self.ends[:, 0], -state.m)
         np.add.at(inflow, self.ends[:, 1], state.m)
         return np.where(self.shut, 0.0, inflow[self.free])
 
     def _columns_left(self, state: _State) -> tuple[Vector, Vector]:
-        """What accelerates each column [J/kg], and what its round-off belongs to.
+        """What accelerates each column [J/kg], and the scale of its round-off.
 
-        That is the sum of what it is the difference of, and of pressure over density: near ambient
+        That is the sum of both terms of the difference, and of pressure over density: near ambient
         pressure the energy itself is small, its round-off is that of the pressure.
         """
         at_ends = state.p[self.ends]
@@ -786,7 +771,6 @@ class _Balance:
     def _newton(
         self, state: _State, start: _State, creep: Vector, mass: Vector, tau: float
     ) -> Vector:
-        """Change of all unknowns by one Newton step."""
         n, f = self.ports, self.free.size
         force_y, force_p = self.by_port[:n], self.by_pressure[:n, :f]
         now, by_p, density = self._masses(state)
@@ -813,7 +797,7 @@ class _Balance:
         return np.asarray(change * self.couplings.units)
 
     def failed(self) -> ConvergenceError:
-        """Error of the part that knows no answer at the start."""
+        """Error of the part without an answer at the start."""
         head, k, status = (int(value) for value in self.code)
         rows = self.network.rows
         failed = rows.branches[k] if head else rows.elements[k]
@@ -827,7 +811,7 @@ class _Balance:
         )
 
     def left_on_bodies(self) -> dict[str, float]:
-        """Force that is left on each free body [N]."""
+        """Force left on each free body [N]."""
         left = self.shapes @ self.force[:-1]
         result = {}
         for b, row in enumerate(self.network.rows.bodies):
@@ -861,7 +845,7 @@ class _Balance:
         )
 
     def steady_slopes(self, state: _State) -> SteadySlopes:
-        """Equations about a state in which everything has been put."""
+        """Equations about the state that the network is in."""
         n, network = self.ports, self.network
         place = {int(i): j for j, i in enumerate(self.free)}
         flow = self.by_pressure[n + 1 :]
@@ -887,7 +871,7 @@ class _Balance:
         )
 
     def _known(self, flow: Matrix) -> NDArray[np.bool_]:
-        """Free volumes from which fluid finds a way to a known pressure.
+        """Free volumes with a way for the fluid to a known pressure.
 
         A pressure of one volume that changes the flow into another node leads there.
         """
@@ -909,7 +893,7 @@ class _Balance:
     def put(
         self, state: _State, notes: tuple[str, ...], *, tells_closed: bool = True
     ) -> StaticStart:
-        """Put the network into this state, and say where that is."""
+        """Put the network into this state, and describe it."""
         if not self.evaluate(state):
             raise self.failed()
         self._check_stops(state)
@@ -920,7 +904,7 @@ class _Balance:
         return self._told(state, notes, tells_closed=tells_closed)
 
     def _check_stops(self, state: _State) -> None:
-        """Refuse bodies that are pressed far deeper into a stop than they can move away."""
+        """Reject bodies pressed far deeper into a stop than they can move away."""
         rows, interfaces = self.network.rows, self.network.interfaces
         gap = interfaces.gap0 + state.y[interfaces.upper] - state.y[interfaces.lower]
         for row, depth in zip(rows.interfaces, -gap, strict=True):
@@ -1053,7 +1037,7 @@ class _Balance:
         )
 
     def _closed(self, names: list[str], p: Vector) -> tuple[str, ...]:
-        """Words for volumes without a stated pressure that nothing fills or empties.
+        """Notes on volumes without a stated pressure that nothing fills or empties.
 
         One that a valve has filled until it closed has a pressure of its own.
         """
@@ -1071,9 +1055,9 @@ class _Balance:
 
 
 def _along(body: ReducedBody) -> Matrix:
-    """Direction of the axial shift among the rigid modes, shape (1, rigid); (0, rigid) if held.
+    """Axial shift among the rigid modes, shape (1, rigid); (0, rigid) if held.
 
-    Bodies in three dimensions have six of them: forces along the axis balance along the axis.
+    Bodies in three dimensions have six: forces along the axis balance along the axis.
     """
     size = float(np.linalg.norm(body.rigid_axial))
     return np.atleast_2d(body.rigid_axial / size) if size > 0.0 else np.zeros((0, body.rigid_count))

@@ -1,4 +1,4 @@
-"""Sizes of the steps of a network, from the accuracy that is wanted and what its parts allow."""
+"""Sizes of the steps of a network, from the accuracy and what its parts allow."""
 
 from dataclasses import dataclass, replace
 from math import inf, sqrt
@@ -30,7 +30,7 @@ class StepSizes:
     Parameters
     ----------
     step [s]
-        Fine step of bodies, contacts and films, where films change fast.
+        Fine step of bodies, contacts and films.
     coarse
         Fine steps of a macro step in flight, after which elements and fluid answer; 1 for none.
     near
@@ -54,24 +54,10 @@ class StepSizes:
 def step_sizes(
     rows: Rows, accuracy: Accuracy, *, step: float | None = None, coarse: int | None = None
 ) -> StepSizes:
-    """Choose the steps for a network.
+    """Choose the steps for a network; ``step`` [s] and ``coarse`` replace those of the accuracy.
 
-    Macro steps are as long as the accuracy has them, but no longer than any segment of a line; and
-    a whole number of them makes the exchange interval of a row that has one, if there is such a
-    number.
-
-    Parameters
-    ----------
-    accuracy : "normal" or "fine"
-    step [s]
-        Fine step, in place of that of the accuracy.
-    coarse
-        Fine steps of a macro step in flight, in place of that of the accuracy.
-
-    Raises
-    ------
-    InputError
-        For an unknown accuracy, or fewer than one fine step in a macro step.
+    Macro steps are as long as the accuracy has them, but no longer than any segment of a line; if
+    possible a whole number of them makes the exchange interval of a row that has one.
     """
     if accuracy not in ACCURACIES:
         raise InputError(
@@ -94,15 +80,11 @@ def step_sizes(
 
 
 def scaled(rows: Rows, sizes: StepSizes, factor: float) -> StepSizes:
-    """Return sizes of steps that are all longer by a factor, whatever parts of the network ask for.
+    """Sizes of steps all longer by a factor, whatever parts of the network ask for.
 
     Longer steps have fine sub-steps throughout, so that errors of sub-steps are not those of the
-    run that they are compared with.
-
-    Raises
-    ------
-    InputError
-        Where an exchange interval would no longer hold whole steps.
+    run that they are compared with.  An exchange interval that would no longer hold whole steps
+    raises InputError.
     """
     macro = sizes.coarse * sizes.step
     for interval in _intervals(rows):
@@ -123,7 +105,7 @@ def _intervals(rows: Rows) -> list[float]:
 
 
 def _chosen(rows: Rows, macro: float, h: float) -> int:
-    """Fine steps of a macro step: a power of two, unless an exchange interval asks for another."""
+    """Fine steps of a macro step: a power of two, unless an exchange interval needs another."""
     longest = min([macro, *(_segment(line) for line in rows.lines)])
     longest = min([longest, *(wave.crossing for wave in rows.waves)])
     intervals = _intervals(rows)
@@ -140,7 +122,7 @@ def _chosen(rows: Rows, macro: float, h: float) -> int:
 def kinks(rows: Rows, macro: float) -> NDArray[np.float64]:
     """Times [s] at which a table of forces or pressures bends sharply, then infinity.
 
-    The macro steps, of ``macro`` [s], that hold one of them are divided: a force within a step is a
+    The macro steps of ``macro`` [s] that hold one are divided: a force within a step is a
     straight line.
     """
     tables: list[tuple[ArrayLike, ArrayLike]] = [row.table for row in rows.elements]
@@ -177,5 +159,5 @@ def _middle(rows: Rows, h: float, near: int) -> int:
 
 
 def largest_divisor(number: int, most: int) -> int:
-    """Largest divisor of a number that is at most this; 1 if there is no other."""
+    """Largest divisor of a number that is at most ``most``."""
     return next((size for size in range(most, 1, -1) if number % size == 0), 1)

@@ -26,9 +26,10 @@ class ContactPair:
     Parameters
     ----------
     body_a, port_a, body_b, port_b
-        Both ports point along +z (a contact port made of ``G_b^T lam`` must be turned round).
-    law : LinearLaw, HertzLaw, TableLaw, HuntCrossley; RubbingLaw or YieldingLaw of a single contact
-        Of the compliance that neither the modes nor ``series_compliance`` carry.
+        Both ports point along +z (a contact port made of ``G_b^T lam`` must be reversed).
+    law
+        Of the compliance that neither the modes nor ``series_compliance`` carry; a law with memory
+        (RubbingLaw, YieldingLaw) only where there is a single contact.
     gap [m]
         At the start.
     series_compliance [m/N]
@@ -63,7 +64,7 @@ class AxialForce:
     Parameters
     ----------
     force [N]
-        Negative presses a needle onto its seat.
+        Below zero it presses a needle onto its seat.
     port
         Where it acts; ``None`` spreads it over the mass, like weight.
     """
@@ -75,14 +76,7 @@ class AxialForce:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReturnSpring:
-    """Spring between a port and the ground: force ``-(preload + stiffness * y)`` along +z.
-
-    Parameters
-    ----------
-    stiffness [N/m]
-    preload [N]
-        Force in -z at the start.
-    """
+    """Spring between a port and the ground: force ``-(preload + stiffness * y)`` along +z."""
 
     body: str
     port: str
@@ -95,15 +89,7 @@ class ReturnSpring:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReducedSystem:
-    """Bodies with modes, and all that acts between and on them.
-
-    Parameters
-    ----------
-    bodies
-        Distinct names.
-    contacts
-        At least one.
-    """
+    """Bodies of distinct names, at least one contact, and all that acts on them."""
 
     bodies: tuple[ReducedBody, ...]
     contacts: tuple[ContactPair, ...]
@@ -143,7 +129,7 @@ class ReducedSystem:
         )
 
     def shape(self, body: str, port: str) -> NDArray[np.float64]:
-        """Return the modal amplitudes of a port, shape (m,)."""
+        """Modal amplitudes of a port, shape (m,)."""
         owner = self.body(body)
         return np.asarray(owner.port_shapes)[:, owner.port_index(port)]
 

@@ -45,8 +45,8 @@ def run_with_tangents(
     """:func:`klack.simulation.network_kernel.run_network` with derivatives.
 
     Every array of floats, and every float but for those of the compiled code itself, has a last
-    axis of :data:`LANES`: the value and its derivatives.  They are made by :func:`lanes_of`; the
-    step functions are those of :func:`tangent_address`.
+    axis of :data:`LANES`, made by :func:`lanes_of`; the step functions are those of
+    :func:`tangent_address`.
     """
     return _run(
         macros,
@@ -72,7 +72,7 @@ def start_with_tangents(recording: Any, now: Any) -> None:
 
 
 def lanes_of(shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Zeros for numbers with derivatives, a last axis of :data:`LANES`, where vectors may lie."""
+    """Zeros for numbers with derivatives, aligned for vector registers."""
     count = int(np.prod(shape)) * LANES
     raw = np.zeros(count + LANES)
     first = (-raw.ctypes.data % _ALIGNED) // 8
@@ -80,7 +80,7 @@ def lanes_of(shape: tuple[int, ...]) -> NDArray[np.float64]:
 
 
 def tangent_address(step: StepFunction) -> int:
-    """Address of a step function for numbers with derivatives; compiles it the first time."""
+    """Address of a step function for numbers with derivatives; compiled the first time."""
     result = step.get_compile_result(_STEP)
     name = result.fndesc.llvm_cfunc_wrapper_name
     return int(result.library.get_pointer_to_function(name))

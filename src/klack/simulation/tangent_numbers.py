@@ -1,9 +1,8 @@
 """The numbers of a network with their derivatives, before the first step.
 
-Delay lines while the steps of a run stretch: what their memory holds belongs to other times.
-
-A line keeps its waves as means over fine steps.  Where these are longer by a share ``c``, a wave
-that was sent ``a`` steps ago is one of an earlier time, ``- a c h`` of its slope.
+While the steps of a run stretch, the memory of delay lines belongs to other times: a line keeps its
+waves as means over fine steps.  Where these are longer by a share ``c``, a wave sent ``a`` steps
+ago is one of an earlier time, ``- a c h`` of its slope.
 """
 
 from collections.abc import Sequence
@@ -42,7 +41,7 @@ __all__ = [
 
 
 def delay_slopes(lines: Lines) -> Vector:
-    """Change of :attr:`Lines.fraction` with the logarithm of the step: the delays stay.
+    """Change of :attr:`Lines.fraction` with the logarithm of the step, at constant delays.
 
     Only the last segment of a line has a fraction of a step, and takes the change of all.
     """
@@ -54,9 +53,9 @@ def delay_slopes(lines: Lines) -> Vector:
 
 
 def later_delays(base: Lines, other: Lines) -> Vector:
-    """How much longer the delays of other lines are, in steps of segments as those of the base.
+    """Excess of the delays of other lines, in steps of segments as those of the base.
 
-    As in :func:`delay_slopes` the last segment of a line takes the change of all.
+    The last segment of a line takes the change of all, as in :func:`delay_slopes`.
     """
     longer = (other.depth + other.fraction) - (base.depth + base.fraction)
     found = np.zeros(len(longer))
@@ -66,14 +65,9 @@ def later_delays(base: Lines, other: Lines) -> Vector:
 
 
 def steady_waves(base: Any, other: Any, flow: Vector) -> Vector:
-    """Waves of lines with a steady flow, in a memory as that of the base.
+    """Waves of the ``other`` lines at rest with a steady flow [m^3/s], in a memory like the base.
 
-    Parameters
-    ----------
-    base, other
-        With segments of equal numbers; the delays may differ.
-    flow [m^3/s]
-        In each line of the other network, which is at rest.
+    Segments are of equal numbers; the delays may differ.
     """
     lines = other.lines._replace(
         first_segment=base.lines.first_segment,
@@ -95,29 +89,29 @@ def steady_waves(base: Any, other: Any, flow: Vector) -> Vector:
 
 
 def waves_under_way(lines: Any, state: Any) -> list[Any]:
-    """Samples of all waves that have not arrived, where they lie now; the others mean nothing."""
+    """Samples of all waves that have not arrived, in place; the others mean nothing."""
     return [window for window, _ in _memory(lines, state)]
 
 
 def begin_stretch(lines: Any, state: Any, lane: int) -> None:
-    """Let the waves in memory be those of steps that have been longer all the time."""
+    """Change the waves in memory to those of steps that have been longer all the time."""
     for window, sent in _memory(lines, state):
         window[:, lane] = -sent * _change(window[:, 0])
 
 
 def end_stretch(lines: Any, state: Any, lane: int) -> None:
-    """Let the waves in memory be those of steps that are no longer, whatever they were."""
+    """Change the waves in memory to those of steps that are no longer."""
     for window, sent in _memory(lines, state):
         window[:, lane] += sent * _change(window[:, 0])
 
 
 def _change(waves: Vector) -> Vector:
-    """Change of the waves from one fine step to the next."""
+    """Change of the waves per fine step."""
     return np.asarray(np.gradient(waves)) if len(waves) > 1 else np.zeros(len(waves))
 
 
 def _memory(lines: Lines, state: LineState) -> list[tuple[Any, Vector]]:
-    """Samples under way of each wave, and how many steps ago each was sent into the line."""
+    """Samples under way of each wave, and how many steps ago each was sent."""
     found = []
     delays = lines.depth - 1.0 + lines.fraction[..., 0]
     for begin, end in zip(lines.first_segment[:-1], lines.first_segment[1:], strict=True):
@@ -137,20 +131,12 @@ _LONGER = 1e-4  # of the step, to either side: what a longer one changes
 _BENT = 0.1  # of a small change: more than this to one side only is a jump
 _ROUND_OFF = 1e-10  # of the largest number of a bundle: a change that tells nothing
 _LEAST = {"at": 1.0, "g": 1.0, "force": 1.0, "force_before": 1.0}
-"""Of bundles that may hold nothing but round-off, forces [N] and energies [J/kg], their size."""
+"""Scale of bundles that may hold nothing but round-off, forces [N] and energies [J/kg]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Direction:
-    """A direction in which a network changes.
-
-    Parameters
-    ----------
-    plus, minus
-        A little further on, and as much before.
-    distance
-        Between both.
-    """
+    """A direction in which a network changes, from ``minus`` to ``plus``, ``distance`` apart."""
 
     name: str
     plus: Rows
@@ -160,12 +146,12 @@ class Direction:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class TangentNumbers:
-    """Numbers of a network with their derivatives, and what changes with the length of the steps.
+    """Numbers of a network with their derivatives.
 
     Parameters
     ----------
-    by_step : list of (array, places, array)
-        Of each array the numbers that stay but depend on the step, and their change with its
+    by_step
+        Of each array the places that stay but depend on the step, and their change with its
         logarithm.
     """
 
@@ -181,13 +167,8 @@ def numbers_at_rest(
 ) -> TangentNumbers:
     """Numbers of a network with their derivatives in each direction, none with the step.
 
-    What a component makes of its parameters, and the static equilibrium, are differentiated by
-    central differences.
-
-    Parameters
-    ----------
-    rest
-        Of it; None for one that starts undeformed.
+    Central differences through all that a component makes of its parameters, and through the
+    static equilibrium ``rest``, None for an undeformed start.
 
     Raises
     ------
@@ -206,7 +187,7 @@ def numbers_at_rest(
 def slopes_at_rest(
     network: CompiledNetwork, rest: RestState | None, direction: Direction, sizes: StepSizes
 ) -> NetworkArrays:
-    """What changes in all numbers of a network at rest in a direction, per unit."""
+    """Change of all numbers of a network at rest per unit of a direction."""
     base, distance = network.arrays, direction.distance
     plus, minus = (_at_rest(rows, rest, sizes) for rows in (direction.plus, direction.minus))
     further, before = _in_place(plus.arrays, base), _in_place(minus.arrays, base)
@@ -258,7 +239,7 @@ def _in_place(numbers: NetworkArrays, base: NetworkArrays) -> NetworkArrays:
 
 
 def _slopes_by_step(network: CompiledNetwork, sizes: StepSizes) -> NetworkArrays:
-    """What changes with the length of the steps, in what stays; states do not yet."""
+    """Change with the length of the steps, of what stays; states do not yet."""
     base, *ends = (
         compile_network(network.rows, replace(sizes, step=sizes.step * factor)).arrays
         for factor in (1.0, 1.0 + _LONGER, 1.0 - _LONGER)
@@ -374,7 +355,7 @@ def state_arrays(numbers: NetworkArrays) -> list[Any]:
 
 
 def mode_places(numbers: NetworkArrays) -> tuple[Any, Any]:
-    """All numbers of the modes, and the places of their displacements and velocities."""
+    """All numbers of the modes, and places of their displacements and velocities."""
     rows = (ROW_V + 1) * ROW
     places = [np.arange(start, start + rows) for start in numbers.bodies.start[:-1]]
     return numbers.bodies.laid_out, np.concatenate(places)

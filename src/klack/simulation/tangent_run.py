@@ -1,19 +1,19 @@
-r"""Run a network together with its derivatives in some directions: what would change, and how much.
+r"""Run a network together with its derivatives in some directions.
 
 The compiled time loop runs on numbers that carry derivatives
 (:mod:`klack.machine.compiling.tangent_number`).  All of it is differentiated but for its decisions,
 which are those of the run itself.
 
-**Steps follow the touches.**  A step cannot see when within it a body touches: impacts begin with
-an error that depends on this phase, a saw-tooth of nothing as high as :math:`10^{-5}` and as narrow
-as one step.  Its slope, the derivative of the program at fixed steps, has nothing to do with that
-of the valve.  So the steps stretch with the parameter such that each touch keeps its phase: beside
-the directions that are asked for runs one in which nothing changes but the length of all steps,
+**Steps follow the touches.**  Impacts begin with an error that depends on the phase of the touch
+within its step, a saw-tooth as high as :math:`10^{-5}` and as narrow as one step.  Its slope, the
+derivative of the program at fixed steps, has nothing to do with that of the valve.  So the steps
+stretch with the parameter such that each touch keeps its phase: beside the requested directions
+runs one in which only the length of all steps changes,
 
 .. math:: h(p) = h\,[1 + c\,(p - p_0)] ,
 
-and since tangents add up, ``c`` follows at each touch, for every direction, from its phase.  What
-is recorded then belongs to times that move along: :math:`t(p) = t + \theta (p - p_0)`.
+and since tangents add up, ``c`` follows at each touch, for every direction, from its phase.  The
+record then belongs to times that move along: :math:`t(p) = t + \theta (p - p_0)`.
 """
 
 from collections.abc import Callable, Sequence
@@ -107,12 +107,12 @@ class Touch:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TangentRun:
-    """A run, its touches, and how it would be a little further in every direction.
+    """A run with its touches and derivatives in every direction.
 
     Parameters
     ----------
     cpu_time [s]
-        Of the processor; with compiling, if that was not done before.
+        With compiling, if that was needed.
     looks
         Records of the loop in one of the result.
     """
@@ -131,7 +131,7 @@ class TangentRun:
 
     @cached_property
     def _peaks(self) -> tuple[tuple[str, Lanes | None, Lanes | None], ...]:
-        """Of each impact its stop, and force and time of its peak between the steps."""
+        """Of each impact its stop, and force and time of its peak."""
         places = {row.component: c for c, row in enumerate(self.rows.interfaces)}
         return tuple(
             (event.stop, *_vertex(self._fine[places[event.stop]], event.peak_time))
@@ -139,11 +139,10 @@ class TangentRun:
         )
 
     def moved(self, direction: int, amount: float) -> NetworkResult:
-        """The run where the parameter of a direction has changed by an amount, to first order.
+        """The run after a change of the parameter of a direction by ``amount``, to first order.
 
         Times change as well.  A peak between two steps is found on the parabola through three of
-        them: the largest one of the steps themselves would depend on where these lie.  What the run
-        keeps for its continuation is not there.
+        them: the largest step would depend on where these lie.  There is no state to continue from.
         """
         result = self._moved(direction, amount)
         peaks = self._peaks
@@ -198,8 +197,8 @@ class TangentRun:
     def without_bound(self, direction: int, amount: float) -> float | None:
         """Time from which derivatives grow without bound; None where they do not.
 
-        From there on, by them a change of the parameter by ``amount`` would move a port a thousand
-        times as far as any port moves.
+        That is, a change of the parameter by ``amount`` would move a port a thousand times as far
+        as any port moves.
         """
         ports = [i for i, c in enumerate(self._columns[1]) if c.name.endswith(" displacement")]
         longest = np.max(np.abs(self._points[:, ports, 0]), initial=0.0)
@@ -213,10 +212,9 @@ class TangentRun:
         Returns
         -------
         rates : NetworkResult
-            Derivatives of all channels and forces in place of them, at the times of the run itself;
-            without impacts.
+            Of all channels and forces, at the times of the run; without impacts.
         late : array, shape (looks + 1,) [s per unit]
-            Derivatives of the times that divide the run into equal parts.
+            Of the times that divide the run into equal parts.
         """
         lane = _FIRST + direction
         fine = [np.concatenate([part[:, :2, 0], part[:, 2:, lane]], axis=1) for part in self._fine]
@@ -295,8 +293,6 @@ def run_tangents(
     InputError
         For a component that calls Python or an FMU, and for a direction in which the numbers of
         the network do not change smoothly.
-    ConvergenceError
-        When a step fails.
     """
     if has_python_steps(rows):
         raise InputError(
@@ -313,12 +309,7 @@ def run_tangents(
 
 
 def compile_tangents(rows: Rows, *, step: float | None = None) -> None:
-    """Compile all that a run with derivatives needs, or load it; a run of no steps.
-
-    Parameters
-    ----------
-    step [s]
-    """
+    """Compile or load all that a run with derivatives needs, by a run of no steps."""
     for function in [row.step for row in rows.elements] + [row.step for row in rows.branches]:
         tangent_address(function)
     sizes = step_sizes(rows, "normal", step=step)
@@ -326,7 +317,7 @@ def compile_tangents(rows: Rows, *, step: float | None = None) -> None:
 
 
 class _Running:
-    """A run with derivatives: numbers, what was recorded, and where it is."""
+    """A run with derivatives, under way."""
 
     def __init__(
         self,
@@ -413,7 +404,7 @@ class _Running:
         self.done: list[_Part] = []
 
     def compile(self) -> None:
-        """Compile the time loop, or load it, by a run of no steps."""
+        """Compile or load the time loop."""
         self._start()
         self._advance(0)
 
@@ -549,7 +540,7 @@ class _Running:
         )
 
     def _touch(self, part: "_Part") -> "_Found | None":
-        """The first touch of a chunk that is worth its phase."""
+        """First touch of a chunk that needs to keep its phase."""
         found: _Found | None = None
         for c, rows in enumerate(part.fine):
             contact = rows[:, 2, 0] > 0.0
@@ -573,7 +564,7 @@ class _Running:
         return found
 
     def _take(self, part: "_Part") -> None:
-        """Keep what was recorded: which contacts are closed, and when the others were released."""
+        """Keep which contacts are closed, and when the others were released."""
         self.done.append(part)
         for c, rows in enumerate(part.fine):
             contact = rows[:, 2, 0] > 0.0
@@ -628,7 +619,7 @@ class _Running:
         )
 
     def _add(self, parts: Sequence["_Part"], share: Lanes) -> None:
-        """Add to each direction what steps that are longer by so much have changed."""
+        """Add to each direction the effect of steps longer by ``share``."""
         arrays = [self.origin, *self.states]
         arrays += waves_under_way(self.numbers.lines, self.numbers.line_state)
         for part in parts:
@@ -683,7 +674,7 @@ def _quotient(a: Lanes, b: Lanes) -> Lanes:
 
 
 def _vertex(rows: Lanes, peak_time: float) -> tuple[Lanes | None, Lanes | None]:
-    """Force and time of a peak, on the parabola through the three steps about it."""
+    """Force and time of a peak on the parabola through three steps."""
     middle = rows[:, 0] + 0.5 * rows[:, 1]
     k = int(np.argmin(np.abs(middle[:, 0] - peak_time))) if len(rows) else 0
     if not 0 < k < len(rows) - 1:
@@ -709,7 +700,7 @@ def _vertex(rows: Lanes, peak_time: float) -> tuple[Lanes | None, Lanes | None]:
 
 
 def _parabola(t: Lanes, f: Lanes) -> tuple[float, float] | None:
-    """Highest point through three others, as value and place; None if it is not between them."""
+    """Value and place of the highest point; None if it is not between the three."""
     a, b = (f[1] - f[0]) / (t[1] - t[0]), (f[2] - f[1]) / (t[2] - t[1])
     bend = (b - a) / (t[2] - t[0])
     if not bend < 0.0:
@@ -732,7 +723,7 @@ def _within(force: float, after: float) -> float:
 def _with_releases(rows: Lanes) -> Lanes:
     """Let the first step after each contact begin when its gap opens, in the derivatives.
 
-    The time of the release lies between the ends of two steps, on a straight line.
+    That time lies between the ends of two steps, on a straight line.
     """
     contact = rows[:, 2, 0] > 0.0
     for k in np.flatnonzero(contact[:-1] & ~contact[1:]):

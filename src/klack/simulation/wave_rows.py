@@ -1,7 +1,7 @@
 """Parts with two ends that answer with waves: lines in cells, by a step function of their own.
 
-As a delay line such a part gives, per end, ``P = c + Z q`` for the step that begins; after the
-nodes are solved it is told what came in and moves on.  Its state is written in place.
+Like a delay line they give ``P = c + Z q`` per end for a step; after the nodes are solved they take
+in the flows and move on.  State is written in place.
 """
 
 from collections.abc import Sequence
@@ -92,7 +92,7 @@ def compile_waves(rows: Sequence[WaveRow], first_end: int, density: float, longe
 def start_wave(
     waves: Waves, rows: Sequence[WaveRow], k: int, p_a: float, p_b: float, flow: float = 0.0
 ) -> None:
-    """Fill a row with the steady flow [kg/s] between two pressures [Pa], in place."""
+    """Fill a row with the steady ``flow`` [kg/s] between two pressures [Pa], in place."""
     waves.state[waves.state0[k] : waves.state0[k + 1]] = rows[k].start(p_a, p_b, flow)
 
 
@@ -107,7 +107,7 @@ def wave_store(waves: Waves, rows: Sequence[WaveRow], k: int) -> Vector:
 def waves_incoming(waves: Waves, H: float, c: Vector, Z: Vector) -> None:
     """Fill ``c`` [Pa] and ``Z`` [Pa s/m^3] of every end of the rows for a step of ``H``.
 
-    A row that fails answers with what is no number, and keeps its status.
+    A row that fails answers with NaN, and keeps its status.
     """
     density = waves.density
     for k in range(waves.rows):
@@ -130,7 +130,7 @@ def waves_incoming(waves: Waves, H: float, c: Vector, Z: Vector) -> None:
 
 @inner(error_model="numpy", _nrt=False)
 def waves_commit(waves: Waves, H: float, c: Vector, Z: Vector, q: Vector, losses: Any) -> None:
-    """Move all rows on with the flows ``q`` [m^3/s] into their ends.
+    """Advance all rows with the flows ``q`` [m^3/s] into their ends.
 
     Parameters
     ----------
