@@ -70,6 +70,8 @@ def rod_body(
 
     Parameters
     ----------
+    length, area [m], [m^2]
+    young, density [Pa], [kg/m^3]
     damping [-]
         Ratio of every elastic mode.
 

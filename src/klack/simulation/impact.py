@@ -463,6 +463,7 @@ def simulate_impact(
     ----------
     speed [m/s]
         Of body a of the contact, in -z; everything else is at rest.
+    duration [s]
     step : float [s] or None
         By default :func:`propose_step`.
     contact

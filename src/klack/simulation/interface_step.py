@@ -134,12 +134,16 @@ def solve_interface(
         Dissipation factor of Hunt and Crossley, ``alpha / (v0 h)``; 0 for an elastic law.
     cubic, linear, cut_off, suction
         Film, see :class:`klack.network.rows.FilmRow`; ``cubic = linear = 0`` for none.
+    h [s]
+        Above 0.
     G [m/N]
         Gap at the end of the step per force during it, above 0.
     g0, g_free [m]
         Gap of the bodies at the start, and at the end without this interface's force.
     e0 [m]
         Compression of the ``series`` compliance [m/N] at the start.
+    guess [N]
+        Total force, from the last step or sweep.
     film_before [N]
         Film force of the last step, if the contact closed in it; else 0.
 

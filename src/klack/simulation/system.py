@@ -76,7 +76,13 @@ class AxialForce:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ReturnSpring:
-    """Spring between a port and the ground: force ``-(preload + stiffness * y)`` along +z."""
+    """Spring between a port and the ground: force ``-(preload + stiffness * y)`` along +z.
+
+    Parameters
+    ----------
+    stiffness [N/m]
+    preload [N]
+    """
 
     body: str
     port: str

@@ -1,7 +1,7 @@
 """Complementarity problem of a contact, solved from the set of points that carried before.
 
-The inverse of the active block of the matrix is carried along: a point that closes borders it, a
-point that opens takes a row out, each at the cost of one product with it.
+The inverse of the active block follows: a point that closes borders it, a point that opens takes a
+row out, each at the cost of one product with it.
 """
 
 import numpy as np
@@ -15,12 +15,12 @@ __all__ = ["rebuild", "solve_active"]
 
 _FAST_ROUNDS = 60
 _REFRESH = 256
-"""Changes of the active set after which its inverse is computed afresh."""
+"""Changes of the active set after which its inverse is recomputed."""
 
 
 @inner
 def rebuild(A: NDArray, B: NDArray, index: NDArray, m: int) -> None:
-    """Compute the inverse over the first m points of the index afresh."""
+    """Recompute the inverse over the first m points of the index."""
     block = np.empty((m, m))
     for i in range(m):
         for j in range(m):
@@ -33,7 +33,7 @@ def rebuild(A: NDArray, B: NDArray, index: NDArray, m: int) -> None:
 
 @phase
 def _border(A: NDArray, B: NDArray, index: NDArray, m: int, j: int, u: NDArray) -> bool:
-    """Take point j into the active set; False when the matrix is not positive definite."""
+    """Add point j to the active set; False when the matrix is not positive definite."""
     row = A[j]
     for i in range(m):
         u[i] = 0.0
@@ -60,7 +60,7 @@ def _border(A: NDArray, B: NDArray, index: NDArray, m: int, j: int, u: NDArray) 
 
 @phase
 def _take_out(B: NDArray, index: NDArray, m: int, place: int) -> None:
-    """Take the point at ``place`` out; the last one moves there."""
+    """Remove the point at ``place``; the last one moves there."""
     last = m - 1
     if place != last:
         for i in range(m):
@@ -77,7 +77,7 @@ def _take_out(B: NDArray, index: NDArray, m: int, place: int) -> None:
 
 @phase
 def _forces(A: NDArray, q: NDArray, carrying: ActiveSet, u: NDArray, gap: NDArray) -> None:
-    """Forces ``u`` that close the gaps of the points that carry, and all gaps under them."""
+    """Forces ``u`` that close the gaps of the carrying points, and all gaps under them."""
     index, B, m = carrying.points, carrying.inverse, carrying.counts[0]
     for k in range(m):
         u[k] = 0.0
@@ -98,7 +98,7 @@ def _forces(A: NDArray, q: NDArray, carrying: ActiveSet, u: NDArray, gap: NDArra
 
 @phase
 def _flip(A: NDArray, carrying: ActiveSet, j: int, many: bool, u: NDArray) -> bool:
-    """Let a point carry, or no longer; False when the matrix is not positive definite."""
+    """Let a point carry, or stop; False when the matrix is not positive definite."""
     active, index, B, counts = carrying
     if active[j]:
         place = 0
@@ -138,7 +138,7 @@ def solve_active(
     q (n,) [m]
         Gaps without contact forces.
     carrying
-        In: first guess; out: the points that carry.
+        In: first guess; out: the carrying points.
     lam, gap (n,) [N], [m]
         Out.
     tolerance [m]

@@ -1,19 +1,19 @@
-r"""Viscous damping of a body with every degree of freedom, as the reduced levels have it.
+r"""Viscous damping of a full-order body, as the reduced levels have it.
 
 .. math:: C = \sum_i 2 \zeta_i \omega_i \, (M \varphi_i)(M \varphi_i)^T
     + \alpha \left(M - M R R^T M\right) + \beta K
 
-with mass-normalised modes :math:`\varphi_i` and rigid modes *R*: a damping ratio for each of a few
-modes is a matrix of low rank, Rayleigh damping a sparse one.  Rigid motion is never damped, as in
+with mass-normalised modes :math:`\varphi_i` and rigid modes *R*: damping ratios of a few modes make
+a matrix of low rank, Rayleigh damping a sparse one.  Rigid motion is never damped, as in
 :mod:`klack.bodies.reduction.damping`.
 
-A step of the full order solves :math:`(S + Z D Z^T) x = b + G^T \lambda` with a sparse *S* and the
-thin :math:`Z`.  With :math:`Y = S^{-1} Z` and :math:`P = (D^{-1} + Z^T Y)^{-1}` (Woodbury)
+A step solves :math:`(S + Z D Z^T) x = b + G^T \lambda` with a sparse *S* and the thin :math:`Z`.
+With :math:`Y = S^{-1} Z` and :math:`P = (D^{-1} + Z^T Y)^{-1}` (Woodbury)
 
 .. math::
     x = S^{-1}\left(b - Z P \, Y^T b + G^T \lambda\right) - Y P \, (G Y)^T \lambda
 
-which costs two thin products beside the solve with *S*.
+at the cost of two thin products beside the solve with *S*.
 
 A non-reflecting end adds the sparse matrix of its dashpots
 (:func:`klack.bodies.elasticity.loads.face_dashpots`), which brakes rigid motion as well: the body
@@ -39,7 +39,7 @@ __all__ = ["BodyDamping", "DampingMatrix", "LowRankSolve", "body_damping"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class BodyDamping:
-    """Damping of one body, see the module.
+    """Damping of one body.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class BodyDamping:
         ``2 zeta omega`` of each.
     alpha [1/s]
     beta [s]
-    ends : sparse array, shape (n_dof, n_dof), optional [N s/m]
+    ends (n_dof, n_dof) [N s/m]
         Dashpots of non-reflecting ends.
     """
 
@@ -72,7 +72,7 @@ def body_damping(damping: Damping, modes: Modes) -> BodyDamping | None:
     Parameters
     ----------
     damping
-        Rayleigh damping acts on the whole body; a ratio or a loss factor on the modes given.
+        Rayleigh damping acts on the whole body, a ratio or a loss factor on the modes.
     modes
         Elastic modes that the reduced levels keep.
     """
@@ -98,13 +98,12 @@ class DampingMatrix:
 
     Parameters
     ----------
-    sparse : sparse array, shape (n, n) [N s/m]
     columns (n, r) [kg^(1/2)]
         Z.
     rate (r,) [rad/s]
         Below zero for what takes the drag of ``alpha M`` off the rigid motion.
-    ends : sparse array, shape (n, n), or None [N s/m]
-        What non-reflecting ends have in ``sparse``.
+    ends (n, n) [N s/m]
+        Share of non-reflecting ends in ``sparse``.
     """
 
     sparse: csr_array
@@ -118,8 +117,8 @@ class DampingMatrix:
 
         Parameters
         ----------
-        M : sparse array, shape (n_dof, n_dof) [kg]
-            Mass that the run moves, which may differ from the one of the body at its contact nodes.
+        M (n_dof, n_dof) [kg]
+            Mass that the run moves, which may differ at the contact nodes from that of the body.
         """
         free = body.free
         columns, rate = M @ damping.shapes, damping.rate
@@ -152,15 +151,13 @@ class DampingMatrix:
 
 
 class LowRankSolve:
-    """An :class:`InterfaceSolve` of S with the low-rank term Z diag(weight) Z^T added.
+    """:class:`InterfaceSolve` of S with the low-rank term Z diag(weight) Z^T added.
 
     Parameters
     ----------
-    plain
+    plain, factorization
         Of S alone.
-    factorization
-        Of S.
-    G : sparse array, shape (nc, n) [-]
+    G (nc, n) [-]
     columns (n, r)
         Z.
     weight (r,)

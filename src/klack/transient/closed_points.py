@@ -9,10 +9,9 @@ is missing along to the force of slip,
     w_n = 0, \quad w_e = 0 \text{ (sticks)}, \quad w_p + D \lambda_p = 0 .
 
 So a point that begins to slip loses an unknown and leaves the columns of all others as they are.
-The matrix of these equations changes little from step to step, and its inverse is carried along:
-an unknown more borders it, one less takes a row out, each at the cost of one product with it, and
-*D* changes its diagonal.  It may be a little wrong (frames that have turned, other *D*), as it only
-has to shrink what the equations are missed by.
+The inverse of the matrix is updated from step to step as in :mod:`klack.transient.active_set`, and
+*D* changes its diagonal.  It may be slightly wrong (frames that have turned, other *D*), as it only
+has to reduce the residual.
 """
 
 import numpy as np
@@ -32,7 +31,7 @@ _SINGULAR = 1e-10
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy")
 def multiply(matrix: Matrix, size: int, x: Vector, out: Vector) -> None:
-    """Product of the first rows and columns of a matrix with a vector."""
+    """Product of the first ``size`` rows and columns of a matrix with a vector."""
     for i in range(size):
         row = matrix[i]
         total = 0.0
@@ -43,7 +42,7 @@ def multiply(matrix: Matrix, size: int, x: Vector, out: Vector) -> None:
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy")
 def multiply_even(matrix: Matrix, size: int, x: Vector, out: Vector) -> None:
-    """The same for a symmetric matrix, of which it reads what is left of the diagonal."""
+    """The same for a symmetric matrix, read left of the diagonal."""
     for i in range(size):
         out[i] = 0.0
     for i in range(0, size - 1, 2):
@@ -65,7 +64,7 @@ def multiply_even(matrix: Matrix, size: int, x: Vector, out: Vector) -> None:
 
 @phase
 def admit(A: Matrix, closed: Closed, k: int) -> None:
-    """Let point k be one of those that may carry."""
+    """Add point k to those that may carry."""
     n, block, at = len(closed.points), closed.block, closed.counts[0]
     d = len(closed.row) // n
     closed.points[at] = k
@@ -83,7 +82,7 @@ def admit(A: Matrix, closed: Closed, k: int) -> None:
 
 @phase
 def _leave(closed: Closed, number: int) -> None:
-    """Take an unknown force out of the inverse; the last one moves to its row."""
+    """Remove an unknown force from the inverse; the last one moves to its row."""
     inverse, unknown, row = closed.inverse, closed.unknown, closed.row
     last, at = closed.counts[1] - 1, row[number]
     if at != last:
@@ -104,7 +103,7 @@ def _leave(closed: Closed, number: int) -> None:
 
 @phase
 def dismiss(closed: Closed, at: int) -> None:
-    """Let the point in a place carry no more; the last one moves there."""
+    """Remove the point in a place from those that may carry; the last one moves there."""
     n, block = len(closed.points), closed.block
     d, last = len(closed.row) // n, closed.counts[0] - 1
     for kind in range(d):
@@ -143,7 +142,7 @@ def _along(closed: Closed, number: int, pull: float, d: int) -> tuple[float, flo
 
 @phase
 def _line(closed: Closed, number: int, pull: float, line: Vector) -> None:
-    """What all directions do under an unknown force, or all forces to its equation."""
+    """Effect of an unknown force on all directions, or of all forces on its equation."""
     d = len(closed.row) // len(closed.points)
     normal, x, y = _along(closed, number, pull, d)
     first, size = number // d * d, d * closed.counts[0]
@@ -224,7 +223,7 @@ def soften(closed: Closed, at: int, yields: float) -> None:
 
 @phase
 def keep_what(closed: Closed, at: int, last: int) -> bool:
-    """Let just the unknown forces up to ``last`` of a point be some; False: invert afresh."""
+    """Keep just the unknown forces up to ``last`` of a point; False: invert afresh."""
     d = len(closed.row) // len(closed.points)
     fine = True
     for kind in range(d):
@@ -240,7 +239,7 @@ def keep_what(closed: Closed, at: int, last: int) -> bool:
 
 @inner
 def invert(closed: Closed, fine: bool) -> None:
-    """Compute the inverse over the unknown forces afresh.
+    """Recompute the inverse over the unknown forces.
 
     In single precision, which takes half the time and lags by 1e-4 per round, or ``fine``.
     """

@@ -1,23 +1,19 @@
-r"""One body of a full-order impact: its state, and what one step does to it.
+r"""One body of a full-order impact (:mod:`klack.transient.full_order`).
 
-The equations are those of :mod:`klack.transient.full_order`.
-
-Whether bodies that have parted meet again: their linear motion says so, not a rule of thumb.
+Whether bodies that have parted meet again follows from their linear motion.
 
 Without forces a step of the trapezoidal rule turns each mode by :math:`\theta = 2 \arctan(\omega h
-/ 2)`, and rigid motion goes straight on.  The gaps of all later steps are therefore known, but for
-what the known modes leave of displacement and velocity.  That rest keeps an energy *E* of its own,
-and changes the gap of a row *g* (Cauchy-Schwarz) by no more than
+/ 2)`, and rigid motion is straight.  So the gaps of all later steps are known, but for what the
+known modes leave.  That rest keeps its energy *E* and changes the gap of a row *g* (Cauchy-Schwarz)
+by no more than
 
 .. math:: |g u| \le \sqrt{2 E c}, \qquad c = g K^+ g^T - \sum_i \frac{(g \varphi_i)^2}{\omega_i^2},
 
-with what the known modes leave of the static compliance: 0.1 um for a needle and its seat of 87 000
-unknowns, which part at 0.01 um a step and are let go after 30 steps.
-
-Inertia at the contact points: its compliance, and contact nodes without any.
+0.1 um for a needle and its seat of 87 000 unknowns, which part at 0.01 um a step and are let go
+after 30 steps.
 
 The mass matrix of a displacement element is the same for every direction, :math:`M = m \otimes I`,
-so everything here works on the scalar matrix *m* of one direction (d times fewer unknowns).
+so solves with it need only the scalar matrix *m* of one direction (d times fewer unknowns).
 """
 
 from collections.abc import Sequence
@@ -57,7 +53,7 @@ def scalar_mass(M: csr_array, dimension: int) -> csr_array:
     Raises
     ------
     InputError
-        If the directions differ or are coupled (a mass matrix that no displacement element has).
+        If directions differ or are coupled, which they do in no displacement element.
     """
     m = csr_array(M[::dimension, ::dimension])
     difference = abs(M - kron(m, eye_array(dimension), format="csr"))
@@ -72,14 +68,7 @@ def scalar_mass(M: csr_array, dimension: int) -> csr_array:
 
 
 class InverseMass:
-    """Solves with the mass matrix of the free degrees of freedom.
-
-    Parameters
-    ----------
-    M : sparse array, shape (n_dof, n_dof) [kg]
-    free (n_free,)
-        Free degrees of freedom, sorted.
-    """
+    """Solves with the mass matrix M (n_dof, n_dof) [kg] at sorted ``free`` degrees of freedom."""
 
     def __init__(
         self,
@@ -104,7 +93,7 @@ class InverseMass:
             self._parts.append((places, factors[key]))
 
     def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
-        """M^-1 B for the free degrees of freedom, shape (n_free,) or (n_free, k)."""
+        """M^-1 B, shape (n_free,) or (n_free, k)."""
         X = np.zeros(B.shape)
         for places, factor in self._parts:
             X[places] = factor.solve(B[places])
@@ -134,18 +123,14 @@ class InverseMass:
 
 
 def massless_nodes(M: csr_array, nodes: NDArray[np.int64], dimension: int) -> csr_array:
-    r"""Mass matrix without inertia at ``nodes``; theirs goes to their neighbours.
+    r"""Mass matrix [kg] without inertia at ``nodes``; theirs goes to their neighbours.
 
     The velocity of a node without mass is taken as a weighted mean W of its neighbours with mass:
 
     .. math:: \tilde m = T^T m \, T, \qquad T = [I; \, W], \qquad W_{ci} \propto |m_{ci}|
 
-    (Khenous, Laborde & Renard 2008 on why; the redistribution here is the simplest that keeps the
+    (Khenous, Laborde & Renard 2008 on why; this redistribution is the simplest that keeps the
     matrix positive).  The total mass is kept exactly, its moments to the order of an element.
-
-    Parameters
-    ----------
-    M : sparse array, shape (n_dof, n_dof) [kg]
     """
     m = scalar_mass(M, dimension)
     light = np.zeros(m.shape[0], dtype=bool)
@@ -175,7 +160,7 @@ Scheme = Literal["contact-stabilised-newmark", "massless"]
 
 
 class FullBody:
-    """State of one body on its free degrees of freedom, and what one step does to it."""
+    """State of one body on its free degrees of freedom."""
 
     def __init__(
         self,
@@ -293,7 +278,7 @@ class FullBody:
             self.inverse_mass.close()
 
     def fly(self) -> NDArray[np.float64]:
-        """Free flight w of this step; gaps and offsets change by its return value [m]."""
+        """Free flight w of this step; returns the change of gaps and offsets [m]."""
         self.w = self.u + self.step * self.v
         self.resistance = 2.0 * self.elastic + self.step * self.elastic_rate
         if self.C is not None:
@@ -317,12 +302,7 @@ class FullBody:
         return self.rows @ self.next
 
     def commit(self, lam: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Make the end of the step the new state.
-
-        Parameters
-        ----------
-        lam : array, shape (nc,) or with those across the normals [N]
-            Forces that :meth:`complete` was given.
+        """Make the end of the step the new state; ``lam`` [N] as given to :meth:`complete`.
 
         Returns
         -------
@@ -365,7 +345,7 @@ class FullBody:
         Raises
         ------
         InputError
-            For an axisymmetric body, or one that something holds sideways.
+            For an axisymmetric body, or one held sideways.
         """
         if not any(velocity):
             return np.zeros(len(self.free))
@@ -380,7 +360,7 @@ class FullBody:
         return np.array([*velocity, 0.0])[direction]
 
     def refresh(self) -> None:
-        """Take K u and K v, which every step only adds to, from K itself."""
+        """Recompute K u and K v, which every step only adds to."""
         self.elastic = self.K @ self.u
         self.elastic_rate = self.K @ self.v
 
@@ -403,7 +383,7 @@ class FullBody:
         return float(self.axial_mass @ self.u) / self.mass
 
     def velocity(self, y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the true velocity of the free degrees of freedom [m/s]."""
+        """True velocity of the free degrees of freedom [m/s]."""
         if self.inverse_mass is None:
             return self.v
         return self.v - self.inverse_mass.solve(self.G_transposed @ y)
@@ -417,14 +397,14 @@ class FullBody:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KnownBody:
-    """What is known of a body before it moves.
+    """Known properties of a body.
 
     Parameters
     ----------
     modes
-        Converged elastic modes, any of them: the more, the sooner a run can end.
+        Converged elastic modes: the more, the sooner a run can end.
     compliance (nc,) [m/N]
-        Static compliance of the body at each contact point.
+        Static one at each contact point.
     """
 
     modes: Modes
@@ -440,11 +420,13 @@ def open_gaps(
     steps: int,
     slack: float,
 ) -> Floats | None:
-    """Gaps of bodies on which no force acts, now and after each further step, if none closes.
+    """Gaps of bodies without forces, now and after each further step; None if one may close.
+
+    The gaps (nc, steps + 1) [m] lack the share of the rest, which the bound limits.
 
     Parameters
     ----------
-    bodies, known : sequence of FullBody, KnownBody
+    bodies, known
         One or two, in the same order; without damping and springs.
     at_rest (nc,) [m]
         Gaps without displacement.
@@ -452,11 +434,6 @@ def open_gaps(
         Contact-sized part of the velocity, as of :meth:`FullBody.velocity`.
     slack [m]
         What gaps have to stay wider than, besides the bound of the rest.
-
-    Returns
-    -------
-    array, shape (nc, steps + 1) [m], or None
-        Without the share of the rest, which the bound limits; None where a gap may close.
     """
     gaps, most = at_rest[:, None], np.zeros(len(at_rest))
     for body, one in zip(bodies, known, strict=True):
@@ -466,7 +443,7 @@ def open_gaps(
 
 
 def _course(body: FullBody, known: KnownBody, y: Floats, steps: int) -> tuple[Floats, Floats]:
-    """Share of one body in the gaps, shape (nc, steps + 1), and bound of its rest, (nc,) [m]."""
+    """Share of one body in the gaps (nc, steps + 1), and bound of its rest (nc,) [m]."""
     rigid, shapes = body.body.rigid_modes[body.free], known.modes.shapes[body.free]
     omega, since = known.modes.omega, body.step * np.arange(steps + 1)
     u, v = body.u, body.velocity(y)

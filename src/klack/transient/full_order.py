@@ -5,16 +5,16 @@ Between :math:`t` and :math:`t + h` a body with trapezoidal inertia obeys
 .. math:: \tfrac{4}{h^2} M (u_1 - w) + K (u_0 + u_1) = 2 f + 2 G^T \lambda, \qquad
     v_1 = v_0 + \tfrac{2}{h} (u_1 - w)
 
-with the free flight :math:`w = u_0 + h v_0`, the contact forces :math:`\lambda` of mid step and
-the gaps :math:`g = g_0 + \sum_b G_b u_b` at the end, :math:`0 \le \lambda \perp g_1 \ge 0`.  There
-is no penalty and no regularisation.  Damping (:mod:`klack.transient.body_damping`) adds
-:math:`\tfrac{2}{h} C (u_1 - u_0)` to the left side and takes
-:math:`\tfrac{1}{h} (u_1 - u_0)^T C (u_1 - u_0)` in a step.  Two schemes keep the forces quiet:
+with the free flight :math:`w = u_0 + h v_0`, the contact forces :math:`\lambda` of mid step and the
+gaps :math:`g = g_0 + \sum_b G_b u_b` at the end, :math:`0 \le \lambda \perp g_1 \ge 0`, without
+penalty or regularisation.  Damping (:mod:`klack.transient.body_damping`) adds :math:`\tfrac{2}{h} C
+(u_1 - u_0)` to the left side and takes :math:`\tfrac{1}{h} (u_1 - u_0)^T C (u_1 - u_0)` in a step.
+Two schemes keep the forces quiet:
 
 ``contact-stabilised-newmark``
     (Deuflhard, Krause & Ertel 2008.)  Where free flight would carry the inertia of contact nodes
     through the other body it is first put back, :math:`w = u_0 + h v_0 + M^{-1} G^T \mu` with
-    :math:`0 \le \mu \perp g(w) \ge 0`.  The energy can only fall, and the two losses are counted:
+    :math:`0 \le \mu \perp g(w) \ge 0`.  The energy can only fall, by two losses:
 
     .. math:: E_1 - E_0 = -\lambda^T g_0 - \tfrac{2}{h^2} \mu^T g_1
 
@@ -29,10 +29,9 @@ With friction the faces also carry forces across their normals, with rows *T* of
     \lambda_t = -\mu \lambda \frac{s}{|s|} \text{ where } s = T (u_1 - u_0) \ne 0 ,
 
 solved together with the gaps (:mod:`klack.transient.rubbing`).  The slip is that of the whole step,
-elastic part included, and not counted from *w*, which is put back along the normals only: so the
-energy changes by :math:`\lambda_t^T s \le 0` more, a loss of strict sign.  In the massless scheme
-:math:`\lambda_t` holds at the end of the step as well; its friction is :math:`-\lambda_{t1}^T s`,
-and the rest of the work of the mean force belongs to points that open, close or turn.
+elastic part included, not counted from *w*, so that :math:`\lambda_t^T s \le 0` is a loss of strict
+sign.  In the massless scheme friction is :math:`-\lambda_{t1}^T s`; the rest of the work of the
+mean force belongs to points that open, close or turn.
 
 Neither needs :math:`M^{-1}` in the loop: with :math:`v = \tilde v - M^{-1} G^T y` the corrections
 are carried by the contact-sized vector *y*, and a step costs one product with K and one solve with
@@ -86,19 +85,19 @@ _RETURNED = 1e-6  # share of the energy that gaps closed in single precision may
 _log = logging.getLogger(__name__)
 
 _PENETRATION = 1e-13
-"""Gap [m] below which a point outside of the watched ones counts as closed."""
+"""Gap [m] below which a point that is not watched counts as closed."""
 
 _WATCH_STEPS = 12
-"""A point is watched when it would close within this many steps at the impact speed."""
+"""A point is watched when it would close within so many steps at the impact speed."""
 
 _LEARN_STEPS = 60
-"""The same for the points whose response is worked out together with those needed now."""
+"""The same for points whose response is computed together with those needed now."""
 
 _RIM_RESERVE = 1.1
 """Points of a vibrating body travel slightly farther than its centre of mass."""
 
 _LOOK_STEPS = 8
-"""Steps between looks whether bodies that do not touch have parted for good."""
+"""Steps between checks whether bodies have parted for good."""
 
 _REVIEW_STEPS = 32
 """Steps between reviews of the watched points."""
@@ -107,7 +106,7 @@ _REVIEW_STEPS = 32
 def recommended_step(contact_time: float) -> float:
     """Time step [s] for an expected contact time [s]: one 440th of it.
 
-    On a needle and seat this left 0.02 N of ripple on some 300 N and lost 3e-5 of the energy.
+    On a needle and seat: 0.02 N of ripple on some 300 N, and a loss of 3e-5 of the energy.
     """
     require_positive("recommended_step: contact_time", contact_time, "s")
     return contact_time / 440.0
@@ -152,19 +151,19 @@ def simulate_full_order(
     space
         Contact points and their gaps at the given placement.
     speed [m/s]
-        Speed of approach, above zero.
+        Of approach, above zero.
     duration [s]
-        Simulated time, counted from the start of the record.
+        From the start of the record.
     step [s]
-        Time step; see :func:`recommended_step`.
-    scheme : {"contact-stabilised-newmark", "massless"}
+        See :func:`recommended_step`.
+    scheme
     axial_force [N]
         Constant force on a along +z (negative presses a onto b), spread over it like its weight.
     spring_stiffness [N/m]
         Of a massless spring from the centre of mass of a to ground, without force at the given
         placement.
-    damping : pair of BodyDamping or None
-        Of body a and of body b; without any by default.  Non-reflecting ends are for body b.
+    damping
+        Of body a and of body b.  Non-reflecting ends are for body b.
     friction
         Between the faces, of these contact points.
     layer
@@ -177,23 +176,23 @@ def simulate_full_order(
         Of body a and, unless it is a rigid wall, body b: with it the steps end where these bodies
         have parted for good (:mod:`klack.transient.full_body`), and the rest of the record is
         their free flight: no force, constant velocities of the centres of mass, gaps without what
-        the known modes leave.  Not with damping, spring, axial force, friction, snapshots or the
-        massless scheme: there every step is taken.
+        the known modes leave.  Without effect with damping, spring, axial force, friction,
+        snapshots or the massless scheme.
     energy_interval
         Steps between entries of the energy record.
     longest_period [s]
-        Of the elastic modes of body a, handed on to the history.
-    backend : {"auto", "pardiso", "ngsolve", "superlu"}
-    precision : {"double", "single"}
+        Of the elastic modes of body a, passed on to the history.
+    backend
+    precision
         Of the factors (pardiso only; others are double).  ``"single"`` takes half the memory and
-        two thirds of the time.  Every step solves for an increment only, and what its solve leaves
-        of the equations is paid back in the next one: the force changes by some 1e-7.
+        two thirds of the time.  A step solves for an increment only, and the next one repays the
+        defect of its solve: the force changes by some 1e-7.
     threads
-        Threads of the factorisation; with two or more the two bodies also advance side by side.
+        Of the factorisation; with two or more the bodies also advance side by side.
     progress
-        Called now and then with the fraction done, 0 to 1.
+        Called with the fraction done.
     snapshots
-        Who wants to see the fields on the way.
+        Reader of the fields on the way.
 
     Raises
     ------
@@ -297,7 +296,7 @@ def simulate_full_order(
 
 
 def _returned(precision: Precision) -> float:
-    """Share of the energy [-] by which the losses may fall below zero.
+    """Share of the energy [-] by which losses may be below zero.
 
     A closed gap is zero to the precision of the factor, times its change in a step.
     """
@@ -388,7 +387,7 @@ class _Run:
 
     @property
     def is_free(self) -> bool:
-        """Whether nothing but a smooth contact acts on the bodies, all of which have inertia."""
+        """Whether only a smooth contact acts on the bodies, and all nodes have inertia."""
         alone = all(body.damping is None and body.spring == 0.0 for body in self.bodies)
         return (
             alone and self.axial_force == 0.0 and self.rubbing is None and self.scheme != "massless"
@@ -419,7 +418,7 @@ class _Run:
         )
 
     def _rows(self, points: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Numbers of the rows of these points: gaps, then offsets in every direction."""
+        """Rows of these points: gaps, then offsets in every direction."""
         directions = np.arange(len(self.lam) // self.count)
         return (self.count * directions[:, None] + points).ravel()
 
@@ -446,7 +445,7 @@ class _Run:
         return self._commit(lam, ends)
 
     def _push(self, flight: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Contact-sized forces that are known before the solve, of the shape of lam [N]."""
+        """Contact-sized forces known before the solve, shaped like lam [N]."""
         self.mu = np.zeros(len(flight))
         if self.scheme == "massless":
             return self.lam
@@ -473,7 +472,7 @@ class _Run:
     def _forces(
         self, free: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-        """Forces of the watched points that would get these gaps and offsets without."""
+        """Forces of the watched points from their gaps and offsets without them."""
         active = self.closed[self.points]
         gap = free[: len(self.points)]
         if not np.any(active) and np.all(gap >= 0.0):
@@ -528,14 +527,14 @@ class _Run:
 
     @property
     def held(self) -> float:
-        """Energy of the layer of asperities [J], part of what the contact has taken."""
+        """Energy of the layer of asperities [J], part of what the contact took."""
         if self.layer is None:
             return 0.0
         return float(self.space.area @ self.layer.state(-self.gap)[2])
 
     @property
     def travel(self) -> float:
-        """Distance that the centres of mass have closed since the given placement [m]."""
+        """Distance that the centres of mass have closed since the placement [m]."""
         other = self.bodies[1].centre() if len(self.bodies) > 1 else 0.0
         return other - self.bodies[0].centre()
 
@@ -543,7 +542,7 @@ class _Run:
         return np.sum(self.together(tasks), axis=0)
 
     def together(self, tasks: Sequence[Callable[[], _T]]) -> list[_T]:
-        """Do the same for all bodies, side by side if there are threads."""
+        """Do the same for all bodies, in parallel if there are threads."""
         if self.pool is None:
             return [task() for task in tasks]
         futures = [self.pool.submit(task) for task in tasks]
@@ -608,7 +607,7 @@ class _Record:
             self.highest, self.peak = force, [body.u for body in run.bodies]
 
     def fly(self, run: _Run, gaps: NDArray[np.float64]) -> None:
-        """Continue without contact; ``gaps`` now and after each further step, shape (nc, k + 1)."""
+        """Continue without contact; ``gaps`` now and after each further step (nc, k + 1)."""
         further = gaps.shape[1] - 1
         self.force += [0.0] * further
         self.gap += np.min(0.5 * (gaps[:, 1:] + gaps[:, :-1]), axis=0).tolist()

@@ -5,12 +5,11 @@ bore pushes it back towards the axis,
 
 .. math:: N \ge 0, \qquad |x| - c \le k^{-1} N, \qquad x = x_0 + T q,
 
-with the lateral displacement *x* of the shaft section (mean over a ring of nodes, which has the
-same weights as the force) and the compliance :math:`k^{-1}` that the modes do not have: of the
-bore, and, for the consistent law, of the shaft itself (static flexibility less that of the kept
-modes).  Coulomb friction of at most :math:`\mu N` acts on the rim of the shaft, along the axis and
-around it, against its slip (:mod:`klack.transient.guide_step`); it turns and tilts the shaft as
-well.  Viscous drag brakes it along the axis.
+with the lateral displacement *x* of the shaft section (mean over a ring of nodes with the weights
+of the force) and the compliance :math:`k^{-1}` that the modes lack: of the bore, and, for the
+consistent law, of the shaft (static flexibility less that of the kept modes).  Coulomb friction
+acts on the rim of the shaft, along the axis and around it (:mod:`klack.transient.guide_step`), so
+it also turns and tilts the shaft.  Viscous drag brakes it along the axis.
 
 Limits: the bore does not move; drag acts along the axis only; no fluid film in the guide.
 """
@@ -38,7 +37,7 @@ _ROUND = 1e-2
 """Largest deviation of a guided surface from a round one, over its width."""
 
 _AT_HEIGHT = 1e-7
-"""Nodes so near are at the height itself [m]."""
+"""Distance [m] within which nodes are at the height itself."""
 
 
 def guide_of_shaft(
@@ -66,18 +65,18 @@ def guide_of_shaft(
     flexibility
         Of the moving body.
     surface
-        Cylindrical surface of the shaft.
+        Cylindrical.
     heights [m]
         z at the placement; each takes the ring of nodes of the surface that is there, or the two
         around it (on an unstructured mesh as many near it as surround the axis).
     clearance [m]
         Radial.
     stiffness [N/m]
-        Of the bore at each height; rigid without.
+        Of the bore at each height; by default rigid.
     consistent
         Add the compliance of the shaft that the kept modes miss.
     friction, viscous [-], [N s/m]
-        The drag is shared equally between the heights.
+        The heights share the drag equally.
 
     Raises
     ------
@@ -121,13 +120,12 @@ class ShaftSection(NamedTuple):
     Parameters
     ----------
     motion (6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
-        Displacement and rotation vector per unit coordinate of the modes of the shaft.
+        Displacement and rotation vector per modal coordinate of the shaft.
     centre (3,) [m]
         The axis there.
-    radius [m]
-    compliance : array, shape (2, 2), or None [m/N]
-        Static one across the axis, of a free body with inertia relief; None: nothing is added to
-        that of the modes.
+    radius [m] compliance (2, 2) [m/N]
+        Static, across the axis, of a free body with inertia relief; None: no more than that of the
+        modes.
     """
 
     motion: NDArray[np.float64]
@@ -148,12 +146,7 @@ def guide_at_sections(
 ) -> Guide:
     """Guide of sections that are known on the modes of the moving body, the first of the model.
 
-    Parameters
-    ----------
-    name
-        Of the body, for messages.
-    clearance, stiffness, friction, viscous
-        As given to :func:`guide_of_shaft`.
+    ``name``, that of the body, is for messages; the others are as in :func:`guide_of_shaft`.
     """
     require_positive("guide: clearance", clearance, "m")
     require_nonnegative("guide: friction", friction, "-")
@@ -190,7 +183,7 @@ def guide_at_sections(
 
 
 def require_within(body: str, surface: str, height: float, z: NDArray[np.float64]) -> None:
-    """Raise :class:`InputError` for a height where a surface with these nodes is not."""
+    """Reject a height where a surface with these nodes is not."""
     if not z.min() - 1e-6 <= height <= z.max() + 1e-6:
         raise InputError(
             f"guide of body '{body}': heights",
@@ -213,10 +206,10 @@ class _Section(NamedTuple):
 def _section(body: ElasticBody, surface: str, height: float) -> _Section:
     """Weights of nodes around a height.
 
-    Of the ring of nodes at the height, or of those next above and below.  The weights are as equal
-    as can be while their mean place is the axis there: any rigid motion then moves the section as
+    They are the ring of nodes at the height, or those next above and below.  The weights are as
+    equal as can be while their mean place is the axis there: any rigid motion moves the section as
     it moves the axis, on unstructured meshes as well.  Its rotation is that of the rigid motion
-    which is nearest to the displacement of the nodes with the same weights.
+    nearest to the displacement of the nodes with the same weights.
     """
     nodes = body.mesh.surface(surface).nodes
     z = body.mesh.points[nodes, 2]
@@ -282,7 +275,7 @@ def _weights(places: NDArray[np.float64], size: float) -> NDArray[np.float64]:
 
 
 def _supports(places: NDArray[np.float64], size: float) -> bool:
-    """Whether points support the axis from all sides: no weight below zero, no sector free."""
+    """Whether points support the axis from all sides: no negative weight, no free sector."""
     if len(places) < 4:
         return False
     angle = np.sort(np.arctan2(places[:, 1], places[:, 0]))
@@ -304,7 +297,7 @@ def _missing(
 def turned_sections(body: str, mesh: Mesh, surface: str, heights: Sequence[float]) -> RingSections:
     """Sections of a shaft of revolution at some heights.
 
-    Each takes the ring of nodes that is there, or the next one below and the next one above.
+    Each takes the ring of nodes there, or the next one below and the next one above.
 
     Parameters
     ----------
@@ -313,7 +306,7 @@ def turned_sections(body: str, mesh: Mesh, surface: str, heights: Sequence[float
     mesh
         Half section.
     surface
-        Cylindrical surface of the shaft.
+        Cylindrical.
     heights [m]
 
     Raises
@@ -339,7 +332,6 @@ def turned_sections(body: str, mesh: Mesh, surface: str, heights: Sequence[float
 
 
 def _require_shaft(body: str, surface: str, r: NDArray[np.float64], z: NDArray[np.float64]) -> None:
-    """Raise :class:`InputError` for a surface that is not round a shaft."""
     size = 2.0 * float(r.max())
     place = (z - z.mean()) / max(float(np.ptp(z)), 1e-3 * size)
     terms = np.vander(place, 3)

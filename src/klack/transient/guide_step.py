@@ -1,4 +1,4 @@
-r"""What a guide does to a shaft over one step: Coulomb friction, and films.
+r"""Coulomb friction and films of a guide over one step.
 
 At a height where the bore presses with :math:`N`, the mean of both ends of the step, the rim of the
 shaft touches it at :math:`r n` from the axis, :math:`n` against the force.  Its slip within the
@@ -9,31 +9,29 @@ step along the axis and around it (:math:`t = e_z \times n`) is
     t \cdot T + r\, \Theta_z \end{pmatrix}
 
 with the displacement :math:`T q` and the rotation :math:`\Theta q` of the section.  One force *f*
-over the step, set-valued, without a speed below which it fades out:
+over the step, set-valued, without a speed below which it fades:
 
 .. math:: |f| \le \mu |N|, \qquad f = -|f| \frac{\Delta s}{|\Delta s|} \text{ where }
     \Delta s \ne 0, \qquad f \cdot R v_1 \le 0 ,
 
-and of these the largest: friction holds the shaft as long as it can, slides against it with
-:math:`\mu |N|`, and in the step in which it comes to rest it stops the shaft and does not turn it
-round (a force that makes :math:`\Delta s` zero there leaves :math:`v_1 = -v_0`, and a shaft at rest
-would tremble).  So :math:`-f \cdot \Delta s \ge 0` in every step.
+and of these the largest: friction holds the shaft as long as it can, opposes slip with :math:`\mu
+|N|`, and stops the shaft in the step in which it comes to rest (a force that makes :math:`\Delta s`
+zero there leaves :math:`v_1 = -v_0`, and a shaft at rest would tremble).  So :math:`-f \cdot \Delta
+s \ge 0` in every step.
 
 With one height the slip follows from its force by two compliances,
 :math:`\Delta s = \Delta s_f + R B_1 R^T f` and :math:`R v_1 = R v_f + R B_2 R^T f`; heights take
 turns until no force changes.
 
-Limits: the section has no compliance along the axis and around it but that of the kept modes; how
-heights share the friction of a shaft that is held by several of them is not unique; the bore stays
-round and at rest.  Friction is found before the contact forces of the seat and once more after
-them, which leaves these with a gap of less than :math:`h^2 \mu N / m` in steps in which the shaft
-turns round; the payment of the energy debt of the seat comes last, some 1e-6 of its force.
+Limits: along the axis and around it the section has only the compliance of the kept modes; how
+several heights share the friction of a held shaft is not unique; the bore stays round and at rest.
+Friction is found before the contact forces of the seat and once more after them, which leaves these
+with a gap of less than :math:`h^2 \mu N / m` in steps in which the shaft turns round; the energy
+debt of the seat is paid last, some 1e-6 of its force.
 
-Films in the guide of a needle, in the compiled step of the interface level.
-
-At each height the shaft squeezes the film of a short bearing (:mod:`klack.hydraulics.guide_film`).
-Its clearance is that of the guide and what the roughness leaves, so that a shaft at the wall has a
-film yet.  Where the wall holds it no film is squeezed across, only along the wall.
+At each height the shaft squeezes the film of a short bearing (:mod:`klack.hydraulics.guide_film`),
+with the clearance of the guide and what the roughness leaves, so that a shaft at the wall still has
+a film.  A shaft that the wall holds squeezes it only along the wall.
 """
 
 from typing import NamedTuple
@@ -69,7 +67,7 @@ _STILL = 1e-13  # of the largest force: heights that take turns have settled
 
 
 class GuideRub(NamedTuple):
-    """Friction of the guide over the step that is being taken."""
+    """Friction of the guide over the present step."""
 
     most: Vector  # (k,) [N]
     force: Matrix  # (k, 2) [N] on the shaft, along the axis and around it
@@ -84,7 +82,7 @@ def no_rub(heights: int, modes: int) -> GuideRub:
 
 @inner
 def _on_disc(C: Four, s0: float, s1: float, most: float) -> tuple[float, float]:
-    """Force of at most so much whose slip s + C f vanishes, or is opposite to it."""
+    """Force of at most ``most`` whose slip s + C f vanishes, or is opposite to it."""
     d = _TINY * (C[0] + C[3])
     f0, f1, size, slips = 0.0, 0.0, 0.0, False
     for _ in range(_NEWTON):
@@ -107,19 +105,16 @@ def _on_disc(C: Four, s0: float, s1: float, most: float) -> tuple[float, float]:
 def stopping_force(
     C: Four, s0: float, s1: float, D: Four, u0: float, u1: float, most: float
 ) -> tuple[float, float]:
-    """Friction of one height over a step [N].
+    """Friction of one height over a step [N], at most ``most``.
 
-    Parameters
-    ----------
-    C : four floats [m/N]
+    Parameters ---------- C [m/N]
         Slip per force, row by row; symmetric.
     s0, s1 [m]
         Slip without the force.
-    D : four floats [m/(N s)]
+    D [m/(N s)]
         Speed at the end per force.
     u0, u1 [m/s]
         That speed without the force.
-    most [N]
     """
     if most <= 0.0:
         return 0.0, 0.0
@@ -144,7 +139,7 @@ def stopping_force(
 
 @phase
 def begin_rub(bore: Guide, before: Matrix, after: Matrix, rub: GuideRub) -> bool:
-    """Take the normal forces at both ends of a step; returns whether any height rubs."""
+    """Take the normal forces at both ends of a step; whether any height rubs."""
     rubs = False
     for k in range(len(rub.most)):
         x = 0.5 * (before[k, 0] + after[k, 0])
@@ -165,9 +160,9 @@ def begin_rub(bore: Guide, before: Matrix, after: Matrix, rub: GuideRub) -> bool
 
 @inner
 def rub_guide(modes: Modes, rub: GuideRub, before: Vector, step: Step) -> float:
-    """Let friction act on what the other forces make of a step; returns what the spring adds [N].
+    """Let friction act against what the other forces make of a step; returns the spring's part [N].
 
-    Called again, after other forces have come, it changes the friction by what they change.
+    Called again after other forces, it changes the friction accordingly.
 
     Parameters
     ----------
@@ -246,7 +241,7 @@ _FOUND, _NEARLY = 1e-11, 1e-6  # places that do not fit, over the clearance
 
 @inner
 def shaft_place(bore: Guide, k: int, q: Vector) -> Vector:
-    """Place of the shaft across the axis at a height [m], shape (2,)."""
+    """Place of the shaft across the axis [m], shape (2,)."""
     place = bore.offset[k].copy()
     for c in range(2):
         for i in range(len(q)):
@@ -256,7 +251,6 @@ def shaft_place(bore: Guide, k: int, q: Vector) -> Vector:
 
 @inner
 def _within(place: Vector, clearance: float) -> float:
-    """Share of a place that lies within the clearance."""
     distance = np.sqrt(place[0] ** 2 + place[1] ** 2)
     return clearance / distance if distance > clearance else 1.0
 
@@ -265,9 +259,9 @@ def _within(place: Vector, clearance: float) -> float:
 def _bearings(
     films: Films, bore: Guide, before: Matrix, after: Matrix, step: float, slides: bool
 ) -> tuple[Vector, Matrix]:
-    """Forces of all heights over a step, shape (2 g,), and their slopes with the places after.
+    """Forces of all heights over a step (2 g,), and their slopes with the places after.
 
-    ``slides``: slopes of a shaft that the wall stops and that slides along it, as it is.
+    ``slides``: slopes of a shaft that slides along the wall that stops it.
     """
     heights = len(films.room)
     force, slopes = np.zeros(2 * heights), np.zeros((2 * heights, 2 * heights))
@@ -299,10 +293,9 @@ def squeeze_guide(
 ) -> float:
     """Change of the modal force of the films at all heights over the step that leads to ``q``.
 
-    Returns by how much the shaft moves by that, over its way in this step; below zero if no forces
-    are found.
-
-    Newton's method on the places at the end of the step, halved where it goes too far.
+    By Newton's method on the places at the end of the step, halved where it goes too far.  Returns
+    how far this moves the shaft, over its displacement in the step; below zero if no forces are
+    found.
     """
     heights, M = len(films.room), len(q)
     n = 2 * heights
@@ -344,7 +337,7 @@ def _search(
     step: float,
     slides: bool,
 ) -> tuple[Vector, float]:
-    """Forces of the films by Newton's method, and by how much places do not fit [m]."""
+    """Forces of the films by Newton's method, and the misfit of places [m]."""
     n, heights = len(free), len(before)
     u = free + soft @ old
     force, slopes = _bearings(films, bore, before, u.reshape((heights, 2)), step, slides)

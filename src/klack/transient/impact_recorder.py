@@ -1,16 +1,10 @@
 """Record of each impact while bodies move point by point: forces round the ring, film, motion.
 
-The rows lie in :class:`klack.transient.impact_recorder.ImpactRows`; here impacts that are over are
-taken out of them.
-
-Rows of a record about an impact, in memory of fixed size: the compiled part.
-
-Forces are summed over intervals, so that their sum stays the impulse; where there is no more room,
-two intervals become one.  States of films and bodies are samples; where there is no more room,
-every second one stays.  All of it lies in arrays that a run keeps, puts back and stores with its
-other state.
-
-Forces and gaps of the stops of bodies that meet point by point, in the words of the network.
+The compiled part writes rows (:class:`ImpactRows`) into memory of fixed size, which a run keeps,
+puts back and stores with its other state.  Forces are summed over intervals, so that their sum
+stays the impulse; where there is no more room, two intervals become one.  States of films and
+bodies are samples; where there is no more room, every second one stays.  Impacts that are over are
+taken out of the rows.
 """
 
 from collections.abc import Mapping, Sequence
@@ -56,9 +50,9 @@ _SAME_ANGLE = 1e-6  # [rad]
 def sector_shares(points: Vector, area: Vector, sectors: int = SECTORS) -> csr_array:
     """Share of each sector in the force of each contact point, shape (S, n); columns sum to 1.
 
-    Points at one angle are a column of the mesh.  Between two columns the circumference is divided
-    in the ratio of their areas, so that a uniform pressure is a uniform line load, also where
-    points at corners and in the middle of sides alternate.
+    Between two columns of the mesh (points at one angle) the circumference is divided in the ratio
+    of their areas, so that a uniform pressure is a uniform line load, also where points at corners
+    and in the middle of sides alternate.
 
     Parameters
     ----------
@@ -95,7 +89,7 @@ def sector_shares(points: Vector, area: Vector, sectors: int = SECTORS) -> csr_a
 
 
 RESTING, APART, SQUEEZED, PRESSED = 0, 1, 2, 3
-"""What a stop is doing: carries since long, nothing, its film is felt, an impact is recorded."""
+"""Phase of a stop: carries for long, nothing, its film is felt, an impact is recorded."""
 
 PHASE, NUMBER = 0, 1
 LOAD_ROWS, LOAD_STRIDE, LOAD_FILL = 2, 3, 4
@@ -128,7 +122,7 @@ class ImpactRows(NamedTuple):
 
     @classmethod
     def empty(cls, stops: int, sectors: int, modes: int, films: int) -> Self:
-        """Return room for stops that carry, and have carried for long."""
+        """Room for stops that have carried for long."""
         times = np.full((stops, _TIMES), -np.inf)
         return cls(
             np.zeros((stops, _WORDS), dtype=np.int64),
@@ -159,14 +153,14 @@ def follow(
     pause: float,
     rest: float,
 ) -> int:
-    """Take in steps ``first`` and later; the step before which a recorded impact is over, or -1.
+    """Take in steps from ``first`` on; the step before which a recorded impact is over, or -1.
 
     Then the caller takes its rows, sets the phase, and continues with that step.
 
     Parameters
     ----------
-    c, first
-        Stop; step to begin with.
+    c
+        Stop.
     t, h [s]
         Start of step 0, and length of the steps.
     force (n, S) [N]
@@ -250,7 +244,7 @@ def _await(
 
 @inner
 def _await_place(rows: ImpactRows, c: int, time: float, place: Vector) -> None:
-    """Remember where the bodies are: the moment before a touch."""
+    """Remember where the bodies are before a touch."""
     rows.words[c, MODE_ROWS] = 1
     rows.moments[c, 0] = time
     for k in range(len(place)):
@@ -268,7 +262,7 @@ def _add_load(
     levers: Vector,
     total: float,
 ) -> None:
-    """Add a step to the sums of its interval; before it one without force where time has passed."""
+    """Add a step to the sums of its interval, after one without force where time has passed."""
     words, edges, load = rows.words[c], rows.edges[c], rows.load[c]
     if words[NUMBER] > MOST:
         return
@@ -288,7 +282,7 @@ def _add_load(
 
 @inner
 def _next_load(rows: ImpactRows, c: int) -> None:
-    """Make room for one more step: in the present interval, a new one, or by joining them all."""
+    """Make room for one more step: in the present interval, a new one, or by joining all."""
     words, edges, load = rows.words[c], rows.edges[c], rows.load[c]
     if words[LOAD_ROWS] > 0 and words[LOAD_FILL] < words[LOAD_STRIDE]:
         words[LOAD_FILL] += 1
@@ -396,13 +390,12 @@ class ImpactRecorder:
     ----------
     stops
         Of ``model.contacts``.
-    films : sequence of (str, FilmLand or None)
+    films
         Stop and land of each film, in the order of the record of steps.
     shape_marks (M,)
-        By which the shapes of the modes are known again.
+        Identify the shapes of the modes.
     felt, pause, rest (stops,) [N], [s], [s]
-        Force from which on a film is felt; contacts that are closer together are one impact; a
-        contact that lasts so long ends the impact.
+        As of :func:`follow`.
     """
 
     def __init__(
@@ -442,20 +435,20 @@ class ImpactRecorder:
         self._over: list[tuple[float, SpatialImpact]] = []
 
     def changing(self) -> dict[str, NDArray[np.generic]]:
-        """All arrays that a step changes and the next one begins with."""
+        """All arrays that a step changes and the next one starts from."""
         return {f"impact_{name}": array for name, array in self.rows._asdict().items()}
 
     def resume(self) -> None:
-        """Begin the record of a continued run: with the impacts that are not over."""
+        """Begin the record of a continued run with the unfinished impacts."""
         words = self.rows.words
         going = words[:, PHASE] == PRESSED
         words[going, NUMBER] = np.argsort(np.argsort(words[going, NUMBER])) + 1
         self.rows.total[0] = np.count_nonzero(going)
 
     def tell(self, t: float, h: float, record: Record, before: Vector) -> None:
-        """Take in the steps of a record that begins at ``t`` [s]; ``before``: modes at its start.
+        """Take in the steps of a record from ``t`` [s] on; ``before``: modes at its start.
 
-        What was recorded of later moments is forgotten, since they are computed again.
+        Later moments are forgotten, since they are computed again.
         """
         while self._over and self._over[-1][0] > t + h * (len(record.force) - 0.5):
             self._over.pop()
@@ -501,7 +494,7 @@ class ImpactRecorder:
             self._over.append((time, self._impact(c)))
 
     def impacts(self, end: float) -> tuple[SpatialImpact, ...]:
-        """All impacts up to a moment [s], in order of first touch; also those that are not over."""
+        """All impacts up to a moment [s], finished or not, in order of first touch."""
         found = [impact for time, impact in self._over if time <= end * (1.0 + 1e-12)]
         words = self.rows.words
         for c in np.flatnonzero((words[:, PHASE] == PRESSED) & (words[:, NUMBER] <= MOST)):
@@ -578,7 +571,7 @@ def _land(films: Films, k: int, land: SectorFilm | None) -> FilmLand | None:
 
 
 class StopRecord:
-    """What a macro step tells of each stop.
+    """Record of each stop over a macro step.
 
     Parameters
     ----------
@@ -636,7 +629,7 @@ class StopRecord:
         """Take in the steps of contact ``c`` in a record from ``t`` on, of length ``h`` [s].
 
         ``q``, ``lam``, ``gap0``: modes, forces and gaps of the points at its end; ``points``:
-        whether points were looked at.
+        whether these are computed.
         """
         network, row = self._network, self._rows[c]
         state, faces = network.interface_state, network.interfaces

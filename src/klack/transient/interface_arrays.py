@@ -1,4 +1,4 @@
-"""What the compiled step of the interface level works on: named groups of arrays."""
+"""Named groups of arrays that the compiled step of the interface level works on."""
 
 from typing import NamedTuple, Self
 
@@ -108,7 +108,8 @@ class Grip(NamedTuple):
 class ContactPoints(NamedTuple):
     """Points that may close.
 
-    What they do not have is None: its code is not compiled then.  They have one of it at most.
+    Of ``grip``, ``limit`` and ``layer`` they have one at most; code for what is None is not
+    compiled.
     """
 
     A: Matrix  # (d n, d n) [m/N] of ``contact_compliance``; d = 1 without friction
@@ -120,12 +121,12 @@ class ContactPoints(NamedTuple):
     layer: Layer | None = None  # of rough points
 
     def away(self) -> Self:
-        """Return none of them, as in flight, where no contact is looked at."""
+        """No points, as in flight."""
         return self._replace(A=self.A[:0, :0], traces=self.traces[:0], gap=self.gap[:0])
 
 
 class Guide(NamedTuple):
-    """Clearance contacts of the moving body with a bore along z, at k heights of its shaft."""
+    """Clearance contacts of the moving body with a bore along z, at k heights."""
 
     heights: Vector  # (k,) [m] z of the sections, at the placement of the moving body
     clearance: Vector  # (k,) [m] radial
@@ -147,7 +148,7 @@ class Guide(NamedTuple):
         return cls(none, none, place, across, along, turn, none, compliance, none, none)
 
     def with_friction(self, coefficient: float) -> Self:
-        """Return the same guide with another Coulomb coefficient [-] at all heights."""
+        """The same guide with another Coulomb coefficient [-]."""
         require_nonnegative("guide: friction", coefficient, "-")
         return self._replace(friction=np.full(len(self.heights), coefficient))
 
@@ -155,8 +156,8 @@ class Guide(NamedTuple):
 class Films(NamedTuple):
     """Films between faces: heights are lift + r (tilt_x cos + tilt_y sin) + what roughness leaves.
 
-    Lands of several films lie one behind the other in ``land``:
-    see :func:`klack.transient.tilting_films.land_at`.
+    ``land`` holds the lands of all films in turn: see
+    :func:`klack.transient.tilting_films.land_at`.
     """
 
     rows: Cube  # (k, 3, M) lift and tilts per modal coordinate [-], [1/m]
@@ -194,7 +195,7 @@ class ActiveSet(NamedTuple):
 
 
 class Closed(NamedTuple):
-    """Points that may carry with friction, and an inverse over what they do.
+    """Points that may carry with friction, and an inverse over their unknown forces.
 
     Directions of the point in place s are d s (normal), d s + 1 and, in 3-D, d s + 2 in ``block``;
     unknown forces are numbered likewise: normal, along and across the slip.
@@ -230,7 +231,7 @@ class Closed(NamedTuple):
 
 
 class Rubbing(NamedTuple):
-    """What friction remembers of the points, changed in place; empty without."""
+    """Memory of points with friction, changed in place; empty without."""
 
     forces: Vector  # (d n,) [N] last forces, normal ones first
     before: Vector  # (d n,) [N] those a step earlier: both make the first guess
@@ -258,7 +259,7 @@ class Rubbing(NamedTuple):
 
 
 class Worn(NamedTuple):
-    """What points that yield remember, changed in place; empty without."""
+    """Memory of points that yield, changed in place; empty without."""
 
     set: Vector  # (n,) [m]
     line: NDArray[np.int64]  # (n,) of the limit, as the inverse has it; -1: elastic
@@ -273,7 +274,7 @@ class Worn(NamedTuple):
 
 
 class Pressed(NamedTuple):
-    """What rough points remember, changed in place; empty without."""
+    """Memory of rough points, changed in place; empty without."""
 
     force: Vector  # (n,) [N] last forces
     before: Vector  # (n,) [N] those a step earlier: both make the first guess
@@ -321,7 +322,7 @@ class State(NamedTuple):
         sectors: int = 0,
         rough: bool = False,
     ) -> Self:
-        """Return a state of rest at q = 0, of faces as made."""
+        """State of rest at q = 0, of new faces."""
         return cls(
             np.zeros(modes),
             np.zeros(modes),
@@ -339,7 +340,7 @@ class State(NamedTuple):
 
 
 class Step(NamedTuple):
-    """The step that is being taken: forces over it, state at its end."""
+    """The present step: forces over it, state at its end."""
 
     share: float  # [N/m] force of the spring per displacement that the step would have without it
     known: Vector  # (M,) modal force from outside and from the guide
@@ -388,7 +389,7 @@ class Record(NamedTuple):
         films: int = 0,
         modes: int = 0,
     ) -> Self:
-        """Return room for so many steps; ``modes`` above 0 keeps as many modal coordinates."""
+        """Room for so many steps, and for ``modes`` modal coordinates in each."""
         force, gap, outside = np.zeros((3, steps))
         kept = steps if keep_points else 0
         return cls(

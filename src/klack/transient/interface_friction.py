@@ -5,8 +5,8 @@ Tangential offsets of the points, of the moving body past the other,
 .. math:: s = \Phi_t q + e, \qquad e = C_{tn} \lambda_n + C_{tt} \lambda_t ,
 
 change by :math:`\Delta s` within a step, part of it elastic, and Coulomb's law holds on that
-increment (:mod:`klack.transient.rubbing`): no speed of slip, and nothing is smoothed.  A point
-that closes begins with :math:`\lambda_t = 0` from where it is; one that opens forgets.
+increment (:mod:`klack.transient.rubbing`), without any smoothing.  A point that closes begins with
+:math:`\lambda_t = 0` from where it is; one that opens forgets.
 
 Energy: with the mean forces :math:`\bar\lambda_t = \tfrac12 (\lambda_{t0} + \lambda_{t1})` of a
 step and the part :math:`\tfrac12 \lambda_t^T e` of the potential of the contact,
@@ -14,27 +14,20 @@ step and the part :math:`\tfrac12 \lambda_t^T e` of the potential of the contact
 .. math:: \bar\lambda_t^T \Phi_t \Delta q + \Delta (\tfrac12 \lambda_t^T e) =
     \bar\lambda_t^T \Delta s + \tfrac12 (\lambda_{t1}^T e_0 - \lambda_{t0}^T e_1) .
 
-The first term is what friction takes.  It has the right sign wherever the slip turns by less than
-a right angle within a step; the rest joins the debt of the contact, as the second term does (of
-points that close or open), and is paid by normal forces: friction never pays.  What a payment moves
-closed points by is no slip, but part of their offset *e* from then on.
+The first term is what friction takes, of the right sign wherever the slip turns by less than a
+right angle within a step; the rest joins the debt of the contact, as the second term does (of
+points that close or open), and is paid by normal forces: friction never pays.  The motion of closed
+points by a payment is no slip, but part of their offset *e* from then on.
 
-Points without friction have no ``grip``: what is here does nothing for them then, and is not
-compiled.
+Without friction ``grip`` is None, and all this is not compiled.
 
-Friction between faces beside the fine steps of bodies in a network.
+A repair :math:`\delta q` of the modes between two steps of bodies in a network moves a closed point
+by :math:`\Phi_t\,\delta q` without slip: its offset becomes :math:`e - \Phi_t\,\delta q`, so that
+the slip of the next step contains this motion.  The potential of the contact, :math:`\tfrac12
+\lambda_n^T C \lambda + \tfrac12 \lambda_t^T e`, then changes by :math:`-\tfrac12 \lambda_t^T
+\Phi_t\,\delta q`, as it does along the normals.
 
-The fine steps have it themselves (:mod:`klack.transient.interface_friction`): a point remembers its
-tangential force :math:`\lambda_t` and the offset *e* by which the residual compliance is bent
-across its normal, and slips by :math:`\Delta s = \Phi_t \Delta q + \Delta e` within a step.
-
-A repair :math:`\delta q` of the modes between two steps moves a closed point by
-:math:`\Phi_t\,\delta q`.  It has not slipped by that: the offset from which the next step counts
-becomes :math:`e - \Phi_t\,\delta q`, so that the slip of that step holds this way, too.  The
-potential of the contact, :math:`\tfrac12 \lambda_n^T C \lambda + \tfrac12 \lambda_t^T e`, then
-changes by :math:`-\tfrac12 \lambda_t^T \Phi_t\,\delta q`, as it does along the normals.
-
-At rest the faces start without tangential forces, as frictionless ones would lie.
+At rest the faces start without tangential forces.
 """
 
 import numpy as np
@@ -73,15 +66,16 @@ __all__ = [
 
 
 _SHARE = 1e-2
-"""Of a force that counts as zero, what the law may be missed by.
+"""Residual of the law over the force that counts as zero.
 
-It is energy that the contact owes, and where the bodies turn round they travel too little for a
-small change of the forces to pay it."""
+It is energy that the contact owes; where the bodies turn round they travel too little for a small
+change of the forces to pay it.
+"""
 
 
 @inner
 def _offset_change(grip: Grip, before: Vector, step: Step) -> None:
-    """How far the modes move the points across their normals, on their way."""
+    """Motion of the points across their normals by the modes, so far."""
     for i in range(len(step.way)):
         step.way[i] = step.q[i] - before[i]
     np.dot(grip.tangents, step.way, step.moved)
@@ -89,7 +83,7 @@ def _offset_change(grip: Grip, before: Vector, step: Step) -> None:
 
 @inner
 def begin_offsets(grip: Grip | None, state: State, step: Step) -> None:
-    """Offsets at the end of the step as the modes and the law have found them."""
+    """Offsets at the end of the step by the modes and the law."""
     if grip is not None:
         n, rubbing = len(state.rubbing.slip), state.rubbing
         _offset_change(grip, state.q, step)
@@ -108,10 +102,9 @@ def forget(grip: Grip | None, rubbing: Rubbing, step: Step) -> None:
 
 @inner
 def _hold_offsets(grip: Grip, state: State, step: Step) -> None:
-    """Let closed points slip as their law has found, wherever the modes are moved besides.
+    """Keep the slip of closed points, wherever the modes move afterwards.
 
-    What moves them after that, the payment of a debt or the guide, joins their offsets, as it does
-    the gaps.
+    That motion, by the payment of a debt or the guide, joins their offsets, as it does the gaps.
     """
     n, rubbing = len(state.rubbing.slip), state.rubbing
     _offset_change(grip, state.q, step)
@@ -122,7 +115,7 @@ def _hold_offsets(grip: Grip, state: State, step: Step) -> None:
 
 @phase
 def across(grip: Grip | None, state: State, step: Step) -> float:
-    """Work of tangential forces, energy that they hold, and what friction takes, in all [J]."""
+    """Total work of tangential forces, energy that they hold, and loss in friction [J]."""
     if grip is None:
         return 0.0
     _hold_offsets(grip, state, step)
@@ -143,7 +136,7 @@ def held_across(grip: Grip | None, rubbing: Rubbing, bent: Vector) -> float:
 
 @phase
 def _guess(rubbing: Rubbing) -> None:
-    """Forces that change by as much as in the step before."""
+    """Change the forces by as much as in the step before."""
     n = len(rubbing.slip)
     forces, before = rubbing.forces, rubbing.before
     for k in range(n):
@@ -159,7 +152,7 @@ def _guess(rubbing: Rubbing) -> None:
 def rub(points: ContactPoints, grip: Grip, state: State, step: Step, tolerance: float) -> int:
     """Forces of all directions at the end of the step; returns the rounds, -1: none found.
 
-    Gaps and increments of offset without and with the new forces become known in ``step``.
+    Gaps and increments of offset without and with the new forces are written into ``step``.
     """
     n, rubbing = len(points.gap), state.rubbing
     _offset_change(grip, state.q, step)
@@ -194,7 +187,7 @@ def rub(points: ContactPoints, grip: Grip, state: State, step: Step, tolerance: 
 
 @phase
 def push_across(grip: Grip | None, forces: Vector, first: int, factor: float, kick: Vector) -> None:
-    """Add the modal force of tangential forces, ``first`` and those behind it, times a factor."""
+    """Add ``factor`` times the modal force of tangential forces from ``first`` on."""
     if grip is not None:
         for i in range(len(forces) - first):
             if forces[first + i] != 0.0:
@@ -205,7 +198,7 @@ def push_across(grip: Grip | None, forces: Vector, first: int, factor: float, ki
 
 @phase
 def _friction_work(rubbing: Rubbing, bent: Vector, moved: Vector) -> tuple[float, float]:
-    """Work of the mean tangential forces on the modes, and what friction takes [J]."""
+    """Work of the mean tangential forces on the modes, and loss in friction [J]."""
     n = len(rubbing.slip)
     ways = len(moved) // n
     given, taken = 0.0, 0.0
@@ -268,9 +261,9 @@ def remember(grip: Grip | None, state: State, step: Step) -> None:
 
 
 def rubbing_arrays(rubbing: Rubbing) -> dict[str, NDArray[np.generic]]:
-    """Arrays that a step changes and the next one begins with, but for the closed points.
+    """Arrays that a step changes and the next one starts from, without the closed points.
 
-    Those with their inverse are a means of the solver: it follows the forces from any of them.
+    Those and their inverse belong to the solver: it finds the forces from any of them.
     """
     return {
         "rubbing forces": rubbing.forces,
@@ -284,7 +277,7 @@ def rubbing_arrays(rubbing: Rubbing) -> dict[str, NDArray[np.generic]]:
 
 
 def lie_without_friction(model: InterfaceModel, rubbing: Rubbing, lam: Vector) -> None:
-    """Begin with faces that stick under these normal forces, shape (nc,) [N], without others."""
+    """Begin with faces that stick under these normal forces (nc,) [N], without others."""
     n = model.count
     for forces in (rubbing.forces, rubbing.before):
         forces[:n], forces[n:] = lam, 0.0
@@ -296,7 +289,7 @@ def lie_without_friction(model: InterfaceModel, rubbing: Rubbing, lam: Vector) -
 
 
 def forget_inverse(rubbing: Rubbing) -> None:
-    """Let the next step admit closed points afresh, for another matrix or after a stored state."""
+    """Let the next step admit closed points anew, for another matrix or a stored state."""
     closed = rubbing.closed
     closed.place[:] = -1
     closed.row[:] = -1
@@ -304,7 +297,7 @@ def forget_inverse(rubbing: Rubbing) -> None:
 
 
 def repair_offsets(model: InterfaceModel, rubbing: Rubbing, dq: Vector) -> float:
-    """Take a change of the modes, shape (M,), into the offsets; the work of friction on it [J]."""
+    """Add a change of the modes (M,) to the offsets; the work of friction on it [J]."""
     moved = model.tangents @ dq
     work = float(rubbing.across @ moved)
     closed = np.tile(rubbing.forces[: model.count] > 0.0, model.ways)
@@ -313,7 +306,7 @@ def repair_offsets(model: InterfaceModel, rubbing: Rubbing, dq: Vector) -> float
 
 
 def across_energy(model: InterfaceModel, rubbing: Rubbing, first: int, last: int) -> float:
-    """Part of the potential of some points that their forces across the normals hold [J]."""
+    """Potential of some points held by their forces across the normals [J]."""
     shape = (model.ways, model.count)
     part = np.s_[:, first:last]
     return float(

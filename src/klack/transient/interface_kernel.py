@@ -12,15 +12,14 @@ With the exact modal propagator over one step *h* under a constant mean force (A
 The complementarity problem has the constant matrix :math:`C_l + \tfrac12 \Phi B_1 \Phi^T`.
 
 Energy: the massless contact has the potential :math:`U = \tfrac12 \lambda^T C_l \lambda`, and with
-:math:`\varepsilon = 0` a step misses it by :math:`\tfrac12 (\lambda_0^T g_1 - \lambda_1^T g_0)`,
-which only points that close or open within the step feel.  :math:`\varepsilon` pays that back in
-the same step: some 1e-6 of the force, at most 1e-3, and as much as it takes in the first and the
-last step of a contact, which are closed for a part only.  What is left is owed to the next step
-and never adds up.
+:math:`\varepsilon = 0` a step misses it by :math:`\tfrac12 (\lambda_0^T g_1 - \lambda_1^T g_0)`, by
+points that close or open within the step.  :math:`\varepsilon` pays that back in the same step:
+some 1e-6 of the force, at most 1e-3, and as much as it takes in the first and the last step of a
+contact, which are closed only in part.  The rest is owed to the next step and never adds up.
 
-A spring that holds the moving body at :math:`y = p^T q` pulls with its mean force over the step,
-:math:`-k (y_0 + y_1) / 2`, so that its work is exactly what its energy changes by.  As :math:`y_1`
-follows from all forces of the step, each force comes with the answer of the spring,
+A spring at :math:`y = p^T q` pulls with its mean force over the step, :math:`-k (y_0 + y_1) / 2`,
+so that its work is exactly the change of its energy.  As :math:`y_1` follows from all forces of the
+step, each force comes with the answer of the spring,
 
 .. math:: f \to f - p \, \kappa \, p^T B_1 f, \qquad
     \kappa = \frac{k / 2}{1 + \tfrac{k}{2} p^T B_1 p} ,
@@ -28,19 +27,18 @@ follows from all forces of the step, each force comes with the answer of the spr
 and the matrix of the complementarity problem loses
 :math:`\tfrac12 \kappa (\Phi B_1 p) (\Phi B_1 p)^T` (:func:`contact_compliance`).
 
-With friction between the faces the same holds in all directions of the points
-(:mod:`klack.transient.interface_friction`).  Points that yield leave a set, which is part of their
-gap from then on (:mod:`klack.transient.yielding_points`); its plastic work is what a step takes.
+With friction the same holds in all directions of the points
+(:mod:`klack.transient.interface_friction`).  Points that yield leave a set, from then on part of
+their gap (:mod:`klack.transient.yielding_points`); the step takes its plastic work.
 
 Points with a layer of asperities (:mod:`klack.transient.rough_points`) have no complementarity but
 :math:`\lambda_1 = A p(-g_1)`, and the energy of the layer besides,
 
 .. math:: U = \tfrac12 \lambda^T C_l \lambda + \sum_k A_k \int_0^{-g_k} p \, dc ,
 
-which is convex in :math:`d = g_0 + \Phi q`.  Their mean force is
-:math:`(\tfrac12 - \theta) \lambda_0 + (\tfrac12 + \theta) \lambda_1` with the one
-:math:`\theta` for which its work is the change of U.  The end alone takes more than that change,
-the start alone less: :math:`\theta` is never beyond :math:`\pm\tfrac12`, and of the order of a
+which is convex in :math:`d = g_0 + \Phi q`.  Their mean force is :math:`(\tfrac12 - \theta)
+\lambda_0 + (\tfrac12 + \theta) \lambda_1` with the one :math:`\theta` for which its work is the
+change of U.  By convexity :math:`\theta` is never beyond :math:`\pm\tfrac12`, and of the order of a
 step.  For one point on a rigid body this is the mean pressure of the layer between two closures.
 """
 
@@ -111,38 +109,36 @@ __all__ = [
 FINISHED, OPEN, FAILED, TURNED = 0, 1, 2, 3
 """Why :func:`march` returned.
 
-All steps done; open for long enough; no active set found; a contact would begin that pushes the
-other way (the other stop), and that step is not taken.
+All steps done; open for long enough; no active set found; a contact of the other stop would begin,
+and that step is not taken.
 """
 
 _SWEEPS, _SETTLED = 20, 1e-4
-"""Rounds over all films of a step, which move each other, and the change of their heights that ends
-them, over their way in the step."""
+"""Rounds over all films of a step, which move each other, and the change of heights over their
+displacement in the step that ends them.
+"""
 
 _PAY_FROM = 1e-10
 """Smallest work of a step over the energy of the contact that pays debts.
 
-Of bodies at rest debt and work are round-off, and their ratio is anything."""
+Below it, for bodies at rest, debt and work are round-off.
+"""
 
 _PAY_LIMIT = 1e-3
 """Share of a contact force that may always pay the energy debt.
 
-More may, where the debt is more than that share of the energy that the contact holds."""
+More may, where the debt exceeds that share of the energy of the contact.
+"""
 
 
 def contact_compliance(
     local: NDArray, traces: NDArray, B1: NDArray, push: NDArray, spring: float
 ) -> NDArray:
-    """Matrix A of :func:`march`: gaps at the end of a step per contact force there, (n, n) [m/N].
+    """Matrix of :func:`march`: gaps at the end of a step per contact force there (n, n) [m/N].
 
-    With friction the directions of all points, normal ones first, instead of gaps.
-
-    Parameters
-    ----------
-    local (n, n) [m/N]
-        Of what the modes do not carry.
-    traces, B1, push, spring
-        As in :func:`march`.
+    With friction the directions of all points, normal ones first, instead of gaps.  ``local`` is
+    the compliance that the modes do not carry; ``traces``, ``B1``, ``push``, ``spring`` are as in
+    :func:`march`.
     """
     A = local + 0.5 * (traces * B1) @ traces.T
     if spring > 0.0:
@@ -153,7 +149,7 @@ def contact_compliance(
 
 @njit
 def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
-    """Force of the spring per displacement that the step would have without it [N/m]."""
+    """Force of the spring per displacement of the step without it [N/m]."""
     yields = 0.0
     for i in range(len(push)):
         yields += push[i] * push[i] * B1[i]
@@ -162,7 +158,6 @@ def _spring_share(B1: NDArray, push: NDArray, spring: float) -> float:
 
 @phase
 def _push_by_films(films: Films, bore: Guide | None, state: State, step: Step) -> None:
-    """Modal force of all films as in the step before."""
     for i in range(len(step.kick)):
         step.kick[i] = 0.0
         for k in range(len(films.lowest)):
@@ -199,7 +194,7 @@ def _add(step: Step, modes: Modes, factor: float) -> None:
 
 @phase
 def _gather(traces: Matrix, force: Vector, factor: float, kick: Vector) -> None:
-    """Modal force of contact forces, times a factor."""
+    """Modal force of ``factor`` times contact forces."""
     for i in range(len(kick)):
         kick[i] = 0.0
     for k in range(len(force)):
@@ -227,10 +222,8 @@ def safe_flight(
     ----------
     gap (n,) [m]
         At q = 0.
-    traces (n, M)
-    omega, q, v, force (M,)
-        Frequencies, state and constant modal forces.
-    horizon [s]
+    force (M,)
+        Constant modal forces.
     """
     n, modes = traces.shape
     swing = np.zeros(modes)
@@ -290,7 +283,7 @@ def _work(points: ContactPoints, before: Vector, step: Step) -> tuple[float, flo
 
 @inner
 def _start(modes: Modes, outside: Outside, bore: Guide | None, n: int, rubs: int) -> Step:
-    """Room for a step, the answer of the spring, and how much drag brakes the shaft."""
+    """Room for a step, the answer of the spring, and the drag on the shaft."""
     M, guides = len(modes.push), 0
     if bore is not None:
         guides = len(bore.clearance)
@@ -327,7 +320,7 @@ def _start(modes: Modes, outside: Outside, bore: Guide | None, n: int, rubs: int
 def _potential(points: ContactPoints, state: State) -> float:
     """Energy of the contact, -lam (gap + Phi q) / 2, since closed points have no gap [J].
 
-    With friction and what its forces bend across the normals.
+    With friction also what its forces bend across the normals.
     """
     potential = 0.0
     for k in range(len(points.gap)):
@@ -364,7 +357,7 @@ def _begin(modes: Modes, outside: Outside, bore: Guide | None, state: State, ste
 
 @phase
 def _move(modes: Modes, state: State, step: Step) -> float:
-    """Take the bodies over the step under all forces known by now; returns the spring's [N]."""
+    """Move the bodies over the step under all known forces; returns the spring's [N]."""
     A11, A12, B1, q, v = modes.A11, modes.A12, modes.B1, state.q, state.v
     pull, share = 0.0, step.share
     if share > 0.0:
@@ -384,7 +377,7 @@ def _move(modes: Modes, state: State, step: Step) -> float:
 
 @phase
 def _press(modes: Modes, bore: Guide, step: Step, k: int) -> float:
-    """Keep the shaft in a disc of clearance around the axis; returns what the spring adds [N]."""
+    """Keep the shaft in its disc of clearance; returns what the spring adds [N]."""
     step.normal[k, 0] = 0.0
     step.normal[k, 1] = 0.0
     x, y = bore.offset[k, 0], bore.offset[k, 1]
@@ -416,7 +409,7 @@ def _press(modes: Modes, bore: Guide, step: Step, k: int) -> float:
 
 @phase
 def _look(points: ContactPoints, step: Step) -> tuple[float, float]:
-    """Gaps without new contact forces: the least one and the largest distance from zero [m]."""
+    """Gaps without new contact forces: the smallest, and the largest magnitude [m]."""
     least, widest = 1e300, 0.0
     for k in range(len(points.gap)):
         step.open_gap[k] += points.gap[k]
@@ -428,7 +421,7 @@ def _look(points: ContactPoints, step: Step) -> tuple[float, float]:
 
 @phase
 def _turned(points: ContactPoints, state: State, step: Step) -> bool:
-    """Whether the contact pushes the other way than the last one did."""
+    """Whether the contact pushes opposite to the last one."""
     axial = 0.0
     for k in range(len(points.gap)):
         axial += points.axial[k] * step.lam[k]
@@ -441,7 +434,7 @@ def _turned(points: ContactPoints, state: State, step: Step) -> bool:
 
 @phase
 def _close(points: ContactPoints, state: State, step: Step) -> float:
-    """Let the new contact forces act; returns the least gap [m]."""
+    """Let the new contact forces act; returns the smallest gap [m]."""
     least = 1e300
     for k in range(len(points.gap)):
         if step.lam[k] > 0.0:
@@ -462,7 +455,7 @@ def _touch(
     step: Step,
     widest: float,
 ) -> int:
-    """Contact forces at the end of the step; returns the rounds, below zero if none are found."""
+    """Contact forces at the end of the step; returns the rounds, below zero on failure."""
     n, diagonal = len(points.gap), 0.0
     for k in range(n):
         diagonal += points.A[k, k] / n
@@ -488,7 +481,7 @@ def _touch(
 def _take_up(
     points: ContactPoints, limit: Limit | None, layer: Layer | None, state: State, step: Step
 ) -> float:
-    """What faces that yield have taken, or layers of asperities beyond the potential [J]."""
+    """Loss of faces that yield, or energy of asperities beyond the potential [J]."""
     taken = 0.0
     if limit is not None:
         taken = let_yield(limit, state.worn, step.lam, points.gap)
@@ -512,10 +505,8 @@ def _pay(
 ) -> tuple[float, float, float]:
     """Work of the mean contact forces on d = gap + Phi q against the potential, and the payment.
 
-    What faces that yield have taken is ``yielded`` [J].
-
-    Returns the payment as share of the forces, the potential at the end, and what the spring has
-    answered to the forces of the contact.
+    ``yielded`` [J] is the loss of faces that yield.  Returns the payment as share of the forces,
+    the potential at the end, and the answer of the spring to the contact.
     """
     for k in range(len(points.gap)):
         step.both[k] = state.lam[k] + step.lam[k]
@@ -573,8 +564,8 @@ def _balance(
 ) -> tuple[float, float]:
     """Weigh the forces of rough points so that their work is the change of energy.
 
-    What the layers have taken beyond the potential is ``held`` [J].  Returns the potential at the
-    end, and what the spring has answered to the forces of the contact.
+    ``held`` [J] is the energy of the layers beyond the potential.  Returns the potential at the
+    end, and the answer of the spring to the contact.
     """
     n, M = len(points.gap), len(state.q)
     for i in range(M):
@@ -653,7 +644,7 @@ def _tell_forces(
 def _count(
     modes: Modes, outside: Outside, bore: Guide | None, state: State, step: Step, axial: float
 ) -> None:
-    """Add the step to the sums of energy; ``axial`` is the force from outside [N]."""
+    """Add the step to the sums of energy; ``axial`` [N] is the force from outside."""
     books, q, v, loss = state.books, state.q, state.v, modes.loss
     moved = 0.0
     for i in range(len(q)):
@@ -722,21 +713,16 @@ def march(
     state: State,
     record: Record,
 ) -> tuple[int, int]:
-    """Advance by up to ``steps`` steps; the arrays of ``state`` are changed in place.
+    """Advance by up to ``steps`` steps, in place; returns the steps taken and a status.
 
     Parameters
     ----------
     wait
         Return :data:`OPEN` when no point has carried for so many steps after a contact; 0: never.
-    modes, outside, points, bore, films, state
-        ``bore`` and ``films`` are None without any, as are parts of ``points``: their code is not
-        compiled then.  See :mod:`klack.transient.interface_arrays`.
+    bore, films
+        None without any: their code is not compiled then.
     record
         Out, for at least ``steps`` steps.
-
-    Returns
-    -------
-    taken, status : int
     """
     n, books = len(points.gap), state.books
     step = _start(modes, outside, bore, n, len(state.rubbing.across))

@@ -12,13 +12,13 @@ the *residual* compliance
     \frac{\varphi_i \varphi_i^T}{\omega_i^2} \Big),
 
 positive definite, where F is the static flexibility of a whole body (of a free one with inertia
-relief).  Statics are therefore exact for any number of modes and for *every* pressure pattern:
-centred, eccentric, tilted, or touching in a few places.  The contact points carry no inertia.
+relief).  So statics are exact for any number of modes and *every* pressure pattern, centred or
+eccentric, tilted, or touching in a few places.  The contact points carry no inertia.
 
 With friction (:mod:`klack.contact.friction`) the points have tangential directions too, with the
 same hats and weights (:func:`klack.contact.mortar.tangent_rows`): rows of G are the normals of all
-points, then all of them in the first tangential direction, then in the second.  One residual
-compliance holds all directions: unlike bodies slip sideways where they are pressed.
+points, then the first tangential direction of all, then the second.  One residual compliance
+couples all directions: unlike bodies slip sideways where they are pressed.
 """
 
 from collections.abc import Sequence
@@ -65,14 +65,12 @@ _STATIC_LIMIT = 1e-6
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterfaceBody:
-    """A body, its static flexibility and what is kept of its vibration.
+    """A body with its static flexibility and kept elastic modes.
 
     Parameters
     ----------
-    modes
-        The kept elastic modes.
     damping (m,) [-]
-        Damping ratio of each of them.
+        Damping ratio of each mode.
     observers (k, n_dof)
         Rows on its displacements that are read.
     """
@@ -91,10 +89,9 @@ class InterfaceContact:
     Parameters
     ----------
     upper, lower
-        Names of the bodies a and b of ``space``.
+        Bodies a and b of ``space``.
     compliance (nc, nc) [m/N]
-        Static compliance of both bodies at these points, if it is known already; with tangential
-        directions of all rows.
+        Static one of both bodies at these points, if known; with tangential directions of all rows.
     """
 
     name: str
@@ -110,7 +107,7 @@ class InterfaceContact:
         return 0 if self.faces is None else self.faces.T_a.shape[0] // len(self.space.gap)
 
     def rows(self, body: str) -> csr_array | None:
-        """Rows of all directions on a body, None where it is not part of the contact."""
+        """Rows of all directions on a body; None where it is not part of the contact."""
         if body == self.upper:
             G, T = self.space.G_a, None if self.faces is None else self.faces.T_a
         elif body == self.lower:
@@ -129,7 +126,7 @@ class StaticChecks:
     lowest_pivot [-]
         Smallest Cholesky pivot of the residual compliance over its largest diagonal entry, above 0.
     reciprocity [-]
-        Works of two loads on each other's displacements, their difference over their size (Betti).
+        Relative difference of the works of two loads on each other's displacements (Betti).
     static_limit [-]
         Deviation of modes + residual from the static answer of the whole bodies to one load.
     modal_share [-]
@@ -144,7 +141,7 @@ class StaticChecks:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class InterfaceModel:
-    """Modal coordinates of all bodies and the contact points between them; plain arrays.
+    """Modal coordinates of all bodies and the contact points between them.
 
     Parameters
     ----------
@@ -153,47 +150,44 @@ class InterfaceModel:
     masses [kg]
         ``inf`` for a supported body.
     omega, damping (M,) [rad/s], [-]
-        Of all modal coordinates: body by body, rigid modes first.
+        Body by body, rigid modes first.
     owner (M,)
         Body of each coordinate.
     traces (nc, M) [1/sqrt(kg)]
-        Change of the gaps per unit modal coordinate.
+        Change of the gaps per modal coordinate.
     compliance (nc, nc) [m/N]
-        Residual compliance; with friction (d nc, d nc), the normals of all points first, then each
-        tangential direction.
+        Residual; with friction (d nc, d nc), normals first, then each tangential direction.
     gap (nc,) [m]
         At q = 0 without contact forces.
     axial (nc,) [-]
         Change of the gaps per unit translation of the moving body along +z.
-    area (nc,) [m^2]
-    points (nc, dimension) [m]
-    contacts : tuple of (name, first, last)
-        Rows ``first <= k < last`` belong to the contact.
+    area (nc,) [m^2] points (nc, dimension) [m] contacts
+        Name, first and last: rows ``first <= k < last`` belong to the contact.
     rim, beyond (nc,) [-], [m]
         See :class:`klack.contact.mortar.ContactSpace`.
     rigid (6, M) [1/sqrt(kg)]
-        Translation of the centre of mass and rotation vector of the moving body per unit modal
-        coordinate; rows other than z vanish for bodies of revolution.
+        Translation of the centre of mass and rotation vector of the moving body per modal
+        coordinate; only z for bodies of revolution.
     drift (bodies, M) [1/sqrt(kg)]
-        Displacement of each centre of mass along z per unit modal coordinate.
+        Displacement of each centre of mass along z per modal coordinate.
     centre (3,) [m]
         Centre of mass of the moving body.
     longest_period [s]
         Of its elastic modes, 0 without any.
     tangents (ways nc, M) [1/sqrt(kg)]
-        Change of the tangential offsets per unit modal coordinate; no rows without friction.
+        Change of the tangential offsets per modal coordinate; no rows without friction.
     axial_across (ways nc,) [-]
         The same per unit translation of the moving body along +z.
     friction
         Of each contact; empty without.
     observed (k, M) [1/sqrt(kg)]
-        What the observers of all bodies read per unit modal coordinate.
-    observed_residual : array, shape (k, nc), with friction (k, d nc) [m/N]
-        What they read besides, per unit contact force of each row of ``compliance``.
+        What the observers of all bodies read per modal coordinate.
+    observed_residual (k, nc), with friction (k, d nc) [m/N]
+        And besides per contact force of each row of ``compliance``.
     limit
-        Of the points of the first contact, without friction; None: they stay elastic.
+        Of the points of the first contact, without friction; None: elastic.
     layer
-        On the points of the only contact, without friction or yield; None: they are smooth.
+        On the points of the only contact, without friction or yield; None: smooth.
     """
 
     bodies: tuple[str, ...]
@@ -229,7 +223,7 @@ class InterfaceModel:
         return len(self.tangents) // self.count
 
     def without_friction(self) -> "InterfaceModel":
-        """Return the same bodies and contact points without friction."""
+        """The same bodies and contact points without friction."""
         n = self.count
         return replace(
             self,
@@ -241,13 +235,13 @@ class InterfaceModel:
         )
 
     def elastic(self) -> "InterfaceModel":
-        """Return the same bodies with points that do not yield."""
+        """The same bodies with points that do not yield."""
         return replace(self, limit=None)
 
     def in_steps(self, step: float) -> "InterfaceModel":
-        r"""Return the bodies as the trapezoidal rule moves them in steps of this length [s].
+        r"""The bodies as the trapezoidal rule moves them in steps of this length [s].
 
-        Its angle per step is :math:`2 \arctan(\omega h / 2)`; a constant force deflects as ever.
+        Its angle per step is :math:`2 \arctan(\omega h / 2)`; statics are unchanged.
         """
         angle = 0.5 * step * self.omega
         slower = np.divide(np.arctan(angle), angle, out=np.ones_like(angle), where=angle > 0.0)
@@ -277,25 +271,25 @@ class InterfaceModel:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PointBody:
-    """What an interface model takes of a body: its modes, as its contact points see them.
+    """Modes of a body as its contact points see them.
 
     Parameters
     ----------
     mass [kg]
         ``inf`` for a supported body.
     centre (3,) [m]
-        Centre of mass.
+        Of mass.
     rigid (6, r) [1/sqrt(kg)]
-        Translation of the centre of mass and rotation vector per unit rigid mode, the first modes.
+        Translation of the centre of mass and rotation vector per rigid mode; these come first.
     omega, damping (m,) [rad/s], [-]
-        Of all modes; 0 for rigid ones.
+        0 for rigid modes.
     traces (n, m) [1/sqrt(kg)]
-        Change of the gaps of all contact points per unit modal coordinate, and after them of the
-        offsets in each tangential direction.
+        Change of the gaps of all contact points per modal coordinate, then of the offsets in each
+        tangential direction.
     observed (k, m) [1/sqrt(kg)]
-        What the observers read per unit modal coordinate.
+        What the observers read per modal coordinate.
     observed_static (k, n) [m/N]
-        What they read per unit contact force, of the whole body.
+        And per contact force, of the whole body.
     """
 
     name: str
@@ -311,7 +305,7 @@ class PointBody:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class PointContact:
-    """What an interface model takes of two surfaces that may meet.
+    """Two surfaces that may meet, for an interface model.
 
     Parameters
     ----------
@@ -346,8 +340,6 @@ def interface_model(
     ----------
     bodies
         The moving one first; it must be free along z.
-    contacts
-        One or more, for example seat and stop.
 
     Raises
     ------
@@ -375,7 +367,7 @@ def interface_model(
 
 
 def row_places(counts: Sequence[int], ways: int) -> list[NDArray[np.int64]]:
-    """Rows of each contact among those of all: the gaps of all first, then each direction."""
+    """Rows of each contact among those of all: the gaps of all, then each direction."""
     last = np.cumsum(counts).astype(np.int64)
     return [
         (last[-1] * np.arange(1 + ways)[:, None] + np.arange(b - n, b)).ravel()
@@ -384,7 +376,7 @@ def row_places(counts: Sequence[int], ways: int) -> list[NDArray[np.int64]]:
 
 
 def uneven_loads(rows: int) -> NDArray[np.float64]:
-    """Two loads on all rows, shape (rows, 2) [N], by which a model is checked."""
+    """Two loads on all rows (rows, 2) [N], by which a model is checked."""
     return np.random.default_rng(5).uniform(0.0, 1.0, (rows, 2))
 
 
@@ -395,7 +387,7 @@ def model_at_points(
     loads: NDArray[np.float64],
     answers: NDArray[np.float64],
 ) -> InterfaceModel:
-    """Put bodies and contacts together that are known at their contact points.
+    """Combine bodies and contacts that are known at their contact points.
 
     Parameters
     ----------
@@ -413,8 +405,7 @@ def model_at_points(
     InputError
         For a moving body that is held.
     ConvergenceError
-        When the residual compliance is not positive definite, not reciprocal, or the static limit
-        is missed.
+        As of :func:`interface_model`.
     """
     moving = bodies[0]
     if not moving.mass < inf:
@@ -533,7 +524,7 @@ def _observed_static(
     contacts: Sequence[InterfaceContact],
     places: Sequence[NDArray[np.int64]],
 ) -> NDArray[np.float64]:
-    """What the observers read of a body per unit of each contact force, by reciprocity."""
+    """What the observers of a body read per contact force, by reciprocity."""
     rows = item.observers.reshape(-1, item.body.dof_count)
     out = np.zeros((len(rows), sum(len(place) for place in places)))
     if len(rows):
@@ -559,7 +550,6 @@ def _common_ways(contacts: Sequence[InterfaceContact]) -> int:
 
 
 def _axial_across(contacts: Sequence[PointContact], rows: int) -> NDArray[np.float64]:
-    """Change of the tangential offsets of all points, direction by direction."""
     counts = [len(contact.gap) for contact in contacts]
     ways = rows // sum(counts) - 1
     out = np.zeros(rows)
@@ -569,7 +559,7 @@ def _axial_across(contacts: Sequence[PointContact], rows: int) -> NDArray[np.flo
 
 
 def rigid_motion(body: ElasticBody) -> NDArray[np.float64]:
-    """Translation of the centre of mass and rotation vector per unit rigid mode, shape (6, r)."""
+    """Translation of the centre of mass and rotation vector per rigid mode, shape (6, r)."""
     R, d = body.rigid_modes, body.dimension
     out = np.zeros((6, R.shape[1]))
     if not R.shape[1]:
@@ -600,7 +590,6 @@ def _traces(
     contacts: Sequence[InterfaceContact],
     places: Sequence[NDArray[np.int64]],
 ) -> NDArray[np.float64]:
-    """Contact traces of the modes of one body at all contact points."""
     shapes = np.hstack([item.body.rigid_modes, item.modes.shapes])
     out = np.zeros((sum(len(place) for place in places), shapes.shape[1]))
     for contact, place in zip(contacts, places, strict=True):
@@ -669,7 +658,7 @@ def _answers(
     places: Sequence[NDArray[np.int64]],
     loads: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """What loads open by the deflection of one body, solved anew."""
+    """What loads open by the deflection of one body, from a new solution."""
     parts = [
         (G, place)
         for contact, place in zip(contacts, places, strict=True)

@@ -12,27 +12,27 @@ __all__ = ["ImpactSegment", "InterfaceEnergy", "InterfaceResult", "RigidMotion"]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class ImpactSegment:
-    """A stretch of fine steps around one impact.
+    """Fine steps around one impact.
 
     Parameters
     ----------
     contact
-        Name of the contact that carried first.
+        That carried first.
     side [-]
         1 when it pushes the moving body to +z, -1 when the stop is above.
     history
         Axial contact force (magnitude), smallest gap, velocities of the centres of mass; seen with
         the other body below, so velocities and outside forces along +z are ``side`` times these.
-    point_force : float32 array, shape (n, nc) [N]
-        Mean force of every contact point in each step; no rows when points were not asked for.
+    point_force (n, nc) [N]
+        Mean force of every contact point in each step; no rows without ``points``.
     position (6,) [m], [rad]
-        Rigid placement of the moving body when the segment began: translation of the centre of
-        mass and rotation vector.
+        Rigid placement of the moving body at the start: translation of the centre of mass and
+        rotation vector.
     velocity (6,) [m/s], [rad/s]
-    friction_force : float32 array, shape (n, ways nc) [N]
-        Mean friction of every contact point on the moving body's side in each step, all points in
-        the first tangential direction, then in the second; no rows without friction or points.
-    doing : int8 array, shape (n, nc)
+    friction_force (n, ways nc) [N]
+        Mean friction of every contact point on the moving body in each step, all points in the
+        first tangential direction, then in the second; no rows without friction or points.
+    doing (n, nc)
         0 open, 1 sticking, 2 slipping at the end of each step; likewise.
     """
 
@@ -54,7 +54,7 @@ class RigidMotion:
     ----------
     time (n,) [s]
     position, velocity (n, 6)
-        Translation of the centre of mass [m], [m/s] and rotation vector [rad], [rad/s].
+        Of the centre of mass [m], [m/s], and rotation vector [rad], [rad/s].
     """
 
     time: NDArray[np.float64]
@@ -71,16 +71,14 @@ class InterfaceEnergy:
     initial, final [J]
         Kinetic and strain energy of all bodies, of the contacts, the guides and the spring.
     damping, guide [J]
-        Lost in modal damping; in the guides (friction, drag, and their numerical part).
+        Lost in modal damping; in guides (friction, drag, and their numerical part).
     work [J]
         Of constant forces.
     debt [J]
-        Energy that the contact steps have given too much and not yet taken back; the residual
-        of the balance except for round-off.
-    friction [J]
-        Lost in friction between the faces.
-    plastic [J]
-        Lost to faces that yield.
+        What the contact steps gave too much and have not yet taken back; the residual except for
+        round-off.
+    friction, plastic [J]
+        Lost in friction between the faces, and to their yield.
     """
 
     initial: float
@@ -99,17 +97,17 @@ class InterfaceEnergy:
 
     @property
     def residual(self) -> float:
-        """Energy from nowhere over the largest of initial energy and work [-]."""
+        """Energy balance residual over :attr:`turned_over` [-]."""
         return (self.final - self.initial + self.lost - self.work) / self.turned_over
 
     @property
     def turned_over(self) -> float:
-        """Scale of the residual [J]: the larger one of initial energy and work."""
+        """Larger one of initial energy and work [J]."""
         return max(abs(self.initial), abs(self.work), 1e-300)
 
     @property
     def least_loss(self) -> float:
-        """Smallest of the losses, relative to the energy turned over [-]."""
+        """Smallest loss over :attr:`turned_over` [-]."""
         return min(self.damping, self.guide, self.friction) / self.turned_over
 
 
@@ -120,7 +118,7 @@ class InterfaceResult:
     Parameters
     ----------
     impacts
-        In the order of time; without flight one segment holds the whole run.
+        In order of time; without flight one segment holds the whole run.
     worn (nc,) [m]
         Set of the contact points at the end; no points where they stay elastic.
     steps, steps_in_contact
@@ -128,7 +126,8 @@ class InterfaceResult:
     rounds_per_step
         Active sets tried per step in contact.
     approach [m]
-        Largest way of the centre of mass of the moving body to -z after the first touch below.
+        Largest displacement of the centre of mass of the moving body to -z after the first touch
+        below.
     wall_time [s]
         Of the time loop.
     """

@@ -1,10 +1,9 @@
 """Impacts at the interface level: the model, the compiled step, and the flight in between.
 
-Around an impact the step is fine and every gap is looked at.  Far from it the exact propagator
-jumps, as far as no gap can close (:func:`klack.transient.interface_kernel.safe_flight`) and the
-guide allows.  Before each impact the gaps can be taken anew from the geometry at the rigid
-placement reached by then, so that tilt and eccentricity may grow over many bounces while each
-impact stays linear.
+Around an impact steps are fine.  Far from it the exact propagator jumps as far as no gap can close
+(:func:`klack.transient.interface_kernel.safe_flight`) and the guide allows.  Before each impact the
+gaps can be taken from the geometry at the present placement, so that tilt and eccentricity may grow
+over many bounces while each impact stays linear.
 """
 
 from collections.abc import Callable
@@ -75,7 +74,7 @@ from klack.transient.rough_points import layer_energy, solve_rough
 __all__ = ["Gaps", "contact_points", "modes_of_step", "simulate_interface"]
 
 Gaps = Callable[[NDArray[np.float64]], NDArray[np.float64]]
-"""Exact gaps, shape (nc,) [m], at a rigid placement of the moving body, shape (6,) [m], [rad]."""
+"""Exact gaps (nc,) [m] at a rigid placement of the moving body (6,) [m], [rad]."""
 
 _BALANCE = 1e-3  # energy residual that a run keeps at its usual step
 _CHUNK = 500
@@ -122,7 +121,7 @@ def simulate_interface(
     force [N]
         Constant, presses the moving body towards -z (closing), spread over it like its weight.
     spring_stiffness [N/m]
-        Of a spring that pulls the centre of mass back to where it started; its preload belongs to
+        Of a spring that pulls the centre of mass back to its start; its preload belongs to
         ``force``.
     offset (6,) [m], [rad]
         Rigid placement of the moving body, from that of the meshes: translation of the centre of
@@ -130,10 +129,9 @@ def simulate_interface(
     velocity (6,) [m/s], [rad/s]
         Besides ``speed``.
     height [m]
-        Start this far above first touch; without it, where the offset puts the body.
+        Start this far above first touch; by default where the offset puts the body.
     gaps
-        Exact gaps at a rigid placement, asked before every impact; without it the gaps stay
-        linear in the placement.
+        Used before every impact; without it the gaps stay linear in the placement.
     flight
         Jump over free flight; the result then has one segment per impact.
     impacts
@@ -141,7 +139,7 @@ def simulate_interface(
     points
         Keep the force of every contact point.
     worn (nc,) [m]
-        Set of the contact points that earlier impacts have left, of a model whose points yield.
+        Set of the contact points by earlier impacts, of a model whose points yield.
     progress
         Called with the fraction done.
 
@@ -221,7 +219,7 @@ def contact_points(
 
 
 def _limit(model: InterfaceModel) -> Limit | None:
-    """Pressure limit of the points of one contact; those of others stay elastic."""
+    """Pressure limit of the points of one contact; others stay elastic."""
     if model.limit is None:
         return None
     area = np.full(model.count, np.inf)
@@ -372,7 +370,7 @@ class _Run:
         self.keep_motion()
 
     def settle(self) -> None:
-        """Press the layer of faces that are placed into each other."""
+        """Press the layer of faces that overlap at the start."""
         gap, lam = self.open_gap + self.model.traces @ self.q, self.state.lam
         if self.model.layer is None or not np.any(gap < 0.0):
             return
@@ -471,9 +469,9 @@ class _Run:
                 progress(min(self.time / duration, 1.0))
 
     def stale(self) -> float:
-        """Largest possible difference of the gaps from those of the geometry [m].
+        """Largest possible error of the gaps [m].
 
-        Surfaces that enclose an angle slide past each other: a share of the way is missing.
+        Faces at an angle slide past each other: a share of the displacement is missing.
         """
         if self.gaps is None:
             return 0.0
@@ -668,9 +666,9 @@ class _Run:
         )
 
     def closed(self, force: NDArray[np.float64]) -> tuple[str, float, int | None]:
-        """Contact that carried first, its side, and the other body there (None: it has no modes).
+        """Contact that carried first, its side by the sign of the force, and the other body.
 
-        The sign of the axial force tells which side.
+        None for a body that has no modes.
         """
         model = self.model
         carried = np.flatnonzero(force)
@@ -691,7 +689,7 @@ class _Run:
         return 0.0 if self.touched_at is None else max(0.0, self.touched_at - self.lowest)
 
     def check_rim(self) -> None:
-        """Refuse a contact that has grown to the border of the candidate points."""
+        """Reject a contact that has grown to the border of the candidate points."""
         at_rim = self.state.carried & self.model.rim
         if not np.any(at_rim):
             return

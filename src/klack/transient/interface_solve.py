@@ -1,9 +1,8 @@
 r"""Linear solves whose right-hand side depends on the solution at a few contact points.
 
 A time step has to solve :math:`S x = b + G^T \lambda`, where the forces :math:`\lambda` follow from
-the gaps :math:`G x` themselves.  Done plainly that takes two solves with the large matrix *S*: one
-without the forces, to see the gaps, and one for the forces.  With a Cholesky factor
-:math:`S = L L^T` one is enough:
+the gaps :math:`G x`.  Instead of two solves with *S*, without and with the forces, a Cholesky
+factor :math:`S = L L^T` needs one:
 
 .. math::
     L y = b, \qquad \hat Y = L^{-1} G^T, \qquad G S^{-1} b = \hat Y^T y, \qquad
@@ -41,13 +40,13 @@ class InterfaceSolve(Protocol):
     compliance: NDArray[np.float64]
 
     def learn(self, points: NDArray[np.int64]) -> None:
-        """Work out the response to new contact points, shape (k,)."""
+        """Compute the response to new contact points (k,)."""
 
     def select(self, points: NDArray[np.int64]) -> None:
-        """Contact points that the next calls speak about, shape (ns,); all learned before."""
+        """Contact points (ns,) of the next calls; all learned before."""
 
     def predict(self, b: NDArray[np.float64]) -> None:
-        """Take the right-hand side without contact forces, shape (n,)."""
+        """Take the right-hand side without contact forces (n,)."""
 
     def response(self) -> NDArray[np.float64]:
         """G S^-1 b at the selected points, shape (ns,)."""
@@ -57,14 +56,7 @@ class InterfaceSolve(Protocol):
 
 
 def interface_solve(factorization: Factorization, G: csr_array) -> InterfaceSolve:
-    """Choose the cheapest method of the factorisation.
-
-    Parameters
-    ----------
-    factorization
-        Of S, shape (n, n) [N/m].
-    G : sparse array, shape (nc, n) [-]
-    """
+    """Choose the cheapest method for a factorisation of S (n, n) and G (nc, n)."""
     if isinstance(factorization, Halves):
         return SplitSolve(factorization, G)
     return WholeSolve(factorization, G)
@@ -117,9 +109,9 @@ class SplitSolve:
 
 
 class WholeSolve:
-    """For factorisations that offer whole solves only: one per step, or two while in contact.
+    """For factorisations that offer whole solves only: one per step, or two in contact.
 
-    One is enough as long as the responses S^-1 G^T of all contact points fit into 1 GiB.
+    One suffices while the responses S^-1 G^T of all contact points fit into 1 GiB.
     """
 
     def __init__(self, factorization: Factorization, G: csr_array) -> None:

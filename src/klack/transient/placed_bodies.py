@@ -1,4 +1,4 @@
-"""What follows from where modal bodies are: coordinates, energy, and the hold of a guide."""
+"""Coordinates and energy of placed modal bodies, and the hold of a guide."""
 
 import numpy as np
 

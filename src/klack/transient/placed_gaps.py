@@ -1,11 +1,9 @@
-r"""Gaps of the contact points of a needle that moves: taken from the geometry, then followed.
-
-How the gaps of contact points follow a rigid placement, where they are not asked anew.
+r"""Gaps of the contact points of a moving needle: taken from the geometry, then followed.
 
 The exact gap of a point is the length of its normal up to the other face
 (:mod:`klack.contact.gap_update`).  Its slope with the placement is that of the contact force only
-where both faces are parallel, as they are in touch; at points aside of it the other face is met at
-an angle.  With the slopes :math:`G` at one placement, the gaps of another one are
+where both faces are parallel, as in touch; beside it the other face is met at an angle.  With the
+slopes :math:`G` at one placement, the gaps of another one are
 
 .. math:: g = g_0 + G\,(x - x_0) + O(c\,|x - x_0|^2), \qquad c \approx 1/R .
 """
@@ -28,23 +26,23 @@ _STEEPEST = 20.0  # ways: a gap that changes by more has lost or found a face
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class GapCourse:
-    """Slopes of gaps with a rigid placement, and what they leave.
+    """Slopes of gaps with a rigid placement, and their error.
 
     Parameters
     ----------
     slopes (n, 6)
         Per translation [-] and rotation vector [m].
     bends (n, 6) [1/m], [m]
-        Second derivatives along each of these motions, without a sign.
+        Magnitudes of the second derivatives along these motions.
     """
 
     slopes: Matrix
     bends: Matrix
 
     def left(self, moved: Vector) -> Vector:
-        """What the slopes can be wrong by after a motion [m], shape (n,); twice the second order.
+        """Error of the slopes after a motion [m], shape (n,); twice the second order.
 
-        The other half is for the slopes, which are those of another placement.
+        The other half is for slopes of another placement.
         """
         return np.asarray(self.bends @ moved**2)
 
@@ -54,8 +52,6 @@ def gap_course(gaps: Callable[[Vector], Vector], reach: float) -> GapCourse:
 
     Parameters
     ----------
-    gaps
-        Exact gaps at a placement.
     reach [m]
         Farthest contact point from the centre of the rotation.
     """
@@ -73,24 +69,24 @@ def gap_course(gaps: Callable[[Vector], Vector], reach: float) -> GapCourse:
 
 
 FRESH = 0.04e-6
-"""Gaps that may be wrong by less are as good as new [m]."""
+"""Error of gaps [m] that counts as none."""
 _NO_FACE = 0.2e-3  # [m] no gap changes by so much with the placement: nothing faces the point
 
 
 class PlacedGaps:
     """Gaps beside the linear ones of the modes; without geometry they stay as they are.
 
-    Between two moments at which they are taken from the geometry, gaps follow the placement of the
-    needle along their slopes (:mod:`klack.transient.placed_gaps`).
+    Between two moments at which they are taken from the geometry, they follow the placement of the
+    needle along their slopes.
 
     Parameters
     ----------
     rigid_count
         Rigid modes of the needle, the first ones.
     gaps
-        Exact gaps at a rigid placement of the needle.
+        Exact ones at a rigid placement of the needle.
     course
-        Of these gaps; made of them if not given.
+        Of these gaps; computed by default.
     reach [m]
         Farthest contact point from the centre of the rotation.
     """
@@ -114,7 +110,7 @@ class PlacedGaps:
             self._turning = self._course.slopes - model.traces[:, :rigid_count] @ q
 
     def take(self, q: Vector, *, careful: bool = False) -> bool:
-        """Take them from the geometry; ``careful``: only where no point is closed by it."""
+        """Take them from the geometry; ``careful``: only where this closes no point."""
         if self._exact is None:
             return False
         model, r = self._model, self._rigid
@@ -126,7 +122,7 @@ class PlacedGaps:
         return True
 
     def follow(self, q: Vector) -> bool:
-        """Let them follow the placement, unless a point is closed by it."""
+        """Let them follow the placement, unless this closes a point."""
         if self._course is None:
             return False
         at = self._model.rigid @ q

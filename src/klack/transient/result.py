@@ -29,11 +29,11 @@ class EnergyRecord:
     kinetic, strain (k, n_bodies) [J]
         Of body a, then body b.
     contact (k,) [J]
-        Work that the contact forces took out of the bodies when points closed or opened within
-        a step; the first of the two numerical losses.  Never below zero in the stabilised scheme;
-        the massless one may gain (3e-4 of the energy in 60 steps through an impact of 25 us).
+        Taken from the bodies when points closed or opened within a step; the first numerical loss.
+        Never below zero in the stabilised scheme; the massless one may gain (3e-4 of the energy in
+        60 steps through an impact of 25 us).
     overshoot (k,) [J]
-        Taken out by removing the inertial overshoot, >= 0; the second one.
+        Taken by removing the inertial overshoot, >= 0; the second one.
     work (k,) [J]
         Done by the constant force.
     damping (k,) [J]
@@ -79,8 +79,8 @@ class FieldsOfBody:
         At the end of the step with the largest contact force, counted from the start of the run.
     end_displacement (n_dof,) [m]
     end_velocity (n_dof,) [m/s]
-        At the end; its mass-weighted projection on the modes says where the energy went.  Modes
-        that the step does not resolve alternate from step to step, which single contact nodes show.
+        Its mass-weighted projection on the modes tells where the energy went.  Modes that the step
+        does not resolve alternate from step to step, visibly at single contact nodes.
     """
 
     name: str
@@ -91,12 +91,12 @@ class FieldsOfBody:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class MotionOfBody:
-    """Where one body is at one instant, all degrees of freedom (zero where fixed).
+    """Motion of one body at one instant, all degrees of freedom (zero where fixed).
 
     Parameters
     ----------
     displacement (n_dof,) [m]
-        Counted from the given placement, with the flight to the first touch.
+        From the given placement, with the flight to the first touch.
     velocity (n_dof,) [m/s]
         Mean over the step before, in which modes cancel that the step does not resolve.
     """
@@ -108,14 +108,14 @@ class MotionOfBody:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Snapshots:
-    """Reads fields of a run in progress; they are kept only by the caller.
+    """Reads fields of a run in progress, which are not kept.
 
     Parameters
     ----------
     steps
-        Numbers of the steps after which to look; 0 is the start.
+        After which to look; 0 is the start.
     receive
-        Called with the time [s] and a tuple of :class:`MotionOfBody`, body a first.
+        Called with the time [s] and the bodies, a first.
     """
 
     steps: Collection[int]
@@ -133,13 +133,13 @@ class SolverStatistics:
     rounds_per_step
         Active sets tried per step in contact.
     watched
-        Mean number of contact points that were near enough to be looked at.
+        Mean number of contact points near enough to be checked.
     repeats
-        Steps done twice because a point outside of these closed.
+        Steps repeated because another point closed.
     factor_entries
-        Stored entries of all factors (0 where the solver does not tell).
+        Stored entries of all factors (0 if unknown).
     turns
-        Steps whose forces with friction were found by taking turns, point by point.
+        Steps whose forces with friction were found point by point.
     set_up_time, loop_time [s]
         Wall-clock.
     """
@@ -161,13 +161,13 @@ class SolverStatistics:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RubbingRecord:
-    """What the contact points did across their normals.
+    """Motion of the contact points across their normals.
 
     Parameters
     ----------
-    force : float32 array, shape (n, ways, nc) [N]
+    force (n, ways, nc) [N]
         On body a along each tangential direction, mean over each step.
-    doing : int8 array, shape (n, nc)
+    doing (n, nc)
         Open, sticking or slipping in each step, as of :mod:`klack.transient.rubbing`.
     """
 
@@ -182,10 +182,9 @@ class FullOrderResult:
     Parameters
     ----------
     history
-        Contact force, gap and centre-of-mass velocities; its contact dissipation is the
-        numerical loss of the scheme.
-    point_force : float32 array, shape (n, nc) [N]
-        Force of every contact point, mean over each step.
+        Its contact dissipation is the numerical loss of the scheme.
+    point_force (n, nc) [N]
+        Of every contact point, mean over each step.
     area (nc,) [m^2]
         Of the contact points.
     fields
@@ -194,8 +193,6 @@ class FullOrderResult:
         Largest approach of the centre of mass of a after the first touch.
     retraction [m]
         Distance that a was moved back along +z at the start because the bodies overlapped.
-    rubbing
-        With friction.
     """
 
     history: ImpactHistory
@@ -220,7 +217,7 @@ class FullOrderResult:
 
     @property
     def energy_loss(self) -> float:
-        """Energy that the scheme lost, relative to the energy at the start [-]."""
+        """Loss of the scheme over the energy at the start [-]."""
         given = self.energy.total[0] + self.energy.work[-1]
         kept = self.energy.total[-1] + self.energy.spring[-1] + self.energy.damping[-1]
         lost = given - kept - self.energy.friction[-1] - self.energy.radiated[-1]

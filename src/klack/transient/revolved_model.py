@@ -1,14 +1,12 @@
-"""Interface model of bodies of revolution that meet off their axis: no mesh of three dimensions.
+"""Interface model of bodies of revolution that meet off their axis, without a 3-D mesh.
 
-Bodies of revolution at the points of rings: modes and statics of all Fourier orders.
+A body that is hit on one side of its seat moves in every Fourier order.  The orders do not couple
+(:mod:`klack.bodies.elasticity.fourier_body`), so it is reduced to rigid motions and modes of the
+lowest frequencies, whatever their order, and the static compliance of every order that the points
+resolve.  Orders without a mode are there with their statics alone.
 
-A body that is hit on one side of its seat moves in every order.  Its orders do not couple
-(:mod:`klack.bodies.elasticity.fourier_body`), so it is taken apart: rigid motions and modes of the
-lowest frequencies, whatever their order, and of every order that the points resolve the static
-compliance. Orders without a mode are there with their statics alone.
-
-What comes out, :class:`RevolvedPoints`, is what the interface level takes of a solid body, without
-a mesh of it: :func:`klack.transient.interface_model.model_at_points` puts two or three together.
+:func:`klack.transient.interface_model.model_at_points` combines two or three such
+:class:`RevolvedPoints`, which are what the interface level takes of a solid body.
 """
 
 import sys
@@ -70,13 +68,13 @@ class RevolvedPoints:
     order (m,)
         Of each mode.
     compliance (p, p) [m/N]
-        Static compliance of the whole body, of a free one with inertia relief.
+        Static, of a free body with inertia relief.
     answers (p, k) [m]
-        What the loads move the points by, solved apart from ``compliance``.
+        Displacement by the loads, solved apart from ``compliance``.
     sections (s, 6, m) [1/sqrt(kg)], [1/(m sqrt(kg))]
-        Displacement and rotation vector of sections of the body per unit modal coordinate.
+        Displacement and rotation vector of sections per modal coordinate.
     section_compliance (s,) [m/N]
-        Static one of each section across the axis, of a free body with inertia relief.
+        Likewise of each section, across the axis.
     """
 
     body: PointBody
@@ -94,7 +92,7 @@ class RevolvedPoints:
         return self.compliance - shares @ shares.T
 
     def among(self, place: NDArray[np.int64], rows: int) -> "RevolvedPoints":
-        """The same body among ``rows`` rows of a model, of which it acts on those at ``place``."""
+        """The same body among ``rows`` rows of a model, on those at ``place``."""
         traces = np.zeros((rows, self.body.traces.shape[1]))
         compliance, answers = np.zeros((rows, rows)), np.zeros((rows, self.answers.shape[1]))
         traces[place], answers[place] = self.body.traces, self.answers
@@ -123,21 +121,19 @@ def reduce_revolved(
     ----------
     in_order
         Body in an order.
-    rows
+    rows, points
         Of all its contacts.
-    points
-        Points of all its contacts, and the rows that read them.
     axial
-        Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
+        Kept elastic modes of order 0, with shapes of u_r and u_z.
     others
-        Modes of the orders above that are kept, both motions of an order counted: those with the
+        Number of kept modes of the orders above, both motions of an order counted, those of the
         lowest frequencies; None: all with ``below``.
     damping
         Ratios of modes with these angular frequencies.
     loads (p, k) [N]
         For ``answers``.
     below [rad/s]
-        Highest angular frequency of these others.
+        Highest angular frequency of the others.
     sections
         That are read as well.
     cache
@@ -201,7 +197,6 @@ class _Orders:
         self._rigid: list[tuple[int, int, Floats]] = []  # order, way and what is read
 
     def add(self, order: int, flexibility: Flexibility) -> None:
-        """Static compliance of the rows, and the answer to the loads."""
         S = self.read[order] = self.rows.of_order(order)
         self.spectrum.append(flexibility.condensed(S))
         share = share_of_order(order, self.points.count)
@@ -237,7 +232,7 @@ class _Orders:
     def modes(
         self, elastic: list[tuple[int, float, Floats]]
     ) -> tuple[NDArray[np.int64], Floats, Floats, Floats]:
-        """Of rigid and elastic modes: orders, angular frequencies, traces, motions of sections."""
+        """Orders, angular frequencies, traces and motions of sections, rigid modes first."""
         ways = [(n, way, read) for n, _, read in elastic for way in range(1 if n == 0 else 2)]
         omega = [w for n, w, _ in elastic for _ in range(1 if n == 0 else 2)]
         all_modes = [*self._rigid, *ways]
@@ -262,7 +257,7 @@ class _Orders:
 
 
 class _Pairs:
-    """The lowest pairs of modes of the orders above 0, found order by order."""
+    """The lowest pairs of modes above order 0, found order by order."""
 
     def __init__(self, others: int | None, below: float, highest: int) -> None:
         self.count = sys.maxsize if others is None else others // 2
@@ -300,7 +295,7 @@ class _Pairs:
         return sorted(low, key=lambda one: one[:2][::-1])[: self.count]
 
     def _cut(self, more: "Floats | list[float]") -> float:
-        """Angular frequency of the last pair that is kept, with the modes found so far."""
+        """Angular frequency of the last kept pair among those found so far."""
         known = sorted([*(omega for _, omega, _ in self.found), *more])
         last = float(known[self.count - 1]) if len(known) >= self.count else inf
         return min(last, self.below)
@@ -311,20 +306,14 @@ _COPIES = 8  # of the compliance, for each body, their sum, and a factor of it
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class RevolvedBody:
-    """A body of revolution and what is kept of its vibration.
+    """A body of revolution and its kept modes.
 
     Parameters
     ----------
     in_order
         Body in a Fourier order, of the half section at its centred place.
-    axial
-        Elastic modes of order 0 that are kept, with shapes of u_r and u_z.
-    others
-        Modes of the orders above that are kept, the lowest ones; None: all with ``below``.
-    damping
-        Ratios of modes with these angular frequencies [rad/s].
-    below [rad/s]
-        Highest angular frequency of the others.
+    axial, others, damping, below
+        As of :func:`reduce_revolved`.
     sections
         Of its shaft, in a guide.
     """
@@ -344,10 +333,8 @@ class RingContact:
 
     Parameters
     ----------
-    upper, lower
-        Names of the bodies.
     faces
-        Their friction; None without tangential directions.
+        None without tangential directions.
     """
 
     name: str
@@ -368,14 +355,9 @@ def reduced_bodies(
     *,
     cache: ResultCache | None = None,
 ) -> tuple[list[RevolvedPoints], Floats]:
-    """Every body at the points of all contacts, and the loads that it has answered.
+    """Every body at the points of all contacts, with the loads of its answers.
 
-    Parameters
-    ----------
-    contacts
-        All with the same number of angles.
-    cache
-        As of :class:`klack.bodies.elasticity.statics.Flexibility`.
+    All contacts have the same number of angles.
     """
     ways = {contact.ways for contact in contacts}
     if len(ways) > 1:
@@ -427,19 +409,9 @@ def revolved_model(
     *,
     cache: ResultCache | None = None,
 ) -> InterfaceModel:
-    """Interface model of bodies of revolution; see :func:`reduced_bodies`.
+    """Interface model of bodies of revolution, the moving one first; see :func:`reduced_bodies`.
 
-    Parameters
-    ----------
-    bodies
-        The moving one first; it must be free.
-
-    Raises
-    ------
-    InputError
-        For a moving body that is held.
-    ConvergenceError
-        As :func:`klack.transient.interface_model.model_at_points`.
+    Errors are those of :func:`klack.transient.interface_model.model_at_points`.
     """
     return model_of_reduced(*reduced_bodies(bodies, contacts, cache=cache), contacts)
 
@@ -447,7 +419,7 @@ def revolved_model(
 def model_of_reduced(
     reduced: Sequence[RevolvedPoints], loads: Floats, contacts: Sequence[RingContact]
 ) -> InterfaceModel:
-    """Interface model of what :func:`reduced_bodies` returned for these contacts."""
+    """Interface model of the results of :func:`reduced_bodies` for these contacts."""
     return model_at_points(
         [item.body for item in reduced],
         [_point_contact(contact, reduced[0].body.name) for contact in contacts],
@@ -458,7 +430,7 @@ def model_of_reduced(
 
 
 def _rings(contacts: Sequence[tuple[RingContact, bool]]) -> tuple[RingRows, RingPoints]:
-    """Rows and points of one body: its contacts, and whether it is the upper body of each."""
+    """Rows and points of one body, with its contacts and whether it is the upper body of each."""
     along, around, turned = [], [], []
     row: list[list[NDArray[np.int64]]] = []
     sections = [contact.space.section for contact, _ in contacts]

@@ -1,4 +1,4 @@
-"""How many angles of its rings a contact of half sections carries on at the peak of an impact."""
+"""Angles of its rings that a contact of half sections carries on at the peak of an impact."""
 
 import warnings
 from dataclasses import dataclass, field
@@ -23,10 +23,10 @@ class RingArcs:
     ----------
     count
         Angles of every ring.
-    turn : tuple of int array
-        Number of the angle of each point, stop by stop.
+    turn
+        Number of the angle of each point, by stop.
     weakest [N]
-        Impacts on each stop with a lower peak are not judged.
+        Lower peaks on each stop are not judged.
     """
 
     count: int
@@ -37,7 +37,7 @@ class RingArcs:
 
 @dataclass(slots=True, eq=False)
 class ArcWatch:
-    """Looks at the contacts of one run, and warns once for each stop."""
+    """Checks the contacts of one run, and warns once for each stop."""
 
     arcs: RingArcs
     peak: dict[int, float] = field(default_factory=dict)
@@ -45,21 +45,16 @@ class ArcWatch:
     told: set[int] = field(default_factory=set)
 
     def see(self, stop: int, force: float, carried: NDArray[np.float64]) -> None:
-        """Look at a stop after a step.
+        """Check a stop after a step; warn after an impact whose peak force few angles carried.
 
         Parameters
         ----------
         stop
             Its number.
         force [N]
-            Along the axis.
+            Axial.
         carried (n,) [N]
             At its points.
-
-        Warns
-        -----
-        AccuracyWarning
-            When an impact has ended whose peak force a few angles carried.
         """
         if force > self.peak.get(stop, 0.0):
             turns = self.arcs.turn[stop][carried > 0.0]

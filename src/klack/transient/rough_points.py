@@ -9,8 +9,8 @@ strictly convex, since the pressure rises with closure.  Newton's direction is
 
 .. math:: \delta = -(1 + D A)^{-1} (\mu - \lambda), \qquad D = \mathrm{diag}(A_k\, p') ,
 
-taken whole unless the energy rises again before its end: then as far as it falls.  With an older D
-it still leads downhill, so the inverse is kept from step to step while the energy falls fast.
+taken as far as the energy falls.  With an older D it still leads downhill, so the inverse is kept
+from step to step while the energy falls fast.
 """
 
 import numpy as np
@@ -32,7 +32,7 @@ _ROUND_OFF = 1e-14  # of the largest gap without forces: miss of a closure
 
 @phase
 def _interval(layer: Layer, closure: float) -> int:
-    """Interval of the curve that a closure is in; the last one has no end."""
+    """Interval of the curve with a closure; the last one has no end."""
     low, high = 0, len(layer.closure) - 1
     while high - low > 1:
         middle = (low + high) // 2
@@ -72,7 +72,7 @@ def layer_energy(layer: Layer, lam: NDArray, gap: NDArray) -> float:
 
 @inner
 def _invert(A: NDArray, pressed: Pressed, stiffness: NDArray) -> None:
-    """Inverse of A and of the compliance of the layer, over the points that are pressed."""
+    """Inverse of A and of the compliance of the layer, over the pressed points."""
     m = 0
     for k in range(len(stiffness)):
         pressed.stiffness[k] = stiffness[k]
@@ -98,7 +98,7 @@ def _invert(A: NDArray, pressed: Pressed, stiffness: NDArray) -> None:
 def _direct(
     A: NDArray, pressed: Pressed, miss: NDArray, change: NDArray, moved: NDArray, u: NDArray
 ) -> float:
-    """Newton's direction of the forces and of the gaps; returns the slope of the energy there."""
+    """Newton's direction of forces and gaps; returns the slope of the energy there."""
     index, m, B = pressed.points, pressed.counts[0], pressed.inverse
     n = len(miss)
     for i in range(n):
@@ -138,7 +138,6 @@ def _slope_at(
     change: NDArray,
     moved: NDArray,
 ) -> float:
-    """Slope of the energy at a share of the way."""
     slope = 0.0
     for k in range(len(force)):
         p = _pressure(layer, gap[k] + share * moved[k])[0]
@@ -155,7 +154,7 @@ def _way(
     change: NDArray,
     moved: NDArray,
 ) -> float:
-    """Share of the way to go: the whole one unless the energy rises again before its end."""
+    """Share of the direction to take: all unless the energy rises again before its end."""
     low, high, share = 0.0, 1.0, 1.0
     for _ in range(_HALVINGS):
         slope = _slope_at(layer, share, force, gap, change, moved)
@@ -171,7 +170,7 @@ def _way(
 
 @phase
 def _agree(miss: NDArray, stiffness: NDArray, force: float, closure: float) -> bool:
-    """Whether every force is that of its closure, one or the other to round-off."""
+    """Whether every force is that of its closure, or this that of the force, to round-off."""
     for k in range(len(miss)):
         if not abs(miss[k]) <= force + closure * stiffness[k]:
             return False

@@ -1,8 +1,7 @@
 r"""Contact points with Coulomb friction: forces at the end of a step.
 
-Per point a force :math:`\lambda_n` along the normal and one or two across it,
-:math:`\lambda_t`; *w* is what the points do under all forces, gaps along the normal and slip
-within the step across it,
+Per point a force :math:`\lambda_n` along the normal and one or two, :math:`\lambda_t`, across it;
+*w* are gaps along the normal and slips within the step across it under all forces,
 
 .. math::
     w = q + A \lambda, \qquad 0 \le \lambda_n \perp w_n \ge 0, \qquad
@@ -17,26 +16,22 @@ A slipping point has the force :math:`\mu \lambda_n` along :math:`e = \tau / |\t
 .. math:: w_\perp + D \lambda_\perp = 0, \qquad
     D = a\, \frac{|\tau| - \mu \lambda_n}{\mu \lambda_n} ,
 
-which is what turns its direction: directions that are iterated by :math:`\tau` alone take hundreds
-of rounds.  A point that would slip against the force it has sticks for one round: faces that turn
-round as a whole would else turn round again in the next one.
+which turns its direction; by :math:`\tau` alone that takes hundreds of rounds.  A point that would
+slip against its force sticks for one round: faces that turn round as a whole would else turn round
+again in the next one.
 
 A round is two products, one with the compliance of the closed points and one with the inverse of
-Newton's matrix, which is carried along from step to step and follows what the points do
-(:mod:`klack.transient.closed_points`).  It lags behind *e* and *D*: what is missed then falls by a
-constant factor per round instead of its square, at a hundredth of the cost of solving afresh.  The
-first round of a step keeps what each point did in the step before: a guess of the forces is too
-rough to tell a slow slip from none.  Where the rounds do not end, the points take turns (projected
-Gauss-Seidel), each with its own equations.
+Newton's matrix, which is kept from step to step (:mod:`klack.transient.closed_points`).  As it lags
+behind *e* and *D*, the residual falls by a constant factor per round instead of its square, at a
+hundredth of the cost of solving anew.  In the first round of a step each point sticks or slips as
+before: a guess of the forces is too rough to tell a slow slip from none.  Where the rounds do not
+end, the points take turns (projected Gauss-Seidel).
 
 Friction makes the matrix unsymmetric; for a large coefficient on an eccentric body a solution may
 not be unique (jam), or taking turns may find none.
 
-Contact points that rub, from step to step of a full-order impact.
-
-The forces of a step come from :func:`klack.transient.rubbing.solve_rubbing`.  What the points
-remember is how fast each slipped at the end of the last step: it holds the coefficient of that
-speed, the static one where it stuck or was open.
+From step to step each point remembers how fast it slipped: its coefficient is that of this speed,
+the static one where it stuck or was open.
 """
 
 import numpy as np
@@ -68,37 +63,37 @@ OPEN, STICK, SLIP = 0, 1, 2
 
 _ROUNDS = 40
 _FRESH = 8
-"""Inverses computed afresh in one step before the points take turns."""
+"""Inverses recomputed in one step before the points take turns."""
 
 _SWEEPS = 20
 _CALMS = 6
-"""Times that so many sweeps may bring Newton's method back on its way."""
+"""Times that so many sweeps may bring Newton's method back."""
 
 _STILL = 100
-"""Sweeps that take nothing off what is missed before they end."""
+"""Sweeps without any gain before they end."""
 
 _LEAST = 1e-3
-"""Share of what is missed below which the change of a force need not be felt within the round."""
+"""Share of the residual below which the change of a force need not act within the round."""
 
 _TURNED = 0.98
-"""Cosine of the largest turn of a slip that the inverse is left with."""
+"""Cosine of the largest turn of a slip that the inverse need not follow."""
 
 _SLOW = 0.2
-"""Share that a round leaves of what is missed above which the inverse has to follow *D*."""
+"""Reduction of the residual in a round above which the inverse has to follow *D*."""
 
 _SOFTER = 0.2
 """Relative change of an entry of the inverse by *D* that makes it follow."""
 
 _MANY = 8
-"""The inverse is computed afresh where one unknown of so many comes or goes."""
+"""The inverse is recomputed where one of so many unknowns comes or goes."""
 
 _PRICE, _PER_ROUND = 4, 6
-"""Rounds that cost as much as a fresh inverse: the first, and one for each so many unknowns."""
+"""Rounds that cost as much as a new inverse: the first, and one for each so many unknowns."""
 
 
 @inner(fastmath=FAST, _nrt=False, error_model="numpy")
 def _answer(A: Matrix, q: Vector, closed: Closed, lam: Vector, w: Vector) -> None:
-    """Gaps and slips of all points under the forces of the closed ones: w = q + A lam."""
+    """Gaps and slips of all points under the closed ones: w = q + A lam."""
     n, size = len(closed.points), len(q)
     for i in range(size):
         w[i] = q[i]
@@ -127,7 +122,7 @@ def _judge(
     along: Matrix,
     stiffer: Vector,
 ) -> float:
-    """What each point does by the projections, and how far its forces are from them [N]."""
+    """State of each point by the projections, and the residual of its forces [N]."""
     worst = 0.0
     for s in range(closed.counts[0]):
         i, block = d * s, closed.block
@@ -178,7 +173,7 @@ def _has(closed: Closed, d: int, s: int) -> int:
 def _as_before(
     closed: Closed, d: int, lam: Vector, doing: Ints, along: Matrix, stiffer: Vector
 ) -> None:
-    """Let points that carried do what they did, as the inverse has it."""
+    """Let points that carried stick or slip as the inverse has it."""
     for s in range(closed.counts[0]):
         known = _has(closed, d, s)
         if known & 1 == 0:
@@ -207,9 +202,9 @@ def _place(
     least: float,
     change: Vector,
 ) -> None:
-    """Give open and slipping points the forces that they can have.
+    """Give open and slipping points their admissible forces.
 
-    What the points do under changes below ``least`` waits for the product of the round.
+    Changes below ``least`` act only with the product of the round.
     """
     size = d * closed.counts[0]
     for s in range(closed.counts[0]):
@@ -271,7 +266,6 @@ def _start_afresh(
     stiffer: Vector,
     fine: bool,
 ) -> None:
-    """Compute the inverse for what the points do."""
     m = 0
     for s in range(closed.counts[0]):
         wanted = _wanted(d, mu[s], doing[s])
@@ -296,9 +290,9 @@ def _follow(
     stiffer: Vector,
     slow: bool,
 ) -> bool:
-    """Let the inverse follow what the points do; False where it is to be computed afresh.
+    """Let the inverse follow the points; False where it has to be recomputed.
 
-    Its compliances across a slip follow only where the rounds take little off (``slow``).
+    Its compliances across a slip follow only in ``slow`` rounds.
     """
     changes = 0
     for s in range(closed.counts[0]):
@@ -337,7 +331,6 @@ def _missed(
     stiffer: Vector,
     missed: Vector,
 ) -> None:
-    """What the equations of the points are missed by."""
     for r in range(closed.counts[1]):
         s, kind = closed.unknown[r] // d, closed.unknown[r] % d
         i = d * s
@@ -425,10 +418,10 @@ def _rounds(
     stiffer: Vector,
     tolerance: float,
 ) -> int:
-    """Newton's method over the closed points; returns the rounds, negative where they stand still.
+    """Newton's method over the closed points; returns the rounds, negative where they stall.
 
-    The inverse is computed afresh where the rounds still to come would cost more, at the pace of
-    the last one, and where the rounds beyond two since the last time have cost as much.
+    The inverse is recomputed where the remaining rounds, at the pace of the last one, or the rounds
+    beyond two since the last time, cost more.
     """
     d = len(closed.row) // len(closed.points)
     size = d * closed.counts[0]
@@ -464,7 +457,7 @@ def _rounds(
 
 @inner
 def _tame(closed: Closed, q: Vector, lam: Vector, w: Vector) -> None:
-    """Begin with no force where Newton's method has found none; gaps and slips anew."""
+    """Restart from no force, with gaps and slips, where Newton's method has found none."""
     size = len(closed.row) // len(closed.points) * closed.counts[0]
     total = 0.0
     for i in range(size):
@@ -491,7 +484,7 @@ def _settle(
 ) -> int:
     """Forces of the closed points by Newton's method, or in turn; returns as the solver does.
 
-    A few sweeps first bring Newton's method back on its way.
+    A few sweeps first bring Newton's method back.
     """
     d = len(closed.row) // len(closed.points)
     sweeps, rounds = 0, 0
@@ -555,6 +548,8 @@ def solve_rubbing(
 ) -> int:
     """Forces of contact points with friction; returns the rounds, negative where some took turns.
 
+    Sweeps are counted, too; 0 where not even taking turns has ended.
+
     Parameters
     ----------
     A (d n, d n) [m/N]
@@ -573,11 +568,6 @@ def solve_rubbing(
         Out: :data:`OPEN`, :data:`STICK` or :data:`SLIP`.
     tolerance [N]
         Of the residual of the law.
-
-    Returns
-    -------
-    rounds : int
-        And sweeps; 0 where not even taking turns has ended.
     """
     n, total, in_turn = len(mu), 0, False
     d = len(q) // n
@@ -609,23 +599,23 @@ def solve_rubbing(
 
 
 _PRECISION = 1e-13
-"""Residual of the law over the largest force that one point would need by itself."""
+"""Residual of the law over the largest force that one point alone would need."""
 
 _LEAST_GAP = 1e-18
-"""Below this distance [m] gaps and slips are round-off: displacements of 1 um times 1e-12."""
+"""Round-off [m] of gaps and slips: displacements of 1 um times 1e-12."""
 
 _RIGID = 1e-9
 """Compliance across the normal, over that along it, below which a point cannot move across."""
 
 
 class RubbingPoints:
-    """Forces of the contact points that are watched, under Coulomb's law.
+    """Forces of the watched contact points under Coulomb's law.
 
     Parameters
     ----------
     step [s]
     count
-        Number of all contact points, nc.
+        All contact points, nc.
     ways
         Tangential directions, 1 or 2.
     still (nc,)
@@ -646,12 +636,11 @@ class RubbingPoints:
         self._closed = Closed.none(0, ways)
 
     def watch(self, points: NDArray[np.int64], A: NDArray[np.float64]) -> None:
-        """Watch these points, shape (n,), from now on.
+        """Watch these points (n,) from now on.
 
         Parameters
         ----------
-        points (n,)
-        A : array, shape ((ways + 1) n, (ways + 1) n) [m/N]
+        A ((ways + 1) n, (ways + 1) n) [m/N]
             Compliance of their gaps, then of their slips in every direction.
 
         Raises
@@ -678,24 +667,13 @@ class RubbingPoints:
     def solve(
         self, q: NDArray[np.float64], guess: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_], int]:
-        """Forces of the watched points for one step.
+        """Forces of the watched points for one step [N], which are closed, and the rounds.
 
         Parameters
         ----------
         q ((ways + 1) n,) [m]
             Gaps at the end of the step, then slips within it, without these forces.
         guess ((ways + 1) n,) [N]
-
-        Returns
-        -------
-        lam : array, shape ((ways + 1) n,) [N]
-        closed : bool array, shape (n,)
-        rounds : int
-
-        Raises
-        ------
-        ConvergenceError
-            When no forces are found that obey the law.
         """
         n = len(self._points)
         lam, w = guess.copy(), np.zeros(len(q))
@@ -726,12 +704,9 @@ class RubbingPoints:
         return lam, doing != OPEN, abs(rounds)
 
     def commit(self, force: NDArray[np.float64], slip: NDArray[np.float64]) -> float:
-        """Make the last forces those of the step; returns what their friction took [J].
+        """Make the last forces those of the step; returns the loss by friction [J].
 
-        Parameters
-        ----------
-        force, slip (ways nc,) [N], [m]
-            Of all points, across their normals.
+        ``force`` and ``slip`` (ways nc,) [N], [m] are those of all points across their normals.
         """
         force, slip = force.reshape(self._ways, -1), slip.reshape(self._ways, -1)
         self.doing, self._found = self._found, np.full_like(self._found, OPEN)

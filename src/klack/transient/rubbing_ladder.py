@@ -1,4 +1,4 @@
-r"""Static contact with Coulomb friction: up a ladder of approaches, and down from several of them.
+r"""Static contact with Coulomb friction: up a ladder of approaches, down from several of them.
 
 As :mod:`klack.contact.statics`, with the offset *s* of the faces along their tangents and the
 forces across the normals,
@@ -9,13 +9,13 @@ forces across the normals,
     + C \begin{pmatrix} \lambda_n \\ \lambda_t \end{pmatrix}, \qquad
     P = a^T \lambda_n + a_t^T \lambda_t ,
 
-:math:`a_t` being the offset per unit translation along +z, not zero on a cone.  Each step is one
+with the offset :math:`a_t` per translation along +z, not zero on a cone.  Each step is one
 increment of Coulomb's law (:mod:`klack.transient.rubbing`): a point slips by the change of *s*.  A
-point that opens forgets its forces; one that closes has the slip of the whole step.
+point that opens forgets its forces; one that closes slips over the whole step.
 
 Closing a contact that grows, the slip is self-similar (Spence, J. Elasticity 5 (1975) 297): the
 force converges with the increments as the frictionless one does.  Opening, points stick first and
-slip back from the edge inwards.  The loop between the two is what an impact loses.
+slip back from the edge inwards.  An impact loses the loop in between.
 """
 
 from collections.abc import Sequence
@@ -54,11 +54,11 @@ class RubbingContact:
     Parameters
     ----------
     closing
-        While it closes from first touch; ``force`` is that of pressure and friction together.
+        From first touch; ``force`` is that of pressure and friction together.
     shear (n, ways nc) [N]
-        Forces across the normals at these states.
+        Forces across the normals.
     loops
-        It opens again from several states, the last one from the highest.
+        Opening from several states, the last one from the highest.
     """
 
     closing: StaticContact
@@ -104,11 +104,11 @@ def rubbing_contact(
     static
         Without friction.
     faces
-        Of one coefficient: where the law has two, the kinetic one counts.
+        Of one coefficient: of two, the kinetic one counts.
     C (d nc, d nc) [m/N]
         Of :func:`klack.contact.statics.contact_compliance`.
     turns
-        Approaches from which it opens again, over the highest one; the last is 1.
+        As :data:`TURNS`; the last is 1.
     count
         Steps of each opening.
     key
@@ -221,6 +221,6 @@ class _State:
         self.offset = self.offset + w[self.count :]
 
     def _without_friction(self, q: Vector) -> Vector:
-        """Forces of the same gaps without friction, a first guess from afar."""
+        """Forces of the same gaps without friction, a first guess."""
         lam, _, _ = self.frictionless.solve(q[: self.count], self.lam[: self.count] > 0.0)
         return np.append(lam, np.zeros(len(q) - self.count))

@@ -1,10 +1,9 @@
 r"""Forces of magnets and seats across the axis of a needle, in its rigid freedoms.
 
 Each law gives force and moments :math:`f` on the four numbers :math:`u = A q` of the axis
-(:mod:`klack.network.across`); the modes feel :math:`A^T f`.  It is constant over a macro step, that
-of its middle: places that move at the speed of the start, fluxes that change at their rate,
-pressures as they act in the step.  So its work is :math:`f^T A\,\Delta q`, to round-off, with the
-way of a repair in it.
+(:mod:`klack.network.across`); the modes feel :math:`A^T f`.  It is constant over a macro step, with
+the position (at the speed of the start), fluxes and pressures of its middle.  So its work is
+:math:`f^T A\,\Delta q`, to round-off, displacement by a repair included.
 """
 
 import warnings
@@ -31,8 +30,6 @@ class SideForces:
 
     Parameters
     ----------
-    model
-        The needle first.
     ports (M, k)
         Shapes of the ports of the network.
     """
@@ -55,12 +52,12 @@ class SideForces:
         return bool(self.rows)
 
     def begin(self, q: Vector, v: Vector, H: float, pressures: Vector, t: float) -> None:
-        """Forces of a step of ``H`` [s] that begins at ``t`` [s], and their modal force.
+        """Forces of a step of ``H`` [s] from ``t`` [s] on, and their modal force.
 
         Raises
         ------
         ConvergenceError
-            Where faces meet, and the law has an end.
+            Where faces meet, and the law ends.
         """
         if not self.rows:
             return
@@ -72,12 +69,12 @@ class SideForces:
         self.push[:] = self.A.T @ self.force.sum(axis=0)
 
     def move(self, way: Vector) -> None:
-        """Count the work of the step on this way of the modes."""
+        """Count the work of the step over this displacement of the modes."""
         if self.rows:
             self.work += self.force @ (self.A @ way)
 
     def place(self, q: Vector) -> None:
-        """Tell the rows where the axis is in the step."""
+        """Give the rows the place of the axis in the step."""
         for row in self.rows:
             if row.placement >= 0:
                 steps, k = self._row(row)
@@ -86,13 +83,7 @@ class SideForces:
                 steps.parameters[begin : begin + len(at)] = at
 
     def now(self, q: Vector, t: float) -> Vector:
-        """Forces and moments about the centre of mass at this moment, shape (n, 4).
-
-        Raises
-        ------
-        ConvergenceError
-            Where faces meet.
-        """
+        """Forces and moments about the centre of mass (n, 4); an error as in :meth:`begin`."""
         told = np.zeros((len(self.rows), 4))
         for k, row in enumerate(self.rows):
             now = self._inputs(row, q, 0.0, self.network.node_state.p)
@@ -103,7 +94,7 @@ class SideForces:
         return told
 
     def warn(self) -> None:
-        """Warn of reluctances that the position changes, and flux and axial force do not follow."""
+        """Warn of reluctances that the position changes, but not flux and axial force."""
         for row, share in zip(self.rows, self.left_out, strict=True):
             if share > _LEFT_OUT:
                 warnings.warn(
@@ -116,14 +107,14 @@ class SideForces:
                 )
 
     def supplies(self) -> dict[str, float]:
-        """Energies [J] that they gave since the start of the run."""
+        """Energies [J] that they supplied since the start of the run."""
         return {
             f"{row.component} side force": float(work)
             for row, work in zip(self.rows, self.work, strict=True)
         }
 
     def _row(self, row: SideRow) -> tuple[StepRows, int]:
-        """Rows of the network that it belongs to, and its number among them."""
+        """Rows of the network that it belongs to, and its index."""
         if row.element >= 0:
             return self.network.elements, row.element
         return self.network.branches, row.branch

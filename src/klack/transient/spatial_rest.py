@@ -1,4 +1,4 @@
-r"""Bodies that lie on each other at rest, point by point, under constant forces.
+r"""Bodies at rest on each other, point by point, under constant forces.
 
 Unknown are the rigid coordinates :math:`z` of the needle; everything else follows from them. With
 the elastic modes at rest, :math:`q_e = \Omega^{-2} (f_e + \Phi_e^T \lambda)`, contact is
@@ -6,13 +6,13 @@ the elastic modes at rest, :math:`q_e = \Omega^{-2} (f_e + \Phi_e^T \lambda)`, c
 .. math:: g = g_0 + \Phi_r z + \Phi_e \Omega^{-2} f_e + C \lambda, \qquad
     C = C_l + \Phi_e \Omega^{-2} \Phi_e^T, \qquad 0 \le \lambda \perp g \ge 0,
 
-and the guide is made of such points too, straight walls that touch its bore, one more in each step
-(J. E. Kelley, J. SIAM 8 (1960) 703).  The forces on the rigid coordinates balance in the end of
-proximal steps (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877),
-:math:`z_{k+1} = z_k + \sigma (f_r + \Phi_r^T \lambda_{k+1})`, each of them one complementarity
-problem with :math:`C + \sigma \Phi_r \Phi_r^T`.  The rotation about the axis, which smooth faces of
-revolution do not hold, is left out.  A ball in its seat is free to tilt as well: there the facets
-of a mesh leave some 1e-5 of the force, and the needle creeps.
+and the guide is made of such points too: straight walls that touch its bore, one more in each step
+(J. E. Kelley, J. SIAM 8 (1960) 703).  The forces on the rigid coordinates are balanced by proximal
+steps (R. T. Rockafellar, SIAM J. Control Optim. 14 (1976) 877), :math:`z_{k+1} = z_k + \sigma (f_r
++ \Phi_r^T \lambda_{k+1})`, each of them one complementarity problem with :math:`C + \sigma \Phi_r
+\Phi_r^T`.  The rotation about the axis, which smooth faces of revolution do not hold, is left out.
+Nor is the tilt of a ball in its seat held: there the facets of a mesh leave some 1e-5 of the force,
+and the needle creeps.
 """
 
 import warnings
@@ -56,9 +56,9 @@ def settle_at_rest(
     model
         Without friction between the faces.
     state
-        In: where they are; out: at rest, but for the set of points that carry.
+        In: start; out: at rest, but for the set of carrying points.
     gaps
-        Gaps at q = 0, shape (nc,) [m], where ``state.q`` is now.
+        Gaps at q = 0 (nc,) [m] for the present ``state.q``.
     force (M,)
 
     Raises
@@ -121,7 +121,7 @@ def settle_at_rest(
 
 
 def _spin(model: InterfaceModel, rigid: NDArray[np.bool_]) -> Vector:
-    """Modal direction of the rotation about the axis, of length 1; zero without one."""
+    """Unit modal direction of the rotation about the axis; zero without one."""
     turn = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e3])
     mine = rigid & (model.owner == 0)
     q = rigid_coordinates(model.rigid[:, mine], turn)
@@ -132,9 +132,9 @@ def _spin(model: InterfaceModel, rigid: NDArray[np.bool_]) -> Vector:
 
 @dataclass(frozen=True, eq=False)
 class _Walls:
-    """Straight walls that touch the round bore: outside of all of them the shaft cannot be.
+    """Straight walls that touch the round bore, outside of which the shaft cannot be.
 
-    Tangents of a disc hold in all of it, so those of former positions stay, while they carry.
+    Tangents of a disc hold in all of it, so former ones stay while they carry.
     """
 
     height: NDArray[np.int64]  # (w,) number of the height in the bore
@@ -151,10 +151,7 @@ class _Walls:
         return type(self)(self.height[keep], self.normal[keep])
 
     def with_present(self, bore: Guide, q: Vector) -> Self:
-        """These and, at each height, the one nearest to the shaft.
-
-        A shaft in the middle of the bore has no nearest one; any does.
-        """
+        """These and, at each height, the one nearest to the shaft (any for a centred one)."""
         place = bore.offset + bore.traces @ q
         distance = np.linalg.norm(place, axis=1)
         normal = np.where(distance[:, None] > 0.0, place, [1.0, 0.0])
@@ -169,7 +166,7 @@ class _Walls:
         )
 
     def missed(self, bore: Guide, q: Vector, force: Vector, rows: NDArray[np.float64]) -> float:
-        """Largest modal force by which the round bore pushes unlike these walls."""
+        """Largest modal force by which the round bore and these walls differ."""
         missed = 0.0
         for k in range(len(bore.clearance)):
             here = self.height == k

@@ -1,8 +1,8 @@
-r"""Bodies that meet point by point, driven by the axial network of a valve.
+"""Bodies that meet point by point, driven by the axial network of a valve.
 
-Modes of all bodies move under the forces of the network, constant over a macro step; contact points
-and guide act in the fine steps of :mod:`klack.transient.interface_kernel` where they may touch.
-What the guess of the forces missed is repaired by superposition: see :class:`_Moving`.
+Modes move under the forces of the network, constant over a macro step; where they may touch,
+contact points and guide act in the fine steps of :mod:`klack.transient.interface_kernel`.  What the
+guess of the forces missed is repaired by superposition: see :class:`_Moving`.
 """
 
 import warnings
@@ -129,32 +129,31 @@ class SpatialValve:
     Parameters
     ----------
     model
-        Of all bodies of the network, the needle first, at the placement of the meshes (q = 0 is
-        where the network has its displacements 0).  Faces stay elastic and have no layer of
-        asperities.
+        Of all bodies, the needle first, at the placement of the meshes (q = 0 is displacement 0 of
+        the network).  Faces stay elastic and have no layer of asperities.
     components
-        Component of each of ``model.bodies`` in the network.
+        Of each of ``model.bodies``.
     stops
-        Component of the network at each of ``model.contacts``; one below and one above at most.
+        Component at each of ``model.contacts``; at most one below and one above.
     arms (contacts, 3) [m]
         Middle of each contact from the centre of mass of the needle; with ``gaps``.
     gaps
-        Exact gaps at a rigid placement of the needle; without it they stay linear.
+        Exact ones at a rigid placement of the needle; by default they stay linear.
     course
-        Of these gaps; made of them if not given.
+        Of these gaps; computed by default.
     placement (6,) [m], [rad]
         Of the needle at the start: translation of its centre of mass and rotation vector, beside
-        the displacement along the axis that the network has.
+        the axial displacement in the network.
     velocity (6,) [m/s], [rad/s]
-        At the start, beside what the network has.
+        At the start, beside that in the network.
     films
-        Lands of squeeze films, for the stops that have one in the network.
+        Lands of the squeeze films of stops.
     bearing
         Film in the guide, where the network has a fluid.
     shape_marks (M,)
-        By which the shapes of the modes are known again: recorded with their coordinates.
+        Identify the shapes of the modes in records of their coordinates.
     arcs
-        Angles of contact points on rings, for a doubt about short contacts.
+        For a doubt about short contacts.
     """
 
     model: InterfaceModel
@@ -172,7 +171,7 @@ class SpatialValve:
     arcs: RingArcs | None = None
 
     def of(self, network: CompiledNetwork, sizes: StepSizes) -> "_Moving":
-        """Return them in a network.
+        """These bodies in a network.
 
         Raises
         ------
@@ -184,7 +183,7 @@ class SpatialValve:
 
 
 class _Run(NamedTuple):
-    """What the loop of the network works on beside the network, and records."""
+    """What the loop works on beside the network, and records."""
 
     recording: Recording
     scratch: Scratch
@@ -207,7 +206,7 @@ class _Kept(NamedTuple):
 class _Moving:
     r"""Bodies of a valve in one run.
 
-    The network has the modes while nothing can touch; else ``state`` has them, in the order of the
+    The network holds the modes while nothing can touch; else ``state`` does, in the order of the
     model, and the network gets them at the end of each record.
 
     A repair :math:`\delta q, \delta \dot q` of the modes adds the energy
@@ -215,8 +214,8 @@ class _Moving:
     .. math:: \delta E = \sum \omega^2 q\,\delta q + \dot q\,\delta\dot q
         + \tfrac12 (\omega^2 \delta q^2 + \delta\dot q^2) ,
 
-    of which :math:`\lambda^T \Phi\,\delta q` is of the contact (half of it in its potential, half a
-    debt of its next step) and :math:`N^T T\,\delta q` of the guide.
+    of which :math:`\lambda^T \Phi\,\delta q` belongs to the contact (half to its potential, half to
+    the debt of its next step) and :math:`N^T T\,\delta q` to the guide.
     """
 
     def __init__(self, valve: SpatialValve, network: CompiledNetwork, sizes: StepSizes) -> None:
@@ -287,7 +286,6 @@ class _Moving:
     # ------------------------------------------------------------------ start
 
     def start(self, balance: Callable[[Vector], StaticStart] | None) -> StaticStart | None:
-        """Place the needle, and let it settle under the forces of the network."""
         self.read()
         shapes = self.model.rigid[:, : self.rigid_count]
         self.q[: self.rigid_count] += rigid_coordinates(shapes, self.valve.placement)
@@ -315,8 +313,8 @@ class _Moving:
     def _settle(self, balance: Callable[[Vector], StaticStart]) -> StaticStart | None:
         """Rest on the contact points, and where elements and fluid balance there.
 
-        The points let ports go elsewhere than the law along the axis does, each its own way.  That
-        law, which only balances the forces, does not see it.
+        Ports then differ from the law along the axis, each in its own way, which that law does not
+        notice.
         """
         begun, here, faces = None, slice(0, self.ports), self.network.interfaces
         gap0, shift = faces.gap0.copy(), np.zeros(self.ports)
@@ -389,15 +387,13 @@ class _Moving:
     # ------------------------------------------------------------------ what others ask
 
     def recorded_impacts(self, end: float) -> tuple[SpatialImpact, ...]:
-        """What was recorded of the impacts up to a moment [s]."""
         return self.impacts.impacts(end)
 
     def gap(self) -> Vector:
-        """Add this to a recorded gap to have the true one, of each interface [m]."""
         return np.full(len(self.order), -_AWAY)
 
     def channels(self, time: Vector) -> dict[str, ChannelData]:
-        """Way of the axis of the needle across itself, and the forces of the guide."""
+        """Lateral displacement of the axis of the needle, and the forces of the guide."""
         path, needle = self.path, self.valve.components[0]
         at = path.position_at(time)
         arm = float(self.valve.arms[np.argmax(self.stops.side), 2])  # of its lower end
@@ -417,7 +413,7 @@ class _Moving:
         return told | self._side_channels(time)
 
     def _side_channels(self, time: Vector) -> dict[str, ChannelData]:
-        """Forces and moments of magnets and seats, these about the centre of mass."""
+        """Forces of magnets and seats, and moments about the centre of mass."""
         told = {}
         self.sides.warn()
         for k, row in enumerate(self.sides.rows):
@@ -428,7 +424,6 @@ class _Moving:
         return told
 
     def changing(self) -> dict[str, NDArray[np.generic]]:
-        """All arrays that a step changes and the next one begins with."""
         lifts = {} if self.films is None else {"lifts": self.films.offset}
         rubs = rubbing_arrays(self.state.rubbing) if self.model.ways else {}
         sides = {"sides": self.sides.work} if self.sides.acts else {}
@@ -471,11 +466,9 @@ class _Moving:
         return held
 
     def supplies(self) -> dict[str, float]:
-        """Energies [J] that forces across the axis gave since the start of the run."""
         return self.sides.supplies()
 
     def losses(self) -> dict[str, float]:
-        """Energies [J] lost since the start of the run."""
         lost = {}
         if np.any(self.model.damping > 0.0):
             lost["bodies damping"] = float(self.books[DAMPING] + self.flags[_LOST])
@@ -513,7 +506,6 @@ class _Moving:
         looks: int,
         report: Vector,
     ) -> int:
-        """Advance by so many ``looks`` of ``look`` times ``block`` fine steps; a status."""
         run = _Run(recording, scratch, clock, block, look, report)
         if not looks:
             return self._loop(run, 0, 0)
@@ -551,7 +543,7 @@ class _Moving:
         return STATUS_DONE
 
     def _outlook(self, span: float, most: int) -> tuple[int, bool]:
-        """How many records can be flown, and else whether contact points have to be looked at."""
+        """How many records can be flown, and else whether contact points are needed."""
         if self.state.contact.counts[0]:
             return 0, True
         horizon = min(most, _LONGEST) * span / _SURE
@@ -609,7 +601,7 @@ class _Moving:
         )
 
     def _watch(self, run: _Run, row: int, points: bool) -> int:
-        """One record in which contact points or the guide are looked at."""
+        """One record with contact points or the guide."""
         clock, left = run.clock, run.look * run.block
         time = left * self.sizes.step
         before, flies = self.stops.force.copy(), True
@@ -650,7 +642,7 @@ class _Moving:
         return steps > 1 and bool(np.any((at > 0.0) & (at < steps)))
 
     def _step(self, run: _Run, level: int, points: bool, record: int, record_time: float) -> int:
-        """One macro step, with bodies in fine steps; at rest in one."""
+        """One macro step, with bodies in fine steps, or at rest in one."""
         clock, scratch, report = run.clock, run.scratch, run.report
         h, steps, arrays = self.sizes.step, self.steps[level], self.arrays
         t, H = float(clock[0]) * h, steps * h
@@ -715,9 +707,9 @@ class _Moving:
         return STATUS_DONE
 
     def _parts(self, steps: int, H: float, points: bool) -> tuple[int, Modes]:
-        """Into how many steps a macro step is cut, and the modes over one of them.
+        """Parts of a macro step, and the modes over one.
 
-        Fine ones where points or a dry guide may act; else heights of films change by little.
+        Fine ones where points or a dry guide may act; else heights of films change little.
         """
         longest = 1
         films = self.films
@@ -748,13 +740,13 @@ class _Moving:
         return self._cut(steps, steps // longest)
 
     def _too_long(self, record: Record | None, steps: int, count: int) -> bool:
-        """Whether shorter steps may find forces of films, or what a guide did."""
+        """Whether shorter steps may find the forces of films or of a guide."""
         if record is None:
             return count < steps
         return count * _AT_THE_WALL < steps and bool(np.any(self.state.guide_force))
 
     def _off_the_wall(self, time: float) -> bool:
-        """Whether the shaft will hardly meet its guide within this time."""
+        """Whether the shaft is unlikely to meet its guide within this time."""
         if np.any(self.state.guide_force):
             return False
         place = np.linalg.norm(self.bore.offset + self.bore.traces @ self.q, axis=1)
@@ -762,7 +754,6 @@ class _Moving:
         return bool(np.all(place + way < _ROOM * self.bore.clearance))
 
     def _cut(self, steps: int, count: int) -> tuple[int, Modes]:
-        """So many parts of a macro step, and the modes over one of them."""
         length = steps // count
         if length not in self.coarser:
             self.coarser[length] = modes_of_step(self.model, length * self.sizes.step)
@@ -772,7 +763,7 @@ class _Moving:
         return self.steps.get(level, default) if level >= 0 else default
 
     def _march(self, modes: Modes, count: int, points: bool, rest: bool) -> Record | None:
-        """Fine steps under a constant modal force, that of ``modes.push``; None where they fail."""
+        """Fine steps under the constant modal force ``modes.push``; None where they fail."""
         n, ways = (self.model.count, self.model.ways) if points else (0, 0)
         record = Record.empty(
             *(count, len(self.model.bodies), n, ways),
@@ -790,7 +781,7 @@ class _Moving:
         return None if failed else record
 
     def _repair(self, level: int) -> float:
-        """Let what was missed act; the energy that bodies got beyond what was given to them [J]."""
+        """Let what was missed act; the energy that bodies got beyond their due [J]."""
         at, here, omega2 = self.at, self.ports, self.model.omega**2
         missed, d = at[MISSED : MISSED + here], at[AHEAD : AHEAD + here]
         guess = at[GUESS : GUESS + here]
@@ -815,7 +806,7 @@ class _Moving:
     # ------------------------------------------------------------------ rest
 
     def _rests(self, clock: Index) -> bool:
-        """Whether the needle lies on a stop long enough, and steadily."""
+        """Whether the needle lies long and steadily enough on a stop."""
         if self.flags[_AT_REST]:
             return True
         long = float(clock[0]) - self.stops.closed >= self.rest
@@ -831,13 +822,13 @@ class _Moving:
         self.flags[_STEADILY] = float(steady)
 
     def _still(self, record: Record) -> bool:
-        """Whether a long step met nothing that it cannot see."""
+        """Whether a long step met nothing that it cannot resolve."""
         total, before = abs(float(record.force[0])), float(np.sum(self.stops.force))
         steady = abs(total - before) <= _STEADY * max(abs(total), abs(before))
         return steady and bool(self.state.contact.counts[0] > 0)
 
     def _take_carrying(self) -> None:
-        """Let the points carry that have a force, as in a stored state."""
+        """Let the points with a force carry, as in a stored state."""
         contact, carrying = self.state.contact, np.flatnonzero(self.state.lam > 0.0)
         if not self.model.ways:
             contact.active[:] = self.state.lam > 0.0
@@ -846,12 +837,12 @@ class _Moving:
         self._renew(self.resting.A if self.flags[_AT_REST] else self.points.A)
 
     def _rest_on(self, *, rest: bool) -> None:
-        """Change between fine steps and those at rest: their contact matrices differ."""
+        """Switch between fine steps and those at rest: their contact matrices differ."""
         self.flags[_AT_REST] = float(rest)
         self._renew(self.resting.A if rest else self.points.A)
 
     def _renew(self, A: NDArray[np.float64]) -> None:
-        """Inverse over the points that carry, of another matrix."""
+        """Inverse over the carrying points, of another matrix."""
         if self.model.ways:
             forget_inverse(self.state.rubbing)
             return
@@ -907,7 +898,7 @@ class _Moving:
         return float(safe_flight(self.gap0 - stale, *args))
 
     def _clear(self) -> bool:
-        """Whether no point and no height of the guide has closed."""
+        """Whether no point and no height of the guide is closed."""
         open_by = self.gap0 + self.model.traces @ self.q
         return bool(np.min(open_by) > 0.0) and surely_unguided(
             self.model, self.bore, self.state, 0.0
@@ -934,7 +925,7 @@ class _Moving:
 
 
 def _places(valve: SpatialValve, network: CompiledNetwork) -> tuple[Index, Index, Vector]:
-    """Where the network keeps each coordinate of the model, and the shapes of its ports."""
+    """Place of each coordinate of the model in the network, and the shapes of its ports."""
     model, rows = valve.model, network.rows
     names = [row.component for row in rows.bodies]
     starts = np.cumsum([0, *(len(row.ports) for row in rows.bodies)])
@@ -952,7 +943,7 @@ def _places(valve: SpatialValve, network: CompiledNetwork) -> tuple[Index, Index
 
 
 def _impact_recorder(moving: _Moving, network: CompiledNetwork) -> ImpactRecorder:
-    """Record of impacts with the pauses by which the network tells impacts apart."""
+    """Record of impacts with the pauses by which the network tells them apart."""
     rows, order = network.rows, moving.order
     rest = np.asarray(network.interfaces.rest[order])
     pause = longest_period(rows.bodies)

@@ -1,16 +1,16 @@
 r"""Squeeze films between faces that tilt, in the compiled step of the interface level.
 
-A film sees lift and tilts :math:`u = (g, t_x, t_y)` of its land, and gives back the force and the
-moments :math:`f` that do the work of its pressure (:mod:`klack.hydraulics.tilted_film`),
+Lift and tilts :math:`u = (g, t_x, t_y)` of the land give the force and the moments :math:`f` that
+do the work of the pressure (:mod:`klack.hydraulics.tilted_film`),
 
 .. math:: h = \max(g + r\,(t_x \cos\theta + t_y \sin\theta), 0) + h_r, \qquad
     u = u_0 + Y q + D (f + S^T \lambda), \qquad g_k = g_{0k} + (\Phi q + C_l \lambda + S D f)_k .
 
-Film and contact lie side by side on the bulk of the bodies, whose compliance D is in series with
-both (as along the axis: :class:`klack.mechanics.end_stop.EndStop`); S are lift and tilts at the
-contact points.  Where faces are closed the height stays, and no film acts.
+Film and contact lie side by side in series with the compliance D of the bulk (as along the axis:
+:class:`klack.mechanics.end_stop.EndStop`); S are lift and tilts at the contact points.  Where faces
+are closed no film acts.
 
-Forces are means over a step, from the heights at both of its ends, so that the work of the film is
+Forces are means over a step, from the heights at both ends, so that the work of the film is
 dissipated at every step size.  The bulk holds :math:`\tfrac12 f^T D f + f^T D S^T \lambda`.  The
 film is found before the contact, with the contact forces of the step before.
 """
@@ -51,7 +51,7 @@ class TiltingFilm:
     Parameters
     ----------
     stop
-        Name of the contact in the model.
+        Contact in the model.
     land
         None for a film that no tilt changes: a sphere.
     cubic [m^4]
@@ -108,7 +108,7 @@ def film_arrays(
     rows
         Of each of their stops, between parallel faces along the axis.
     series [m/N]
-        Compliance along the axis of the bulk of the bodies at these stops.
+        Axial compliance of the bulk of the bodies at these stops.
     bearing, room (g,) [N s], [m]
         Of the films at the heights of the guide; empty without.
     """
@@ -143,7 +143,7 @@ def film_arrays(
 
 
 def _arms(model: InterfaceModel, film: TiltingFilm) -> Floats:
-    """Lift and tilts at the contact points of the stop of a film, zero at others, shape (n, 3)."""
+    """Lift and tilts at the contact points of a film, zero at others, (n, 3)."""
     arms = np.zeros((model.count, 3))
     for name, first, last in model.contacts:
         if name == film.stop:
@@ -152,7 +152,7 @@ def _arms(model: InterfaceModel, film: TiltingFilm) -> Floats:
 
 
 def _bulk(model: InterfaceModel, film: TiltingFilm, series: float) -> Floats:
-    """Compliance of the bulk for a force and moments, as of an elastic bed under the touching ring.
+    """Compliance of the bulk as an elastic bed under the touching ring.
 
     Along the axis it is ``series``; a bed of the same stiffness under a ring of radius r has the
     tilting compliance 2/r^2 times as large.
@@ -220,7 +220,7 @@ def land_at(films: Films, k: int) -> Land:
 
 @inner
 def _spread(films: Films, k: int) -> Matrix:
-    """Heights of the circles of all sectors per unit of lift and tilts, shape (S N, 3)."""
+    """Heights of the circles of all sectors per lift and tilts, (S N, 3)."""
     S, N = films.sizes[k, 0], films.sizes[k, 1]
     begin = films.start[k]
     return films.land[begin : begin + S * N * 3].reshape((S * N, 3))
@@ -275,7 +275,7 @@ def _pressed(
 ) -> tuple[Vector, Matrix]:
     """Mean force and moments over a step, and ``steeply`` their slopes with its end.
 
-    ``limit``: sectors at the limit of tension, 0 or 1; in: where the search for them begins.
+    ``limit``: sectors at the limit of tension, 0 or 1; in: start of the search.
     """
     f, slopes = np.zeros(3), np.zeros((3, 3))
     lowest = films.lowest[k]
@@ -340,7 +340,7 @@ def _pressed(
 
 @inner
 def begin_films(state: State, step: float) -> None:
-    """Remember the forces of the step before, and guess those of this one on a straight line."""
+    """Remember the forces of the last step, and extrapolate them."""
     films = state.films
     for k in range(len(films)):
         for c in range(3):
@@ -353,12 +353,12 @@ def begin_films(state: State, step: float) -> None:
 def squeeze(films: Films, k: int, modes: Modes, state: State, q: Vector, kick: Vector) -> float:
     """Change of the modal force of a film over the step that leads to ``q`` with its present force.
 
-    Returns by how much its heights change by that, over their way in this step; below zero if no
-    force is found.
+    Returns the change of its heights over their displacement in the step; below zero if no force is
+    found.
 
     Newton's method on lift and tilts, first with the slopes of an earlier step.  They minimise a
-    convex potential, that of ``soft`` and that of the film; along a change its slope is brought
-    near zero where Newton's step goes too far.  A small last change of the forces is linear.
+    convex potential, that of ``soft`` and that of the film; where Newton's step goes too far, its
+    slope along the step is brought near zero.  A small last change of the forces is linear.
     """
     step, reach = modes.step, films.reach[k]
     rows, D = films.rows[k], films.compliance[k]
@@ -465,8 +465,8 @@ def _follow(
 ) -> bool:
     """Let the forces follow their slopes to where heights fit, into ``best``, if that is little.
 
-    The change must be little of the forces.  Where sectors open or close on the way, slopes tell
-    nothing: then also the forces that ``soft`` would need for the change, which none exceeds.
+    Where sectors open or close on the way, slopes mean nothing: then the change has to be little
+    also of the forces that ``soft`` would need for it, which none exceeds.
     """
     reach = films.reach[k]
     change = np.linalg.solve(np.eye(3) - soft @ slopes, left)
@@ -496,7 +496,7 @@ def _weight(f: Vector, reach: float) -> float:
 
 @inner
 def _resisting(slopes: Matrix, reach: float) -> Matrix:
-    """The part of a film's stiffness that resists: symmetric, without what is below zero.
+    """Resisting part of a film's stiffness: symmetric, without what is below zero.
 
     Cavitating sectors beside closed ones have a little of the other kind.
     """
@@ -527,7 +527,7 @@ def bulk_work(films: Films, k: int, state: State, lam: Vector) -> float:
 
 @inner
 def bulk_energy(films: Films, k: int, force: Vector, held: Vector) -> float:
-    """Energy [J] that the bulk holds by a film beside that by contact forces, ``held``."""
+    """Energy [J] of the bulk by a film beside that by contact forces, ``held``."""
     D, energy = films.compliance[k], 0.0
     for c in range(3):
         for d in range(3):
@@ -561,10 +561,10 @@ def film_strain(films: Films, k: int, state: State) -> float:
 
 @inner
 def tell_land(films: Films, k: int, state: State, q: Vector, out: Vector) -> None:
-    """Write lift and tilts of film ``k`` at the start and at the end of a step, shape (6,).
+    """Write lift and tilts of film ``k`` at the start and the end of a step, shape (6,).
 
-    Called when the film has been found and before the contact is: ``q`` is what the film saw, and
-    the contact forces are those of the step before (:mod:`klack.transient.tilting_films`).
+    Called between the solutions of film and contact: ``q`` is what the film saw, and the contact
+    forces are those of the step before.
     """
     D, held = films.compliance[k], contact_resultant(films, k, state.lam)
     first, last = film_state(films, k, state.q), film_state(films, k, q)

@@ -6,11 +6,10 @@ with it, so that
 .. math:: 0 \le \lambda \perp q + A \lambda + w(\lambda) - w_0 \ge 0
 
 is the condition of the minimum of a strictly convex function.  On every straight line of the limit
-a yielding point is one with the further compliance :math:`w'(\lambda)`: the problem is solved
-exactly with the lines that the points are on, and again where a point has left its line.  Active
-sets of points that are either at the limit or not turn in circles on such problems; here the force
-goes only as far along the way to the next solution as that function falls, once a few whole steps
-have not settled it.
+a yielding point has the further compliance :math:`w'(\lambda)`: the problem is solved exactly for
+the present lines, and again where a point has left its line.  As such active sets may cycle, once a
+few whole steps have not settled it the force goes towards the next solution only as far as that
+function falls.
 """
 
 import numpy as np
@@ -46,7 +45,7 @@ def _limit_at(limit: Limit, w: float) -> float:
 
 @phase
 def _set_under(limit: Limit, p: float, w: float) -> float:
-    """Set [m] after a pressure, of a point that had the set w."""
+    """Set [m] after a pressure, of a point with the set w."""
     if p <= _limit_at(limit, w):
         return w
     j = len(limit.set) - 1
@@ -57,7 +56,7 @@ def _set_under(limit: Limit, p: float, w: float) -> float:
 
 @phase
 def _line_of(limit: Limit, p: float, w: float, now: int) -> int:
-    """Line that a pressure is on; the present one where it is off it by round-off."""
+    """Line of a pressure; the present one where only round-off is off it."""
     more, less = p * (1.0 + _ON_THE_LINE), p * (1.0 - _ON_THE_LINE)
     least = _limit_at(limit, w)
     last = len(limit.set) - 1
@@ -94,7 +93,7 @@ def _loss_of_set(limit: Limit, k: int, w: float) -> float:
 def _take_line(
     A: NDArray, limit: Limit, worn: Worn, carrying: ActiveSet, k: int, line: int, afresh: bool
 ) -> bool:
-    """Put a point on a line; returns whether the inverse is to be computed afresh."""
+    """Put a point on a line; whether the inverse has to be recomputed."""
     soft = 0.0
     if line != ELASTIC:
         soft = limit.softness[line] / limit.area[k]
@@ -137,11 +136,11 @@ def solve_yielding(
     Parameters
     ----------
     A (n, n) [m/N]
-        Of the elastic points, and on its diagonal ``worn.softness``; changed in place.
+        Of the elastic points, plus ``worn.softness`` on its diagonal; changed in place.
     q (n,) [m]
         Gaps without contact forces, over the faces as they are.
     worn
-        The set stays as it is: :func:`let_yield` takes it along.
+        The set stays: :func:`let_yield` updates it.
     carrying, lam, gap, tolerance, scale
         As in :func:`klack.transient.active_set.solve_active`.
     """
@@ -195,7 +194,7 @@ def solve_yielding(
 
 @phase
 def _closed(A: NDArray, q: NDArray, shifted: NDArray, carrying: ActiveSet, lam: NDArray) -> bool:
-    """Whether the points that carry are closed, with an inverse that many changes have reached."""
+    """Whether carrying points are closed, after many changes of the inverse."""
     index, m = carrying.points, carrying.counts[0]
     widest = 0.0
     for k in range(len(q)):
@@ -219,7 +218,7 @@ def _lowest(
     opened: NDArray,
     moved: NDArray,
 ) -> float:
-    """Share of the way from the last forces to the new ones at which the energy is lowest."""
+    """Share of the way from the last forces to the new ones with the lowest energy."""
     low, high = 0.0, 1.0
     for halving in range(_HALVINGS):
         share = 1.0 if halving == 0 else 0.5 * (low + high)
@@ -242,7 +241,7 @@ def _lowest(
 
 @njit
 def let_yield(limit: Limit, worn: Worn, lam: NDArray, gap: NDArray) -> float:
-    """Take the set along with accepted forces, and the gaps of the faces; returns the loss [J]."""
+    """Update the set for accepted forces, and the gaps of the faces; returns the loss [J]."""
     lost = 0.0
     for k in range(len(lam)):
         if worn.line[k] != ELASTIC:
